@@ -1,0 +1,1 @@
+"""Campaign directories: recorded shots on disk, read and written in one format."""

@@ -1,0 +1,1 @@
+"""Where model and measurement disagree: locate, name, extend, prove."""

@@ -1,0 +1,154 @@
+"""Everything impactcell raises on purpose.
+
+::
+
+    ImpactCellError
+    ├── SettingsError             a cell, map, model or scenario file: file:line:column and the way out
+    ├── CampaignError             a campaign directory: file, line and the way out
+    ├── SeriesError               a series for `impactcell track`: file, line and the way out
+    ├── PhysicsError              the plant model cannot answer
+    │   ├── NoBreakawayError      the part never moved
+    │   ├── NoSeparationError     the part never left the actuator
+    │   └── NoStopError           the part was still moving at the end of the allowed time
+    ├── PredictionError           a capture cannot be turned into a coefficient
+    │   ├── CaptureError          empty, constant, not finite or without a contact
+    │   ├── ClippedForceError     the force channel is saturated where it is needed
+    │   ├── NegativeRootError     equation (5) has no real root at this distance
+    │   └── NotConvergedError     the waveform fit did not reach a minimum
+    ├── PositioningError          a target or command that is refused; nothing has been commanded
+    ├── DiscrepancyError          the workflow cannot give an answer from these data
+    ├── FieldbusError
+    │   ├── MapError              a register map that overlaps itself or leaves the register space
+    │   ├── WrongDeviceError      identity or map version is not what the cell file says
+    │   ├── LinkError             not connected, lost, or no answer in time          (retry)
+    │   ├── ProtocolError         the peer broke the protocol; nothing of it is used  (retry)
+    │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry, if busy)
+    ├── JournalError
+    │   ├── ForeignJournalError   not our file, or of another version; never overwritten
+    │   └── JournalFullError      the disk or the quota is full                       (retry)
+    └── AccessError               users, certificates and rights of the OPC UA server
+
+`retry` says whether doing the same again can help. A message names the cell, the thing and the way out.
+"""
+
+from typing import ClassVar
+
+
+class ImpactCellError(Exception):
+    """Root of the tree; `retry` is True where doing the same again can help."""
+
+    retry: ClassVar[bool] = False
+
+
+class SettingsError(ImpactCellError):
+    """A YAML file that cannot be used; the message lists every fault as `file:line:column: text`."""
+
+
+class CampaignError(ImpactCellError):
+    """A campaign directory that cannot be read; the message names file and line."""
+
+
+class SeriesError(ImpactCellError):
+    """A friction series that cannot be read; the message names file and line."""
+
+
+class PhysicsError(ImpactCellError):
+    """The plant model has no answer for these parameters."""
+
+
+class NoBreakawayError(PhysicsError):
+    """Static friction held the part for the whole stroke."""
+
+
+class NoSeparationError(PhysicsError):
+    """The part never left the actuator within the allowed time."""
+
+
+class NoStopError(PhysicsError):
+    """The part was still moving at the end of the allowed time."""
+
+
+class PredictionError(ImpactCellError):
+    """A capture that cannot be turned into a friction coefficient."""
+
+
+class CaptureError(PredictionError):
+    """A capture that is empty, constant, not finite, or shows no contact."""
+
+
+class ClippedForceError(PredictionError):
+    """The force channel is saturated where the estimate needs it."""
+
+
+class NegativeRootError(PredictionError):
+    """Equation (5) has no real root: the part slid less than the calibration allows at this velocity."""
+
+
+class NotConvergedError(PredictionError):
+    """The waveform fit did not reach a minimum."""
+
+
+class PositioningError(ImpactCellError):
+    """A target or command that is refused; nothing has been commanded."""
+
+
+class DiscrepancyError(ImpactCellError):
+    """The discrepancy workflow cannot give an answer from these data."""
+
+
+class FieldbusError(ImpactCellError):
+    """The module, its map or the link to it."""
+
+
+class MapError(FieldbusError):
+    """A register map that overlaps itself, leaves the register space or lacks a needed register."""
+
+
+class WrongDeviceError(FieldbusError):
+    """The module answers, but its identity or map version is not what the cell file says."""
+
+
+class LinkError(FieldbusError):
+    """Not connected, connection lost, or no answer in time."""
+
+    retry: ClassVar[bool] = True
+
+
+class ProtocolError(FieldbusError):
+    """The peer broke the protocol; nothing of its reply has been used."""
+
+    retry: ClassVar[bool] = True
+
+
+class ModbusExceptionError(FieldbusError):
+    """The peer refused a request.
+
+    Attributes
+    ----------
+    code : int
+        Modbus exception code (MODBUS Application Protocol V1.1b3, section 7).
+    """
+
+    retry: ClassVar[bool] = True
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class JournalError(ImpactCellError):
+    """The durable store of a cell."""
+
+
+class ForeignJournalError(JournalError):
+    """A file that is not this cell's journal, or of another format version; it is never overwritten."""
+
+
+class JournalFullError(JournalError):
+    """The disk or the journal's quota is full."""
+
+    retry: ClassVar[bool] = True
+
+
+class AccessError(ImpactCellError):
+    """Users, certificates or rights of the OPC UA server."""

@@ -1,0 +1,1 @@
+"""Modbus TCP: register map, codec, transport and acquisition of whole cycles."""

@@ -1,0 +1,1 @@
+"""Figures of the source paper and of this project, drawn from this code."""

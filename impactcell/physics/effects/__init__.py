@@ -1,0 +1,1 @@
+"""Physical effects that join the nominal model; one file is one named effect."""

@@ -1,0 +1,1 @@
+"""OPC UA: information model, values, conditions, history and access control."""

@@ -1,0 +1,1 @@
+"""Friction followed over time (wear), material (batch) and one stroke (signature)."""

@@ -1,0 +1,1 @@
+"""Laws of the effects, written apart from impactcell.physics, as the truth of tests."""

@@ -1,0 +1,34 @@
+"""Shared by all tests: where the sample data lie, and no asyncio task may outlive its test."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Directory of the sample campaigns and real slides; the test skips where it is absent."""
+    if not SHARED.is_dir():
+        pytest.skip("the sample data are not beside this checkout")
+    return SHARED
+
+
+@pytest_asyncio.fixture
+async def leak_check() -> AsyncIterator[None]:
+    """Fail when the test leaves a task running."""
+    before = asyncio.all_tasks()
+    yield
+    leaked = {task for task in asyncio.all_tasks() - before if not task.done()}
+    assert not leaked, f"tasks left running: {sorted(task.get_name() for task in leaked)}"
+
+
+@pytest.fixture(autouse=True)
+def no_leaked_tasks(request: pytest.FixtureRequest) -> None:
+    """Put every asynchronous test under the leak check."""
+    if request.node.get_closest_marker("asyncio") is not None:
+        request.getfixturevalue("leak_check")
