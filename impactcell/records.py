@@ -40,12 +40,20 @@ class Channel:
         Standard deviation of the sensor's white noise, None where it is not known.
     full_scale : tuple of float or None
         Smallest and largest value the channel can show; a sample at either end is saturated.
+    resolution : float or None
+        Value of one step of the sensor's integer code; None where values are not such multiples.
     """
 
     time_s: Samples
     values: Samples
     noise_std: float | None = None
     full_scale: tuple[float, float] | None = None
+    resolution: float | None = None
+
+
+def uniform_times(start_s: float, rate_hz: float, count: int) -> Samples:
+    """Sample times `start_s + i / rate_hz` of a channel without gaps, the same bits wherever they are made."""
+    return start_s + np.arange(count) / rate_hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
