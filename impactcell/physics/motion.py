@@ -1,0 +1,111 @@
+"""The course of one tap: its events, its figures, and its samples at any times."""
+
+import enum
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from impactcell.errors import NoBreakawayError, NoSeparationError
+from impactcell.records import Samples
+
+
+class EventKind(enum.Enum):
+    """What joins two smooth phases."""
+
+    BREAKAWAY = "breakaway"
+    CONTACT = "contact"
+    SEPARATION = "separation"
+    STOP = "stop"
+    HALT = "halt"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened at a time located inside a step."""
+
+    kind: EventKind
+    time_s: float
+
+
+class Sampled(NamedTuple):
+    """Channels at the times asked for; force positive in compression, the others signed along +1."""
+
+    force_n: Samples
+    position_m: Samples
+    actuator_m: Samples
+    velocity_m_s: Samples
+
+
+Course = Callable[[Samples], Sampled]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """One tap from first contact at time 0 to rest.
+
+    Attributes
+    ----------
+    events : tuple of Event
+        In order of time.
+    peak_force_n : float
+        Maximum of the contact force over all contacts, as the force sensor reports it.
+    displacement_m : float
+        From first contact to rest, positive along the tap.
+    stop_s : float
+        When the part came to rest for good; 0 if it never moved.
+    """
+
+    events: tuple[Event, ...]
+    peak_force_n: float
+    displacement_m: float
+    stop_s: float
+    distance_after_separation_m: float
+    course: Course
+
+    @property
+    def breakaway_s(self) -> float:
+        """When the part first moved; raises `NoBreakawayError` if it never did."""
+        for event in self.events:
+            if event.kind is EventKind.BREAKAWAY:
+                return event.time_s
+        raise NoBreakawayError(
+            f"static friction held the part throughout; the force reached {self.peak_force_n:.6g} N. "
+            "Tap faster or with a longer stroke"
+        )
+
+    @property
+    def separation_s(self) -> float:
+        """When the part last left the actuator; raises `NoSeparationError` if it never did."""
+        last = math.nan
+        for event in self.events:
+            if event.kind is EventKind.SEPARATION:
+                last = event.time_s
+        if math.isnan(last):
+            raise NoSeparationError(
+                "the part came to rest against the actuator and never left it. "
+                "Tap faster or with a longer stroke"
+            )
+        return last
+
+    @property
+    def sliding_distance_m(self) -> float:
+        """From the last loss of contact to rest, positive along the tap.
+
+        Raises
+        ------
+        NoBreakawayError
+            The part never moved.
+        NoSeparationError
+            It moved, but never left the actuator.
+        """
+        if self.breakaway_s <= self.separation_s:
+            return self.distance_after_separation_m
+        raise NoSeparationError("the part never left the actuator after it had moved")
+
+    def sample(self, time_s: ArrayLike) -> Sampled:
+        """Channels at `time_s`, shape (n,), in any order; 0 is first contact, before it all is at rest."""
+        return self.course(np.atleast_1d(np.asarray(time_s, dtype=np.float64)))
