@@ -1,0 +1,279 @@
+"""YAML with positions: read a file so that every fault can be told as `file:line:column: message`.
+
+Scalars follow the core schema of YAML 1.2: `1e-6` is a number, `on` and `2026-01-01` are text, `010` is ten.
+PyYAML alone follows 1.1, where each of these surprises.
+"""
+
+import difflib
+import re
+import types
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar, Union, get_args, get_origin
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from impactcell.errors import SettingsError
+
+Location = tuple[str | int, ...]
+M = TypeVar("M", bound=BaseModel)
+
+MOST_NODES = 200_000
+"""A file of nested aliases can describe more than memory holds; no honest one comes near this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where something stands in a file; both counted from 1, printed as `line:column`."""
+
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Positions:
+    """Where each key and each value of a YAML file stands, by its path of keys and indices."""
+
+    keys: Mapping[Location, Place]
+    values: Mapping[Location, Place]
+
+    def known(self, location: Sequence[str | int]) -> Location:
+        """Give the part of `location` that the file has, leaving out tags that only a schema knows."""
+        path: Location = ()
+        for part in location:
+            if (*path, part) in self.values:
+                path = (*path, part)
+        return path
+
+    def value(self, location: Sequence[str | int]) -> Place:
+        """Place of the value at `location`, or of the nearest enclosing one."""
+        return self.values[self.known(location)]
+
+    def key(self, location: Sequence[str | int]) -> Place:
+        """Place of the key at `location`, or of the nearest enclosing one."""
+        path = self.known(location)
+        return self.keys.get(path, self.values[path])
+
+
+class _CoreLoader(yaml.SafeLoader):
+    """SafeLoader with the scalars of YAML 1.2's core schema; a repeated key is an error."""
+
+    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:  # noqa: FBT001, FBT002
+        seen: set[object] = set()
+        for key_node, _ in node.value:
+            if key_node.tag == "tag:yaml.org,2002:merge":
+                continue
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, str | int | float | None):
+                raise yaml.MarkedYAMLError(
+                    None, None, "a key must be plain text or a number", key_node.start_mark
+                )
+            if key in seen:
+                raise yaml.MarkedYAMLError(None, None, f"key {key!r} is given twice", key_node.start_mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep=deep)
+
+
+def _decimal(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+    text = str(loader.construct_scalar(node))
+    return int(text, 0) if text[:2] in ("0x", "0o") else int(text)
+
+
+for _tag, _pattern, _first in (
+    ("bool", r"true|True|TRUE|false|False|FALSE", "tTfF"),
+    ("null", r"~|null|Null|NULL|", "~nN"),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", "-+0123456789"),
+    (
+        "float",
+        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
+        "-+.0123456789",
+    ),
+    ("merge", r"<<", "<"),
+):
+    _CoreLoader.add_implicit_resolver(
+        f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), [*_first, *([""] * (_tag == "null"))]
+    )
+_CoreLoader.add_constructor("tag:yaml.org,2002:int", _decimal)
+
+
+def load(path: Path) -> tuple[object, Positions]:
+    """Read one YAML document.
+
+    Returns
+    -------
+    data : object
+        As `yaml.safe_load` would give it, but with the scalars of YAML 1.2.
+    positions : Positions
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read, is empty, is not UTF-8 or not YAML, repeats a key or contains itself.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as fault:
+        raise SettingsError(f"{path}: cannot be read: {fault.strerror}") from fault
+    except UnicodeDecodeError as fault:
+        raise SettingsError(f"{path}: is not UTF-8 text (byte {fault.start})") from fault
+    try:
+        loader = _CoreLoader(text)
+        try:
+            node = loader.get_single_node()
+            if node is None:
+                raise SettingsError(f"{path}:1:1: the file is empty")
+            positions = _positions(path, node)
+            return loader.construct_document(node), positions
+        finally:
+            loader.dispose()
+    except yaml.MarkedYAMLError as fault:
+        mark = fault.problem_mark or fault.context_mark
+        place = Place(mark.line + 1, mark.column + 1) if mark else Place(1, 1)
+        context = f" ({fault.context})" if fault.context else ""
+        raise SettingsError(f"{path}:{place}: {fault.problem}{context}") from fault
+    except yaml.reader.ReaderError as fault:
+        before = text[: fault.position]
+        place = Place(before.count("\n") + 1, fault.position - (before.rfind("\n") + 1) + 1)
+        raise SettingsError(f"{path}:{place}: a character YAML does not allow ({fault.reason})") from fault
+    except RecursionError as fault:
+        raise SettingsError(f"{path}:1:1: nested too deeply") from fault
+    except ValueError as fault:
+        raise SettingsError(f"{path}:1:1: {fault}") from fault
+
+
+def _positions(path: Path, root: yaml.Node) -> Positions:
+    keys: dict[Location, Place] = {}
+    values: dict[Location, Place] = {}
+
+    def visit(node: yaml.Node, location: Location, above: tuple[yaml.Node, ...]) -> None:
+        place = Place(node.start_mark.line + 1, node.start_mark.column + 1)
+        if node in above:
+            raise SettingsError(f"{path}:{place}: this part of the file contains itself")
+        values[location] = place
+        if len(values) > MOST_NODES:
+            raise SettingsError(f"{path}:{place}: aliases describe more than {MOST_NODES} values")
+        within = (*above, node)
+        if isinstance(node, yaml.SequenceNode):
+            for index, item in enumerate(node.value):
+                visit(item, (*location, index), within)
+        elif isinstance(node, yaml.MappingNode):
+            merged = [pair for pair in node.value if pair[0].tag == "tag:yaml.org,2002:merge"]
+            for _, source in merged:
+                for part in source.value if isinstance(source, yaml.SequenceNode) else [source]:
+                    visit(part, location, within)
+            values[location] = place
+            for key_node, value_node in node.value:
+                if isinstance(key_node, yaml.ScalarNode) and (key_node, value_node) not in merged:
+                    key: str | int = key_node.value
+                    if key_node.tag == "tag:yaml.org,2002:int":
+                        key = int(key_node.value, 0) if "x" in key_node.value else int(key_node.value)
+                    here = (*location, key)
+                    keys[here] = Place(key_node.start_mark.line + 1, key_node.start_mark.column + 1)
+                    visit(value_node, here, within)
+
+    visit(root, (), ())
+    return Positions(keys, values)
+
+
+def read(path: Path, schema: type[M]) -> tuple[M, Positions]:
+    """Read a file into a pydantic model.
+
+    Raises
+    ------
+    SettingsError
+        With every fault of the file, one `file:line:column: message` a line.
+    """
+    data, positions = load(path)
+    try:
+        return schema.model_validate(data), positions
+    except ValidationError as error:
+        raise SettingsError("\n".join(complaints(path, positions, error, schema))) from error
+
+
+def complaint(path: Path, place: Place, message: str) -> str:
+    """One fault in the form every fault takes: `file:line:column: message`."""
+    return f"{path}:{place}: {message}"
+
+
+def complaints(
+    path: Path, positions: Positions, error: ValidationError, schema: type[BaseModel]
+) -> list[str]:
+    """Turn a pydantic error into `file:line:column: message`, in the order of the file, each once."""
+    found = {
+        (place.line, place.column, complaint(path, place, message))
+        for place, message in (
+            _explain(details, positions, schema) for details in error.errors(include_url=False)
+        )
+    }
+    return [text for _, _, text in sorted(found)]
+
+
+def _explain(details: ErrorDetails, positions: Positions, schema: type[BaseModel]) -> tuple[Place, str]:
+    location = tuple(details["loc"])
+    kind = details["type"]
+    if kind == "extra_forbidden":
+        name = str(location[-1])
+        near = difflib.get_close_matches(name, _allowed(schema, location[:-1]), n=1, cutoff=0.6)
+        allowed = ", ".join(_allowed(schema, location[:-1]))
+        hint = f"did you mean {near[0]!r}?" if near else f"allowed here: {allowed}"
+        return positions.key(location), f"unknown key {_dotted(location)!r}; {hint}"
+    if kind == "missing":
+        return positions.key(
+            location[:-1]
+        ), f"{_dotted((*positions.known(location), location[-1]))!r} is missing"
+    text = details["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    name = _dotted(positions.known(location))
+    given = details.get("input")
+    if kind != "value_error" and isinstance(given, str | int | float | bool | None):
+        text += f", not {'empty' if given is None else repr(given)}"
+    return positions.value(location), f"{name}: {text}" if name else text
+
+
+def _dotted(location: Sequence[str | int]) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _allowed(schema: type[BaseModel], location: Sequence[str | int]) -> list[str]:
+    """Names of the fields that a mapping at `location` may have."""
+    types_here: list[object] = [schema]
+    for part in location:
+        below = [inner for here in types_here for inner in _below(here, part)]
+        types_here = below or types_here
+    models = [here for here in types_here if isinstance(here, type) and issubclass(here, BaseModel)]
+    return sorted({field.alias or name for model in models for name, field in model.model_fields.items()})
+
+
+def _below(annotation: object, part: str | int) -> list[object]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [
+            inner
+            for name, field in annotation.model_fields.items()
+            if part in (name, field.alias)
+            for inner in _alternatives(field.annotation)
+        ]
+    if get_origin(annotation) is not None:
+        return [inner for argument in get_args(annotation)[-1:] for inner in _alternatives(argument)]
+    return []
+
+
+def _alternatives(annotation: object) -> list[object]:
+    """Members of a union, without the metadata of Annotated."""
+    origin = get_origin(annotation)
+    if origin in (Union, types.UnionType):
+        return [inner for argument in get_args(annotation) for inner in _alternatives(argument)]
+    if hasattr(annotation, "__metadata__"):
+        return _alternatives(get_args(annotation)[0])
+    if origin is tuple:
+        return [inner for argument in get_args(annotation) for inner in _alternatives(argument)]
+    return [annotation]
