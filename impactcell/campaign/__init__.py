@@ -1,1 +1,7 @@
 """Campaign directories: recorded shots on disk, read and written in one format."""
+
+from impactcell.campaign.contents import Campaign, Excitation, Sensor
+from impactcell.campaign.reading import read
+from impactcell.campaign.writing import write
+
+__all__ = ["Campaign", "Excitation", "Sensor", "read", "write"]

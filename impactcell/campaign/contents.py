@@ -1,0 +1,60 @@
+"""What a campaign directory holds, in SI units."""
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from impactcell.records import Capture
+
+CHANNELS = {"force": "force_n", "position": "position_m", "actuator": "actuator_m"}
+"""Column of a trace for each sensor."""
+
+
+class Excitation(enum.StrEnum):
+    """What makes the part move."""
+
+    TAP = "tap"
+    FREE_SLIDE = "free_slide"
+    DRIVEN = "driven"
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """What `campaign.yaml` says of one sensor; None where it says nothing.
+
+    Attributes
+    ----------
+    rate_hz : float or None
+        Nominal sampling rate; the traces' own times are what counts.
+    noise_std : float or None
+        Standard deviation of the white noise, N or m.
+    """
+
+    rate_hz: float | None = None
+    noise_std: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Campaign:
+    """A set of shots taken under one excitation.
+
+    Attributes
+    ----------
+    excitation : Excitation
+    gravity_m_s2 : float
+    stroke_m : float
+        Travel of the actuator from first contact; inf where it never halts or there is none.
+    sensors : mapping
+        `force`, `position` and `actuator`, those that were recorded.
+    shots : tuple of Capture
+        In the order of `shots.csv`, which is the order in which they were taken.
+    columns : tuple of str
+        Columns of `shots.csv`, so that what was not recorded is told from what was.
+    """
+
+    excitation: Excitation
+    shots: tuple[Capture, ...]
+    gravity_m_s2: float = 9.81
+    stroke_m: float = float("inf")
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    columns: tuple[str, ...] = ("shot",)

@@ -1,0 +1,52 @@
+"""Collects every fault of a campaign before any of them is reported."""
+
+from pathlib import Path
+
+from impactcell.errors import CampaignError
+
+SHOWN = 20
+
+
+class Faults:
+    """List of `file:line: what is wrong; the way out`, raised together."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._messages: list[str] = []
+
+    def add(self, file: Path, line: int | None, message: str) -> None:
+        """Note one fault; `line` counts from 1 and is None where the whole file is meant."""
+        place = str(file) if line is None else f"{file}:{line}"
+        self._messages.append(f"{place}: {message}")
+
+    def raise_any(self) -> None:
+        """Raise what was noted.
+
+        Raises
+        ------
+        CampaignError
+            With one fault a line, when there is any.
+        """
+        if not self._messages:
+            return
+        shown = self._messages[:SHOWN]
+        rest = len(self._messages) - len(shown)
+        if rest:
+            shown.append(f"{self._directory}: and {rest} more faults")
+        raise CampaignError("\n".join(shown))
+
+    def __len__(self) -> int:
+        return len(self._messages)
+
+
+def read_text(file: Path, faults: Faults) -> str | None:
+    """Text of `file`, or None after noting why it cannot be read."""
+    try:
+        return file.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        faults.add(file, None, "is missing")
+    except UnicodeDecodeError as error:
+        faults.add(file, None, f"is not UTF-8 text (byte {error.start}); write it again as UTF-8")
+    except OSError as error:
+        faults.add(file, None, f"cannot be read: {error.strerror}")
+    return None

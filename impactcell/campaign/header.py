@@ -1,0 +1,145 @@
+"""Reads `campaign.yaml`: format, excitation, gravity, actuator and sensors, with the line of each fault."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from impactcell.campaign.contents import CHANNELS, Excitation, Sensor
+from impactcell.campaign.faults import Faults, read_text
+
+FORMAT = 1
+NOISE_KEY = {"force": "noise_std_n", "position": "noise_std_m", "actuator": "noise_std_m"}
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """Content of `campaign.yaml`."""
+
+    excitation: Excitation
+    gravity_m_s2: float
+    stroke_m: float
+    sensors: dict[str, Sensor]
+
+
+def read_header(file: Path, faults: Faults) -> Header | None:
+    """Read `campaign.yaml`; None after noting every fault of it."""
+    text = read_text(file, faults)
+    if text is None:
+        return None
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = None if mark is None else mark.line + 1
+        faults.add(file, line, f"is not YAML: {getattr(error, 'problem', None) or error}")
+        return None
+    noted = len(faults)
+    reader = _Reader(file, faults)
+    top = reader.mapping(
+        root, "campaign.yaml", {"format", "excitation", "gravity_m_s2", "actuator", "sensors"}
+    )
+    if top is None:
+        return None
+    _check_format(reader, top)
+    excitation = _excitation(reader, top)
+    gravity = reader.number(top.get("gravity_m_s2"), "gravity_m_s2", 9.81, positive=True)
+    actuator = reader.mapping(top.get("actuator"), "actuator", {"stroke_m"}) or {}
+    stroke = reader.number(
+        actuator.get("stroke_m"), "actuator.stroke_m", math.inf, positive=True, finite=False
+    )
+    sensors = _sensors(reader, top)
+    if len(faults) > noted or excitation is None or gravity is None or stroke is None:
+        return None
+    return Header(excitation, gravity, stroke, sensors)
+
+
+def _check_format(reader: "_Reader", top: dict[str, yaml.Node]) -> None:
+    node = top.get("format")
+    if node is None:
+        reader.fault(None, f"format is missing; write format: {FORMAT}")
+    elif not isinstance(node, yaml.ScalarNode) or node.value != str(FORMAT):
+        shown = node.value if isinstance(node, yaml.ScalarNode) else "a block"
+        reader.fault(node, f"format {shown} is not known; this version reads format {FORMAT}")
+
+
+def _excitation(reader: "_Reader", top: dict[str, yaml.Node]) -> Excitation | None:
+    node = top.get("excitation")
+    known = ", ".join(Excitation)
+    if node is None:
+        reader.fault(None, f"excitation is missing; write one of {known}")
+        return None
+    value = node.value if isinstance(node, yaml.ScalarNode) else None
+    if value not in set(Excitation):
+        reader.fault(node, f"excitation {value!r} is not known; write one of {known}")
+        return None
+    return Excitation(value)
+
+
+def _sensors(reader: "_Reader", top: dict[str, yaml.Node]) -> dict[str, Sensor]:
+    sensors = {}
+    nodes = reader.mapping(top.get("sensors"), "sensors", set(CHANNELS)) or {}
+    for name, node in nodes.items():
+        noise_key = NOISE_KEY[name]
+        keys = reader.mapping(node, f"sensors.{name}", {"rate_hz", noise_key}) or {}
+        rate = reader.number(keys.get("rate_hz"), f"sensors.{name}.rate_hz", None, positive=True)
+        noise = reader.number(keys.get(noise_key), f"sensors.{name}.{noise_key}", None, positive=True)
+        sensors[name] = Sensor(rate, noise)
+    return sensors
+
+
+class _Reader:
+    def __init__(self, file: Path, faults: Faults) -> None:
+        self._file = file
+        self._faults = faults
+
+    def fault(self, node: yaml.Node | None, message: str) -> None:
+        self._faults.add(self._file, None if node is None else node.start_mark.line + 1, message)
+
+    def mapping(self, node: yaml.Node | None, name: str, known: set[str]) -> dict[str, yaml.Node] | None:
+        if node is None and name != "campaign.yaml":
+            return {}
+        if node is not None and _is_null(node) and name != "campaign.yaml":
+            return {}
+        if not isinstance(node, yaml.MappingNode):
+            self.fault(node, f"{name} has to be a block of `key: value`")
+            return None
+        found: dict[str, yaml.Node] = {}
+        for key, value in node.value:
+            text = key.value if isinstance(key, yaml.ScalarNode) else "?"
+            if text not in known:
+                self.fault(key, f"unknown key {text!r} in {name}; known: {', '.join(sorted(known))}")
+            elif text in found:
+                self.fault(key, f"{text!r} appears twice in {name}; keep one")
+            else:
+                found[text] = value
+        return found
+
+    def number(
+        self,
+        node: yaml.Node | None,
+        name: str,
+        default: float | None,
+        *,
+        positive: bool,
+        finite: bool = True,
+    ) -> float | None:
+        """Value of a scalar; YAML 1.1 takes `1e-6` for text, this does not."""
+        if node is None or _is_null(node):
+            return default
+        try:
+            value = (
+                float(node.value.replace(".inf", "inf")) if isinstance(node, yaml.ScalarNode) else math.nan
+            )
+        except ValueError:
+            value = math.nan
+        if math.isnan(value) or (finite and math.isinf(value)) or (positive and value <= 0.0):
+            shown = node.value if isinstance(node, yaml.ScalarNode) else "a block"
+            self.fault(node, f"{name} is {shown!r}; it has to be a positive number")
+            return default
+        return value
+
+
+def _is_null(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"

@@ -1,0 +1,106 @@
+"""Reads a whole campaign directory, or says everything that is wrong with it at once."""
+
+import re
+from pathlib import Path
+
+from impactcell.campaign.contents import Campaign, Excitation, Sensor
+from impactcell.campaign.faults import Faults
+from impactcell.campaign.header import Header, read_header
+from impactcell.campaign.shots import Shot, read_shots
+from impactcell.campaign.trace import read_trace
+from impactcell.records import Capture, Channel
+
+REQUIRED = {
+    Excitation.TAP: ({"force", "position"}, "force_n or position_m"),
+    Excitation.FREE_SLIDE: ({"position"}, "position_m"),
+    Excitation.DRIVEN: ({"force", "position"}, "force_n and position_m"),
+}
+
+
+def read(directory: Path) -> Campaign:
+    """Read a campaign directory.
+
+    Parameters
+    ----------
+    directory : Path
+        Holds `campaign.yaml`, `shots.csv` and `traces/N.csv`.
+
+    Returns
+    -------
+    Campaign
+        In SI units, shots in the order of `shots.csv`.
+
+    Raises
+    ------
+    CampaignError
+        Every fault of every file, as `file:line: what is wrong; the way out`.
+    """
+    faults = Faults(directory)
+    if not directory.is_dir():
+        faults.add(directory, None, "is not a directory; name the directory that holds campaign.yaml")
+        faults.raise_any()
+    header = read_header(directory / "campaign.yaml", faults)
+    table = read_shots(directory / "shots.csv", header.excitation if header else None, faults)
+    traces = directory / "traces"
+    if not traces.is_dir():
+        faults.add(traces, None, "is missing; it holds N.csv for every shot N")
+    elif table is not None:
+        _check_orphans(traces, {shot.number for shot in table[1]}, faults)
+    shots: list[Capture] = []
+    if traces.is_dir() and table is not None:
+        for shot in table[1]:
+            capture = _capture(traces / f"{shot.number}.csv", shot, header, faults)
+            if capture is not None:
+                shots.append(capture)
+    faults.raise_any()
+    if header is None or table is None:
+        message = f"{directory}: cannot be read"
+        raise AssertionError(message)
+    return Campaign(
+        excitation=header.excitation,
+        shots=tuple(shots),
+        gravity_m_s2=header.gravity_m_s2,
+        stroke_m=header.stroke_m,
+        sensors=header.sensors,
+        columns=table[0],
+    )
+
+
+def _check_orphans(traces: Path, numbers: set[int], faults: Faults) -> None:
+    for file in sorted(traces.glob("*.csv")):
+        if not re.fullmatch(r"[1-9][0-9]*", file.stem):
+            faults.add(file, None, "is not named after a shot; traces are called 1.csv, 2.csv, ...")
+        elif int(file.stem) not in numbers:
+            faults.add(file, None, f"has no shot {file.stem} in shots.csv; add the row or remove the trace")
+
+
+def _capture(file: Path, shot: Shot, header: Header | None, faults: Faults) -> Capture | None:
+    channels = read_trace(file, faults)
+    if channels is None or header is None:
+        return None
+    wanted, named = REQUIRED[header.excitation]
+    enough = wanted & channels.keys() if header.excitation is Excitation.TAP else wanted <= channels.keys()
+    if not enough:
+        faults.add(file, 1, f"a campaign of excitation {header.excitation} needs {named}")
+        return None
+
+    def channel(sensor: str) -> Channel | None:
+        if sensor not in channels:
+            return None
+        time, values = channels[sensor]
+        return Channel(time, values, header.sensors.get(sensor, Sensor()).noise_std)
+
+    return Capture(
+        cycle=shot.number,
+        velocity_m_s=shot.velocity_m_s,
+        mass_kg=shot.mass_kg,
+        force=channel("force"),
+        position=channel("position"),
+        actuator=channel("actuator"),
+        direction=shot.direction,
+        stroke_m=header.stroke_m,
+        batch_id=shot.batch_id,
+        dwell_s=shot.dwell_s,
+        start_m=shot.start_m,
+        covariates=shot.covariates,
+    )

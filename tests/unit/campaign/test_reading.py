@@ -1,0 +1,266 @@
+"""Campaign directories: every faulty file is reported with its line, every good one is read as written."""
+
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from impactcell.campaign import Excitation, read
+from impactcell.errors import CampaignError
+
+HEADER = """\
+format: 1
+excitation: tap
+gravity_m_s2: 9.81
+actuator:
+  stroke_m: 0.0015
+sensors:
+  force: {rate_hz: 10000, noise_std_n: 0.4}
+  position: {rate_hz: 1000, noise_std_m: 1e-6}
+"""
+SHOTS = "shot,velocity_mm_per_min,mass_kg,direction,batch,dwell_s\n1,3000,18.9,1,A,5\n2,6000,,-1,B,\n"
+TRACE = "time_s,force_n,position_m\n0,1,0\n0.1,2,\n0.2,3,1e-3\n0.9,4,2e-3\n"
+
+
+def campaign(directory: Path, header: str = HEADER, shots: str = SHOTS, **traces: str) -> Path:
+    (directory / "traces").mkdir(parents=True)
+    (directory / "campaign.yaml").write_text(header)
+    (directory / "shots.csv").write_text(shots)
+    for name, text in ({"1": TRACE, "2": TRACE} | {key[1:]: text for key, text in traces.items()}).items():
+        (directory / "traces" / f"{name}.csv").write_text(text)
+    return directory
+
+
+def test_reads_si_units_unequal_rates_gaps_and_empty_cells(tmp_path: Path) -> None:
+    read_back = read(campaign(tmp_path / "c"))
+    assert read_back.excitation is Excitation.TAP
+    assert read_back.stroke_m == 0.0015
+    assert read_back.sensors["position"].noise_std == 1e-6
+    first, second = read_back.shots
+    assert first.velocity_m_s == pytest.approx(0.05)
+    assert (first.cycle, first.mass_kg, first.direction, first.batch_id, first.dwell_s) == (
+        1,
+        18.9,
+        1,
+        "A",
+        5.0,
+    )
+    assert np.isnan(second.mass_kg)
+    assert np.isnan(second.dwell_s)
+    assert second.direction == -1
+    assert first.force is not None
+    assert first.position is not None
+    assert first.actuator is None
+    np.testing.assert_array_equal(first.force.time_s, [0, 0.1, 0.2, 0.9])
+    np.testing.assert_array_equal(first.position.time_s, [0, 0.2, 0.9])
+    np.testing.assert_array_equal(first.position.values, [0, 1e-3, 2e-3])
+    assert first.force.noise_std == 0.4
+
+
+def test_defaults_where_columns_are_missing(tmp_path: Path) -> None:
+    header = "format: 1\nexcitation: free_slide\nsensors:\n  position: {rate_hz: 148, noise_std_m: null}\n"
+    got = read(campaign(tmp_path / "c", header, "shot,heading_deg,note\n1,-12.5,left\n2,,\n"))
+    assert got.gravity_m_s2 == 9.81
+    assert got.stroke_m == np.inf
+    assert got.sensors["position"].noise_std is None
+    shot = got.shots[0]
+    assert np.isnan(shot.velocity_m_s)
+    assert (shot.direction, shot.batch_id, shot.start_m) == (1, None, 0.0)
+    assert shot.covariates == {"heading_deg": -12.5, "note": "left"}
+
+
+def test_start_position_and_covariates_are_kept(tmp_path: Path) -> None:
+    shots = "shot,velocity_mm_per_min,start_m,temperature_c\n1,3000,0.01,21.5\n2,3000,,22\n"
+    got = read(campaign(tmp_path / "c", shots=shots))
+    assert [shot.start_m for shot in got.shots] == [0.01, 0.0]
+    assert got.shots[1].covariates["temperature_c"] == 22.0
+
+
+@pytest.mark.parametrize(
+    ("header", "line", "message"),
+    [
+        ("excitation: tap\n", None, "format is missing"),
+        ("format: 2\nexcitation: tap\n", 1, "format 2 is not known"),
+        ("format: 1\n", None, "excitation is missing"),
+        ("format: 1\nexcitation: push\n", 2, "write one of tap, free_slide, driven"),
+        ("format: 1\nexcitation: tap\ngravity: 9.8\n", 3, "unknown key 'gravity'"),
+        ("format: 1\nexcitation: tap\ngravity_m_s2: heavy\n", 3, "gravity_m_s2 is 'heavy'"),
+        ("format: 1\nexcitation: tap\ngravity_m_s2: .nan\n", 3, "positive number"),
+        ("format: 1\nexcitation: tap\nactuator: {stroke_m: -1}\n", 3, "actuator.stroke_m is '-1'"),
+        ("format: 1\nexcitation: tap\nsensors: {sound: {}}\n", 3, "unknown key 'sound'"),
+        ("format: 1\nexcitation: tap\nsensors:\n  force: {noise_std_n: 0}\n", 4, "positive number"),
+        ("format: 1\nexcitation: tap\nformat: 1\n", 3, "appears twice"),
+        ("format: [1\n", 2, "is not YAML"),
+        ("- 1\n", 1, "block of `key: value`"),
+        ("", None, "block of `key: value`"),
+    ],
+)
+def test_faults_of_the_header(tmp_path: Path, header: str, line: int | None, message: str) -> None:
+    directory = campaign(tmp_path / "c", header)
+    place = "campaign.yaml: " if line is None else f"campaign.yaml:{line}: "
+    with pytest.raises(CampaignError, match=re.escape(place)) as caught:
+        read(directory)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("shots", "line", "message"),
+    [
+        ("", None, "is empty"),
+        ("shot,velocity_mm_per_min\n", 1, "has no shots"),
+        ("number,velocity_mm_per_min\n1,2\n", 1, "no column 'shot'"),
+        ("shot,mass_kg\n1,2\n", 1, "no column 'velocity_mm_per_min'"),
+        ("shot,shot,velocity_mm_per_min\n1,1,2\n", 1, "appears twice"),
+        ("shot,velocity_mm_per_min\n1,3000\n1,3000\n", 3, "shot 1 is in line 2 already"),
+        ("shot,velocity_mm_per_min\none,3000\n2,3000\n", 2, "shot is 'one'"),
+        ("shot,velocity_mm_per_min\n1.5,3000\n2,3000\n", 2, "whole number"),
+        ("shot,velocity_mm_per_min\n1,\n2,3000\n", 2, "velocity_mm_per_min is empty"),
+        ("shot,velocity_mm_per_min\n1,-5\n2,3000\n", 2, "positive number"),
+        ("shot,velocity_mm_per_min,mass_kg\n1,3000,x\n2,3000,1\n", 2, "mass_kg is 'x'"),
+        ("shot,velocity_mm_per_min,direction\n1,3000,0\n2,3000,1\n", 2, "+1 or -1"),
+        ("shot,velocity_mm_per_min,dwell_s\n1,3000,nan\n2,3000,1\n", 2, "dwell_s is 'nan'"),
+        ("shot,velocity_mm_per_min\n1,3000,7\n2,3000\n", 2, "3 cells where the header has 2"),
+        ('shot,velocity_mm_per_min\n1,"3000\n', 2, "is not CSV"),
+        ("shot,velocity_mm_per_min\n1,3000\n2,3000\n3,3000\n", None, "3.csv: is missing"),
+        ("shot,velocity_mm_per_min\n1,3000\n", None, "2.csv: has no shot 2 in shots.csv"),
+    ],
+)
+def test_faults_of_the_shots(tmp_path: Path, shots: str, line: int | None, message: str) -> None:
+    directory = campaign(tmp_path / "c", shots=shots)
+    with pytest.raises(CampaignError) as caught:
+        read(directory)
+    assert message in str(caught.value)
+    if line is not None:
+        assert f"shots.csv:{line}: " in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("trace", "line", "message"),
+    [
+        ("", None, "is empty"),
+        ("time_s,position_m\n", 1, "has no samples"),
+        ("force_n,position_m\n1,2\n", 1, "no column time_s"),
+        ("time_s\n1\n", 1, "has no channel"),
+        ("time_s,actuator_m\n1,2\n", 1, "needs force_n or position_m"),
+        ("time_s,position_mm\n1,2\n", 1, "unknown column 'position_mm'"),
+        ("time_s,force_n,force_n\n1,2,3\n", 1, "appears twice"),
+        ("time_s,force_n\n0,1\n0.1,nan\n", 3, "'nan' is not a finite number"),
+        ("time_s,force_n\n0,inf\n", 2, "'inf' is not a finite number"),
+        ("time_s,force_n\n0,1_0\n", 2, "'1_0' is not a finite number"),
+        ("time_s,force_n\n0,1\n0.1,x\n", 3, "'x' is not a finite number"),
+        ("time_s,force_n\n0,1\n0.1\n", 3, "1 cells where the header has 2"),
+        ("time_s,force_n\n0,1\n\n0.1,2\n", 3, "a blank line"),
+        ("time_s,force_n\n0,1\n0,2\n", 3, "time_s does not increase"),
+        ("time_s,force_n\n0,1\n0.2,2\n0.1,3\n", 4, "time_s does not increase"),
+        ("time_s,force_n\n0,1\n,2\n", 3, "time_s is empty"),
+        ("time_s,force_n,position_m\n0,1,\n1,2,\n", 1, "position_m has no sample"),
+    ],
+)
+def test_faults_of_a_trace(tmp_path: Path, trace: str, line: int | None, message: str) -> None:
+    directory = campaign(tmp_path / "c", _2=trace)
+    with pytest.raises(CampaignError) as caught:
+        read(directory)
+    assert message in str(caught.value)
+    assert ("2.csv: " if line is None else f"2.csv:{line}: ") in str(caught.value)
+
+
+def test_all_faults_at_once(tmp_path: Path) -> None:
+    directory = campaign(
+        tmp_path / "c",
+        HEADER.replace("tap", "push"),
+        "shot,velocity_mm_per_min\n1,3000\n2,3000\n",
+        _1="time_s,force_n\n0,nan\n",
+        _2="",
+        _7=TRACE,
+    )
+    with pytest.raises(CampaignError) as caught:
+        read(directory)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 4
+    assert all(str(directory) in line for line in lines)
+
+
+def test_long_lists_of_faults_are_cut_short(tmp_path: Path) -> None:
+    directory = campaign(tmp_path / "c", _1="time_s,force_n\n" + "0,nan\n" * 1000)
+    with pytest.raises(CampaignError, match="the same in 997 more rows"):
+        read(directory)
+
+
+def test_missing_directory_and_files(tmp_path: Path) -> None:
+    with pytest.raises(CampaignError, match="is not a directory"):
+        read(tmp_path / "absent")
+    (tmp_path / "bare").mkdir()
+    with pytest.raises(CampaignError) as caught:
+        read(tmp_path / "bare")
+    assert [line.rsplit("/", 1)[-1].split(":")[0] for line in str(caught.value).splitlines()] == [
+        "campaign.yaml",
+        "shots.csv",
+        "traces",
+    ]
+
+
+def test_not_text(tmp_path: Path) -> None:
+    directory = campaign(tmp_path / "c")
+    (directory / "traces" / "1.csv").write_bytes(b"time_s,force_n\n0,\xff\n")
+    with pytest.raises(CampaignError, match="is not UTF-8"):
+        read(directory)
+
+
+def test_driven_needs_both_channels(tmp_path: Path) -> None:
+    directory = campaign(tmp_path / "c", "format: 1\nexcitation: driven\n", _1="time_s,force_n\n0,-5\n1,5\n")
+    with pytest.raises(CampaignError, match=r"1\.csv:1: .*needs force_n and position_m"):
+        read(directory)
+
+
+@pytest.mark.shared_data
+@pytest.mark.parametrize(
+    ("name", "shots"),
+    [("sample-campaigns/no-effect", 60), ("sample-campaigns/one-effect", 60), ("contactnets-slides", 467)],
+)
+def test_reads_the_recorded_campaigns(shared_data: Path, name: str, shots: int) -> None:
+    began = time.process_time()
+    got = read(shared_data / name)
+    assert time.process_time() - began < 1.0
+    assert len(got.shots) == shots
+    first = got.shots[0].position
+    assert first is not None
+    expected = np.genfromtxt(
+        shared_data / name / "traces" / f"{got.shots[0].cycle}.csv", delimiter=",", names=True
+    )
+    np.testing.assert_array_equal(first.values, expected["position_m"])
+    np.testing.assert_array_equal(first.time_s, expected["time_s"])
+
+
+@settings(max_examples=200, deadline=None)
+@given(body=st.text(alphabet="0123456789.,-+einfa_ \n\r\tx", max_size=60), width=st.integers(1, 3))
+def test_any_trace_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, body: str, width: int
+) -> None:
+    directory = tmp_path_factory.mktemp("fuzz") / "c"
+    names = ("time_s", "force_n", "position_m")[: width + 1]
+    campaign(directory, _1=",".join(names) + "\n" + body)
+    try:
+        got = read(directory)
+    except CampaignError:
+        return
+    for channel in (got.shots[0].force, got.shots[0].position):
+        if channel is not None:
+            assert np.isfinite(channel.values).all()
+            assert (np.diff(channel.time_s) > 0).all()
+
+
+@settings(max_examples=200, deadline=None)
+@given(text=st.text(max_size=80))
+def test_any_header_or_table_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    directory = tmp_path_factory.mktemp("fuzz") / "c"
+    campaign(directory)
+    for name in ("campaign.yaml", "shots.csv"):
+        kept = (directory / name).read_bytes()
+        (directory / name).write_text(text, encoding="utf-8", errors="ignore")
+        with pytest.raises(CampaignError):
+            read(directory)
+        (directory / name).write_bytes(kept)
