@@ -1,0 +1,152 @@
+"""Captures as bytes and back, to the same bits.
+
+Layout: magic `ICC1`, then zlib of: header length (u32, little-endian), header (JSON), arrays one after
+the other. A channel whose values are whole multiples of its `resolution` is kept as differences of the
+integer codes, one whose times follow `records.uniform_times` as start and rate; both are checked sample
+by sample when written, and what does not fit is kept as 64-bit floats.
+"""
+
+import json
+import struct
+import zlib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from impactcell.errors import JournalError
+from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
+
+MAGIC = b"ICC1"
+_CHANNELS = ("force", "position", "actuator")
+
+
+def encode_capture(capture: Capture) -> bytes:
+    """Return the capture as compressed bytes; see the module's docstring for the layout."""
+    arrays: list[bytes] = []
+    header: dict[str, Any] = {
+        "cycle": capture.cycle,
+        "time_ns": capture.time_ns,
+        "velocity_m_s": capture.velocity_m_s,
+        "mass_kg": capture.mass_kg,
+        "direction": capture.direction,
+        "stroke_m": capture.stroke_m,
+        "batch_id": capture.batch_id,
+        "dwell_s": capture.dwell_s,
+        "start_m": capture.start_m,
+        "session": capture.session,
+        "covariates": dict(capture.covariates),
+    }
+    if capture.summary is not None:
+        header["summary"] = [capture.summary.peak_force_n, capture.summary.sliding_distance_m]
+    for name in _CHANNELS:
+        channel: Channel | None = getattr(capture, name)
+        if channel is not None:
+            header[name] = _encode_channel(channel, arrays)
+    text = json.dumps(header).encode()
+    return MAGIC + zlib.compress(b"".join([struct.pack("<I", len(text)), text, *arrays]), level=1)
+
+
+def decode_capture(blob: bytes) -> Capture:
+    """Return the capture that `encode_capture` was given.
+
+    Raises
+    ------
+    JournalError
+        If the bytes are not such a capture.
+    """
+    if blob[:4] != MAGIC:
+        raise JournalError("not a capture of this journal format")
+    try:
+        raw = zlib.decompress(blob[4:])
+        (length,) = struct.unpack_from("<I", raw)
+        header = json.loads(raw[4 : 4 + length])
+        cursor = _Cursor(raw, 4 + length)
+        channels = {name: _decode_channel(header.pop(name), cursor) for name in _CHANNELS if name in header}
+        summary = header.pop("summary", None)
+        capture = Capture(
+            **header, force=channels.get("force"), position=channels.get("position"),
+            actuator=channels.get("actuator"),
+        )  # fmt: skip
+        return capture if summary is None else replace(capture, summary=Summary(*summary))
+    except (zlib.error, ValueError, KeyError, TypeError, struct.error) as error:
+        raise JournalError(f"a stored capture is damaged: {error}") from error
+
+
+class _Cursor:
+    """Reads the arrays of a decompressed capture in the order they were written."""
+
+    def __init__(self, raw: bytes, offset: int) -> None:
+        self.raw, self.offset = raw, offset
+
+    def take(self, dtype: str, count: int) -> np.ndarray[Any, Any]:
+        values = np.frombuffer(self.raw, dtype, count, self.offset)
+        self.offset += values.nbytes
+        return values
+
+
+def _encode_channel(channel: Channel, arrays: list[bytes]) -> dict[str, Any]:
+    count = len(channel.values)
+    header: dict[str, Any] = {
+        "count": count,
+        "noise_std": channel.noise_std,
+        "full_scale": channel.full_scale,
+        "resolution": channel.resolution,
+    }
+    rate_hz = _uniform_rate(channel.time_s)
+    if rate_hz is None:
+        arrays.append(channel.time_s.astype("<f8").tobytes())
+    else:
+        header["uniform"] = [float(channel.time_s[0]), rate_hz]
+    codes = _codes(channel)
+    if codes is None:
+        arrays.append(channel.values.astype("<f8").tobytes())
+    else:
+        differences = np.diff(codes, prepend=np.int64(0))
+        header["dtype"] = "<i2" if np.abs(differences).max(initial=0) < 2**15 else "<i8"
+        arrays.append(differences.astype(header["dtype"]).tobytes())
+    return header
+
+
+def _decode_channel(header: dict[str, Any], cursor: _Cursor) -> Channel:
+    count = header["count"]
+    uniform = header.get("uniform")
+    time_s = (
+        uniform_times(uniform[0], uniform[1], count)
+        if uniform
+        else cursor.take("<f8", count).astype(np.float64)
+    )
+    if "dtype" in header:
+        values = np.cumsum(cursor.take(header["dtype"], count), dtype=np.int64) * header["resolution"]
+    else:
+        values = cursor.take("<f8", count).astype(np.float64)
+    full_scale = header["full_scale"]
+    return Channel(
+        time_s=time_s,
+        values=values,
+        noise_std=header["noise_std"],
+        full_scale=None if full_scale is None else (full_scale[0], full_scale[1]),
+        resolution=header["resolution"],
+    )
+
+
+def _uniform_rate(time_s: Samples) -> float | None:
+    if len(time_s) < 2 or not time_s[-1] > time_s[0]:
+        return None
+    rate_hz = float((len(time_s) - 1) / (time_s[-1] - time_s[0]))
+    for candidate in (rate_hz, float(round(rate_hz))):
+        if candidate > 0 and np.array_equal(uniform_times(float(time_s[0]), candidate, len(time_s)), time_s):
+            return candidate
+    return None
+
+
+def _codes(channel: Channel) -> np.ndarray[Any, np.dtype[np.int64]] | None:
+    if not channel.resolution or not np.all(np.isfinite(channel.values)):
+        return None
+    scaled = np.rint(channel.values / channel.resolution)
+    if np.abs(scaled).max(initial=0) >= 2**53:
+        return None
+    codes = scaled.astype(np.int64)
+    # Negative zero is not a multiple that an integer remembers: compare bits, not values.
+    same = (codes * channel.resolution).view(np.int64) == channel.values.view(np.int64)
+    return codes if bool(np.all(same)) else None

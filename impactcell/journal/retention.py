@@ -1,0 +1,69 @@
+"""How long a journal keeps what: by age and by size; captures go before summaries."""
+
+import sqlite3
+from dataclasses import dataclass
+
+_CHUNK = 64
+_NS_PER_DAY = 86_400 * 10**9
+
+
+@dataclass(frozen=True, slots=True)
+class Retention:
+    """What is kept.
+
+    Attributes
+    ----------
+    days, captures_days : float
+        Cycles, and captures, older than this are dropped.
+    max_size_bytes : int
+        Above this, captures are dropped oldest first, then cycles with their alarms.
+    """
+
+    days: float = 365.0
+    captures_days: float = 30.0
+    max_size_bytes: int = 4096 * 2**20
+
+
+def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> None:
+    """Drop what `keep` does not keep, and give the space back; the last cycle always stays.
+
+    Called inside no transaction; each step commits by itself, so a crash in between loses nothing else.
+    """
+    oldest_ns = now_ns - int(keep.days * _NS_PER_DAY)
+    oldest_capture_ns = now_ns - int(keep.captures_days * _NS_PER_DAY)
+    database.execute(
+        "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns < ?)", (oldest_capture_ns,)
+    )
+    database.execute(
+        "DELETE FROM cycles WHERE time_ns < ? AND seq < (SELECT max(seq) FROM cycles)", (oldest_ns,)
+    )
+    database.execute("DELETE FROM alarms WHERE time_ns < ?", (oldest_ns,))
+    database.execute("DELETE FROM audit WHERE time_ns < ?", (oldest_ns,))
+    while _size(database) > keep.max_size_bytes and _drop_oldest(database):
+        pass
+    # execute() would step this statement once, and so give back a single page; executescript() runs it to its end.
+    database.executescript("PRAGMA incremental_vacuum")
+    database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+
+
+def _drop_oldest(database: sqlite3.Connection) -> bool:
+    """Drop a few of the oldest captures, or cycles where no capture is left; False when nothing is left."""
+    captures = database.execute(
+        "DELETE FROM captures WHERE seq IN (SELECT seq FROM captures ORDER BY seq LIMIT ?)", (_CHUNK,)
+    )
+    if captures.rowcount > 0:
+        return True
+    cycles = database.execute(
+        "DELETE FROM cycles WHERE seq IN "
+        "(SELECT seq FROM cycles WHERE seq < (SELECT max(seq) FROM cycles) ORDER BY seq LIMIT ?)",
+        (_CHUNK,),
+    )
+    return cycles.rowcount > 0
+
+
+def _size(database: sqlite3.Connection) -> int:
+    """Bytes in use, free pages not counted."""
+    (pages,) = database.execute("PRAGMA page_count").fetchone()
+    (free,) = database.execute("PRAGMA freelist_count").fetchone()
+    (page_size,) = database.execute("PRAGMA page_size").fetchone()
+    return int((pages - free) * page_size)

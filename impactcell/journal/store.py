@@ -1,0 +1,249 @@
+"""The durable store of one cell: what has been committed here survives a crash, a power cut included.
+
+Write-ahead log with full synchronisation. A cycle, its capture, its alarms and the state that it led to
+are one transaction: after any crash the file shows the cycle with all of it, or not at all.
+
+A `Journal` is used from one thread at a time; `service.py` gives it a thread of its own.
+"""
+
+import json
+import math
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
+from impactcell.journal.blobs import decode_capture, encode_capture
+from impactcell.journal.retention import Retention, thin
+from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, TABLES
+from impactcell.records import Alarm, Capture, Snapshot
+
+_INSERT_CYCLE = (
+    f"INSERT INTO cycles ({', '.join(c.name for c in COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"  # noqa: S608
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """The last durable cycle: the module's session and its number in that session."""
+
+    session: int
+    cycle: int
+
+
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """Who did what, when, and what came of it."""
+
+    time_ns: int
+    user: str
+    action: str
+    arguments: str
+    result: str
+
+
+class Journal:
+    """One cell's journal file.
+
+    Parameters
+    ----------
+    path : Path
+        Created where it does not exist.
+    cell : str
+        The journal of another cell is refused.
+    read_only : bool
+        Open an existing file without writing to it.
+
+    Raises
+    ------
+    ForeignJournalError
+        If the file is not a journal, of another format, or of another cell; it is left as it is.
+    JournalError
+        If the file cannot be opened.
+    """
+
+    def __init__(self, path: Path, cell: str | None, *, read_only: bool = False) -> None:
+        self.path = path
+        if read_only and not path.is_file():
+            raise JournalError(f"{path}: there is no such journal")
+        new = not path.exists() or path.stat().st_size == 0
+        mode = "ro" if read_only else "rwc"
+        try:
+            self._db = sqlite3.connect(
+                f"{path.absolute().as_uri()}?mode={mode}",
+                uri=True,
+                isolation_level=None,
+                check_same_thread=False,
+            )
+        except sqlite3.Error as error:
+            raise JournalError(f"{path}: cannot be opened ({error}); is the directory there?") from error
+        try:
+            if new:
+                self._create(cell or "")
+            self._check(cell)
+            if not read_only:
+                self._db.execute("PRAGMA journal_mode = WAL")
+                self._db.execute("PRAGMA synchronous = FULL")
+        except BaseException:
+            self._db.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; what was committed stays."""
+        self._db.close()
+
+    @property
+    def cell(self) -> str:
+        """Name of the cell this journal belongs to."""
+        return self._meta("cell")
+
+    def append(
+        self, capture: Capture, snapshot: Snapshot, state: bytes, changed: Sequence[Alarm] = ()
+    ) -> None:
+        """Store one cycle, its capture, the alarms it changed and the state it led to, all or nothing.
+
+        Raises
+        ------
+        JournalFullError
+            If the disk or a quota is full; nothing of the cycle is stored.
+        JournalError
+            If the cycle is stored already, or the file cannot be written.
+        """
+        with self._transaction():
+            try:
+                row = self._db.execute(
+                    _INSERT_CYCLE, [_sql(column.of(capture, snapshot)) for column in COLUMNS]
+                ).lastrowid
+            except sqlite3.IntegrityError as error:
+                raise JournalError(f"{self.path}: cycle {capture.cycle} is stored already") from error
+            self._db.execute("INSERT INTO captures VALUES (?, ?)", (row, encode_capture(capture)))
+            self._put_alarms(changed)
+            self._db.execute("INSERT OR REPLACE INTO state VALUES (1, ?, ?)", (row, state))
+
+    def record(self, state: bytes, changed: Sequence[Alarm] = (), audit: AuditEntry | None = None) -> None:
+        """Store what happened between cycles: alarms, a person's action and the state they led to."""
+        with self._transaction():
+            self._put_alarms(changed)
+            if audit is not None:
+                self._db.execute(
+                    "INSERT INTO audit (time_ns, user, action, arguments, result) VALUES (?, ?, ?, ?, ?)",
+                    (audit.time_ns, audit.user, audit.action, audit.arguments, audit.result),
+                )
+            self._db.execute(
+                "INSERT OR REPLACE INTO state VALUES (1, (SELECT coalesce(max(seq), 0) FROM cycles), ?)",
+                (state,),
+            )
+
+    def state(self) -> bytes | None:
+        """Return the state of the last durable cycle; None in a new journal."""
+        row = self._db.execute("SELECT blob FROM state").fetchone()
+        return None if row is None else bytes(row[0])
+
+    def position(self) -> Position | None:
+        """Return the last durable cycle; None in a new journal."""
+        row = self._db.execute("SELECT session, cycle FROM cycles ORDER BY seq DESC LIMIT 1").fetchone()
+        return None if row is None else Position(*row)
+
+    def captures(self, first_cycle: int | None = None, last_cycle: int | None = None) -> Iterator[Capture]:
+        """Yield the stored captures in order of their cycles; thinned ones are gone."""
+        rows = self._db.execute(
+            "SELECT blob FROM captures JOIN cycles USING (seq) "
+            "WHERE (?1 IS NULL OR cycle >= ?1) AND (?2 IS NULL OR cycle <= ?2) ORDER BY seq",
+            (first_cycle, last_cycle),
+        )
+        for (blob,) in rows:
+            yield decode_capture(blob)
+
+    def thin(self, keep: Retention, now_ns: int) -> None:
+        """Drop what `keep` does not keep; see `impactcell.journal.retention`."""
+        with self._errors():
+            thin(self._db, keep, now_ns)
+
+    def audit(self) -> tuple[AuditEntry, ...]:
+        """Return every action of a person, oldest first."""
+        rows = self._db.execute("SELECT time_ns, user, action, arguments, result FROM audit ORDER BY id")
+        return tuple(AuditEntry(*row) for row in rows)
+
+    def _create(self, cell: str) -> None:
+        self._db.execute("PRAGMA auto_vacuum = INCREMENTAL")
+        with self._transaction():
+            for statement in TABLES.split(";"):
+                self._db.execute(statement)
+            self._db.execute("INSERT INTO meta VALUES ('cell', ?)", (cell,))
+            self._db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            self._db.execute(f"PRAGMA user_version = {FORMAT}")
+
+    def _check(self, cell: str | None) -> None:
+        try:
+            (application_id,) = self._db.execute("PRAGMA application_id").fetchone()
+            (version,) = self._db.execute("PRAGMA user_version").fetchone()
+        except sqlite3.DatabaseError as error:
+            raise ForeignJournalError(f"{self.path}: not a journal ({error}); it is left as it is") from error
+        if application_id != APPLICATION_ID:
+            raise ForeignJournalError(
+                f"{self.path}: a database, but no journal of impactcell; it is left as it is"
+            )
+        if version != FORMAT:
+            raise ForeignJournalError(
+                f"{self.path}: journal format {version}, this program writes {FORMAT}; it is left as it is"
+            )
+        if cell is not None and self.cell != cell:
+            raise ForeignJournalError(
+                f"{self.path}: the journal of cell '{self.cell}', not of '{cell}'; name another file"
+            )
+
+    def _meta(self, key: str) -> str:
+        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        return "" if row is None else str(row[0])
+
+    def _put_alarms(self, changed: Sequence[Alarm]) -> None:
+        self._db.executemany(
+            "INSERT INTO alarms (time_ns, record) VALUES (?, ?)",
+            [(alarm.time_ns, json.dumps(asdict(alarm), default=_plain)) for alarm in changed],
+        )
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with self._errors():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._db.execute("COMMIT")
+            except BaseException:
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+                raise JournalFullError(
+                    f"{self.path}: the disk or its quota is full ({error}); make room"
+                ) from error
+            raise JournalError(f"{self.path}: cannot be written ({error})") from error
+        except sqlite3.DatabaseError as error:
+            raise JournalError(f"{self.path}: cannot be used ({error})") from error
+
+
+def _sql(value: float | str) -> float | str | None:
+    """NaN is no SQL number: it is stored as NULL."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _plain(value: Any) -> Any:
+    return getattr(value, "value", str(value))

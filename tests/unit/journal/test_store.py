@@ -1,0 +1,132 @@
+"""What was committed is there, with its state; what was not has left no trace."""
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
+from impactcell.journal.retention import Retention
+from impactcell.journal.store import AuditEntry, Journal, Position
+from impactcell.records import Alarm, AlarmName
+from tests.snapshots import make_capture, make_snapshot
+
+
+def append(journal: Journal, cycle: int, *, session: int = 1, samples: int = 200) -> None:
+    capture = make_capture(cycle, session, samples)
+    journal.append(capture, make_snapshot(capture), f"state {cycle}".encode())
+
+
+def append_many(journal: Journal, cycles: range) -> None:
+    for cycle in cycles:
+        append(journal, cycle, samples=4000)
+
+
+def test_cycle_capture_and_state_come_back_after_reopening(tmp_path: Path) -> None:
+    path = tmp_path / "cell.sqlite"
+    with Journal(path, "press-1") as journal:
+        assert journal.state() is None
+        assert journal.position() is None
+        append(journal, 1)
+        append(journal, 2)
+    with Journal(path, "press-1") as journal:
+        assert journal.state() == b"state 2"
+        assert journal.position() == Position(1, 2)
+        first, second = journal.captures()
+        assert (first.cycle, second.cycle) == (1, 2)
+        assert [capture.cycle for capture in journal.captures(2, 2)] == [2]
+
+
+def test_a_cycle_is_stored_once(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", "c") as journal:
+        append(journal, 1)
+        with pytest.raises(JournalError, match="stored already"):
+            append(journal, 1)
+        assert journal.state() == b"state 1"
+        append(journal, 1, session=2)
+        assert journal.position() == Position(2, 1)
+
+
+def test_a_failed_append_leaves_nothing_behind(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", "c") as journal:
+        append(journal, 1)
+        pages = journal._db.execute("PRAGMA page_count").fetchone()[0]
+        journal._db.execute(f"PRAGMA max_page_count = {pages}")
+        with pytest.raises(JournalFullError, match="make room"):
+            append_many(journal, range(2, 50))
+        stored = [capture.cycle for capture in journal.captures()]
+        last = journal.position()
+        assert last is not None
+        assert journal.state() == f"state {last.cycle}".encode()
+        assert stored == list(range(1, last.cycle + 1))
+        journal._db.execute("PRAGMA max_page_count = 1000000")
+        append(journal, last.cycle + 1)
+        assert journal.position() == Position(1, last.cycle + 1)
+
+
+def test_actions_are_audited_with_their_state(tmp_path: Path) -> None:
+    entry = AuditEntry(5, "anna", "ResetWear", '{"Comment": "new plate"}', "Good")
+    with Journal(tmp_path / "j", "c") as journal:
+        append(journal, 1)
+        journal.record(b"after reset", [Alarm(AlarmName.WEAR_LIMIT, time_ns=5)], entry)
+        assert journal.audit() == (entry,)
+        assert journal.state() == b"after reset"
+
+
+@pytest.mark.parametrize("content", [b"not a database at all" * 100, None, "other version", "other cell"])
+def test_foreign_files_are_refused_and_left_alone(tmp_path: Path, content: bytes | str | None) -> None:
+    path = tmp_path / "j"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content is None:
+        with sqlite3.connect(path) as db:
+            db.execute("CREATE TABLE theirs (x)")
+        db.close()
+    else:
+        Journal(path, "other").close()
+        if content == "other version":
+            db = sqlite3.connect(path)
+            db.execute("PRAGMA user_version = 99")
+            db.close()
+    before = path.read_bytes()
+    with pytest.raises(ForeignJournalError):
+        Journal(path, "press-1")
+    assert path.read_bytes() == before
+
+
+def test_missing_directory_is_named(tmp_path: Path) -> None:
+    with pytest.raises(JournalError, match="nowhere"):
+        Journal(tmp_path / "nowhere" / "j", "c")
+    with pytest.raises(JournalError, match="no such journal"):
+        Journal(tmp_path / "j", None, read_only=True)
+
+
+def test_captures_are_thinned_before_cycles(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", "c") as journal:
+        for cycle in range(1, 301):
+            append(journal, cycle, samples=1000)
+        size = 400_000
+        journal.thin(Retention(max_size_bytes=size), now_ns=make_capture(300).time_ns)
+        kept = [capture.cycle for capture in journal.captures()]
+        assert kept
+        assert kept[-1] == 300
+        assert len(kept) < 300
+        assert journal._db.execute("SELECT count(*) FROM cycles").fetchone() == (300,)
+        pages, page_size = (
+            journal._db.execute(f"PRAGMA {p}").fetchone()[0] for p in ("page_count", "page_size")
+        )
+        assert pages * page_size <= size
+
+
+def test_age_drops_captures_then_cycles_but_never_the_last(tmp_path: Path) -> None:
+    day_ns = 86_400 * 10**9
+    with Journal(tmp_path / "j", "c") as journal:
+        for cycle in (1, 2, 3):
+            append(journal, cycle)
+        now_ns = make_capture(3).time_ns
+        journal.thin(Retention(days=10, captures_days=5), now_ns + 6 * day_ns)
+        assert list(journal.captures()) == []
+        assert journal.position() == Position(1, 3)
+        journal.thin(Retention(days=10, captures_days=5), now_ns + 11 * day_ns)
+        assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(3,)]
+        assert journal.state() == b"state 3"
