@@ -1,0 +1,227 @@
+"""One register of a map: its type, its unit, and how its words become a value and back.
+
+Pure. Blocks of words are big-endian 16-bit arrays (`WIRE`), the bytes exactly as Modbus carries them, so a block
+becomes an array of samples by a view, not register by register.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impactcell.errors import MapError
+
+WIRE: Final = np.dtype(">u2")
+"""One register as Modbus carries it."""
+
+Words = NDArray[np.uint16]
+Value = int | float | str | NDArray[Any]
+
+SI_FACTOR: Final[Mapping[str, float]] = {
+    "1": 1.0,
+    "m": 1.0,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "nm": 1e-9,
+    "m/s": 1.0,
+    "mm/s": 1e-3,
+    "mm/min": 1e-3 / 60.0,
+    "N": 1.0,
+    "mN": 1e-3,
+    "kN": 1e3,
+    "kg": 1.0,
+    "g": 1e-3,
+    "s": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+    "Hz": 1.0,
+    "kHz": 1e3,
+}
+"""Units a map may use, and how many SI units one of them is."""
+
+KINDS: Final[Mapping[str, np.dtype[Any]]] = {
+    "u16": np.dtype(">u2"),
+    "i16": np.dtype(">i2"),
+    "u32": np.dtype(">u4"),
+    "i32": np.dtype(">i4"),
+    "u64": np.dtype(">u8"),
+    "f32": np.dtype(">f4"),
+    "f64": np.dtype(">f8"),
+}
+"""Numeric types of a register; `string` is the other one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One documented value of the map: a number, an array of numbers, or a text.
+
+    Attributes
+    ----------
+    name : str
+        How this project calls it.
+    address : int
+        Zero-based PDU address of its first register (a 4xxxx or 3xxxx reference is this plus one).
+    kind : str
+        One of `KINDS`, or `string` (UTF-8, two bytes a register, padded with NUL).
+    count : int
+        Number of values; above 1 it is an array.
+    length : int
+        Registers of a string; 0 for numbers.
+    table : str
+        `holding` (read by function 3) or `input` (function 4).
+    writable : bool
+        Whether a client may write it.
+    word_order : str
+        `big`: the most significant word at the lowest address; `little`: at the highest.
+    scale : float
+        Size of one code, in `unit`.
+    unit : str
+        Unit of the scaled value; empty for a plain code, which stays an integer.
+    not_a_number : int or None
+        Code of a sample that was not measured.
+    saturation : tuple of int, or None
+        Codes at and beyond which the channel is at full scale.
+    expect : int, str or None
+        What a module of this map must show here.
+    codes : mapping
+        Names of the values of a state register.
+    """
+
+    name: str
+    address: int
+    kind: str
+    count: int = 1
+    length: int = 0
+    table: str = "holding"
+    writable: bool = False
+    word_order: str = "big"
+    scale: float = 1.0
+    unit: str = ""
+    not_a_number: int | None = None
+    saturation: tuple[int, int] | None = None
+    expect: int | str | None = None
+    codes: Mapping[int, str] = field(default_factory=dict)
+    description: str = ""
+
+    @property
+    def words_per_value(self) -> int:
+        """Registers one value takes."""
+        return self.length if self.kind == "string" else KINDS[self.kind].itemsize // 2
+
+    @property
+    def words(self) -> int:
+        """Registers the whole entry takes."""
+        return self.words_per_value * self.count
+
+    @property
+    def end(self) -> int:
+        """First address after it."""
+        return self.address + self.words
+
+    @property
+    def si_factor(self) -> float:
+        """SI units per code."""
+        return self.scale * SI_FACTOR.get(self.unit, 1.0)
+
+    @property
+    def is_code(self) -> bool:
+        """Whether it is a plain integer code, without scale or unit."""
+        return not self.unit and self.scale == 1.0 and self.kind not in ("f32", "f64", "string")
+
+    @property
+    def full_scale(self) -> tuple[float, float] | None:
+        """Smallest and largest value the channel can show, SI; None where the map does not say."""
+        if self.saturation is None:
+            return None
+        return self.saturation[0] * self.si_factor, self.saturation[1] * self.si_factor
+
+    def raw(self, words: Words) -> NDArray[Any]:
+        """Codes in `words`, shape (len(words) // words_per_value,), big-endian dtype of `kind`.
+
+        Raises
+        ------
+        MapError
+            If the words are not a whole number of values, or this is a string.
+        """
+        if self.kind == "string":
+            raise MapError(f"register {self.name} holds text, not codes")
+        if words.size % self.words_per_value:
+            raise MapError(f"register {self.name}: {words.size} words are no whole number of {self.kind}")
+        wire = np.ascontiguousarray(words, dtype=WIRE)
+        if self.word_order == "little" and self.words_per_value > 1:
+            wire = np.ascontiguousarray(wire.reshape(-1, self.words_per_value)[:, ::-1]).reshape(-1)
+        return wire.view(KINDS[self.kind])
+
+    def decode(self, words: Words) -> Value:
+        """Value in `words`: text, a number, or an array (also a shorter one than `count`).
+
+        Plain codes stay integers; all else comes in SI as float64, with nan for `not_a_number`.
+
+        Raises
+        ------
+        MapError
+            If a single value is asked for from the wrong number of words.
+        """
+        if self.kind == "string":
+            text = np.ascontiguousarray(words, dtype=WIRE).tobytes().split(b"\0", 1)[0]
+            return text.decode("utf-8", errors="replace").rstrip()
+        raw = self.raw(words)
+        if self.count == 1:
+            if raw.size != 1:
+                raise MapError(f"register {self.name} takes {self.words} words, not {words.size}")
+            if self.is_code:
+                return int(raw[0])
+            return math.nan if raw[0] == self.not_a_number else float(raw[0]) * self.si_factor
+        if self.is_code:
+            return raw.astype(np.int64)
+        values = raw.astype(np.float64) * self.si_factor
+        if self.not_a_number is not None:
+            values[raw == self.not_a_number] = np.nan
+        return values
+
+    def encode(self, value: ArrayLike | str) -> Words:
+        """Words of `value` (SI, text, or an array of at most `count` values), dtype `WIRE`.
+
+        A number beyond the codes' range goes to the nearest end (to `saturation` where that is given), nan to
+        `not_a_number`.
+
+        Raises
+        ------
+        MapError
+            If a text or an array is too long, or nan has no code here.
+        """
+        if self.kind == "string":
+            text = str(value).encode()
+            if len(text) > 2 * self.length:
+                raise MapError(f"register {self.name}: {len(text)} bytes do not fit {self.length} registers")
+            return np.frombuffer(text.ljust(2 * self.length, b"\0"), dtype=WIRE).copy()
+        codes = self._codes(np.atleast_1d(np.asarray(value)))
+        if codes.size > self.count:
+            raise MapError(f"register {self.name}: {codes.size} values do not fit {self.count}")
+        wire = codes.view(WIRE)
+        if self.word_order == "little" and self.words_per_value > 1:
+            wire = np.ascontiguousarray(wire.reshape(-1, self.words_per_value)[:, ::-1]).reshape(-1)
+        return wire
+
+    def _codes(self, values: NDArray[Any]) -> NDArray[Any]:
+        dtype = KINDS[self.kind]
+        if dtype.kind == "f":
+            return (values.astype(np.float64) / self.si_factor).astype(dtype)
+        info = np.iinfo(dtype)
+        if values.dtype.kind in "iu" and self.is_code:  # exact: u64 does not pass through a float
+            if values.size and (int(values.min()) < info.min or int(values.max()) > info.max):
+                raise MapError(f"register {self.name}: value outside {info.min}..{info.max}")
+            return values.astype(dtype)
+        low, high = self.saturation or (info.min, info.max)
+        scaled = np.rint(values.astype(np.float64) / self.si_factor)
+        missing = np.isnan(scaled)
+        if missing.any() and self.not_a_number is None:
+            raise MapError(f"register {self.name} has no code for a value that is not a number")
+        codes = np.clip(np.where(missing, 0.0, scaled), low, high).astype(dtype)
+        if self.not_a_number is not None:
+            codes[missing] = self.not_a_number
+        return codes
