@@ -83,6 +83,8 @@ class Capture:
         Time the part had been at rest before the tap; nan where it is not known.
     start_m : float
         Position on the table at which the part lay.
+    session : int
+        Changes when the module has restarted and counts its cycles anew.
     covariates : mapping
         Any further numeric or text column of a campaign.
     summary : Summary or None
@@ -101,6 +103,7 @@ class Capture:
     batch_id: str | None = None
     dwell_s: float = float("nan")
     start_m: float = 0.0
+    session: int = 0
     covariates: Mapping[str, float | str] = field(default_factory=dict)
     summary: "Summary | None" = None
 

@@ -184,7 +184,7 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
 
 
 def read(path: Path, schema: type[M]) -> tuple[M, Positions]:
-    """Read a file into a pydantic model.
+    """Read a file into a pydantic model; validators find the file's directory in their context.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def read(path: Path, schema: type[M]) -> tuple[M, Positions]:
     """
     data, positions = load(path)
     try:
-        return schema.model_validate(data), positions
+        return schema.model_validate(data, context={"directory": path.parent}), positions
     except ValidationError as error:
         raise SettingsError("\n".join(complaints(path, positions, error, schema))) from error
 

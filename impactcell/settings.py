@@ -1,0 +1,270 @@
+"""A cell's YAML file as frozen models: every key, its unit in its name, its range and its default.
+
+Relative paths are taken from the directory of the file that names them.
+"""
+
+import json
+import re
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    model_validator,
+)
+
+
+def _resolved(value: object, info: ValidationInfo) -> object:
+    if not isinstance(value, str) or not value:
+        return value
+    directory: Path = (info.context or {}).get("directory", Path())
+    return (directory / Path(value).expanduser()).resolve()
+
+
+def _existing_file(path: Path) -> Path:
+    if not path.is_file():
+        raise ValueError(f"there is no file {path}")
+    return path
+
+
+def _existing_parent(path: Path) -> Path:
+    if path.is_dir():
+        raise ValueError(f"{path} is a directory; a file is needed here")
+    if not path.parent.is_dir():
+        raise ValueError(f"there is no directory {path.parent} to write it in")
+    return path
+
+
+AnyPath = Annotated[Path, BeforeValidator(_resolved)]
+InputFile = Annotated[AnyPath, AfterValidator(_existing_file)]
+OutputFile = Annotated[AnyPath, AfterValidator(_existing_parent)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Probability = Annotated[float, Field(gt=0, lt=1)]
+
+
+def _endpoint(value: str) -> str:
+    if not value.startswith("opc.tcp://"):
+        raise ValueError("an OPC UA endpoint starts with opc.tcp://, as in opc.tcp://127.0.0.1:4840")
+    return value
+
+
+def _cell_name(value: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", value):
+        raise ValueError("a cell's name has up to 64 letters, digits, '_', '-' or '.', as in press-1")
+    return value
+
+
+class Section(BaseModel):
+    """A mapping of the cell file; unknown keys are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+
+
+class Identification(Section):
+    """Machinery identification (OPC 40001-1), shown to SCADA."""
+
+    manufacturer: str = "unknown"
+    """Maker of the cell."""
+    model: str = "impact cell"
+    """Type of the cell."""
+    serial_number: str = ""
+    """Serial number of the cell; the cell's name where it is empty."""
+    product_instance_uri: str = ""
+    """Globally unique name of the cell."""
+    location: str = ""
+    """Where the cell stands."""
+
+
+class Tls(Section):
+    """Modbus/TCP Security: both sides show certificates."""
+
+    ca_certificate: InputFile
+    """Certificates (PEM) that the module's certificate must lead to."""
+    certificate: InputFile | None = None
+    """Our own certificate (PEM)."""
+    key: InputFile | None = None
+    """Our own private key (PEM)."""
+
+
+class Module(Section):
+    """The FPGA module on Modbus TCP."""
+
+    host: str = "127.0.0.1"
+    """Address of the module, or of the gateway in front of it."""
+    port: Annotated[int, Field(ge=1, le=65535)] = 502
+    """TCP port; 802 is customary with TLS."""
+    device_id: Annotated[int, Field(ge=0, le=255)] = 1
+    """Modbus unit id."""
+    register_map: InputFile
+    """Register map that the module speaks."""
+    word_order: Literal["big", "little"] | None = None
+    """Order of the words of a value of several registers; absent: as the map says."""
+    window: Annotated[int, Field(ge=1, le=64)] = 1
+    """Requests in flight; 1 is safe with any device, 16 is fast with those that queue."""
+    max_registers_per_request: Annotated[int, Field(ge=1, le=125)] = 125
+    """Registers asked for at once; some gateways allow fewer than 125."""
+    pause_between_requests_ms: NotNegative = 0.0
+    """Rest that a slow device needs between requests."""
+    timeout_ms: Positive = 500.0
+    """An answer later than this closes the connection."""
+    tls: Tls | None = None
+    """Encrypted link; absent: plain Modbus TCP."""
+
+
+class Part(Section):
+    """The part that is struck."""
+
+    mass_kg: Positive | None = None
+    """Mass where the module does not report one for each cycle."""
+
+
+class Actuator(Section):
+    """The actuator and the limits that no command passes."""
+
+    stroke_mm: Positive | None = None
+    """Travel from first contact where the module does not report one for each cycle."""
+    max_velocity_mm_per_min: Positive = 6000.0
+    """Fastest tap that may be commanded."""
+    max_stroke_mm: Positive = 1.5
+    """Longest stroke that may be commanded."""
+    max_force_n: Positive | None = None
+    """Largest contact force a commanded tap may be expected to make."""
+    both_ends: bool = False
+    """Actuators on both ends: the part can be struck back."""
+
+
+class Sensors(Section):
+    """Noise of the sensors, one standard deviation."""
+
+    force_noise_std_n: Positive = 0.4
+    """Force sensor."""
+    position_noise_std_um: Positive = 1.5
+    """Position sensor."""
+
+
+class Tracking(Section):
+    """How friction is followed over time and material."""
+
+    batch: Literal["known", "unknown"] = "known"
+    """known: the PLC names every batch; unknown: changes of batch are found from the friction."""
+    learning_cycles: Annotated[int, Field(ge=5)] = 30
+    """Cycles from which the scatter is learned before alarms are trusted."""
+
+
+class Alarms(Section):
+    """When a person is called."""
+
+    wear_limit: Positive
+    """mu_s at which the surface counts as worn."""
+    wear_probability_on: Probability = 0.9
+    """The wear alarm comes when P(level > limit) passes this ..."""
+    wear_probability_off: Probability = 0.5
+    """... and goes when it falls below this."""
+    false_alarm_cycles: Annotated[float, Field(ge=100)] = 100_000.0
+    """Designed mean number of cycles between two false alarms of one rule."""
+    on_delay_cycles: Annotated[int, Field(ge=0)] = 0
+    """Cycles a rule must hold before its alarm comes."""
+    off_delay_cycles: Annotated[int, Field(ge=0)] = 0
+    """Cycles a rule must be clear before its alarm goes."""
+
+    @model_validator(mode="after")
+    def _hysteresis(self) -> Self:
+        if self.wear_probability_off >= self.wear_probability_on:
+            raise ValueError("wear_probability_off must be below wear_probability_on")
+        return self
+
+
+class SignatureGrid(Section):
+    """The grid along the stroke on which friction is shown."""
+
+    spacing_mm: Positive = 0.1
+    """Distance between grid points."""
+    points: Annotated[int, Field(ge=4, le=200)] = 30
+    """Number of grid points."""
+
+
+class Positioning(Section):
+    """Placing the part by taps."""
+
+    tolerance_um: Positive = 50.0
+    """The part is in place when it is this near its target."""
+    travel_mm: Positive = 40.0
+    """Targets beyond this are refused."""
+    encoder_resolution_um: Positive = 1.0
+    """A tolerance below this is refused."""
+    overshoot_probability: Probability = 0.001
+    """Accepted chance that a task overshoots."""
+
+
+class OpcUa(Section):
+    """The OPC UA server; cells with the same endpoint share one."""
+
+    endpoint: Annotated[str, AfterValidator(_endpoint)] = "opc.tcp://127.0.0.1:4840/impactcell"
+    """Where SCADA connects; an address other than loopback opens it to the network."""
+    users_file: InputFile | None = None
+    """Users and roles, made by `impactcell users`; absent: nobody may log in with a password."""
+    certificates_dir: AnyPath | None = None
+    """Own, trusted and rejected certificates, made by `impactcell certs`."""
+    allow_insecure_sessions_without_login: bool = False
+    """Opens sessions over security policy None with the Observer role: for demonstrations only."""
+    max_sessions: Annotated[int, Field(ge=1)] = 100
+    """Sessions beyond this are refused."""
+
+
+class Journal(Section):
+    """The durable store of the cell."""
+
+    file: OutputFile
+    """SQLite file; one a cell."""
+    retain_days: Positive = 365.0
+    """Cycles older than this are dropped."""
+    retain_captures_days: Positive = 30.0
+    """Captures older than this are dropped; their summaries stay."""
+    max_size_mb: Positive = 4096.0
+    """Above this, captures are thinned, oldest first, then summaries."""
+
+
+class Monitoring(Section):
+    """Health and metrics over HTTP; every cell of a process shares one listener."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on."""
+    port: Annotated[int, Field(ge=0, le=65535)]
+    """Port of /healthz and /metrics."""
+
+
+class CellSettings(Section):
+    """One cell."""
+
+    format: Literal[1]
+    """Version of this file format."""
+    cell: Annotated[str, AfterValidator(_cell_name)]
+    """Name of the cell, in OPC UA, in logs and in messages."""
+    identification: Identification = Identification()
+    module: Module
+    model: InputFile
+    """Model of the plant and its calibration, made by `impactcell calibrate`."""
+    part: Part = Part()
+    actuator: Actuator = Actuator()
+    sensors: Sensors = Sensors()
+    tracking: Tracking = Tracking()
+    alarms: Alarms
+    signature: SignatureGrid = SignatureGrid()
+    positioning: Positioning | None = None
+    """Absent: the cell only watches."""
+    opcua: OpcUa = OpcUa()
+    journal: Journal | None = None
+    """Absent: nothing is kept over a restart."""
+    monitoring: Monitoring | None = None
+    """Absent: no HTTP."""
+
+
+def schema() -> str:
+    """JSON Schema (2020-12) of a cell file."""
+    return json.dumps(CellSettings.model_json_schema(), indent=2)
