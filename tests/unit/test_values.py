@@ -1,0 +1,61 @@
+"""A value restored from its bytes is the same value, to the last bit."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from impactcell import values
+from impactcell.records import Alarm, AlarmName, Samples, Shelving
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inner:
+    table: Samples
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outer:
+    value: float
+    inner: Inner | None
+    alarms: tuple[Alarm, ...]
+    pair: tuple[int, str]
+    named: dict[str, float]
+
+
+@given(
+    st.floats(),
+    st.lists(st.floats(), max_size=12),
+    st.lists(st.integers(), max_size=4),
+    st.dictionaries(st.text(), st.floats(), max_size=3),
+)
+def test_round_trip_is_exact(value, numbers, counts, named):
+    alarm = Alarm(AlarmName.WEAR_LIMIT, shelving=Shelving.TIMED, shelved_until_ns=2**62)
+    outer = Outer(value, Inner(np.array(numbers), tuple(counts)), (alarm,), (3, "ä"), named)
+    data = values.dumps(outer)
+    back = values.loads(Outer, data)
+    assert values.dumps(back) == data
+    assert back.alarms[0].shelving is Shelving.TIMED
+    assert back.inner.table.dtype == np.float64
+    assert back.inner.table.tobytes() == outer.inner.table.tobytes()
+    assert math.copysign(1, back.value) == math.copysign(1, value) or math.isnan(value)
+
+
+def test_none_and_shapes_survive():
+    outer = Outer(-0.0, Inner(np.zeros((0, 22)), ()), (), (1, ""), {})
+    back = values.loads(Outer, values.dumps(outer))
+    assert back.inner.table.shape == (0, 22)
+    assert values.loads(Outer, values.dumps(Outer(0.0, None, (), (1, ""), {}))).inner is None
+
+
+def test_another_version_is_refused():
+    with pytest.raises(ValueError, match="not a stored Inner"):
+        values.loads(Inner, b'{"table": 1}')
+    with pytest.raises(ValueError, match="not a stored Inner"):
+        values.loads(Inner, b"[]")
+    with pytest.raises(TypeError):
+        values.dumps({1, 2})
