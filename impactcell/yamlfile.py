@@ -7,7 +7,7 @@ PyYAML alone follows 1.1, where each of these surprises.
 import difflib
 import re
 import types
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin
@@ -203,6 +203,13 @@ def complaint(path: Path, place: Place, message: str) -> str:
     return f"{path}:{place}: {message}"
 
 
+def nearest(name: str, allowed: Iterable[str]) -> str:
+    """Suggest what `name` may have meant: the nearest of `allowed`, or all of it."""
+    names = sorted(allowed)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    return f"did you mean {near[0]!r}?" if near else f"allowed here: {', '.join(names)}"
+
+
 def complaints(
     path: Path, positions: Positions, error: ValidationError, schema: type[BaseModel]
 ) -> list[str]:
@@ -221,9 +228,7 @@ def _explain(details: ErrorDetails, positions: Positions, schema: type[BaseModel
     kind = details["type"]
     if kind == "extra_forbidden":
         name = str(location[-1])
-        near = difflib.get_close_matches(name, _allowed(schema, location[:-1]), n=1, cutoff=0.6)
-        allowed = ", ".join(_allowed(schema, location[:-1]))
-        hint = f"did you mean {near[0]!r}?" if near else f"allowed here: {allowed}"
+        hint = nearest(name, _allowed(schema, location[:-1]))
         return positions.key(location), f"unknown key {_dotted(location)!r}; {hint}"
     if kind == "missing":
         return positions.key(
