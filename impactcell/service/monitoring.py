@@ -1,0 +1,124 @@
+"""`/healthz` and Prometheus `/metrics` over HTTP for the cells of a process; off unless the YAML says so."""
+
+import json
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import TracebackType
+from typing import Self
+
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
+from prometheus_client.registry import Collector, CollectorRegistry
+
+from impactcell.errors import SettingsError
+
+
+@dataclass(frozen=True, slots=True)
+class CellHealth:
+    """What monitoring shows of one cell."""
+
+    cell: str
+    connected: bool
+    cycles: int
+    missed: int
+    last_cycle: int
+    round_trip_ms: float
+    mu_s: float
+    wear_level: float
+    alarms_active: int
+    journal_ok: bool
+
+    @property
+    def healthy(self) -> bool:
+        """The module answers and the journal can be written."""
+        return self.connected and self.journal_ok
+
+
+Health = Callable[[], Iterable[CellHealth]]
+
+_METRICS: tuple[tuple[str, str, str, Callable[[CellHealth], float]], ...] = (
+    ("gauge", "connected", "1 while the module answers", lambda h: float(h.connected)),
+    ("counter", "cycles", "Cycles processed since the start", lambda h: h.cycles),
+    ("counter", "cycles_missed", "Cycles the module had overwritten", lambda h: h.missed),
+    ("gauge", "last_cycle", "Number of the last cycle", lambda h: h.last_cycle),
+    ("gauge", "round_trip_milliseconds", "Of the last Modbus request", lambda h: h.round_trip_ms),
+    ("gauge", "static_friction", "mu_s of the last cycle", lambda h: h.mu_s),
+    ("gauge", "wear_level", "Tracked mu_s at the reference batch", lambda h: h.wear_level),
+    ("gauge", "alarms_active", "Active alarms", lambda h: h.alarms_active),
+    ("gauge", "journal_ok", "1 while the journal can be written", lambda h: float(h.journal_ok)),
+)
+
+
+class _Cells(Collector):
+    def __init__(self, health: Health) -> None:
+        self._health = health
+
+    def collect(self) -> Iterable[Metric]:
+        cells = list(self._health())
+        for kind, name, text, value in _METRICS:
+            family = (CounterMetricFamily if kind == "counter" else GaugeMetricFamily)(
+                f"impactcell_{name}", text, labels=["cell"]
+            )
+            for cell in cells:
+                family.add_metric([cell.cell], value(cell))
+            yield family
+
+
+class Monitoring:
+    """An HTTP listener in a thread of its own, from entering the context to leaving it.
+
+    Raises
+    ------
+    SettingsError
+        On entering, if the address cannot be listened on.
+    """
+
+    def __init__(self, host: str, port: int, health: Health) -> None:
+        self.host, self.port = host, port
+        registry = CollectorRegistry()
+        registry.register(_Cells(health))
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                if self.path == "/metrics":
+                    self._answer(200, CONTENT_TYPE_LATEST, generate_latest(registry))
+                elif self.path == "/healthz":
+                    cells = {cell.cell: cell.healthy for cell in health()}
+                    status = 200 if all(cells.values()) else 503
+                    self._answer(status, "application/json", json.dumps(cells).encode())
+                else:
+                    self.send_error(404, "only /healthz and /metrics are here")
+
+            def _answer(self, status: int, content_type: str, body: bytes) -> None:
+                self.send_response(status)
+                self.send_header("Content-Type", content_type)
+                self.send_header("Content-Length", str(len(body)))
+                self.end_headers()
+                self.wfile.write(body)
+
+            def log_message(self, *_: object) -> None:
+                """Stay silent: a scrape every few seconds is no news."""
+
+        self._handler = Handler
+
+    def __enter__(self) -> Self:
+        try:
+            self._server = ThreadingHTTPServer((self.host, self.port), self._handler)
+        except OSError as error:
+            raise SettingsError(
+                f"monitoring: cannot listen on {self.host}:{self.port} ({error.strerror}); choose another"
+            ) from error
+        self._server.daemon_threads = True
+        self.port = self._server.server_address[1]
+        self._thread = threading.Thread(target=self._server.serve_forever, name="monitoring", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()

@@ -1,0 +1,26 @@
+"""The service manager's protocol: readiness, watchdog and stopping, as in sd_notify(3)."""
+
+import os
+import socket
+
+from impactcell.errors import SettingsError
+
+
+def notify(state: str) -> bool:
+    """Send `state`, as in `READY=1`, to the service manager; False where there is none."""
+    address = os.environ.get("NOTIFY_SOCKET")
+    if not address:
+        return False
+    if address[0] not in "/@":
+        raise SettingsError(f"NOTIFY_SOCKET={address}: neither a path nor an abstract socket")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as channel:
+        channel.connect("\0" + address[1:] if address[0] == "@" else address)
+        channel.sendall(state.encode())
+    return True
+
+
+def watchdog_interval_s() -> float | None:
+    """Half the time after which the service manager takes a silent service for dead; None without one."""
+    microseconds = os.environ.get("WATCHDOG_USEC", "")
+    for_us = os.environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+    return int(microseconds) / 2e6 if microseconds.isdigit() and int(microseconds) > 0 and for_us else None
