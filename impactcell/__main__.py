@@ -87,9 +87,9 @@ def run(cells: Cells, *, quiet: Quiet = False, verbose: Verbose = False) -> None
 def check(cells: Cells, *, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Report every fault of the cell files at once as file:line:column: message."""
     del verbose
-    from impactcell.settings import check as check_cells
+    from impactcell.settings import read_cells
 
-    check_cells(cells)
+    read_cells(cells)
     if not quiet:
         typer.echo(f"{len(cells)} cell file{'s' * (len(cells) > 1)} in order")
 

@@ -1,0 +1,102 @@
+"""Cells read whole: the cell file, the register map and the model that it names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from impactcell import yamlfile
+from impactcell.errors import MapError, SettingsError
+from impactcell.fieldbus.registers import RegisterMap
+from impactcell.modelfile import read_model
+from impactcell.prediction.model import Model
+from impactcell.settings.sections import CellSettings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cell:
+    """One cell as its files describe it."""
+
+    path: Path
+    settings: CellSettings
+    register_map: RegisterMap
+    model: Model
+
+    @property
+    def name(self) -> str:
+        """Name of the cell, in OPC UA, in logs and in messages."""
+        return self.settings.cell
+
+
+def read_cell(path: Path) -> Cell:
+    """Read a cell file with the register map and the model that it names.
+
+    Raises
+    ------
+    SettingsError
+        With every fault of the three files, one `file:line:column: message` a line.
+    """
+    settings, _ = yamlfile.read(path, CellSettings)
+    faults = []
+    try:
+        register_map = read_register_map(settings.module.register_map, settings.module.word_order)
+    except SettingsError as error:
+        faults.append(str(error))
+    try:
+        model = read_model(settings.model)
+    except SettingsError as error:
+        faults.append(str(error))
+    if faults:
+        raise SettingsError("\n".join(faults))
+    return Cell(path, settings, register_map, model)
+
+
+def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
+    """Read a register map; `word_order` takes the place of the map's own.
+
+    Raises
+    ------
+    SettingsError
+        With every fault of the file, each with its name.
+    """
+    data, _ = yamlfile.load(path)
+    if not isinstance(data, dict):
+        raise SettingsError(f"{path}:1:1: a register map is a mapping of format, name and registers")
+    if word_order is not None:
+        data = {**data, "word_order": word_order}
+    try:
+        return RegisterMap.from_mapping(data)
+    except MapError as error:
+        raise SettingsError("\n".join(f"{path}: {fault}" for fault in str(error).splitlines())) from error
+
+
+def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
+    """Read the cells of one process; see that they do not get in each other's way.
+
+    Raises
+    ------
+    SettingsError
+        With every fault of every file.
+    """
+    cells, faults = [], []
+    for path in paths:
+        try:
+            cells.append(read_cell(path))
+        except SettingsError as error:
+            faults.append(str(error))
+    for index, cell in enumerate(cells):
+        for other in cells[:index]:
+            if cell.name == other.name:
+                faults.append(f"{cell.path}: cell '{cell.name}' is in {other.path} too; rename one")
+            journals = cell.settings.journal, other.settings.journal
+            if journals[0] and journals[1] and journals[0].file == journals[1].file:
+                faults.append(
+                    f"{cell.path}: {other.path} has the same journal file; a journal belongs to one cell"
+                )
+            if (
+                cell.settings.opcua != other.settings.opcua
+                and cell.settings.opcua.endpoint == other.settings.opcua.endpoint
+            ):
+                faults.append(f"{cell.path}: {other.path} has the same endpoint, but other opcua settings")
+    if faults:
+        raise SettingsError("\n".join(faults))
+    return tuple(cells)

@@ -1,0 +1,108 @@
+"""A cell file is understood whole, or every fault of it is told at once, with its place."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from impactcell.errors import SettingsError
+from impactcell.settings import read_cell, read_cells, schema
+
+CONFIG = Path(__file__).resolve().parents[3] / "config"
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    shutil.copytree(CONFIG, tmp_path / "config")
+    return tmp_path / "config"
+
+
+def edited(config: Path, old: str, new: str, name: str = "edited") -> Path:
+    text = (config / "cells" / "prototype.yaml").read_text()
+    assert old in text
+    path = config / "cells" / f"{name}.yaml"
+    path.write_text(text.replace(old, new))
+    return path
+
+
+@pytest.mark.parametrize("path", sorted((CONFIG / "cells").glob("*.yaml")), ids=lambda path: path.stem)
+def test_shipped_cells_are_in_order(path: Path) -> None:
+    assert read_cell(path).name
+
+
+def test_every_fault_at_once_with_its_place(config: Path) -> None:
+    path = config / "cells" / "bad.yaml"
+    path.write_text(
+        "format: 1\ncell: press 1\nmodule:\n  porrt: 502\n  register_map: maps/none.yaml\n  window: 1000\n"
+        "model: m.yaml\nalarms: {wear_limit: -1}\njournal: {file: nowhere/x.sqlite}\nopcua: {endpoint: 'http://x'}\n"
+    )
+    with pytest.raises(SettingsError) as caught:
+        read_cell(path)
+    places = [line.removeprefix(f"{path}:").split(" ")[0] for line in str(caught.value).splitlines()]
+    assert places == ["2:7:", "4:3:", "5:17:", "6:11:", "7:8:", "8:22:", "9:17:", "10:19:"]
+    for hint in (
+        "did you mean 'port'",
+        "as in press-1",
+        "there is no file",
+        "no directory",
+        "opc.tcp://127.0.0.1",
+    ):
+        assert hint in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("port: 15020", "port: '15020'", "module.port: should be a valid integer, not '15020'"),
+        ("port: 15020", "port: 70000", "less than or equal to 65535"),
+        ("wear_limit: 0.25", "wear_limit: .nan", "finite"),
+        ("wear_limit: 0.25", "wear_limit: 0.2\n  wear_limit: 0.3", "twice"),
+        (
+            "wear_limit: 0.25",
+            "wear_limit: 0.2\n  wear_probability_on: 0.4",
+            "wear_probability_off must be below",
+        ),
+        ("format: 1", "format: 2", "format"),
+        ("cell: prototype", "cell: 7", "valid string"),
+        ("../models/prototype.yaml", "none.yaml", "no file"),
+        ("../models/prototype.yaml", "../maps/fpga-v1.yaml", "unknown key"),
+        ("../maps/fpga-v1.yaml", "../models/prototype.yaml", "prototype.yaml"),
+        ("format: 1", "format: 1\n\tcell: x", "4:1: .*token"),
+    ],
+)
+def test_one_fault(config: Path, old: str, new: str, complaint: str) -> None:
+    with pytest.raises(SettingsError, match=complaint):
+        read_cell(edited(config, old, new))
+
+
+def test_cells_of_one_process_do_not_share_what_is_one_cells(config: Path) -> None:
+    journal = f"cell: prototype\njournal: {{file: {config / 'one.sqlite'}}}"
+    first = edited(config, "cell: prototype", journal, "first")
+    second = edited(
+        config,
+        "cell: prototype",
+        journal.replace("prototype", "other") + "\nopcua: {max_sessions: 3}",
+        "second",
+    )
+    with pytest.raises(SettingsError) as caught:
+        read_cells([first, second])
+    assert "same journal file" in str(caught.value)
+    assert "same endpoint" in str(caught.value)
+    with pytest.raises(SettingsError, match="rename one"):
+        read_cells([first, first])
+    assert [cell.name for cell in read_cells([first])] == ["prototype"]
+
+
+def test_word_order_of_the_cell_takes_the_place_of_the_maps(config: Path) -> None:
+    plain = read_cell(config / "cells" / "prototype.yaml").register_map
+    turned = read_cell(edited(config, "port: 15020", "port: 15020\n  word_order: little")).register_map
+    value = plain["cycle_counter"].encode(1)
+    assert list(turned["cycle_counter"].encode(1)) == list(value)[::-1]
+
+
+def test_every_key_of_the_schema_says_what_it_means() -> None:
+    document = json.loads(schema())
+    for name, section in {"CellSettings": document, **document["$defs"]}.items():
+        for key, entry in section["properties"].items():
+            assert "description" in entry or "$ref" in json.dumps(entry) or key == "format", f"{name}.{key}"
