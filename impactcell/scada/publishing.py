@@ -1,0 +1,83 @@
+"""From a snapshot to the nodes of a cell."""
+
+import math
+from datetime import UTC, datetime
+from typing import Final
+
+from asyncua import ua
+
+from impactcell.records import Quality, Snapshot
+from impactcell.scada.descriptions import ModuleState
+from impactcell.scada.instances import read
+from impactcell.scada.nodes import CYCLE, MODULE
+from impactcell.scada.nodes import Value as NodeValue
+from impactcell.scada.space import CellSpace
+from impactcell.scada.values import BAD, LAST_USABLE, NO_COMMUNICATION, STATUS, WAITING, Values, moment
+
+_EMPTY: Final[dict[ua.VariantType, object]] = {
+    ua.VariantType.Double: math.nan,
+    ua.VariantType.UInt32: 0,
+    ua.VariantType.String: "",
+    ua.VariantType.Boolean: False,
+}
+
+
+class CellValues:
+    """Writes the variables of one cell.
+
+    Each cycle writes each variable with the time of the cycle. A subscriber hears of it only where value
+    or status have changed, unless it asks for changes of the timestamp as well.
+    """
+
+    def __init__(self, cell: CellSpace, values: Values, space: object, now: datetime) -> None:
+        self._values = values
+        self._nodes: dict[str, tuple[ua.NodeId, ua.VariantType, bool]] = {}
+        self._seen: set[str] = set()
+        for path in (*CYCLE, *MODULE):
+            node = cell.path(path)
+            kind = ua.VariantType(read(space, node, ua.AttributeIds.DataType).Identifier)
+            is_array = read(space, node, ua.AttributeIds.ValueRank) == 1
+            self._nodes[path] = node, kind, is_array
+            empty = [] if is_array else _EMPTY[kind]
+            values.write(node, ua.DataValue(ua.Variant(empty, kind, is_array=is_array), WAITING, now, now))
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Write all that one cycle has to say."""
+        time = moment(snapshot.time_ns)
+        for path, row in CYCLE.items():
+            value, quality = row.read(snapshot)
+            self._write(path, value, quality, time)
+
+    def module(self, state: ModuleState, time_ns: int) -> None:
+        """Write the state of the link."""
+        time = moment(time_ns)
+        for path, pick in MODULE.items():
+            value = pick(state)
+            missing = isinstance(value, float) and math.isnan(value)
+            self._write(path, value, Quality.BAD if missing else Quality.GOOD, time)
+
+    def lost(self, time_ns: int) -> None:
+        """No communication: every figure of a cycle becomes Bad and keeps its last value."""
+        self._restate(NO_COMMUNICATION, time_ns)
+
+    def stale(self, time_ns: int) -> None:
+        """Nothing new for a while: every figure of a cycle becomes Uncertain and keeps its last value."""
+        self._restate(LAST_USABLE, time_ns)
+
+    def _restate(self, status: ua.StatusCode, time_ns: int) -> None:
+        time = moment(time_ns)
+        for path in CYCLE:
+            if path in self._seen:
+                self._values.restate(self._nodes[path][0], status, time)
+
+    def _write(self, path: str, value: NodeValue, quality: Quality, time: datetime) -> None:
+        node, kind, is_array = self._nodes[path]
+        if quality is Quality.BAD or (isinstance(value, float) and math.isnan(value)):
+            # A Bad value is the last one that could be believed; there is none before the first.
+            held = self._values.read(node)
+            status = BAD if path in self._seen else WAITING
+            self._values.write(node, ua.DataValue(held.Value, status, time, datetime.now(UTC)))
+            return
+        self._seen.add(path)
+        variant = ua.Variant(value, kind, is_array=is_array)
+        self._values.write(node, ua.DataValue(variant, STATUS[quality], time, datetime.now(UTC)))
