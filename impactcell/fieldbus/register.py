@@ -1,7 +1,7 @@
 """One register of a map: its type, its unit, and how its words become a value and back.
 
-Pure. Blocks of words are big-endian 16-bit arrays (`WIRE`), the bytes exactly as Modbus carries them, so a block
-becomes an array of samples by a view, not register by register.
+Pure. Blocks of words are big-endian 16-bit arrays (`WIRE`), the bytes exactly as Modbus carries them, so a
+block becomes an array of samples by a view, not register by register.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Register maps: what stands at which Modbus address.
 
-Pure: a map is a value made from a mapping (the parsed map file), used alike by the service and by the simulator.
+Pure: a map is a value made from a mapping (the parsed map file), used by the service and the simulator alike.
 A value is in SI on this side; a map's `scale` and `unit` say what the wire carries:
 SI value = raw code × scale × SI factor of the unit.
 """

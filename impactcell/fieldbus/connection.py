@@ -1,0 +1,214 @@
+"""One Modbus TCP connection: a window of requests in flight, and nothing unchecked is ever used.
+
+A reply counts only if transaction, unit, function and length are those of its request. At the first one that
+is not, and at a timeout, the connection is given up for good, so that what still comes on it can never be
+taken for an answer. A disconnect fails all that is pending at once.
+"""
+
+import asyncio
+import socket
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
+from impactcell.fieldbus.codec import BUSY, FrameReader, Request, check_reply, frame
+from impactcell.fieldbus.link import ModuleLink
+
+BUSY_PAUSE_S: Final = 0.02
+"""How long a device that said busy is left alone; it is asked again until the timeout has passed."""
+_QUICKACK: Final[int | None] = getattr(socket, "TCP_QUICKACK", None)
+
+
+class Exchange:
+    """Requests that are answered together: the parts of one block, or one write."""
+
+    __slots__ = ("data", "done", "missing")
+
+    def __init__(self, size: int, parts: int) -> None:
+        self.data = bytearray(size)
+        self.missing = parts
+        self.done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+    def fail(self, error: FieldbusError) -> None:
+        """End it with an error, unless it has ended already."""
+        if not self.done.done():
+            self.done.set_exception(error)
+
+
+@dataclass(slots=True, eq=False)
+class Part:
+    """One request of an exchange, where its registers go, and when it was first and last sent."""
+
+    exchange: Exchange
+    request: Request
+    offset: int
+    first_sent_s: float = 0.0
+    sent_s: float = 0.0
+
+
+class Connection(asyncio.Protocol):
+    """One connection, from its making to its loss; it is never used again after that.
+
+    Attributes
+    ----------
+    round_trip_s : float
+        Time between the last request of the last exchange and its reply; nan before the first.
+    lost : asyncio.Event
+        Set once the socket is gone.
+    """
+
+    def __init__(self, link: ModuleLink, transactions: Iterator[int]) -> None:
+        self.link = link
+        self.round_trip_s = float("nan")
+        self.lost = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+        self._transactions = transactions
+        self._transport: asyncio.Transport | None = None
+        self._socket: socket.socket | None = None
+        self._reader = FrameReader()
+        self._waiting: deque[Part] = deque()
+        self._flying: dict[int, Part] = {}
+        self._busy: dict[asyncio.TimerHandle, Part] = {}
+        self._timer: asyncio.TimerHandle | None = None
+        self._resting: asyncio.TimerHandle | None = None
+
+    @property
+    def open(self) -> bool:
+        """Whether requests can be sent."""
+        return self._transport is not None
+
+    def submit(self, parts: Iterable[Part], *, first: bool = False) -> None:
+        """Send `parts` as the window allows; `first`: before all that waits."""
+        if self._transport is None:
+            raise LinkError(f"{self.link}: not connected")
+        if first:
+            self._waiting.extendleft(parts)
+        else:
+            self._waiting.extend(parts)
+        self._pump()
+
+    def give_up(self, error: FieldbusError) -> None:
+        """Close the connection and fail all that is pending."""
+        for handle in (self._timer, self._resting, *self._busy):
+            if handle is not None:
+                handle.cancel()
+        pending = [*self._flying.values(), *self._busy.values(), *self._waiting]
+        self._timer = self._resting = None
+        self._busy.clear()
+        self._flying.clear()
+        self._waiting.clear()
+        transport, self._transport = self._transport, None
+        if transport is not None:
+            transport.abort()
+        for part in pending:
+            part.exchange.fail(error)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take over a fresh connection (called by asyncio)."""
+        assert isinstance(transport, asyncio.Transport)  # noqa: S101 - TCP and TLS both give one
+        self._transport = transport
+        if _QUICKACK is not None:
+            self._socket = transport.get_extra_info("socket")
+
+    def data_received(self, data: bytes) -> None:
+        """Match replies with requests and send the next ones (called by asyncio)."""
+        if self._transport is None:
+            return
+        if self._socket is not None and _QUICKACK is not None:
+            # The system falls back to delayed acknowledgements by itself, so this is set anew on each read.
+            self._socket.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
+        try:
+            for transaction, unit, pdu in self._reader.feed(data):
+                self._answer(transaction, unit, pdu)
+        except ProtocolError as error:
+            self.give_up(ProtocolError(f"{self.link}: {error}"))
+            return
+        if self.link.pause_s and self._resting is None:
+            self._resting = self._loop.call_later(self.link.pause_s, self._rested)
+        else:
+            self._pump()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Fail what is pending (called by asyncio)."""
+        self.lost.set()
+        if self._transport is not None:
+            self.give_up(LinkError(f"{self.link}: connection lost{f': {exc}' if exc else ''}"))
+
+    def _pump(self) -> None:
+        """Send what the window allows, in one write."""
+        if self._transport is None or self._resting is not None:
+            return
+        frames = []
+        now = self._loop.time()
+        while self._waiting and len(self._flying) < self.link.window:
+            part = self._waiting.popleft()
+            if part.exchange.done.done():  # its block has failed, or nobody waits for it any more
+                continue
+            part.sent_s = now
+            part.first_sent_s = part.first_sent_s or now
+            transaction = next(self._transactions)
+            while transaction in self._flying:
+                transaction = next(self._transactions)
+            self._flying[transaction] = part
+            frames.append(frame(transaction, self.link.device_id, part.request.pdu))
+        if frames:
+            self._transport.write(b"".join(frames))
+            if self._timer is None:
+                self._timer = self._loop.call_later(self.link.timeout_s, self._check_time)
+
+    def _check_time(self) -> None:
+        """Give up if the oldest request has waited too long; else look again when it will have."""
+        self._timer = None
+        if not self._flying:
+            return
+        oldest = next(iter(self._flying.values()))  # a dictionary keeps the order of sending
+        left_s = oldest.sent_s + self.link.timeout_s - self._loop.time()
+        if left_s > 0.0:
+            self._timer = self._loop.call_later(left_s, self._check_time)
+            return
+        timeout = f"within {self.link.timeout_s:g} s"
+        self.give_up(LinkError(f"{self.link}: no answer to {oldest.request.what} {timeout}"))
+
+    def _answer(self, transaction: int, unit: int, pdu: bytes) -> None:
+        """Use one reply; raises ProtocolError, with the request still open, where it is not a good one."""
+        part = self._flying.get(transaction)
+        if part is None:
+            raise ProtocolError(f"an answer to transaction {transaction}, which is not open")
+        if unit != self.link.device_id:
+            raise ProtocolError(f"an answer from device {unit} to {part.request.what}")
+        try:
+            data = check_reply(part.request, pdu)
+        except ModbusExceptionError as refused:
+            del self._flying[transaction]
+            self._refused(part, refused)
+            return
+        del self._flying[transaction]
+        exchange = part.exchange
+        exchange.data[part.offset : part.offset + len(data)] = data
+        exchange.missing -= 1
+        if not exchange.missing:
+            self.round_trip_s = self._loop.time() - part.sent_s
+            if not exchange.done.done():
+                exchange.done.set_result(None)
+
+    def _refused(self, part: Part, refused: ModbusExceptionError) -> None:
+        if (
+            refused.code == BUSY
+            and self._loop.time() + BUSY_PAUSE_S < part.first_sent_s + self.link.timeout_s
+        ):
+
+            def again() -> None:
+                del self._busy[handle]
+                self._waiting.appendleft(part)
+                self._pump()
+
+            handle = self._loop.call_later(BUSY_PAUSE_S, again)
+            self._busy[handle] = part
+            return
+        part.exchange.fail(ModbusExceptionError(f"{self.link}: {refused}", refused.code))
+
+    def _rested(self) -> None:
+        self._resting = None
+        self._pump()

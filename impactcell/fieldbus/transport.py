@@ -1,0 +1,109 @@
+"""Modbus TCP client of one device: blocks of registers in and out, over one connection after another."""
+
+import asyncio
+import contextlib
+import itertools
+from typing import Final
+
+import numpy as np
+
+from impactcell.errors import LinkError
+from impactcell.fieldbus.codec import Function, read_request, write_request
+from impactcell.fieldbus.connection import Connection, Exchange, Part
+from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.registers import WIRE, Words
+
+_READ_FUNCTION: Final = {"holding": Function.READ_HOLDING, "input": Function.READ_INPUT}
+
+
+class ModbusClient:
+    """One device; `connect` may be called again after the connection was lost.
+
+    A block is cut into requests of at most `link.max_registers`, of which up to `link.window` are in flight.
+    Every attempt has a fresh transaction id, also across connections.
+    """
+
+    def __init__(self, link: ModuleLink) -> None:
+        self.link = link
+        self._connection: Connection | None = None
+        self._transactions = (number & 0xFFFF for number in itertools.count(1))
+
+    @property
+    def connected(self) -> bool:
+        """Whether requests can be sent."""
+        return self._connection is not None and self._connection.open
+
+    @property
+    def round_trip_s(self) -> float:
+        """Time between the last request and its reply; nan before the first."""
+        return self._connection.round_trip_s if self._connection is not None else float("nan")
+
+    async def connect(self) -> None:
+        """Open the connection, unless it is open.
+
+        Raises
+        ------
+        LinkError
+            If it cannot be made within the timeout.
+        """
+        if self.connected:
+            return
+        link, loop = self.link, asyncio.get_running_loop()
+        context = link.tls.context() if link.tls else None
+        name = (link.tls.server_name or link.host) if link.tls else None
+        try:
+            async with asyncio.timeout(link.timeout_s):
+                _, self._connection = await loop.create_connection(
+                    lambda: Connection(link, self._transactions),
+                    link.host,
+                    link.port,
+                    ssl=context,
+                    server_hostname=name,
+                )
+        except TimeoutError:
+            raise LinkError(f"{link}: no connection within {link.timeout_s:g} s") from None
+        except OSError as error:
+            raise LinkError(f"{link}: no connection: {error.strerror or error}") from error
+
+    async def close(self) -> None:
+        """Close the connection and wait until it is gone; all that is pending fails."""
+        connection, self._connection = self._connection, None
+        if connection is None:
+            return
+        connection.give_up(LinkError(f"{self.link}: connection closed"))
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self.link.timeout_s):
+                await connection.lost.wait()
+
+    async def read(self, address: int, count: int, table: str = "holding") -> Words:
+        """Read registers as they stand on the wire, shape (count,), dtype `WIRE`.
+
+        Raises
+        ------
+        LinkError, ProtocolError
+            If the connection is gone; it fails all that is pending at once.
+        ModbusExceptionError
+            If the device refuses; the connection stays.
+        """
+        function, step = _READ_FUNCTION[table], self.link.max_registers
+        starts = range(0, count, step)
+        exchange = Exchange(2 * count, len(starts))
+        self._open().submit(
+            [
+                Part(exchange, read_request(function, address + start, min(step, count - start)), 2 * start)
+                for start in starts
+            ]
+        )
+        await exchange.done
+        return np.frombuffer(exchange.data, dtype=WIRE)
+
+    async def write(self, address: int, words: Words) -> None:
+        """Write holding registers in one request, before any read that waits; raises as `read` does."""
+        exchange = Exchange(0, 1)
+        self._open().submit([Part(exchange, write_request(address, words), 0)], first=True)
+        await exchange.done
+
+    def _open(self) -> Connection:
+        if self._connection is None:
+            raise LinkError(f"{self.link}: not connected")
+        return self._connection
