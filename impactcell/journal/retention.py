@@ -41,7 +41,7 @@ def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> None:
     database.execute("DELETE FROM audit WHERE time_ns < ?", (oldest_ns,))
     while _size(database) > keep.max_size_bytes and _drop_oldest(database):
         pass
-    # execute() would step this statement once, and so give back a single page; executescript() runs it to its end.
+    # execute() steps this statement once and gives back a single page; executescript() runs it to its end.
     database.executescript("PRAGMA incremental_vacuum")
     database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 

@@ -6,18 +6,19 @@ are one transaction: after any crash the file shows the cycle with all of it, or
 A `Journal` is used from one thread at a time; `service.py` gives it a thread of its own.
 """
 
-import json
 import math
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
+from impactcell import values
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
 from impactcell.journal.blobs import decode_capture, encode_capture
+from impactcell.journal.history import Page, PastValue, Question, past_alarms, past_values
 from impactcell.journal.retention import Retention, thin
 from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, TABLES
 from impactcell.records import Alarm, Capture, Snapshot
@@ -166,6 +167,16 @@ class Journal:
         for (blob,) in rows:
             yield decode_capture(blob)
 
+    def values(self, variable: str, question: Question) -> Page[PastValue]:
+        """Return stored values of a variable; see `impactcell.journal.history`."""
+        with self._errors():
+            return past_values(self._db, variable, question)
+
+    def alarms(self, question: Question) -> Page[Alarm]:
+        """Return the states that each transition of an alarm led to."""
+        with self._errors():
+            return past_alarms(self._db, question)
+
     def thin(self, keep: Retention, now_ns: int) -> None:
         """Drop what `keep` does not keep; see `impactcell.journal.retention`."""
         with self._errors():
@@ -211,7 +222,7 @@ class Journal:
     def _put_alarms(self, changed: Sequence[Alarm]) -> None:
         self._db.executemany(
             "INSERT INTO alarms (time_ns, record) VALUES (?, ?)",
-            [(alarm.time_ns, json.dumps(asdict(alarm), default=_plain)) for alarm in changed],
+            [(alarm.time_ns, values.dumps(alarm).decode()) for alarm in changed],
         )
 
     @contextmanager
@@ -243,7 +254,3 @@ class Journal:
 def _sql(value: float | str) -> float | str | None:
     """NaN is no SQL number: it is stored as NULL."""
     return None if isinstance(value, float) and math.isnan(value) else value
-
-
-def _plain(value: Any) -> Any:
-    return getattr(value, "value", str(value))

@@ -1,0 +1,125 @@
+"""The past of a cell, read page by page in order of time."""
+
+import math
+import sqlite3
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar
+
+from impactcell import values
+from impactcell.errors import JournalError
+from impactcell.records import Alarm, Quality
+
+T = TypeVar("T")
+
+VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
+    "Friction/StaticFriction": ("mu_s", "mu_s_quality"),
+    "Friction/StaticFrictionStdDev": ("mu_s_std", "mu_s_quality"),
+    "Friction/KineticFriction": ("mu_k", "mu_k_quality"),
+    "Wear/Level": ("wear_level", "wear_quality"),
+    "Wear/LevelStdDev": ("wear_level_std", "wear_quality"),
+    "Batch/Offset": ("batch_offset", "batch_quality"),
+    "Batch/OffsetStdDev": ("batch_offset_std", "batch_quality"),
+}
+"""Variables with a past, by their OPC UA path: their columns for value and quality. All are without unit."""
+
+_TOKEN = struct.Struct(">qq")
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """Which part of the past is wanted.
+
+    Attributes
+    ----------
+    start_ns, end_ns : int or None
+        Both ends inclusive, nanoseconds since 1970; None is open.
+    limit : int
+        Entries in a page, at most.
+    newest_first : bool
+        Reverses the order.
+    resume : bytes or None
+        Continues an earlier page of the same question.
+    """
+
+    start_ns: int | None = None
+    end_ns: int | None = None
+    limit: int = 1000
+    newest_first: bool = False
+    resume: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PastValue:
+    """One stored value; nan where the cycle had none."""
+
+    time_ns: int
+    value: float
+    quality: Quality
+
+
+@dataclass(frozen=True, slots=True)
+class Page(Generic[T]):
+    """Entries in order, and the token that continues them; None where nothing is left."""
+
+    entries: tuple[T, ...]
+    resume: bytes | None
+
+
+def past_values(database: sqlite3.Connection, variable: str, question: Question) -> Page[PastValue]:
+    """Read stored values of a variable of `VARIABLES`.
+
+    Raises
+    ------
+    JournalError
+        The variable has no past, or the token is not one of ours.
+    """
+    if variable not in VARIABLES:
+        raise JournalError(f"{variable} has no history; these have: {', '.join(VARIABLES)}")
+    value, quality = VARIABLES[variable]
+    rows, resume = _page(database, question, f"seq, time_ns, {value}, {quality}", "cycles", "seq")
+    return Page(
+        tuple(
+            PastValue(time_ns, math.nan if stored is None else stored, Quality(level))
+            for _, time_ns, stored, level in rows
+        ),
+        resume,
+    )
+
+
+def past_alarms(database: sqlite3.Connection, question: Question) -> Page[Alarm]:
+    """Read the states that each transition of an alarm led to.
+
+    Raises
+    ------
+    JournalError
+        The token is not one of ours, or a record is of another version.
+    """
+    rows, resume = _page(database, question, "id, time_ns, record", "alarms", "id")
+    try:
+        return Page(tuple(values.loads(Alarm, record.encode()) for _, _, record in rows), resume)
+    except ValueError as error:
+        raise JournalError(f"an alarm in the journal cannot be read: {error}") from error
+
+
+def _page(
+    database: sqlite3.Connection, question: Question, columns: str, table: str, key: str
+) -> tuple[list[tuple[Any, ...]], bytes | None]:
+    direction, beyond = ("DESC", "<") if question.newest_first else ("ASC", ">")
+    after = None
+    if question.resume is not None:
+        try:
+            after = _TOKEN.unpack(question.resume)
+        except struct.error as error:
+            raise JournalError("this token continues no page of a history") from error
+    rows = database.execute(
+        f"SELECT {columns} FROM {table} "  # noqa: S608 - names from this module only
+        "WHERE (?1 IS NULL OR time_ns >= ?1) AND (?2 IS NULL OR time_ns <= ?2) "
+        f"AND (?3 IS NULL OR (time_ns, {key}) {beyond} (?3, ?4)) "
+        f"ORDER BY time_ns {direction}, {key} {direction} LIMIT ?5",
+        (question.start_ns, question.end_ns, *(after or (None, None)), question.limit + 1),
+    ).fetchall()
+    more = len(rows) > question.limit
+    rows = rows[: question.limit]
+    return rows, _TOKEN.pack(rows[-1][1], rows[-1][0]) if more and rows else None
