@@ -7,6 +7,7 @@ by sample when written, and what does not fit is kept as 64-bit floats.
 """
 
 import json
+import math
 import struct
 import zlib
 from dataclasses import replace
@@ -133,7 +134,9 @@ def _decode_channel(header: dict[str, Any], cursor: _Cursor) -> Channel:
 def _uniform_rate(time_s: Samples) -> float | None:
     if len(time_s) < 2 or not time_s[-1] > time_s[0]:
         return None
-    rate_hz = float((len(time_s) - 1) / (time_s[-1] - time_s[0]))
+    rate_hz = (len(time_s) - 1) / (float(time_s[-1]) - float(time_s[0]))
+    if not math.isfinite(rate_hz):
+        return None
     for candidate in (rate_hz, float(round(rate_hz))):
         if candidate > 0 and np.array_equal(uniform_times(float(time_s[0]), candidate, len(time_s)), time_s):
             return candidate
@@ -143,7 +146,8 @@ def _uniform_rate(time_s: Samples) -> float | None:
 def _codes(channel: Channel) -> np.ndarray[Any, np.dtype[np.int64]] | None:
     if not channel.resolution or not np.all(np.isfinite(channel.values)):
         return None
-    scaled = np.rint(channel.values / channel.resolution)
+    with np.errstate(over="ignore"):
+        scaled = np.rint(channel.values / channel.resolution)
     if np.abs(scaled).max(initial=0) >= 2**53:
         return None
     codes = scaled.astype(np.int64)
