@@ -1,0 +1,16 @@
+"""Non-linear contact: k d^n."""
+
+from simulator.effects.law import Effect
+
+
+class HertzContact(Effect):
+    """Spring with a free exponent; 1.5 for a sphere on a plane."""
+
+    identifier = "hertz_contact"
+    defaults = {"exponent": 1.03}
+
+    def __init__(self, exponent: float) -> None:
+        self._n = exponent
+
+    def spring_force(self, d: float, stiffness: float, force: float) -> float:  # noqa: ARG002
+        return stiffness * float(d**self._n)
