@@ -1,0 +1,1 @@
+"""`impactcell demo`: a simulated cell and the service on loopback, with a live view."""
