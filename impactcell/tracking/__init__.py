@@ -1,1 +1,16 @@
-"""Friction followed over time (wear), material (batch) and one stroke (signature)."""
+"""Friction over time (wear), over batches (material) and along one stroke (signature)."""
+
+from impactcell.tracking.settings import BatchKnowledge, TrackerSettings
+from impactcell.tracking.state import Reading, Tracked, TrackerState, initial_state, reset_wear
+from impactcell.tracking.tracker import track
+
+__all__ = [
+    "BatchKnowledge",
+    "Reading",
+    "Tracked",
+    "TrackerSettings",
+    "TrackerState",
+    "initial_state",
+    "reset_wear",
+    "track",
+]

@@ -1,0 +1,130 @@
+"""What goes into one cycle of tracking, what is kept between cycles, and what comes out."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from impactcell.records import BatchState, Evidence, FrictionEstimate, Samples, WearState
+from impactcell.tracking.bank import WIDTH
+from impactcell.tracking.noise import Noise
+from impactcell.tracking.screening import Clock
+from impactcell.tracking.wear import WearFilter
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What one cycle brings: mu_s, its standard deviation (nan where there is none), what the PLC says."""
+
+    cycle: int
+    mu_s: float
+    mu_s_std: float
+    time_ns: int = 0
+    batch_id: str | None = None
+    expected_change: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        cycle: int,
+        time_ns: int,
+        estimate: FrictionEstimate,
+        batch_id: str | None,
+        *,
+        expected: bool = False,
+    ) -> "Reading":
+        """Take the published mu_s of an estimate."""
+        return cls(cycle, estimate.mu_s.value, estimate.mu_s.std, time_ns, batch_id, expected)
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """The last batch shift: size in mu_s, its first cycle, and whether it was found or announced."""
+
+    cycle: int
+    size: float
+    size_std: float
+    found_at: int = 0
+    statistic: float = math.nan
+    threshold: float = math.nan
+    expected: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackerState:
+    """All that is kept between cycles; `impactcell.values` writes it bit for bit.
+
+    Attributes
+    ----------
+    clock : Clock
+        Which cycles have been seen, and when.
+    filter : WearFilter or None
+        The filter that believes the PLC's batch ids.
+    bank : ndarray, shape (k, 22)
+        Run-length hypotheses, see `impactcell.tracking.bank`.
+    accepted, accepted_before : int
+        Indices of the last two cycles at which the bank's shift was reported.
+    batch_start, batch_count : int
+        Index at which the PLC's present batch began, and how many there have been.
+    tested : bool
+        The present known batch has been reported as shifted, or was expected to be.
+    """
+
+    clock: Clock = field(default_factory=Clock)
+    noise: Noise = field(default_factory=Noise)
+    filter: WearFilter | None = None
+    bank: Samples = field(default_factory=lambda: np.zeros((0, WIDTH)))
+    accepted: int = 0
+    accepted_before: int = 0
+    batch_id: str | None = None
+    previous_batch: str | None = None
+    batch_start: int = 0
+    batch_count: int = 0
+    tested: bool = True
+    shift: Shift | None = None
+    first: int = 0
+    level_variance: float = 0.0
+    slope_variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracked:
+    """Outcome of one cycle.
+
+    Attributes
+    ----------
+    shift : Evidence or None
+        Set at the one cycle at which a batch shift is found.
+    expected : bool
+        The PLC announced a batch change with this cycle: the alarm is to stay silent.
+    innovation : float
+        Measurement minus prediction in standard deviations; nan if not used.
+    used : bool
+        Whether the reading went into the state.
+    notes : tuple of str
+        What was wrong with the reading, and what was done about it.
+    """
+
+    state: TrackerState
+    wear: WearState
+    batch: BatchState
+    shift: Evidence | None
+    expected: bool
+    innovation: float
+    used: bool
+    notes: tuple[str, ...]
+
+
+def initial_state() -> TrackerState:
+    """State before the first cycle."""
+    return TrackerState()
+
+
+def reset_wear(state: TrackerState) -> TrackerState:
+    """State after the surface was renewed: the next cycle is a new reference; the noise stays learned."""
+    return TrackerState(
+        clock=state.clock,
+        noise=state.noise,
+        level_variance=state.level_variance,
+        slope_variance=state.slope_variance,
+    )

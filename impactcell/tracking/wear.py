@@ -1,0 +1,144 @@
+"""Friction over time with the batch known: a Kalman filter on filterpy, state [level, slope, offsets].
+
+Measurement of cycle n in batch i, and what passes between cycles::
+
+    z_n = level_n + offset_i + e,   e ~ N(0, R)
+    level_{n+1} = level_n + slope_n + w_1,   slope_{n+1} = slope_n + w_2
+
+The first batch is the reference, its offset zero. Every later batch has an offset of its own in the
+state, so that a batch that comes back is recognised and the size of a shift has its exact variance.
+Outliers are clipped after Huber (1964): beyond c standard deviations R is inflated until the innovation
+moves the state as one of c standard deviations would.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from filterpy.kalman import predict, update
+
+from impactcell.records import Samples
+
+KEPT_BATCHES = 12  # more are forgotten, the longest unseen first; their uncertainty stays in level and slope
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WearFilter:
+    """State of the filter.
+
+    Attributes
+    ----------
+    batches : tuple of str
+        The reference batch, then those with an offset in the state, least recently seen first.
+    current : str
+        The present batch.
+    mean : ndarray, shape (2 + len(batches) - 1,)
+        Level, slope a cycle, offsets.
+    covariance : ndarray, shape (n, n)
+    """
+
+    batches: tuple[str, ...]
+    current: str
+    mean: Samples
+    covariance: Samples
+
+
+@dataclass(frozen=True, slots=True)
+class Innovation:
+    """What a measurement was beyond its prediction, and the prediction's standard deviation."""
+
+    value: float
+    std: float
+
+
+def start(value: float, variance: float, slope_std: float, batch: str) -> WearFilter:
+    """Begin with one measurement; its batch is the reference."""
+    return WearFilter((batch,), batch, np.array([value, 0.0]), np.diag([variance, slope_std**2]))
+
+
+def resume(mean: Samples, covariance: Samples, batch: str) -> WearFilter:
+    """Go on from the bank's state [total, slope, offset, shift]; the present batch becomes the reference."""
+    return WearFilter((batch,), batch, mean[:2].copy(), covariance[:2, :2].copy())
+
+
+def pass_cycles(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:
+    """Predict over `cycles` cycles; the variances are those of the random walks, a cycle."""
+    n = len(state.mean)
+    transition = np.eye(n)
+    transition[0, 1] = cycles
+    noise = np.zeros((n, n))
+    noise[0, 0] = level_variance * cycles + slope_variance * cycles**3 / 3.0
+    noise[0, 1] = noise[1, 0] = slope_variance * cycles**2 / 2.0
+    noise[1, 1] = slope_variance * cycles
+    mean, covariance = predict(state.mean, state.covariance, F=transition, Q=noise)
+    return WearFilter(state.batches, state.current, mean, covariance)
+
+
+def change_batch(state: WearFilter, batch: str, step_variance: float) -> WearFilter:
+    """Go on with another batch: one seen before, or a new one with an offset unknown to `step_variance`."""
+    batches, mean, covariance = state.batches, state.mean, state.covariance
+    if batch in batches[1:]:
+        order = [
+            0,
+            1,
+            *(i + 1 for i in range(1, len(batches)) if batches[i] != batch),
+            batches.index(batch) + 1,
+        ]
+        batches = (batches[0], *(b for b in batches[1:] if b != batch), batch)
+        mean, covariance = mean[order], covariance[np.ix_(order, order)]
+    elif batch != batches[0]:
+        if len(batches) > KEPT_BATCHES:
+            kept = [i for i in range(len(mean)) if i != 2]
+            batches, mean, covariance = (batches[0], *batches[2:]), mean[kept], covariance[np.ix_(kept, kept)]
+        n = len(mean)
+        before = _row(batches, state.current, n)
+        batches, mean = (*batches, batch), np.append(mean, before[2:] @ mean[2:])
+        grown = np.zeros((n + 1, n + 1))
+        grown[:n, :n] = covariance
+        before[:2] = 0.0
+        grown[n, :n] = grown[:n, n] = covariance @ before
+        grown[n, n] = before @ covariance @ before + step_variance
+        covariance = grown
+    return WearFilter(batches, batch, mean, covariance)
+
+
+def measure(
+    state: WearFilter, value: float, variance: float, threshold: float, lag: int = 0, batch: str | None = None
+) -> tuple[WearFilter, Innovation]:
+    """Update with one measurement, `lag` cycles late, of `batch` (the present one if None)."""
+    design = _row(state.batches, state.current if batch is None else batch, len(state.mean))
+    design[1] = -float(lag)
+    own = float(design @ state.covariance @ design)
+    innovation = value - float(design @ state.mean)
+    ratio = abs(innovation) / math.sqrt(own + variance) / threshold
+    if ratio > 1.0:
+        # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
+        variance = (own + variance) * ratio - own
+    mean, covariance = update(
+        state.mean, state.covariance, np.array([value]), np.array([[variance]]), design[np.newaxis, :]
+    )
+    symmetric = (covariance + covariance.T) / 2.0
+    fresh = WearFilter(state.batches, state.current, np.asarray(mean, dtype=np.float64), symmetric)
+    return fresh, Innovation(
+        innovation, math.sqrt(own + variance) if ratio <= 1.0 else math.sqrt((own + variance) / ratio)
+    )
+
+
+def offset(state: WearFilter, batch: str) -> tuple[float, float]:
+    """Offset of a batch from the reference batch, and its standard deviation."""
+    return contrast(state, batch, state.batches[0])
+
+
+def contrast(state: WearFilter, batch: str, other: str) -> tuple[float, float]:
+    """Offset of `batch` minus that of `other`, and its standard deviation."""
+    n = len(state.mean)
+    row = _row(state.batches, batch, n) - _row(state.batches, other, n)
+    return float(row @ state.mean), math.sqrt(max(float(row @ state.covariance @ row), 0.0))
+
+
+def _row(batches: tuple[str, ...], batch: str, n: int) -> Samples:
+    row = np.zeros(n)
+    row[0] = 1.0
+    if batch != batches[0]:
+        row[1 + batches.index(batch)] = 1.0
+    return row
