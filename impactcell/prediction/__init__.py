@@ -1,1 +1,25 @@
-"""mu_s and mu_k from one capture: peak force, sliding distance, their combination, and the full waveform."""
+"""mu_s and mu_k of a tap: by peak force (4), sliding distance (5), both (6), and from the whole waveform."""
+
+from impactcell.prediction.calibration import calibrate
+from impactcell.prediction.estimate import estimate
+from impactcell.prediction.model import (
+    DistanceForm,
+    ForceForm,
+    Model,
+    Predictor,
+    Prior,
+    Sensitivity,
+    printed,
+)
+
+__all__ = [
+    "DistanceForm",
+    "ForceForm",
+    "Model",
+    "Predictor",
+    "Prior",
+    "Sensitivity",
+    "calibrate",
+    "estimate",
+    "printed",
+]

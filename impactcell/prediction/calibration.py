@@ -1,0 +1,198 @@
+"""Calibration: equations (4) and (5) fitted to a cell's own plant, by sweeps of friction and velocity.
+
+Nothing here is random and nothing depends on the order of work: the same plant gives the same bits.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from impactcell.errors import PhysicsError, PredictionError
+from impactcell.physics import Plant, Strike, strike
+from impactcell.prediction.equations import Mix
+from impactcell.prediction.model import (
+    REFERENCE_VELOCITY,
+    DistanceForm,
+    ForceForm,
+    Predictor,
+    Sensitivity,
+    printed,
+)
+from impactcell.records import Samples
+
+VELOCITIES = 9
+FRICTIONS = 9
+PERTURBED = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """Peak force and sliding distance of one mass over velocity and friction.
+
+    Attributes
+    ----------
+    velocity_m_s, mu_s : ndarray, shapes (v,) and (u,)
+    peak_force_n, sliding_distance_m : ndarray, shape (v, u)
+    """
+
+    velocity_m_s: Samples
+    mu_s: Samples
+    peak_force_n: Samples
+    sliding_distance_m: Samples
+
+
+def sweep(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Sweep:
+    """Strike the plant at every velocity and friction, mu_k / mu_s kept.
+
+    Velocities at which the part does not slide free at every friction are left out.
+
+    Raises
+    ------
+    PredictionError
+        Fewer than three velocities are left.
+    """
+    ratio = plant.mu_k / plant.mu_s
+    kept, peaks, slid = [], [], []
+    for velocity in velocities:
+        try:
+            row = [
+                figures(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=float(velocity)))
+                for mu in frictions.tolist()
+            ]
+        except PhysicsError:
+            continue
+        kept.append(velocity)
+        peaks.append([peak for peak, _ in row])
+        slid.append([length for _, length in row])
+    if len(kept) < 3:
+        raise PredictionError(
+            f"a part of {tap.mass_kg:.4g} kg slides free at fewer than three velocities between "
+            f"{6e4 * velocities[0]:.4g} and {6e4 * velocities[-1]:.4g} mm/min; "
+            "tap faster, or with a longer stroke"
+        )
+    return Sweep(np.array(kept), frictions, np.array(peaks), np.array(slid))
+
+
+def figures(plant: Plant, tap: Strike) -> tuple[float, float]:
+    """Peak force, N, and sliding distance, m, of one tap."""
+    motion = strike(plant, tap)
+    return motion.peak_force_n, motion.sliding_distance_m
+
+
+def fit_force(swept: Sweep) -> ForceForm:
+    """Equation (4) by least squares in mu_s, in which it is linear."""
+    v, mu = np.meshgrid(swept.velocity_m_s, swept.mu_s, indexing="ij")
+    design = np.column_stack([swept.peak_force_n.ravel(), v.ravel()])
+    (inverse, drop), *_ = np.linalg.lstsq(design, mu.ravel())
+    rms = float(np.sqrt(np.mean((design @ np.array([inverse, drop]) - mu.ravel()) ** 2)))
+    return ForceForm(friction_n=float(1.0 / inverse), velocity_n_s_per_m=float(-drop / inverse), rms=rms)
+
+
+def fit_distance(swept: Sweep) -> DistanceForm:
+    """Equation (5) by least squares in mu_s, starting from the printed coefficients."""
+    u = (swept.velocity_m_s / REFERENCE_VELOCITY)[:, None]
+    mu, slid = swept.mu_s[None, :], swept.sliding_distance_m
+    slope = np.abs(np.gradient(slid, swept.mu_s, axis=1, edge_order=2))
+
+    def form(p: Samples) -> Samples:
+        shape: Samples = np.exp(p[1]) * u ** p[2] * (p[0] - mu) ** 2 + np.exp(p[3]) * u ** p[4]
+        return shape
+
+    def miss(p: Samples) -> Samples:
+        error: Samples = ((form(p) - slid) / slope).ravel()
+        return error
+
+    start = printed().distance
+    scale = float(np.median(slid / form(_packed(start))))
+    first = _packed(replace(start, square_m=start.square_m * scale, offset_m=start.offset_m * scale))
+    fit = least_squares(miss, first, method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=20_000)
+    limit, square, square_power, offset, offset_power = fit.x.tolist()
+    rms = float(np.sqrt(np.mean(fit.fun**2)))
+    return DistanceForm(limit, math.exp(square), square_power, math.exp(offset), offset_power, rms)
+
+
+def predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Predictor:
+    """Fit both equations for one mass and find how they depend on what the plant takes as known."""
+    swept = sweep(plant, tap, velocities, frictions)
+    fitted = Predictor(
+        mass_kg=tap.mass_kg,
+        mu_s_range=(float(frictions[0]), float(frictions[-1])),
+        velocity_range_m_s=(float(swept.velocity_m_s[0]), float(swept.velocity_m_s[-1])),
+        force=fit_force(swept),
+        distance=fit_distance(swept),
+    )
+    changed = {
+        "stiffness": replace(plant, stiffness_n_per_m=plant.stiffness_n_per_m * (1.0 + PERTURBED)),
+        "damping": replace(plant, damping_n_s_per_m=plant.damping_n_s_per_m * (1.0 + PERTURBED)),
+        "ratio": replace(plant, mu_k=plant.mu_k * (1.0 + PERTURBED)),
+    }
+    force, slid = {}, {}
+    for name, other in changed.items():
+        force[name], slid[name] = _sensitivities(fitted, plant, other, tap, swept)
+    return replace(fitted, force_sensitivity=Sensitivity(**force), distance_sensitivity=Sensitivity(**slid))
+
+
+def calibrate(
+    plant: Plant,
+    tap: Strike,
+    masses_kg: Sequence[float],
+    velocities_m_s: Samples,
+    frictions: Samples,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[Predictor, ...]:
+    """Fit equations (4) and (5) for a range of masses.
+
+    Parameters
+    ----------
+    plant : Plant
+        Its mu_k / mu_s is kept, mu_s is swept.
+    tap : Strike
+        Stroke, direction and halt of the cell; its velocity and mass are swept.
+    masses_kg, velocities_m_s, frictions : array_like
+        In ascending order.
+    progress : callable, optional
+        Called with the masses done and their number.
+
+    Raises
+    ------
+    PredictionError
+        The part slides free at too few velocities.
+    """
+    found = []
+    for done, mass in enumerate(masses_kg):
+        if progress is not None:
+            progress(done, len(masses_kg))
+        found.append(predictor(plant, replace(tap, mass_kg=float(mass)), velocities_m_s, frictions))
+    if progress is not None:
+        progress(len(masses_kg), len(masses_kg))
+    return tuple(found)
+
+
+def _sensitivities(
+    fitted: Predictor, plant: Plant, other: Plant, tap: Strike, swept: Sweep
+) -> tuple[float, float]:
+    """Mean relative change of both predicted mu_s per relative change of one property of the plant."""
+    ratio = other.mu_k / other.mu_s
+    mixed = Mix(tap.mass_kg, ((1.0, fitted),), inside=True)
+    force, slid = [], []
+    for velocity in swept.velocity_m_s[[0, len(swept.velocity_m_s) // 2, -1]].tolist():
+        mu = plant.mu_s
+        try:
+            peak, length = figures(
+                replace(other, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity)
+            )
+            peak_0, length_0 = figures(plant, replace(tap, velocity_m_s=velocity))
+        except PhysicsError:
+            continue
+        force.append((peak - peak_0) / fitted.force.friction_n / mu / PERTURBED)
+        slid.append((length - length_0) / mixed.slope_of_distance(mu, velocity) / mu / PERTURBED)
+    return float(np.mean(force or [0.0])), float(np.mean(slid or [0.0]))
+
+
+def _packed(form: DistanceForm) -> Samples:
+    return np.array(
+        [form.limit, math.log(form.square_m), form.square_power, math.log(form.offset_m), form.offset_power]
+    )

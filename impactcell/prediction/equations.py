@@ -1,0 +1,236 @@
+"""Equations (4), (5) and (6): mu_s from the peak force, from the sliding distance, and from both.
+
+The forms are the paper's, the coefficients a cell's own (`impactcell.prediction.model.Predictor`), one set
+a mass; between two masses the predicted force is interpolated linearly in mass, the distance in log-log.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+from impactcell.errors import NegativeRootError, PredictionError
+from impactcell.prediction.model import REFERENCE_VELOCITY, DistanceForm, Model, Predictor, Sensitivity
+from impactcell.prediction.reading import Reading
+from impactcell.records import Coefficient, Quality
+
+LOWEST_MU = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Mix:
+    """The predictors of one mass: those of the masses on either side of it, and their shares."""
+
+    mass_kg: float
+    parts: tuple[tuple[float, Predictor], ...]
+    inside: bool
+
+    def mean(self, name: str) -> float:
+        """Interpolate a coefficient that is linear in the prediction."""
+        return sum(share * _deep(predictor, name) for share, predictor in self.parts)
+
+    def peak_force(self, mu_s: float, velocity_m_s: float) -> float:
+        """Equation (4) forward, N."""
+        return self.mean("force.friction_n") * mu_s + self.mean("force.velocity_n_s_per_m") * velocity_m_s
+
+    def sliding_distance(self, mu_s: float, velocity_m_s: float) -> float:
+        """Equation (5) forward, m."""
+        return math.exp(
+            sum(
+                share * math.log(max(distance(predictor.distance, mu_s, velocity_m_s), 1e-12))
+                for share, predictor in self.parts
+            )
+        )
+
+    def slope_of_distance(self, mu_s: float, velocity_m_s: float) -> float:
+        """Differentiate the sliding distance with respect to mu_s, m; negative below the limit."""
+        step = 1e-5
+        return (
+            self.sliding_distance(mu_s + step, velocity_m_s)
+            - self.sliding_distance(mu_s - step, velocity_m_s)
+        ) / (2.0 * step)
+
+
+def distance(form: DistanceForm, mu_s: float, velocity_m_s: float) -> float:
+    """Equation (5) forward for one mass, m."""
+    u = velocity_m_s / REFERENCE_VELOCITY
+    square: float = form.square_m * u**form.square_power * (form.limit - mu_s) ** 2
+    offset: float = form.offset_m * u**form.offset_power
+    return square + offset
+
+
+def mix(model: Model, mass_kg: float) -> Mix:
+    """Choose the predictors for a mass.
+
+    Raises
+    ------
+    PredictionError
+        The model has not been calibrated, or the mass is not known.
+    """
+    predictors = model.predictors
+    if not predictors:
+        raise PredictionError(f"model {model.name!r} has no predictors: run `impactcell calibrate`")
+    if not (math.isfinite(mass_kg) and mass_kg > 0.0):
+        raise PredictionError("the part's mass is not known")
+    close = min(predictors, key=lambda one: abs(one.mass_kg - mass_kg))
+    if abs(close.mass_kg / mass_kg - 1.0) < 1e-3:
+        return Mix(mass_kg, ((1.0, close),), inside=True)
+    for low, high in pairwise(predictors):
+        if low.mass_kg < mass_kg < high.mass_kg:
+            share = math.log(mass_kg / low.mass_kg) / math.log(high.mass_kg / low.mass_kg)
+            return Mix(mass_kg, ((1.0 - share, low), (share, high)), inside=True)
+    return Mix(mass_kg, ((1.0, close),), inside=False)
+
+
+def by_force(model: Model, mixed: Mix, velocity_m_s: float, peak: Reading) -> Coefficient:
+    """Equation (4): mu_s = (F_p - velocity_n_s_per_m v) / friction_n.
+
+    Raises
+    ------
+    PredictionError
+        The force is smaller than that of a part without friction.
+    """
+    slope = mixed.mean("force.friction_n")
+    value = (peak.value - mixed.mean("force.velocity_n_s_per_m") * velocity_m_s) / slope
+    if value <= 0.0:
+        raise PredictionError(
+            f"peak force {peak.value:.4g} N is below that of a part without friction; check mass and velocity"
+        )
+    sensitivity = _sensitivity(mixed, "force_sensitivity")
+    std = math.hypot(peak.std / slope, mixed.mean("force.rms"), value * _known_to(model, sensitivity))
+    return _in_range(model, mixed, velocity_m_s, value, std)
+
+
+def by_distance(model: Model, mixed: Mix, velocity_m_s: float, slid: Reading) -> Coefficient:
+    """Equation (5): mu_s = limit - sqrt((d - offset_m u^offset_power) / (square_m u^square_power)).
+
+    Raises
+    ------
+    NegativeRootError
+        The distance is shorter than the form allows at this velocity: there is no real root.
+    PredictionError
+        It is longer than that of a part without friction.
+    """
+    limit = min(predictor.distance.limit for _, predictor in mixed.parts)
+    shortest = mixed.sliding_distance(limit, velocity_m_s)
+    if slid.value < shortest:
+        raise NegativeRootError(
+            f"sliding distance {1e6 * slid.value:.4g} µm is below {1e6 * shortest:.4g} µm, the shortest for "
+            f"which equation (5) has a root at {velocity_m_s:.4g} m/s; check mass, stroke and velocity"
+        )
+    if slid.value > mixed.sliding_distance(LOWEST_MU, velocity_m_s):
+        raise PredictionError(
+            f"sliding distance {1e6 * slid.value:.4g} µm is that of a part without friction; "
+            "check mass and velocity"
+        )
+    low, high = LOWEST_MU, limit
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if mixed.sliding_distance(middle, velocity_m_s) > slid.value:
+            low = middle
+        else:
+            high = middle
+    value = 0.5 * (low + high)
+    slope = abs(mixed.slope_of_distance(value, velocity_m_s))
+    sensitivity = _sensitivity(mixed, "distance_sensitivity")
+    std = math.hypot(
+        slid.std / max(slope, 1e-12), mixed.mean("distance.rms"), value * _known_to(model, sensitivity)
+    )
+    return _in_range(model, mixed, velocity_m_s, value, std)
+
+
+def combined(
+    model: Model,
+    mixed: Mix,
+    velocity_m_s: float,
+    force: tuple[Coefficient, Reading],
+    slid: tuple[Coefficient, Reading],
+) -> Coefficient:
+    """Equation (6): mu_s = mu_force w_F + mu_dist w_d, weighted by the gradients of both figures.
+
+    w_F = dF/dmu / (dF/dmu + dd/dmu ΔF/Δd) and w_d = 1 - w_F, with ΔF and Δd the spans of peak force and
+    sliding distance over the calibrated range of mu_s at this velocity.
+    """
+    (mu_force, peak), (mu_dist, distance_read) = force, slid
+    weight = force_weight(mixed, 0.5 * (mu_force.value + mu_dist.value), velocity_m_s)
+    value = weight * mu_force.value + (1.0 - weight) * mu_dist.value
+    one, two = _sensitivity(mixed, "force_sensitivity"), _sensitivity(mixed, "distance_sensitivity")
+    both = Sensitivity(
+        *(
+            weight * getattr(one, name) + (1.0 - weight) * getattr(two, name)
+            for name in ("stiffness", "damping", "ratio")
+        )
+    )
+    slope = abs(mixed.slope_of_distance(mu_dist.value, velocity_m_s))
+    std = math.hypot(
+        weight * peak.std / mixed.mean("force.friction_n"),
+        weight * mixed.mean("force.rms"),
+        (1.0 - weight) * distance_read.std / max(slope, 1e-12),
+        (1.0 - weight) * mixed.mean("distance.rms"),
+        value * _known_to(model, both),
+    )
+    return _in_range(model, mixed, velocity_m_s, value, std)
+
+
+def force_weight(mixed: Mix, mu_s: float, velocity_m_s: float) -> float:
+    """w_F of equation (6)."""
+    low = max(predictor.mu_s_range[0] for _, predictor in mixed.parts)
+    high = min(predictor.mu_s_range[1] for _, predictor in mixed.parts)
+    inside = min(max(mu_s, low), high)
+    slope_f = mixed.mean("force.friction_n")
+    span_f = slope_f * (high - low)
+    span_d = mixed.sliding_distance(low, velocity_m_s) - mixed.sliding_distance(high, velocity_m_s)
+    slope_d = abs(mixed.slope_of_distance(inside, velocity_m_s))
+    return slope_f / (slope_f + slope_d * span_f / max(abs(span_d), 1e-12))
+
+
+def out_of_range(model: Model, mixed: Mix, velocity_m_s: float, mu_s: float, stroke_m: float) -> str:
+    """Say in which ways a tap lies outside the calibration; empty where it does not."""
+    reasons = []
+    if not mixed.inside:
+        low, high = model.predictors[0].mass_kg, model.predictors[-1].mass_kg
+        reasons.append(f"mass {mixed.mass_kg:.4g} kg is outside the calibrated {low:.4g}-{high:.4g} kg")
+    slowest = max(predictor.velocity_range_m_s[0] for _, predictor in mixed.parts)
+    fastest = min(predictor.velocity_range_m_s[1] for _, predictor in mixed.parts)
+    if not slowest * (1 - 1e-9) <= velocity_m_s <= fastest * (1 + 1e-9):
+        reasons.append(
+            f"velocity {6e4 * velocity_m_s:.5g} mm/min is outside the calibrated "
+            f"{6e4 * slowest:.5g}-{6e4 * fastest:.5g} mm/min"
+        )
+    low = max(predictor.mu_s_range[0] for _, predictor in mixed.parts)
+    high = min(predictor.mu_s_range[1] for _, predictor in mixed.parts)
+    if math.isfinite(mu_s) and not low <= mu_s <= high:
+        reasons.append(f"mu_s {mu_s:.4g} is outside the calibrated {low:.4g}-{high:.4g}")
+    same = stroke_m == model.stroke_m or abs(stroke_m / model.stroke_m - 1.0) < 0.01
+    if math.isfinite(stroke_m) != math.isfinite(model.stroke_m) or not same:
+        reasons.append(
+            f"stroke {_millimetres(stroke_m)} is not the {_millimetres(model.stroke_m)} of the calibration"
+        )
+    return "; ".join(reasons)
+
+
+def _in_range(model: Model, mixed: Mix, velocity_m_s: float, value: float, std: float) -> Coefficient:
+    reason = out_of_range(model, mixed, velocity_m_s, value, model.stroke_m)
+    return Coefficient(value, std, Quality.UNCERTAIN if reason else Quality.GOOD, reason)
+
+
+def _known_to(model: Model, sensitivity: Sensitivity) -> float:
+    """Relative error of mu_s that comes from what the calibration took as known."""
+    plant, prior = model.plant, model.prior
+    return math.hypot(
+        sensitivity.stiffness * prior.stiffness_std_n_per_m / plant.stiffness_n_per_m,
+        sensitivity.damping * prior.damping_std_n_s_per_m / max(plant.damping_n_s_per_m, 1e-12),
+        sensitivity.ratio * prior.ratio_std / model.ratio,
+    )
+
+
+def _sensitivity(mixed: Mix, which: str) -> Sensitivity:
+    return Sensitivity(*(mixed.mean(f"{which}.{name}") for name in ("stiffness", "damping", "ratio")))
+
+
+def _deep(predictor: Predictor, name: str) -> float:
+    first, second = name.split(".")
+    return float(getattr(getattr(predictor, first), second))
+
+
+def _millimetres(stroke_m: float) -> str:
+    return f"{1e3 * stroke_m:.4g} mm" if math.isfinite(stroke_m) else "without limit"

@@ -1,0 +1,137 @@
+"""One capture in, one `FrictionEstimate` out: every predictor, and the one that is published."""
+
+import math
+
+from impactcell.errors import PhysicsError, PredictionError
+from impactcell.prediction.equations import by_distance, by_force, combined, mix, out_of_range
+from impactcell.prediction.model import Model
+from impactcell.prediction.reading import Reading, Slide, peak_force, slide
+from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
+
+NOT_READ = Reading(math.nan, math.nan)
+
+
+def estimate(capture: Capture, model: Model) -> FrictionEstimate:
+    """Estimate mu_s and mu_k of one tap by equations (4), (5), (6) and by its waveform.
+
+    Published is the waveform's estimate where it converges, else (6), else what there is of (4) and (5).
+    A capture that cannot be used gives a bad estimate that says why; nothing is raised for it.
+
+    Parameters
+    ----------
+    capture : Capture
+    model : Model
+    """
+    peak, force_fault = _peak(capture)
+    slid, slide_fault = _slide(capture)
+    distance = slid.distance if slid is not None else _reported_distance(capture)
+    mu_force = _coefficient(force_fault)
+    mu_distance = _coefficient(slide_fault)
+    mu_combined = _coefficient("; ".join(dict.fromkeys(filter(None, (force_fault, slide_fault)))))
+    warning = ""
+    try:
+        mixed = mix(model, capture.mass_kg)
+        warning = out_of_range(model, mixed, capture.velocity_m_s, math.nan, capture.stroke_m)
+        try:
+            if math.isfinite(peak.value):
+                mu_force = _warned(by_force(model, mixed, capture.velocity_m_s, peak), warning, force_fault)
+        except PredictionError as fault:
+            mu_force = _coefficient(str(fault))
+        try:
+            if math.isfinite(distance.value):
+                mu_distance = _warned(
+                    by_distance(model, mixed, capture.velocity_m_s, distance), warning, slide_fault
+                )
+        except PredictionError as fault:
+            mu_distance = _coefficient(str(fault))
+        if mu_force.quality < Quality.BAD and mu_distance.quality < Quality.BAD:
+            mu_combined = _warned(
+                combined(model, mixed, capture.velocity_m_s, (mu_force, peak), (mu_distance, distance)),
+                warning,
+                "; ".join(filter(None, (force_fault, slide_fault))),
+            )
+        else:
+            faults = [one.reason for one in (mu_force, mu_distance) if one.quality is Quality.BAD]
+            mu_combined = _coefficient("; ".join(dict.fromkeys(faults)))
+    except PredictionError as fault:
+        mu_force = mu_distance = mu_combined = _coefficient(str(fault))
+    mu_s, estimator = _published(mu_combined, mu_force, mu_distance)
+    return FrictionEstimate(
+        mu_s=mu_s,
+        mu_k=_mu_k(model, slid, mu_s),
+        by_force=mu_force,
+        by_distance=mu_distance,
+        combined=mu_combined,
+        estimator=estimator,
+        peak_force_n=peak.value,
+        sliding_distance_m=distance.value,
+    )
+
+
+def _peak(capture: Capture) -> tuple[Reading, str]:
+    """Peak force and what is wrong with it; the module's own figure where no force was recorded."""
+    if capture.force is None and capture.summary is not None:
+        reported = capture.summary.peak_force_n
+        if math.isfinite(reported) and reported > 0.0:
+            return Reading(reported, 0.01 * reported), "from the module's summary: no force was recorded"
+        return NOT_READ, f"the module reports a peak force of {reported} N and no record"
+    try:
+        return peak_force(capture.force), ""  # type: ignore[arg-type]
+    except (PredictionError, PhysicsError) as fault:
+        return NOT_READ, str(fault)
+
+
+def _slide(capture: Capture) -> tuple[Slide | None, str]:
+    if capture.position is None and capture.summary is not None:
+        return None, "from the module's summary: no position was recorded"
+    try:
+        return slide(capture), ""
+    except (PredictionError, PhysicsError) as fault:
+        return None, str(fault)
+
+
+def _reported_distance(capture: Capture) -> Reading:
+    if capture.position is None and capture.summary is not None:
+        reported = capture.summary.sliding_distance_m
+        if math.isfinite(reported) and reported > 0.0:
+            return Reading(reported, 0.01 * reported)
+    return NOT_READ
+
+
+def _coefficient(reason: str) -> Coefficient:
+    return Coefficient(reason=reason)
+
+
+def _warned(given: Coefficient, *warnings: str) -> Coefficient:
+    """Mark a coefficient uncertain for each warning that says something."""
+    said = [text for text in warnings if text]
+    if not said:
+        return given
+    reasons = dict.fromkeys([*filter(None, given.reason.split("; ")), *"; ".join(said).split("; ")])
+    return Coefficient(given.value, given.std, max(given.quality, Quality.UNCERTAIN), "; ".join(reasons))
+
+
+def _published(
+    mu_combined: Coefficient, mu_force: Coefficient, mu_distance: Coefficient
+) -> tuple[Coefficient, Estimator]:
+    for given, estimator in (
+        (mu_combined, Estimator.COMBINED),
+        (mu_distance, Estimator.DISTANCE),
+        (mu_force, Estimator.FORCE),
+    ):
+        if given.quality < Quality.BAD:
+            return given, estimator
+    return mu_combined, Estimator.NONE
+
+
+def _mu_k(model: Model, slid: Slide | None, mu_s: Coefficient) -> Coefficient:
+    """mu_k from the mean deceleration of the slide, or, without one, from mu_s through the ratio."""
+    if slid is not None and slid.deceleration.value > 0.0:
+        gravity = model.plant.gravity_m_s2
+        value, std = slid.deceleration.value / gravity, slid.deceleration.std / gravity
+        return Coefficient(value, std, Quality.UNCERTAIN, "mean over the slide, viscous part included")
+    if mu_s.quality < Quality.BAD:
+        ratio = model.ratio
+        std = ratio * math.hypot(mu_s.std, mu_s.value * model.prior.ratio_std / ratio)
+        return Coefficient(ratio * mu_s.value, std, Quality.UNCERTAIN, "through mu_k/mu_s of the model")
+    return Coefficient(reason=mu_s.reason)
