@@ -13,7 +13,7 @@ QUALITY_STYLE = {Quality.GOOD: "green", Quality.UNCERTAIN: "yellow", Quality.BAD
 
 
 def chart(snapshots: Sequence[Snapshot], columns: int) -> Text:
-    """Draw one column a cycle: a dot for the estimate, shading for the tracked level ± 2 sd, offset included."""
+    """Draw one column a cycle: a dot for the estimate, shading for the level with its offset, ± 2 sd."""
     shown = list(snapshots)[-columns:]
     bands = [_band(s) for s in shown]
     numbers = [s.friction.mu_s.value for s in shown] + [edge for band in bands for edge in band]

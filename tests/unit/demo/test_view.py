@@ -1,5 +1,6 @@
 """The live view draws whatever a cell can be in, within its width."""
 
+import io
 import math
 from dataclasses import replace
 
@@ -12,10 +13,9 @@ from tests.snapshots import make_capture, make_snapshot
 
 
 def drawn(snapshots: list[Snapshot], width: int = 100) -> str:
-    console = Console(width=width, force_terminal=False, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
-    with console.file:
-        console.print(render(Scene("press-1", "opc.tcp://127.0.0.1:4840", "wear grows", snapshots), width))
-        return console.export_text()
+    console = Console(width=width, file=io.StringIO(), record=True)
+    console.print(render(Scene("press-1", "opc.tcp://127.0.0.1:4840", "wear grows", snapshots), width))
+    return console.export_text()
 
 
 def history(count: int) -> list[Snapshot]:
