@@ -1,0 +1,150 @@
+"""Which conditions should be active after a cycle, and why: hysteresis, delays in cycles, re-alarm."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+from impactcell.alarms.lifecycle import Event, Occurrence
+from impactcell.records import Alarm, AlarmName, Evidence, Quality, WearState
+
+
+@dataclass(frozen=True, slots=True)
+class RuleSettings:
+    """Of one condition.
+
+    Attributes
+    ----------
+    severity : int
+        1-1000, as in OPC UA.
+    on_delay, off_delay : int
+        Cycles for which the rule must hold, and not hold, before the alarm activates and clears.
+    realarm : int
+        Cycles after which an alarm that is still active calls again; 0 for never.
+    enabled : bool
+        Whether the condition starts enabled.
+    """
+
+    severity: int = 500
+    on_delay: int = 0
+    off_delay: int = 0
+    realarm: int = 0
+    enabled: bool = True
+
+
+DEFAULT_RULES: Mapping[AlarmName, RuleSettings] = MappingProxyType(
+    {
+        AlarmName.WEAR_LIMIT: RuleSettings(severity=700, off_delay=20),
+        # a shift is one cycle's finding: the alarm stands for a while and then clears by itself
+        AlarmName.BATCH_SHIFT: RuleSettings(severity=500, off_delay=50),
+        AlarmName.DEVIANT_CYCLE: RuleSettings(severity=400, off_delay=1),
+        AlarmName.MODULE_CONNECTION: RuleSettings(severity=800),
+        AlarmName.MODEL_GAP: RuleSettings(severity=300, off_delay=20),
+        AlarmName.POSITIONING_FAULT: RuleSettings(severity=600),
+        AlarmName.JOURNAL_FAULT: RuleSettings(severity=900),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmSettings:
+    """Of all conditions of a cell.
+
+    Attributes
+    ----------
+    rules : mapping
+        Settings of each condition; a name that is missing has its default.
+    wear_on, wear_off : float
+        P(level > limit) at which WearLimit comes on and goes off.
+    announced_cycles : int
+        For how many cycles an announced batch change keeps BatchShift suppressed.
+    """
+
+    rules: Mapping[AlarmName, RuleSettings] = field(default_factory=lambda: DEFAULT_RULES)
+    wear_on: float = 0.95
+    wear_off: float = 0.5
+    announced_cycles: int = 50
+
+    def rule(self, name: AlarmName) -> RuleSettings:
+        """Return the settings of one condition."""
+        return self.rules.get(name, DEFAULT_RULES[name])
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a rule says of one condition now; `holds` None where it cannot tell, and all stays as it is."""
+
+    name: AlarmName
+    holds: bool | None
+    message: str = ""
+    evidence: Evidence = field(default_factory=Evidence)
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """Cycles for which a condition's rule has held, or not held, and since it last called."""
+
+    held: int = 0
+    missed: int = 0
+    called: int = 0
+
+
+def wear_limit(settings: AlarmSettings, wear: WearState, cycle: int, *, active: bool) -> Finding:
+    """Wear on the probability that the level is above the limit, with hysteresis in probability."""
+    probability = wear.probability_above_limit
+    threshold = settings.wear_off if active else settings.wear_on
+    if wear.quality is Quality.BAD or probability != probability:
+        return Finding(AlarmName.WEAR_LIMIT, None)
+    above = wear.level - wear.limit
+    since = cycle - round(above / wear.rate_per_cycle) if wear.rate_per_cycle > 0.0 < above else cycle
+    evidence = Evidence(probability, settings.wear_on, max(since, 0), above, wear.level_std)
+    message = (
+        f"mu_s {wear.level:.4f} ± {wear.level_std:.4f}, limit {wear.limit:.4f}, P(above) {probability:.3f}"
+    )
+    return Finding(AlarmName.WEAR_LIMIT, probability > threshold, message, evidence)
+
+
+def batch_shift(shift: Evidence | None) -> Finding:
+    """Find a batch shift in what the tracker says."""
+    if shift is None:
+        return Finding(AlarmName.BATCH_SHIFT, holds=False)
+    message = f"mu_s shifted by {shift.size:+.4f} ± {shift.size_std:.4f} from cycle {shift.change_cycle}"
+    return Finding(AlarmName.BATCH_SHIFT, holds=True, message=message, evidence=shift)
+
+
+def deviant_cycle(deviation: Evidence | None, at_m: float, *, judged: bool) -> Finding:
+    """Find a deviant cycle in what the signature says; `judged` False while its reference is learned."""
+    if not judged:
+        return Finding(AlarmName.DEVIANT_CYCLE, None)
+    if deviation is None:
+        return Finding(AlarmName.DEVIANT_CYCLE, holds=False)
+    message = f"friction {deviation.size:+.4f} ± {deviation.size_std:.4f} off at {at_m * 1e3:.2f} mm"
+    return Finding(AlarmName.DEVIANT_CYCLE, holds=True, message=message, evidence=deviation)
+
+
+def delayed(rule: RuleSettings, alarm: Alarm, delay: Delay, finding: Finding) -> tuple[Delay, Event | None]:
+    """Count cycles and say which event, if any, the finding gives to its alarm."""
+    if finding.holds is None or not alarm.enabled:
+        return (delay if finding.holds is None else Delay()), None
+    if finding.holds:
+        counted = replace(delay, held=delay.held + 1, missed=0)
+    else:
+        counted = replace(delay, held=0, missed=delay.missed + 1)
+    if not alarm.active:
+        if counted.held > rule.on_delay:
+            return replace(counted, called=0), Event.ACTIVATE
+        return counted, None
+    if counted.missed > rule.off_delay:
+        return replace(counted, called=0), Event.CLEAR
+    counted = replace(counted, called=counted.called + 1)
+    if rule.realarm and counted.called >= rule.realarm:
+        return replace(counted, called=0), Event.REALARM
+    return counted, None
+
+
+def occurrence(event: Event, finding: Finding, severity: int, cycle: int, time_ns: int) -> Occurrence:
+    """Make the event that carries a finding's message and evidence."""
+    if event is Event.CLEAR:
+        return Occurrence(event, cycle, time_ns)
+    return Occurrence(
+        event, cycle, time_ns, message=finding.message, severity=severity, evidence=finding.evidence
+    )
