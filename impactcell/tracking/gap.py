@@ -1,0 +1,98 @@
+"""Does the model still explain the captures? A self-starting CUSUM on each capture's normalised residual.
+
+Hawkins (1987, The Statistician 36:299): the residual of capture n, standardised by mean and standard
+deviation of those before, is turned into an exactly standard normal score by Student's t distribution,
+so that the false-alarm rate holds from the first captures on, whatever level is usual for the cell.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+from scipy.special import ndtri, stdtr
+
+from impactcell.records import Evidence
+
+SLACK = 0.75  # half of the shift that is found fastest, in standard deviations
+LEARNED = 500  # captures from which the usual residual is learned
+FIRST = 10  # captures before anything is said
+WINSOR = 4.0  # a single capture counts at most so many standard deviations
+
+
+@dataclass(frozen=True, slots=True)
+class GapState:
+    """Usual logarithm of the residual and the cumulated excess over it."""
+
+    count: int = 0
+    mean: float = 0.0
+    squares: float = 0.0
+    excess: float = 0.0
+    since: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GapTracked:
+    """Outcome of one capture; `exceeds` None while the usual residual is being learned."""
+
+    state: GapState
+    exceeds: bool | None
+    evidence: Evidence
+    reason: str = ""
+
+
+def follow(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, period_s: float) -> GapTracked:
+    """Take one capture's normalised residual (1 = noise floor) into the state."""
+    limit = threshold(false_alarm_cycles)
+    if not (math.isfinite(gap) and gap > 0.0):
+        return GapTracked(state, None, Evidence(), "the capture has no normalised residual")
+    value = math.log(gap)
+    score = 0.0
+    if state.count >= 2 and state.squares > 0.0:
+        n = state.count
+        std = math.sqrt(state.squares / (n - 1))
+        t = math.sqrt(n / (n + 1.0)) * (value - state.mean) / std
+        score = _normal_score(t, n - 1)
+    score = max(-WINSOR, min(score, WINSOR))
+    excess = max(0.0, state.excess + score - SLACK)
+    # capped, so that a gap that is closed is seen to be closed within a few captures
+    excess = min(excess, 2.0 * limit)
+    since = cycle if state.excess == 0.0 else state.since
+    fresh = replace(state, excess=excess, since=since)
+    if state.count < LEARNED and state.excess <= limit:
+        n = state.count + 1
+        step = value - state.mean
+        mean = state.mean + step / n
+        fresh = replace(fresh, count=n, mean=mean, squares=state.squares + step * (value - mean))
+    if fresh.count < FIRST:
+        return GapTracked(fresh, None, Evidence(), "the usual residual is being learned")
+    evidence = Evidence(
+        excess,
+        limit,
+        since if excess > 0.0 else 0,
+        gap - math.exp(fresh.mean),
+        math.exp(fresh.mean) * math.sqrt(fresh.squares / max(fresh.count - 1, 1)),
+        false_alarm_cycles,
+        false_alarm_cycles * period_s / 86_400.0,
+    )
+    return GapTracked(fresh, excess > limit, evidence)
+
+
+def threshold(false_alarm_cycles: float) -> float:
+    """Threshold of a one-sided CUSUM of standard normal scores for a mean time between false alarms.
+
+    Siegmund (1985): ARL = (exp(2 k b) - 2 k b - 1) / (2 k^2), b = h + 1.166; solved by Newton's method.
+    """
+    b = math.log(2.0 * SLACK**2 * false_alarm_cycles + 10.0) / (2.0 * SLACK) + 1.0
+    for _ in range(100):
+        value = math.exp(2.0 * SLACK * b) - 2.0 * SLACK * b - 1.0 - 2.0 * SLACK**2 * false_alarm_cycles
+        step = value / (2.0 * SLACK * (math.exp(2.0 * SLACK * b) - 1.0))
+        b -= step
+        if abs(step) < 1e-12 * b:
+            break
+    return b - 1.166
+
+
+def _normal_score(t: float, freedom: int) -> float:
+    """Give the standard normal score of the same tail probability, from the small tail for its digits."""
+    tail = float(stdtr(freedom, -abs(t)))
+    score = WINSOR if tail <= 0.0 else float(-ndtri(tail))
+    return math.copysign(score, t)
