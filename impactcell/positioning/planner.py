@@ -1,0 +1,281 @@
+"""The tap planner: which velocity and stroke bring the part closer, and when there is none."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from impactcell.errors import PositioningError
+from impactcell.physics import Plant
+from impactcell.positioning import belief as beliefs
+from impactcell.positioning.belief import Belief
+from impactcell.positioning.choice import choose
+from impactcell.positioning.response import displacement_of
+from impactcell.positioning.spread import MIDDLE, Z, distribution, plants, scenarios, spread_table
+from impactcell.positioning.value import AIMS, CostToGo, cost_to_go
+from impactcell.records import Samples
+
+SLOWEST_M_S = 0.003
+VELOCITIES = 24
+STROKES = 120
+MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
+STALE = np.array([0.012, 0.03, 0.06, 0.02, 2.0])  # change of the belief after which a table is made anew
+
+
+@dataclass(frozen=True, slots=True)
+class Tap:
+    """One tap to command.
+
+    Attributes
+    ----------
+    velocity_m_s : float
+    stroke_m : float
+        Travel from first contact; inf in a cell without a commanded stroke.
+    direction : int
+        +1 or -1.
+    expected_m, lowest_m, highest_m : float
+        Median displacement along the tap, and the band that holds 99.9 % of them.
+    expected_taps : float
+        Taps still needed, this one included.
+    overshoot_probability : float
+        That this tap or one of those to come overshoots.
+    """
+
+    velocity_m_s: float
+    stroke_m: float
+    direction: int = 1
+    expected_m: float = math.nan
+    lowest_m: float = -math.inf
+    highest_m: float = math.inf
+    expected_taps: float = math.nan
+    overshoot_probability: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Unreachable:
+    """No tap brings the part inside the tolerance within the bound on overshoot."""
+
+    reason: str
+
+
+class _Part(NamedTuple):
+    """What has been worked out for parts of one mass, and the belief it was worked out from."""
+
+    mass_kg: float
+    belief: Belief
+    table: Samples
+    value: CostToGo
+
+
+@dataclass(slots=True)
+class TapPlanner:
+    """Chooses taps by the expected number still needed, and learns from each.
+
+    Parameters
+    ----------
+    tolerance_m : float
+        A part within this distance of its target, on either side, is in place.
+    max_velocity_m_s, max_stroke_m : float
+        Limits of a tap. `max_stroke_m` = inf: the cell has no commanded stroke and its actuator halts
+        at loss of contact.
+    overshoot_probability : float
+        Bound for a whole task, learning included.
+    plant : Plant, optional
+        Nominal plant; contact within some 10 % and
+        friction within a factor of 1.4 of what the cell turns out to be.
+    two_sided : bool
+        Actuators on both ends: a part that went too far is struck back.
+
+    Raises
+    ------
+    PositioningError
+        For a limit, tolerance or probability that no cell can have.
+    """
+
+    tolerance_m: float = 10e-6
+    max_velocity_m_s: float = 0.1
+    max_stroke_m: float = 1.5e-3
+    overshoot_probability: float = 1e-3
+    plant: Plant | None = None
+    two_sided: bool = False
+    _belief: Belief = field(init=False, repr=False)
+    _gravity: float = field(init=False, repr=False)
+    _parts: list[_Part] = field(init=False, repr=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Refuse what no cell can have, and start from the nominal plant."""
+        for name in ("tolerance_m", "max_velocity_m_s", "max_stroke_m"):
+            if not getattr(self, name) > 0.0:
+                raise PositioningError(f"tap planner: {name} must be positive, not {getattr(self, name)}")
+        if not 0.0 < self.overshoot_probability < 1.0:
+            raise PositioningError(
+                f"tap planner: overshoot_probability lies between 0 and 1, not {self.overshoot_probability}"
+            )
+        plant = self.plant
+        if plant is None:
+            plant = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.25, mu_k=0.19)
+        viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
+        self._gravity = plant.gravity_m_s2
+        self._belief = beliefs.prior(
+            plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, viscous
+        )
+
+    @property
+    def belief(self) -> Belief:
+        """What has been learned so far; a value, to be kept and given back with `resume`."""
+        return self._belief
+
+    def resume(self, belief: Belief) -> None:
+        """Go on from a belief kept earlier."""
+        self._belief = belief
+
+    @property
+    def _halts_at_separation(self) -> bool:
+        return math.isinf(self.max_stroke_m)
+
+    @property
+    def _velocities(self) -> Samples:
+        count = VELOCITIES * (8 if self._halts_at_separation else 1)
+        return np.geomspace(min(SLOWEST_M_S, 0.5 * self.max_velocity_m_s), self.max_velocity_m_s, count)
+
+    @property
+    def _strokes(self) -> Samples:
+        if self._halts_at_separation:
+            return np.array([math.inf])
+        knee = 0.2 * self.max_stroke_m
+        return np.concatenate(
+            [
+                np.linspace(knee / STROKES, knee, STROKES // 2, endpoint=False),
+                np.linspace(knee, self.max_stroke_m, STROKES // 2),
+            ]
+        )
+
+    def next_tap(self, remaining_m: float, mass_kg: float) -> Tap | Unreachable | None:
+        """Choose the next tap of a task; None where the part is in place.
+
+        Parameters
+        ----------
+        remaining_m : float
+            Target minus position along +1; negative when the part lies beyond its target.
+        mass_kg : float
+
+        Returns
+        -------
+        Tap, Unreachable or None
+
+        Raises
+        ------
+        PositioningError
+            For a remaining distance or a mass that is not a number, or a mass that is not positive.
+        """
+        if not math.isfinite(remaining_m):
+            raise PositioningError(f"remaining distance must be a number of metres, not {remaining_m}")
+        if not (math.isfinite(mass_kg) and mass_kg > 0.0):
+            raise PositioningError(f"mass of the part must be a positive number of kg, not {mass_kg}")
+        if abs(remaining_m) <= self.tolerance_m:
+            return None
+        if remaining_m < 0.0 and not self.two_sided:
+            return Unreachable(
+                f"the part lies {-remaining_m * 1e3:.3f} mm beyond its target "
+                "and this cell cannot push it back"
+            )
+        distance = abs(remaining_m)
+        part = self._worked_out(mass_kg)
+        furthest = float(np.nanmax(part.table[:, :, MIDDLE]))
+        if not furthest > 0.0:
+            return Unreachable(
+                f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
+                f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
+            )
+        rows = scenarios(self._belief)
+        penalty = MULTIPLIER / self.overshoot_probability
+        least = 1.0
+        for multiplier in (penalty, 30.0 * penalty):
+            chosen, least = choose(
+                distance, part.table, self._velocities, self._strokes, rows, Z, part.value, AIMS,
+                tolerance=self.tolerance_m, penalty=multiplier, bound=self.overshoot_probability,
+                part_mass=mass_kg, gravity=self._gravity,
+            )  # fmt: skip
+            if chosen is not None:
+                break
+        else:
+            return Unreachable(
+                f"{distance * 1e6:.1f} µm remain, and every tap for a part of {mass_kg:.3g} kg overshoots "
+                f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
+                f"(the safest with {least:.2g})"
+            )
+        moved = np.empty((1, Z.size))
+        stroke = np.array([chosen.stroke_m])
+        distribution(chosen.velocity_m_s, stroke, rows, Z, mass_kg, self._gravity, moved)
+        inside = moved[0, np.abs(Z) <= 3.3]
+        return Tap(
+            velocity_m_s=chosen.velocity_m_s,
+            stroke_m=chosen.stroke_m,
+            direction=1 if remaining_m > 0.0 else -1,
+            expected_m=float(moved[0, MIDDLE]),
+            lowest_m=float(inside.min()),
+            highest_m=float(inside.max()),
+            expected_taps=chosen.cost,
+            overshoot_probability=chosen.overshoot,
+        )
+
+    def observe(self, tap: Tap, moved_m: float, mass_kg: float) -> None:
+        """Learn from a tap that moved the part by `moved_m`, positive along the tap.
+
+        Raises
+        ------
+        PositioningError
+            For a displacement or a mass that is not a number.
+        """
+        if not (math.isfinite(moved_m) and math.isfinite(mass_kg) and mass_kg > 0.0):
+            raise PositioningError(f"cannot learn from a displacement of {moved_m} m of {mass_kg} kg")
+
+        def response(states: Samples) -> Samples:
+            factor = np.maximum(1.0 + states[:, 5], 0.05)
+            return displacement_of(
+                tap.velocity_m_s, tap.stroke_m, plants(states[:, :5]), factor, mass_kg, self._gravity
+            )
+
+        self._belief = beliefs.learn(self._belief, response, moved_m)
+
+    def observe_friction(self, mu_k: float, std: float, batch_changed: bool = False) -> None:  # noqa: FBT001, FBT002
+        """Take over the tracker's kinetic coefficient; `batch_changed`: friction has just stepped.
+
+        Raises
+        ------
+        PositioningError
+            For a coefficient that is not positive or a deviation that is negative.
+        """
+        if not (math.isfinite(mu_k) and mu_k > 0.0 and math.isfinite(std) and std >= 0.0):
+            raise PositioningError(f"cannot use a friction of {mu_k} +- {std}")
+        self._belief = beliefs.told_friction(self._belief, mu_k, std, batch_changed=batch_changed)
+
+    def _worked_out(self, mass_kg: float) -> _Part:
+        """Table of taps and cost to go for this mass, made anew where the belief has moved on."""
+        for n, part in enumerate(self._parts):
+            if abs(part.mass_kg / mass_kg - 1.0) < 0.02 and self._still_holds(part):
+                self._parts.append(self._parts.pop(n))
+                return part
+        rows = scenarios(self._belief)
+        table = spread_table(self._velocities, self._strokes, rows, Z, mass_kg, self._gravity)
+        if np.nanmax(table[:, :, MIDDLE]) > 0.0:
+            later = beliefs.foreseen(self._belief)
+            ahead = table
+            if (np.diag(self._belief.cov) > 1.2 * np.diag(later.cov)).any():
+                ahead = spread_table(
+                    self._velocities, self._strokes, scenarios(later), Z, mass_kg, self._gravity
+                )  # fmt: skip
+            value = cost_to_go(ahead, Z, self.tolerance_m, MULTIPLIER / self.overshoot_probability)
+        else:
+            value = CostToGo(np.ones(1), np.ones(1), np.ones(1))
+        part = _Part(mass_kg, self._belief, table, value)
+        self._parts.append(part)
+        del self._parts[:-64]
+        return part
+
+    def _still_holds(self, part: _Part) -> bool:
+        moved = np.abs(self._belief.mean - part.belief.mean)
+        now, then = np.sqrt(np.diag(self._belief.cov)), np.sqrt(np.diag(part.belief.cov))
+        scatter = self._belief.scatter / part.belief.scatter
+        return bool(np.all(moved < STALE) and np.all(np.abs(now - then) < STALE) and 0.9 < scatter < 1.1)

@@ -1,0 +1,230 @@
+"""Expected cost to go against the remaining distance, by dynamic programming.
+
+With W(r) the expected number of taps from a remaining distance r, and D_a the displacement of tap a,
+
+    W(r) = 0                                                   for |r| <= tolerance
+    W(r) = min_a 1 + E W(r - D_a) + penalty P(D_a > r + tolerance)  beyond
+
+(Bellman). The penalty is the Lagrange multiplier of the bound on overshoot: what one overshoot may cost
+in taps. Since a part is only ever pushed towards the target, W(r) needs W at smaller r only, and one
+sweep from the tolerance outwards is exact on its grid. The probability of an overshoot under the optimal
+choice is swept along with it, so that the bound can be held for the whole task.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from impactcell.compiled import compiled
+from impactcell.records import Samples
+
+STALL_PENALTY = 60.0  # taps that a tap which moves nothing costs: it stops a sequence
+STALL_M = 2e-7
+AIMS = np.array([-0.4, 0.0, 0.4, 0.8, 1.4, 2.2])  # short of the target, in tolerances
+SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
+
+
+class CostToGo(NamedTuple):
+    """W and the overshoot probability on a grid of remaining distances, all shape (n,)."""
+
+    remaining_m: Samples
+    cost: Samples
+    overshoot: Samples
+
+
+@compiled
+def beyond(z: float) -> float:
+    """P(Z > z) of a standard normal Z."""
+    half: float = 0.5 * math.erfc(0.7071067811865476 * z)
+    return half
+
+
+@compiled
+def at(grid: Samples, values: Samples, r: float) -> float:
+    """Linear interpolation on an increasing grid; beyond its end, the mean slope of its second half."""
+    n = grid.size
+    if r <= grid[0]:
+        return float(values[0])
+    if r >= grid[n - 1]:
+        middle = n - 1
+        while middle > 0 and grid[middle] > 0.5 * grid[n - 1]:
+            middle -= 1
+        slope = (values[n - 1] - values[middle]) / (grid[n - 1] - grid[middle])
+        return float(values[n - 1] + slope * (r - grid[n - 1]))
+    low, high = 0, n - 1
+    while high - low > 1:
+        half = (low + high) // 2
+        if grid[half] <= r:
+            low = half
+        else:
+            high = half
+    part = (r - grid[low]) / (grid[high] - grid[low])
+    return float(values[low] + part * (values[high] - values[low]))
+
+
+@compiled
+def expect(
+    remaining: float, moved: Samples, z: Samples, mass: Samples, tolerance: float, penalty: float,
+    grid: Samples, cost: Samples, overshoot: Samples, known: int, bound: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Weigh one tap: expected cost and overshoot probability and all that follow it.
+
+    Parameters
+    ----------
+    moved : ndarray, shape (q,)
+        Displacement at the nodes `z`; between them it is interpolated.
+    mass : ndarray, shape (q - 1,)
+        Normal probability between neighbouring nodes.
+    known : int
+        How many points of the grid hold a cost already; one tap that leaves the part beyond them stays
+        where it is, and is charged for by the return of the same question.
+    bound : float
+        A cost above which the answer does not matter: the sweep then stops.
+    """
+    total, risk, again = 1.0, 0.0, 0.0
+    for q in range(mass.size):
+        a, b = remaining - moved[q], remaining - moved[q + 1]
+        near, far = min(a, b), max(a, b)
+        if moved[q] <= STALL_M and moved[q + 1] <= STALL_M:
+            again += mass[q]
+            total += mass[q] * STALL_PENALTY
+        elif near > tolerance:
+            r = 0.5 * (a + b)
+            if known > 0 and r <= grid[known - 1]:
+                total += mass[q] * at(grid[:known], cost[:known], r)
+                risk += mass[q] * at(grid[:known], overshoot[:known], r)
+            elif known == grid.size:
+                total += mass[q] * at(grid, cost, r)
+                risk += mass[q] * overshoot[known - 1]
+            else:
+                again += mass[q]
+        elif far < -tolerance:
+            total += mass[q] * penalty
+            risk += mass[q]
+        elif far > tolerance or near < -tolerance:
+            # z at which the remaining distance crosses +tolerance and -tolerance, linear between nodes
+            slope = (z[q + 1] - z[q]) / (b - a)
+            if near < -tolerance:
+                cut = z[q] + (-tolerance - a) * slope
+                part = beyond(z[q]) - beyond(cut) if a < b else beyond(cut) - beyond(z[q + 1])
+                total += part * penalty
+                risk += part
+            if far > tolerance:
+                cut = z[q] + (tolerance - a) * slope
+                part = beyond(cut) - beyond(z[q + 1]) if a < b else beyond(z[q]) - beyond(cut)
+                r = 0.5 * (tolerance + far)
+                if known > 0:
+                    total += part * at(grid[:known], cost[:known], min(r, grid[known - 1]))
+                    risk += part * at(grid[:known], overshoot[:known], min(r, grid[known - 1]))
+                else:
+                    again += part
+        if total > bound:
+            return math.inf, 1.0
+    if again > 0.9:
+        return math.inf, 1.0
+    return total / (1.0 - again), risk / (1.0 - again)
+
+
+@compiled
+def taps_by_displacement(table: Samples, targets: Samples, z: Samples) -> Samples:
+    """For each displacement wanted, the taps that spread least about it: shape (targets, SLOTS, nodes), m.
+
+    Strokes between those of the table are interpolated. A slot without a tap holds nan.
+    """
+    nodes = z.size
+    middle = nodes // 2
+    best = np.full((targets.size, SLOTS, nodes), math.nan)
+    score = np.full((targets.size, SLOTS), math.inf)
+    row = np.empty(nodes)
+    for i in range(table.shape[0]):
+        for j in range(table.shape[1] - 1):
+            a, b = table[i, j, middle], table[i, j + 1, middle]
+            if not (a <= 0.0 or b <= 0.0 or math.isnan(a) or math.isnan(b)) and a != b:
+                n = np.searchsorted(targets, min(a, b))
+                while n < targets.size and targets[n] <= max(a, b):
+                    part = (targets[n] - a) / (b - a)
+                    square, reach = 0.0, 0.0
+                    for q in range(nodes):
+                        row[q] = table[i, j, q] + part * (table[i, j + 1, q] - table[i, j, q])
+                        if abs(z[q]) < 2.0:
+                            square += (row[q] - targets[n]) ** 2
+                        if abs(z[q]) < 3.5:
+                            reach = max(reach, row[q] - targets[n])
+                    for s in range(SLOTS):
+                        value = square if s == 0 else reach
+                        if value < score[n, s]:
+                            score[n, s] = value
+                            best[n, s] = row
+                    n += 1
+    return best
+
+
+@compiled
+def sweep(
+    grid: Samples, targets: Samples, taps: Samples, aims: Samples, z: Samples, mass: Samples,
+    tolerance: float, penalty: float, cost: Samples, overshoot: Samples,
+) -> None:  # fmt: skip
+    """Fill `cost` and `overshoot` on the grid of remaining distances, from the tolerance outwards."""
+    nodes = z.size
+    row = np.empty(nodes)
+    for n in range(grid.size):
+        r = grid[n]
+        best, risk = math.inf, 1.0
+        last = np.searchsorted(targets, r + tolerance)
+        for backward in range(last):
+            m = last - 1 - backward
+            if targets[m] < 0.2 * r and targets[m] < 0.5 * targets[targets.size - 1]:
+                break
+            for s in range(SLOTS):
+                if not math.isnan(taps[m, s, 0]):
+                    c, p = expect(
+                        r, taps[m, s], z, mass, tolerance, penalty, grid, cost, overshoot, n, best
+                    )  # fmt: skip
+                    if c < best:
+                        best, risk = c, p
+        for aim in aims:
+            wanted = r - aim * tolerance
+            m = np.searchsorted(targets, wanted)
+            if wanted <= 0.0 or m == 0 or m >= targets.size:
+                continue
+            part = (wanted - targets[m - 1]) / (targets[m] - targets[m - 1])
+            for s in range(SLOTS):
+                for q in range(nodes):
+                    row[q] = taps[m - 1, s, q] + part * (taps[m, s, q] - taps[m - 1, s, q])
+                if not math.isnan(row[0]):
+                    c, p = expect(r, row, z, mass, tolerance, penalty, grid, cost, overshoot, n, best)
+                    if c < best:
+                        best, risk = c, p
+        if best == math.inf:  # nothing helps from here: as costly as an overshoot
+            best = penalty
+            risk = 1.0
+        cost[n], overshoot[n] = best, risk
+
+
+def spacing(first: float, last: float, step: float, ratio: float) -> Samples:
+    """Increasing grid from `first` to `last` with steps of at least `step`, and of `ratio` further out."""
+    points = [first]
+    while points[-1] < last:
+        points.append(points[-1] + max(step, ratio * points[-1]))
+    return np.array(points)
+
+
+def between(z: Samples) -> Samples:
+    """Probability between neighbouring nodes, shape (q - 1,); the tails go to the outermost intervals."""
+    below = np.array([1.0 - beyond(float(v)) for v in z])
+    below[0], below[-1] = 0.0, 1.0
+    return np.diff(below)
+
+
+def cost_to_go(table: Samples, z: Samples, tolerance: float, penalty: float) -> CostToGo:
+    """Sweep for one part: `table` (m) as from `spread_table`, shape (velocities, strokes, nodes)."""
+    middle = table[:, :, z.size // 2]
+    furthest = float(np.nanmax(middle))
+    grid = spacing(1.0001 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
+    targets = spacing(min(0.5 * tolerance, 5e-6), furthest, 0.25 * tolerance, 0.03)
+    targets = targets[targets <= furthest]
+    taps = taps_by_displacement(table, targets, z)
+    cost, overshoot = np.zeros(grid.size), np.zeros(grid.size)
+    sweep(grid, targets, taps, AIMS, z, between(z), tolerance, penalty, cost, overshoot)
+    return CostToGo(grid, cost, overshoot)
