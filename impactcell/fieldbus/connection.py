@@ -22,13 +22,16 @@ _QUICKACK: Final[int | None] = getattr(socket, "TCP_QUICKACK", None)
 
 
 class Exchange:
-    """Requests that are answered together: the parts of one block, or one write."""
+    """Requests that are answered together: what a block still lacks, or one write.
+
+    `data` receives registers at `Part.offset`; `missing` holds the offsets not answered yet.
+    """
 
     __slots__ = ("data", "done", "missing")
 
-    def __init__(self, size: int, parts: int) -> None:
-        self.data = bytearray(size)
-        self.missing = parts
+    def __init__(self, data: bytearray, missing: set[int]) -> None:
+        self.data = data
+        self.missing = missing
         self.done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
     def fail(self, error: FieldbusError) -> None:
@@ -187,7 +190,7 @@ class Connection(asyncio.Protocol):
         del self._flying[transaction]
         exchange = part.exchange
         exchange.data[part.offset : part.offset + len(data)] = data
-        exchange.missing -= 1
+        exchange.missing.discard(part.offset)
         if not exchange.missing:
             self.round_trip_s = self._loop.time() - part.sent_s
             if not exchange.done.done():

@@ -7,7 +7,7 @@ SI value = raw code × scale × SI factor of the unit.
 
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -67,6 +67,11 @@ class RegisterMap:
     def __contains__(self, name: object) -> bool:
         """Whether the map has a register called `name`."""
         return name in self.registers
+
+    def with_word_order(self, word_order: str) -> "RegisterMap":
+        """Return the same layout with every value of several registers in another word order."""
+        registers = {name: replace(r, word_order=word_order) for name, r in self.registers.items()}
+        return RegisterMap(self.name, registers)
 
     @property
     def slots(self) -> int:

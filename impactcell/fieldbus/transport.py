@@ -16,6 +16,32 @@ from impactcell.fieldbus.registers import WIRE, Words
 _READ_FUNCTION: Final = {"holding": Function.READ_HOLDING, "input": Function.READ_INPUT}
 
 
+class PartialBlock:
+    """A block of registers, as far as it has been read.
+
+    Attributes
+    ----------
+    data : bytearray
+        The registers, big-endian; zero where they are missing.
+    missing : set of int
+        Where in `data` the requests go that have not been answered.
+    """
+
+    __slots__ = ("address", "count", "data", "missing", "step", "table")
+
+    def __init__(self, address: int, count: int, table: str, step: int) -> None:
+        self.address = address
+        self.count = count
+        self.table = table
+        self.step = step
+        self.data = bytearray(2 * count)
+        self.missing = set(range(0, 2 * count, 2 * step))
+
+    def words(self) -> Words:
+        """Return the registers, shape (count,), dtype `WIRE`."""
+        return np.frombuffer(self.data, dtype=WIRE)
+
+
 class ModbusClient:
     """One device; `connect` may be called again after the connection was lost.
 
@@ -85,21 +111,31 @@ class ModbusClient:
         ModbusExceptionError
             If the device refuses; the connection stays.
         """
-        function, step = _READ_FUNCTION[table], self.link.max_registers
-        starts = range(0, count, step)
-        exchange = Exchange(2 * count, len(starts))
-        self._open().submit(
-            [
-                Part(exchange, read_request(function, address + start, min(step, count - start)), 2 * start)
-                for start in starts
-            ]
-        )
-        await exchange.done
-        return np.frombuffer(exchange.data, dtype=WIRE)
+        return await self.complete(PartialBlock(address, count, table, self.link.max_registers))
+
+    async def complete(self, block: "PartialBlock") -> Words:
+        """Read what `block` still lacks; after an error it keeps what did arrive. Raises as `read` does."""
+        function, step = _READ_FUNCTION[block.table], block.step
+        if block.missing:
+            exchange = Exchange(block.data, block.missing)
+            self._open().submit(
+                [
+                    Part(
+                        exchange,
+                        read_request(
+                            function, block.address + offset // 2, min(step, block.count - offset // 2)
+                        ),
+                        offset,
+                    )
+                    for offset in sorted(block.missing)
+                ]
+            )
+            await exchange.done
+        return block.words()
 
     async def write(self, address: int, words: Words) -> None:
         """Write holding registers in one request, before any read that waits; raises as `read` does."""
-        exchange = Exchange(0, 1)
+        exchange = Exchange(bytearray(), {0})
         self._open().submit([Part(exchange, write_request(address, words), 0)], first=True)
         await exchange.done
 

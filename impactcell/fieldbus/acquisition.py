@@ -1,0 +1,293 @@
+"""Cycles of one module, each once and in order, whatever the link does.
+
+`Module.captures` connects, checks who answers, polls, reads each new cycle consistently, catches up from the
+module's ring after an outage, and counts what the ring no longer had. It never raises for what the module or
+the link does: that is said in `Module.status` and in the `faults` of a `Reception`.
+"""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Self
+
+from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceError
+from impactcell.fieldbus import decoding
+from impactcell.fieldbus.backoff import Backoff
+from impactcell.fieldbus.capture_reader import CaptureReader
+from impactcell.fieldbus.decoding import ModuleReport
+from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.mapped import MappedDevice
+from impactcell.fieldbus.polling import PollSchedule
+from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.ring import Mark, distance, next_wanted
+from impactcell.fieldbus.transport import ModbusClient
+from impactcell.records import Capture
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reception:
+    """One cycle as received.
+
+    Attributes
+    ----------
+    capture : Capture
+        In SI; without channels where they could not be read.
+    mark : Mark
+        Session and cycle: what to acknowledge once it is durable, and where to go on after a restart.
+    missed : int
+        Cycles right before it that the ring no longer had.
+    restarted : bool
+        Whether the module was started anew since the last one.
+    faults : tuple of str
+        What is wrong with it; each names cell, cycle and register.
+    """
+
+    capture: Capture
+    mark: Mark
+    missed: int = 0
+    restarted: bool = False
+    faults: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleStatus:
+    """State of the link and what has come over it since the start of the service.
+
+    Attributes
+    ----------
+    connected : bool
+        Whether the right module answers.
+    reason : str
+        Why it does not.
+    round_trip_s : float
+        Of the last request; nan before the first.
+    received, missed, unreadable : int
+        Cycles received (unreadable ones among them), gone from the ring before they could be read, and
+        received without content.
+    discarded : int
+        Readings thrown away because the capture changed meanwhile or its CRC did not fit.
+    restarts, reconnects : int
+        Starts of the module seen; connections made after the first.
+    """
+
+    connected: bool = False
+    reason: str = "not connected yet"
+    round_trip_s: float = float("nan")
+    received: int = 0
+    missed: int = 0
+    unreadable: int = 0
+    discarded: int = 0
+    restarts: int = 0
+    reconnects: int = 0
+
+
+class Module:
+    """The FPGA module of one cell.
+
+    Use as ``async with Module(...) as module: async for reception in module.captures(after): ...``.
+    Nothing is connected before `captures` runs.
+
+    Parameters
+    ----------
+    cell : str
+        The cell's name, for messages.
+    link : ModuleLink
+        How to reach the module.
+    registers : RegisterMap
+        Its layout.
+    on_change : callable, optional
+        Called with the new `ModuleStatus` when the connection is made or lost.
+    """
+
+    def __init__(
+        self,
+        cell: str,
+        link: ModuleLink,
+        registers: RegisterMap,
+        on_change: Callable[[ModuleStatus], None] | None = None,
+    ) -> None:
+        self.cell = cell
+        self.link = link
+        self.registers = registers
+        self.report: ModuleReport | None = None
+        """What the module said at the last poll; None before the first."""
+        self._client = ModbusClient(link)
+        self.device = MappedDevice(self._client, registers)
+        self._reader = CaptureReader(cell, self.device)
+        self._status = ModuleStatus()
+        self._on_change = on_change
+        self._ready = asyncio.Event()
+        self._durable: Mark | None = None
+        self._acknowledged: Mark | None = None
+        self._connections = 0
+
+    @property
+    def status(self) -> ModuleStatus:
+        """State of the link and counts."""
+        return replace(
+            self._status,
+            round_trip_s=self._client.round_trip_s,
+            discarded=self._reader.discarded,
+            reconnects=max(0, self._connections - 1),
+        )
+
+    async def __aenter__(self) -> Self:
+        """Return the module."""
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the connection."""
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the connection."""
+        self._ready.clear()
+        await self._client.close()
+        self._say(connected=False, reason="closed")
+
+    async def wait_connected(self) -> None:
+        """Wait until the right module answers; `captures` must be running meanwhile."""
+        await self._ready.wait()
+
+    async def read_report(self) -> ModuleReport:
+        """Read the status block now; raises FieldbusError where `captures` would only note it."""
+        values = await self.device.values(decoding.REPORT)
+        self.report = decoding.report(self.registers, values)
+        return self.report
+
+    async def acknowledge(self, mark: Mark) -> None:
+        """Tell the module that the cycle `mark` and all before it are durable.
+
+        Without a connection it is told as soon as there is one; a module without the registers is not told.
+        """
+        self._durable = mark
+        if self._ready.is_set():
+            try:
+                await self._send_acknowledgement()
+            except FieldbusError as error:
+                log.info("%s: acknowledgement of cycle %d will be repeated: %s", self.cell, mark.cycle, error)
+
+    async def captures(self, after: Mark | None = None) -> AsyncIterator[Reception]:
+        """Yield each cycle after `after` once, in order; ends only when it is closed.
+
+        Parameters
+        ----------
+        after : Mark or None
+            Last cycle that is durable; None: begin with the oldest that the module still has.
+        """
+        last, backoff, schedule = after, Backoff(), PollSchedule()
+        loop = asyncio.get_running_loop()
+        newest = Mark(0, 0)
+        skip = 0
+        while True:
+            try:
+                polled = await self._poll()
+                backoff.reset()
+                if (polled.session, polled.cycle_counter) != (newest.session, newest.cycle):
+                    same = polled.session == newest.session
+                    schedule.saw_cycle(
+                        loop.time(), distance(newest.cycle, polled.cycle_counter) if same else 0
+                    )
+                    newest = Mark(polled.session, polled.cycle_counter)
+                want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, skip)
+                if want is None:
+                    await asyncio.sleep(schedule.delay_s(loop.time(), self._client.round_trip_s))
+                    continue
+                read = await self._reader.fetch(want)
+            except FieldbusError as error:
+                await self._down(error)
+                await asyncio.sleep(backoff.next_delay_s())
+                continue
+            if read is None:  # overwritten meanwhile: look at the ring again, further from its end
+                skip = min(max(1, 2 * skip), self.registers.slots // 2)
+                continue
+            skip //= 2
+            last = want.mark
+            reception = Reception(read.capture, want.mark, want.missed, want.restarted, read.faults)
+            self._count(reception, readable=read.readable)
+            yield reception
+
+    async def _connect(self) -> None:
+        """Connect and check who answers."""
+        self._ready.clear()
+        await self._client.connect()
+        await self._identify()
+        self._acknowledged = None
+
+    async def _identify(self) -> None:
+        """Raise WrongDeviceError unless every register that the map pins shows what it should."""
+        pinned = tuple(
+            name for name, register in self.registers.registers.items() if register.expect is not None
+        )
+        try:
+            values = await self.device.values(pinned)
+        except ModbusExceptionError as error:
+            raise WrongDeviceError(
+                f"{self.cell}: {error}; this is not a module of map {self.registers.name}, "
+                f"or device_id {self.link.device_id} is wrong"
+            ) from error
+        for name in pinned:
+            register = self.registers[name]
+            if values[name] != register.expect:
+                raise WrongDeviceError(
+                    f"{self.cell}: {self.link}: register {name} ({register.address}) shows {values[name]!r}, "
+                    f"map {self.registers.name} expects {register.expect!r}"
+                )
+
+    async def _poll(self) -> ModuleReport:
+        if not self._client.connected:
+            await self._connect()
+        polled = await self.read_report()
+        if self._durable != self._acknowledged:
+            await self._send_acknowledgement()
+        if not self._ready.is_set():
+            self._connections += 1
+            self._say(connected=True, reason="")
+            self._ready.set()
+        return polled
+
+    async def _send_acknowledgement(self) -> None:
+        mark = self._durable
+        if mark is not None and "acknowledge_cycle" in self.registers:
+            values = {"acknowledge_cycle": mark.cycle}
+            if "acknowledge_session" in self.registers:
+                values["acknowledge_session"] = mark.session
+            await self.device.write(values)
+        self._acknowledged = mark
+
+    async def _down(self, error: FieldbusError) -> None:
+        """Close the connection after an error and say why, once for each new reason."""
+        self._ready.clear()
+        await self._client.close()
+        reason = str(error) if str(error).startswith(self.cell) else f"{self.cell}: {error}"
+        self._say(connected=False, reason=reason)
+
+    def _say(self, *, connected: bool, reason: str) -> None:
+        before = self._status
+        self._status = replace(before, connected=connected, reason=reason)
+        if (before.connected, before.reason) == (connected, reason):
+            return
+        if connected:
+            log.info("%s: connected to %s", self.cell, self.link)
+        else:
+            log.warning("%s", reason)
+        if self._on_change is not None:
+            self._on_change(self.status)
+
+    def _count(self, reception: Reception, *, readable: bool) -> None:
+        status = self._status
+        self._status = replace(
+            status,
+            received=status.received + 1,
+            missed=status.missed + reception.missed,
+            restarts=status.restarts + reception.restarted,
+            unreadable=status.unreadable + (not readable),
+        )
+        for fault in reception.faults:
+            log.warning("%s", fault)

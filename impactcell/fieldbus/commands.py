@@ -1,0 +1,155 @@
+"""Positioning taps: commanded with a read-back and a handshake, so that none is made twice and none by accident.
+
+The parameters are written and read back; only then the command's sequence number is written, and a change of that
+is what the module acts on. Writing the same number again does nothing, so a command whose answer was lost with the
+connection is repeated safely.
+"""
+
+import asyncio
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from impactcell.errors import LinkError, ModbusExceptionError, PositioningError, ProtocolError
+from impactcell.fieldbus.acquisition import Module
+from impactcell.fieldbus.decoding import PositioningReport
+
+_POLL_S: Final = 0.005
+_PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
+
+
+@dataclass(frozen=True, slots=True)
+class TapCommand:
+    """One tap; `direction` is +1 or -1."""
+
+    velocity_m_s: float
+    stroke_m: float
+    direction: int
+
+
+class Positioner:
+    """Commands taps through a `Module` whose `captures` are running.
+
+    Parameters
+    ----------
+    patience_s : float
+        How long a tap and its slide may take, an outage in between included.
+    """
+
+    def __init__(self, module: Module, patience_s: float = 10.0) -> None:
+        self._module = module
+        self._patience_s = patience_s
+        self._one_at_a_time = asyncio.Lock()
+
+    @property
+    def available(self) -> bool:
+        """Whether the module's map has the registers of a positioning cell."""
+        return all(
+            name in self._module.registers for name in (*_PARAMETERS, "command_sequence", "command_result")
+        )
+
+    async def tap(self, command: TapCommand) -> int:
+        """Execute one tap; return the number of the cycle that it made.
+
+        Raises
+        ------
+        PositioningError
+            If the command is refused, aborted or not finished in time; the message says whether the part may
+            have been struck.
+        """
+        self._check(command)
+        async with self._one_at_a_time:
+            sequence = 0
+            try:
+                async with asyncio.timeout(self._patience_s):
+                    before = await self._report()
+                    if before.state != "ready":
+                        raise PositioningError(
+                            f"{self._module.cell}: module takes no command, it is {before.state}"
+                        )
+                    sequence = before.accepted % (2**32 - 1) + 1
+                    await self._load(command)
+                    return await self._execute(sequence)
+            except TimeoutError:
+                struck = "the part may have been struck" if sequence else "nothing has been commanded"
+                raise PositioningError(
+                    f"{self._module.cell}: tap not finished within {self._patience_s:g} s; {struck}"
+                ) from None
+
+    async def abort(self) -> None:
+        """Abort what is being executed; raises LinkError without a connection."""
+        await self._module.device.write({"command_abort": 1})
+
+    def _check(self, command: TapCommand) -> None:
+        cell = self._module.cell
+        if not self.available:
+            raise PositioningError(f"{cell}: map {self._module.registers.name} has no positioning registers")
+        if not (math.isfinite(command.velocity_m_s) and command.velocity_m_s > 0.0):
+            raise PositioningError(f"{cell}: tap velocity must be above 0, not {command.velocity_m_s} m/s")
+        if not (math.isfinite(command.stroke_m) and command.stroke_m > 0.0):
+            raise PositioningError(f"{cell}: tap stroke must be above 0, not {command.stroke_m} m")
+        if command.direction not in (-1, 1):
+            raise PositioningError(f"{cell}: tap direction must be 1 or -1, not {command.direction}")
+
+    async def _report(self) -> PositioningReport:
+        """Return a fresh report, waiting for the link if it is down."""
+        while True:
+            await self._module.wait_connected()
+            try:
+                found = (await self._module.read_report()).positioning
+            except (LinkError, ProtocolError):
+                await asyncio.sleep(_POLL_S)
+                continue
+            if found is None:
+                raise PositioningError(f"{self._module.cell}: the map lacks registers of a positioning cell")
+            return found
+
+    async def _load(self, command: TapCommand) -> None:
+        """Write the parameters and read them back."""
+        registers = self._module.registers
+        wanted = dict(
+            zip(_PARAMETERS, (command.velocity_m_s, command.stroke_m, command.direction), strict=True)
+        )
+        codes = {name: registers[name].encode(value) for name, value in wanted.items()}
+        while True:
+            await self._module.wait_connected()
+            try:
+                await self._module.device.write(wanted)
+                for name, words in codes.items():
+                    shown = await self._module.device.words(name, 1)
+                    if shown.tobytes() != words.tobytes():
+                        register = registers[name]
+                        raise PositioningError(
+                            f"{self._module.cell}: register {name} ({register.address}) does not show what was "
+                            "written; nothing has been commanded"
+                        )
+            except (LinkError, ProtocolError):
+                await asyncio.sleep(_POLL_S)
+            except ModbusExceptionError as error:
+                raise PositioningError(f"{self._module.cell}: {error}; nothing has been commanded") from error
+            else:
+                return
+
+    async def _execute(self, sequence: int) -> int:
+        """Write the sequence number until the module has it, and wait for the outcome."""
+        cell = self._module.cell
+        while True:
+            await self._module.wait_connected()
+            try:
+                await self._module.device.write({"command_sequence": sequence})
+            except (LinkError, ProtocolError):
+                await asyncio.sleep(_POLL_S)
+            except ModbusExceptionError as error:
+                raise PositioningError(f"{cell}: {error}; nothing has been commanded") from error
+            else:
+                break
+        while True:
+            shown = await self._report()
+            if shown.accepted == sequence:
+                if shown.result == "done":
+                    return shown.cycle
+                if shown.result != "executing":
+                    raise PositioningError(f"{cell}: tap {sequence}: {shown.result}")
+            elif shown.accepted == 0 and shown.state != "executing":
+                raise PositioningError(f"{cell}: module was started anew during tap {sequence}")
+            await asyncio.sleep(_POLL_S)

@@ -1,0 +1,255 @@
+"""Words of the module's window and status block become a `Capture` and a `ModuleReport`. Pure, never fails.
+
+What is wrong with a value is said in `faults`, each naming cell, cycle and register; the value itself is then
+left out (nan, None), so that nothing wrong is ever passed on as measured.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.fieldbus.registers import Register, RegisterMap, Value, Words
+from impactcell.records import Capture, Channel, Summary
+
+
+@dataclass(frozen=True, slots=True)
+class BatchAnnouncement:
+    """A change of batch that the PLC expects; `sequence` 0 before the first."""
+
+    sequence: int = 0
+    from_cycle: int = 0
+    batch_id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PositioningReport:
+    """What the module says of positioning; see the map for the codes.
+
+    Attributes
+    ----------
+    state, result : str
+        Names of the codes of `positioning_state` and `command_result`.
+    position_m, target_m : float
+        Where the part lies, and where the PLC wants it.
+    target_sequence : int
+        Raised by the PLC with each new target.
+    mass_kg : float
+        nan where the PLC does not know it.
+    accepted : int
+        Sequence number of the last command that the module looked at.
+    cycle : int
+        Cycle made by that command, 0 for none.
+    """
+
+    state: str
+    result: str
+    position_m: float
+    target_m: float
+    target_sequence: int
+    mass_kg: float
+    accepted: int
+    cycle: int
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleReport:
+    """The status block of one poll."""
+
+    state: str
+    session: int
+    cycle_counter: int
+    ring: tuple[int, ...]
+    batch: BatchAnnouncement | None
+    positioning: PositioningReport | None
+
+
+REPORT = (
+    "state", "session", "cycle_counter", "ring_cycle",
+    "batch_sequence", "batch_from_cycle", "batch_announced",
+    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
+    "command_accepted", "command_cycle",
+)  # fmt: skip
+"""Registers of a poll, where the map has them."""
+
+_BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
+_POSITIONING = REPORT[7:]
+
+
+def _code_name(register: Register, value: Value) -> str:
+    code = int(value) if isinstance(value, int | float) else -1
+    return register.codes.get(code, f"unknown ({code})")
+
+
+def _integer(value: Value) -> int:
+    return value if isinstance(value, int) else 0
+
+
+def _number(value: Value) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def report(registers: RegisterMap, values: Mapping[str, Value]) -> ModuleReport:
+    """Put the decoded registers of `REPORT` together."""
+    batch = positioning = None
+    if all(name in values for name in _BATCH):
+        batch = BatchAnnouncement(
+            _integer(values["batch_sequence"]),
+            _integer(values["batch_from_cycle"]),
+            str(values["batch_announced"]),
+        )
+    if all(name in values for name in _POSITIONING):
+        positioning = PositioningReport(
+            state=_code_name(registers["positioning_state"], values["positioning_state"]),
+            result=_code_name(registers["command_result"], values["command_result"]),
+            position_m=_number(values["part_position"]),
+            target_m=_number(values["target_position"]),
+            target_sequence=_integer(values["target_sequence"]),
+            mass_kg=_number(values["part_mass"]),
+            accepted=_integer(values["command_accepted"]),
+            cycle=_integer(values["command_cycle"]),
+        )
+    return ModuleReport(
+        state=_code_name(registers["state"], values["state"]),
+        session=_integer(values["session"]),
+        cycle_counter=_integer(values["cycle_counter"]),
+        ring=tuple(int(cycle) for cycle in np.atleast_1d(np.asarray(values["ring_cycle"]))),
+        batch=batch,
+        positioning=positioning,
+    )
+
+
+def used_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, int]:
+    """Return how many samples of each array are used: what the header says, at most what the map has."""
+    return {
+        name: min(_integer(header.get(f"{name}_count", 0)), registers[name].count)
+        for name in ("force", "position", "actuator")
+        if name in registers
+    }
+
+
+def lying_counts(registers: RegisterMap, header: Mapping[str, Value]) -> list[str]:
+    """Return a fault for each count that is more than the map has room for."""
+    return [
+        f"register {name}_count ({registers[f'{name}_count'].address}): {header[f'{name}_count']} samples, "
+        f"but the map has room for {registers[name].count}"
+        for name in ("force", "position", "actuator")
+        if name in registers and _integer(header.get(f"{name}_count", 0)) > registers[name].count
+    ]
+
+
+def blank(cycle: int) -> Capture:
+    """Return the capture of a cycle that could not be read: its number, and nothing else."""
+    return Capture(cycle=cycle, velocity_m_s=math.nan, mass_kg=math.nan, force=None, position=None)
+
+
+def capture(
+    registers: RegisterMap, header: Mapping[str, Value], samples: Mapping[str, Words]
+) -> tuple[Capture, list[str]]:
+    """Put a capture together; `samples` holds the words of the used part of each array.
+
+    Returns
+    -------
+    Capture
+        In SI. A sample without a value is left out, a channel without samples is None.
+    list of str
+        What is wrong with it, register by register.
+    """
+    faults = lying_counts(registers, header)
+    lying = {fault.split("_count", 1)[0].removeprefix("register ") for fault in faults}
+    velocity = _checked(registers, header, "velocity", faults, math.nan)
+    mass = _checked(registers, header, "mass", faults, math.nan, missing=True)
+    stroke = _checked(registers, header, "stroke", faults, math.inf, infinite=True)
+    dwell = _checked(registers, header, "dwell", faults, math.nan, missing=True, zero=True)
+    direction = _integer(header.get("direction", 1))
+    if direction not in (-1, 1):
+        faults.append(
+            f"register direction ({registers['direction'].address}): {direction} instead of 1 or -1"
+        )
+        direction = 1
+    channels = {
+        name: None if name in lying else _channel(registers, header, name, words, faults)
+        for name, words in samples.items()
+    }
+    summary = None
+    if "peak_force" in header and "sliding_distance" in header:
+        summary = Summary(_number(header["peak_force"]), _number(header["sliding_distance"]))
+        for name in ("peak_force", "sliding_distance"):
+            if not math.isfinite(_number(header[name])):
+                faults.append(f"register {name} ({registers[name].address}): not a number")
+    start = _number(header.get("start_position", 0.0))
+    return Capture(
+        cycle=_integer(header["window_cycle"]),
+        velocity_m_s=velocity,
+        mass_kg=mass,
+        force=channels.get("force"),
+        position=channels.get("position"),
+        actuator=channels.get("actuator"),
+        direction=direction,
+        stroke_m=stroke,
+        time_ns=_integer(header["cycle_time"]),
+        batch_id=str(header.get("batch_id", "")) or None,
+        dwell_s=dwell,
+        start_m=start,
+        summary=summary,
+    ), faults
+
+
+def _checked(
+    registers: RegisterMap,
+    header: Mapping[str, Value],
+    name: str,
+    faults: list[str],
+    absent: float,
+    *,
+    missing: bool = False,
+    infinite: bool = False,
+    zero: bool = False,
+) -> float:
+    """Return a value that must be positive; `absent` where the map or the module has none."""
+    if name not in header:
+        return absent
+    value = _number(header[name])
+    if (missing and math.isnan(value)) or (infinite and value == math.inf) or (zero and value == 0.0):
+        return value
+    if math.isfinite(value) and value > 0.0:
+        return value
+    register = registers[name]
+    raw = value / register.si_factor
+    faults.append(f"register {name} ({register.address}): {raw:g} {register.unit} cannot be")
+    return math.nan
+
+
+def _channel(
+    registers: RegisterMap, header: Mapping[str, Value], name: str, words: Words, faults: list[str]
+) -> Channel | None:
+    register = registers[name]
+    where = f"register {name} ({register.address})"
+    rate_hz = _number(header.get(f"{name}_rate", math.nan))
+    start_s = _number(header.get(f"{name}_start", math.nan))
+    if not words.size:
+        if name != "actuator":  # most modules have none
+            faults.append(f"{where}: no samples, {name}_count is 0")
+        return None
+    if not rate_hz > 0.0 or not math.isfinite(start_s):
+        faults.append(f"{where}: no time axis, {name}_rate is {rate_hz:g} Hz")
+        return None
+    values = np.asarray(register.decode(words), dtype=np.float64)
+    time_s = start_s + np.arange(values.size) / rate_hz
+    full_scale = register.full_scale
+    if full_scale is not None:
+        clipped = int(np.count_nonzero((values <= full_scale[0]) | (values >= full_scale[1])))
+        if clipped:
+            low, high = full_scale
+            faults.append(f"{where}: {clipped} samples at full scale ({low:g} to {high:g})")
+    known = np.isfinite(values)
+    gaps = int(values.size - np.count_nonzero(known))
+    if gaps:
+        faults.append(f"{where}: {gaps} of {values.size} samples are not a number")
+        time_s, values = time_s[known], values[known]
+    if not values.size:
+        return None
+    if values.size > 1 and values.min() == values.max():
+        faults.append(f"{where}: constant at {values[0]:g}")
+    return Channel(time_s, values, full_scale=full_scale)

@@ -1,0 +1,47 @@
+"""When to ask for the next cycle: often when one is due, else seldom. Pure; the caller brings the time."""
+
+from typing import Final
+
+FINE_S: Final = 0.003
+"""Between polls while a cycle is due."""
+QUIET_S: Final = 0.015
+"""Between polls before it is due: what an early cycle may have to wait."""
+IDLE_S: Final = 0.1
+"""Between polls once cycles have stopped coming."""
+_GAIN: Final = 0.25
+
+
+class PollSchedule:
+    """Learns the cycle period and how much it varies."""
+
+    def __init__(self) -> None:
+        self._last_s: float | None = None
+        self._period_s: float | None = None
+        self._spread_s = 0.0
+
+    def saw_cycle(self, now_s: float, cycles: int = 1) -> None:
+        """Take note of `cycles` new cycles seen by one poll."""
+        if self._last_s is not None and cycles > 0:
+            period_s = (now_s - self._last_s) / cycles
+            if self._period_s is None:
+                self._period_s, self._spread_s = period_s, 0.1 * period_s
+            else:
+                error_s = period_s - self._period_s
+                self._period_s += _GAIN * error_s
+                self._spread_s += _GAIN * (abs(error_s) - self._spread_s)
+        self._last_s = now_s
+
+    def delay_s(self, now_s: float, round_trip_s: float) -> float:
+        """Return the wait before the next poll; at least three round trips, so that a slow line has rest."""
+        least_s = max(FINE_S, 3.0 * round_trip_s if round_trip_s == round_trip_s else 0.0)
+        if self._last_s is None or self._period_s is None:
+            return max(least_s, QUIET_S)
+        age_s = now_s - self._last_s
+        margin_s = 3.0 * self._spread_s + FINE_S
+        until_due_s = self._period_s - margin_s - age_s
+        if until_due_s > 0.0:
+            return max(least_s, min(until_due_s, QUIET_S))
+        if age_s < self._period_s + margin_s:
+            return least_s
+        overdue_s = age_s - self._period_s
+        return max(least_s, min(IDLE_S, QUIET_S if overdue_s < 3.0 * self._period_s else 0.1 * overdue_s))

@@ -1,0 +1,82 @@
+"""Which cycle to read next from the module's ring, and how many are gone. Pure.
+
+Cycle numbers run 1, 2, ... 4 294 967 295, 1, ...; 0 means none.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+PERIOD: Final = 2**32 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A cycle in the module's life: the session (start) of the module and its number in it."""
+
+    session: int
+    cycle: int
+
+
+@dataclass(frozen=True, slots=True)
+class Want:
+    """The cycle to read next.
+
+    Attributes
+    ----------
+    slot : int
+        Where the ring has it.
+    missed : int
+        Cycles between the last one taken and this one, which the ring no longer has.
+    restarted : bool
+        Whether the module was started anew since the last one taken. How many cycles it made between that one
+        and the restart nobody knows; `missed` counts those of the new session.
+    """
+
+    mark: Mark
+    slot: int
+    missed: int
+    restarted: bool
+
+
+def distance(after: int, to: int) -> int:
+    """Return how many steps lead from cycle `after` to cycle `to`, 0 standing for before the first.
+
+    >>> distance(4294967295, 2), distance(0, 3), distance(7, 7)
+    (2, 3, 0)
+    """
+    return to if after == 0 or to == 0 else (to - after) % PERIOD
+
+
+def next_wanted(
+    last: Mark | None, session: int, counter: int, ring: Sequence[int], skip: int = 0
+) -> Want | None:
+    """Return the oldest cycle of the ring that comes after `last`, or None if there is nothing new.
+
+    Parameters
+    ----------
+    last : Mark or None
+        Last cycle taken; None: none ever, then the ring's oldest comes first and nothing counts as missed.
+    session, counter : int
+        The module's present session and last complete cycle.
+    ring : sequence of int
+        Cycle held by each slot, 0 for an empty one.
+    skip : int
+        Leave out so many of the oldest, because they are overwritten faster than they are read.
+    """
+    if counter == 0:
+        return None
+    ages = {distance(cycle, counter): slot for slot, cycle in enumerate(ring) if cycle != 0}
+    restarted = last is not None and (last.session != session or distance(last.cycle, counter) > PERIOD // 2)
+    if last is None or restarted:
+        behind = counter if restarted else PERIOD
+        held = sorted((age for age in ages if age <= PERIOD // 2), reverse=True)
+    else:
+        behind = distance(last.cycle, counter)
+        held = sorted((age for age in ages if age < behind), reverse=True)
+    if not held:
+        return None
+    age = held[min(skip, len(held) - 1)]
+    slot = ages[age]
+    missed = 0 if last is None else max(0, behind - age - 1)
+    return Want(Mark(session, ring[slot]), slot, missed, restarted)
