@@ -176,6 +176,10 @@ class Motion:
         shown = self._force(time_s - self._forces.delay, sensor=True)
         return np.array([self._forces.sensed(force) for force in shown.tolist()])
 
+    def sensed(self, force: float) -> float:
+        """Return what the force channel shows for a steady force."""
+        return self._forces.sensed(force)
+
     def _force(self, time: Samples, *, sensor: bool) -> Samples:
         forces, path = self._forces, self._path
         lag = forces.sensor_lag() if sensor else None

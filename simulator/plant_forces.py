@@ -96,6 +96,7 @@ class Forces:
         for effect in effects:
             self.mass = effect.mass(self.mass)
         self.weight = self.mass * plant.gravity_m_s2
+        self.mass -= sum(effect.detached_mass() for effect in effects)
         whole = math.prod(effect.shot_factor(shot) for effect in effects)
         self.mu_k = plant.mu_k * whole
         self.mu_s = plant.mu_s * whole * math.prod(effect.static_factor(shot) for effect in effects)
@@ -121,12 +122,12 @@ class Forces:
             if effect.absolute_tolerance:
                 self._states.append((effect, place, place + len(effect.absolute_tolerance)))
                 place += len(effect.absolute_tolerance)
-        self._loss = [
-            (e.speed_loss, a, b) for e, a, b in self._states if type(e).speed_loss is not Effect.speed_loss
-        ]
-        self._state_force = [
-            (e.state_force, a, b) for e, a, b in self._states if type(e).state_force is not Effect.state_force
-        ]
+        self._loss = self._with_states("speed_loss")
+        self._state_force = self._with_states("state_force")
+        self._state_contact_force = self._with_states("state_contact_force")
+
+    def _with_states(self, name: str) -> list[tuple[Any, int, int]]:
+        return [(law, a, b) for effect, a, b in self._states for law in _overriding([effect], name)]
 
     @property
     def absolute_tolerance(self) -> list[float]:
@@ -187,6 +188,8 @@ class Forces:
         force = (spring + damping * rate) / (1.0 + damping * compliance)
         for further in self._contact_force:
             force += further(d, rate, t)
+        for state_law, first, last in self._state_contact_force:
+            force += state_law(d, z[first:last])
         force = max(force, 0.0)
         return force, free - compliance * force
 
@@ -245,8 +248,9 @@ class Forces:
         out = [velocity, acceleration, speed]
         if self._states:
             x, v = self.start + self.sign * advance, self.sign * velocity
+            d = z[2] - advance if phase.contact is Contact.TOUCHING else 0.0
             for effect, first, last in self._states:
-                out += effect.rates(x, v, force, z[first:last])
+                out += effect.rates(x, v, d, force, z[first:last])
         return out
 
     def sensor_lag(self) -> tuple[int, float] | None:

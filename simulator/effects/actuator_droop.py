@@ -16,7 +16,7 @@ class ActuatorDroop(Effect):
         self._tau = time_constant_s
         self.absolute_tolerance = (1e-13,) if time_constant_s > 0.0 else ()
 
-    def rates(self, x: float, v: float, force: float, own: Sequence[float]) -> tuple[float, ...]:  # noqa: ARG002
+    def rates(self, x: float, v: float, d: float, force: float, own: Sequence[float]) -> tuple[float, ...]:  # noqa: ARG002
         return ((self._c * force - own[0]) / self._tau,)
 
     def speed_loss(self, own: Sequence[float]) -> float:

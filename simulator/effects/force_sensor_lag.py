@@ -15,7 +15,7 @@ class ForceSensorLag(Effect):
         self._tau = time_constant_s
         self.absolute_tolerance = (1e-9,) if time_constant_s > 0.0 else ()
 
-    def rates(self, x: float, v: float, force: float, own: Sequence[float]) -> tuple[float, ...]:  # noqa: ARG002
+    def rates(self, x: float, v: float, d: float, force: float, own: Sequence[float]) -> tuple[float, ...]:  # noqa: ARG002
         return ((force - own[0]) / self._tau,)
 
     def sensor_time_constant(self) -> float:

@@ -9,7 +9,7 @@ class FrictionPatch(Effect):
     """Both coefficients differ around one place."""
 
     identifier = "friction_patch"
-    defaults = {"amplitude": 0.25, "position_m": 0.003, "width_m": 0.0006}
+    defaults = {"amplitude": 0.25, "position_m": 0.002, "width_m": 0.0005}
 
     def __init__(self, amplitude: float, position_m: float, width_m: float) -> None:
         self._amplitude = amplitude

@@ -64,6 +64,10 @@ class Effect:
         """Return the mass that really moves where `mass_kg` is believed."""
         return mass_kg
 
+    def detached_mass(self) -> float:
+        """Return the mass that weighs on the table but does not move with the part."""
+        return 0.0
+
     def shot_factor(self, shot: Shot) -> float:  # noqa: ARG002
         """Return the factor of both friction coefficients for a whole shot."""
         return 1.0
@@ -100,8 +104,15 @@ class Effect:
         """Return the effect's own states at first contact."""
         return (0.0,) * len(self.absolute_tolerance)
 
-    def rates(self, x: float, v: float, force: float, own: Sequence[float]) -> tuple[float, ...]:  # noqa: ARG002
-        """Return the rates of the effect's own states; `force` is the contact force."""
+    def rates(
+        self,
+        x: float,  # noqa: ARG002
+        v: float,  # noqa: ARG002
+        d: float,  # noqa: ARG002
+        force: float,  # noqa: ARG002
+        own: Sequence[float],  # noqa: ARG002
+    ) -> tuple[float, ...]:
+        """Return the rates of the effect's own states; `force` is the contact force, d 0 without contact."""
         return ()
 
     def spring_force(self, d: float, stiffness: float, force: float) -> float:  # noqa: ARG002
@@ -114,6 +125,10 @@ class Effect:
 
     def contact_force(self, d: float, d_rate: float, t: float) -> float:  # noqa: ARG002
         """Return a further contact force while d > 0."""
+        return 0.0
+
+    def state_contact_force(self, d: float, own: Sequence[float]) -> float:  # noqa: ARG002
+        """Return a further contact force while d > 0, from states of the effect's own."""
         return 0.0
 
     def pull(self, gap: float) -> float:  # noqa: ARG002

@@ -9,7 +9,7 @@ class StictionAgeing(Effect):
     """Static friction grows with the logarithm of the time at rest."""
 
     identifier = "stiction_ageing"
-    defaults = {"increase_per_decade": 0.04}
+    defaults = {"increase_per_decade": 0.06}
 
     def __init__(self, increase_per_decade: float) -> None:
         self._increase = increase_per_decade

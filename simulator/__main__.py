@@ -1,0 +1,64 @@
+"""Command line of the simulator: `serve SCENARIO.yaml` and `campaign SCENARIO.yaml -o DIR`."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from impactcell.errors import CampaignError, ImpactCellError, MapError, SettingsError
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb; returns the exit code: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.run(options))
+    except (SettingsError, CampaignError, MapError) as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return BAD_INPUT
+    except ImpactCellError as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return 1
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m simulator", description="A cell that strikes a simulated part."
+    )
+    verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
+    campaign = verbs.add_parser("campaign", help="write a campaign directory and its truth")
+    campaign.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
+    campaign.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    campaign.add_argument("--hide", action="append", default=[], metavar="EFFECT", help="repeatable")
+    campaign.add_argument("--seed", type=int, help="in place of the scenario's")
+    campaign.set_defaults(run=_campaign)
+    return parser
+
+
+def _campaign(options: argparse.Namespace) -> int:
+    from pydantic import ValidationError
+
+    from simulator.campaign import write
+    from simulator.campaign_scenario import CampaignScenario
+    from simulator.scenario_file import load
+
+    scenario = load(options.scenario, CampaignScenario)
+    changed = scenario.model_dump() | {"hide": list(dict.fromkeys([*scenario.hide, *options.hide]))}
+    if options.seed is not None:
+        changed["seed"] = options.seed
+    try:
+        scenario = CampaignScenario.model_validate(changed)
+    except ValidationError as error:
+        message = "; ".join(fault["msg"].removeprefix("Value error, ") for fault in error.errors())
+        raise SettingsError(message) from None
+    write(scenario, options.output)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,286 @@
+"""Makes a campaign: shots in a design, struck on the simulator's plant, as a directory and its truth.
+
+The writer is the simulator's own, so that the product's reader is tested on files it has not written.
+Everything random comes from one seed; the same scenario gives the same bytes.
+"""
+
+import json
+import math
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from impactcell.errors import CampaignError
+from simulator.campaign_scenario import CampaignScenario, SensorScenario
+from simulator.plant import Motion, Plant, Shot, Strike, driven, free_slide, tap
+
+Samples = NDArray[np.float64]
+MM_PER_MIN = 1e-3 / 60.0
+COLUMNS = {"force": "force_n", "position": "position_m", "actuator": "actuator_m"}
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedShot:
+    """One row of the design. `velocity` is in mm/min for a tap, m/s for a free slide."""
+
+    number: int
+    velocity: float
+    mass_kg: float
+    direction: int
+    start_m: float
+    batch: int
+    dwell_s: float
+    factor: float
+    ratio_factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class MadeShot:
+    """A shot with its motion, its noisy channels (time, values) and the plant that made it."""
+
+    plan: PlannedShot
+    plant: Plant
+    motion: Motion
+    channels: Mapping[str, tuple[Samples, Samples]]
+
+
+def make(scenario: CampaignScenario) -> tuple[Plant, tuple[MadeShot, ...]]:
+    """Strike every shot of a scenario; the base plant, before scatter, and the shots in order."""
+    design, noise = (np.random.default_rng(seed) for seed in np.random.SeedSequence(scenario.seed).spawn(2))
+    base = _base_plant(scenario, design)
+    plans = tuple(_plan(scenario, design))
+    return base, tuple(_shot(scenario, base, plan, len(plans), noise) for plan in plans)
+
+
+def _base_plant(scenario: CampaignScenario, random: np.random.Generator) -> Plant:
+    spread = 1.0 + scenario.plant.spread * random.uniform(-1.0, 1.0, 3)
+    mu_s = scenario.plant.mu_s * spread[2]
+    return Plant(
+        stiffness_n_per_m=float(scenario.plant.stiffness_n_per_m * spread[0]),
+        damping_n_s_per_m=float(scenario.plant.damping_n_s_per_m * spread[1]),
+        mu_s=float(mu_s),
+        mu_k=float(mu_s * scenario.plant.ratio),
+        gravity_m_s2=scenario.gravity_m_s2,
+        effects=scenario.hidden(),
+    )
+
+
+def _plan(scenario: CampaignScenario, random: np.random.Generator) -> Iterator[PlannedShot]:
+    speeds = {"tap": scenario.velocities_mm_per_min, "free_slide": scenario.speeds_m_s, "driven": [math.nan]}
+    points = [
+        (velocity, mass, direction, start)
+        for velocity in speeds[scenario.excitation]
+        for mass in scenario.masses_kg
+        for direction in ([1] if scenario.excitation == "driven" else scenario.directions)
+        for start in scenario.starts_m
+        for _ in range(scenario.replicates)
+    ]
+    count = scenario.shots or len(points)
+    chosen: list[int] = []
+    while len(chosen) < count:
+        again = np.arange(len(points)) if scenario.order == "as_listed" else random.permutation(len(points))
+        chosen += again.tolist()
+    low, high = scenario.dwell_s
+    for number, place in enumerate(chosen[:count], 1):
+        velocity, mass, direction, start = points[place]
+        jitter = 1.0 + scenario.velocity_jitter * random.uniform(-1.0, 1.0)
+        yield PlannedShot(
+            number=number,
+            velocity=float(velocity * jitter),
+            mass_kg=mass,
+            direction=direction,
+            start_m=start,
+            batch=(number - 1) * len(scenario.batches) // count,
+            dwell_s=round(float(np.exp(random.uniform(np.log(low), np.log(high)))), 1),
+            factor=float(1.0 + scenario.friction_scatter * random.standard_normal()),
+            ratio_factor=float(1.0 + scenario.ratio_scatter * random.standard_normal()),
+        )
+
+
+def _shot(
+    scenario: CampaignScenario, base: Plant, plan: PlannedShot, shots: int, random: np.random.Generator
+) -> MadeShot:
+    plant = replace(base, mu_s=base.mu_s * plan.factor, mu_k=base.mu_k * plan.factor * plan.ratio_factor)
+    covariates = Shot(plan.direction, plan.start_m, plan.dwell_s, plan.number, shots, plan.batch)
+    drive: _Drive | None = None
+    match scenario.excitation:
+        case "tap":
+            strike = Strike(
+                velocity_m_s=plan.velocity * MM_PER_MIN,
+                mass_kg=plan.mass_kg,
+                stroke_m=scenario.stroke_m,
+                direction=plan.direction,
+                start_m=plan.start_m,
+                dwell_s=plan.dwell_s,
+                shot=plan.number,
+                shots=shots,
+                batch=plan.batch,
+            )
+            motion = tap(plant, strike)
+        case "free_slide":
+            motion = free_slide(plant, plan.mass_kg, plan.velocity, covariates)
+        case _:
+            drive = _Drive(scenario, random)
+            motion = driven(plant, plan.mass_kg, drive.force_n, scenario.drive.duration_s, covariates)
+    # The actuator's laws may outlast the part's last stop; nothing of interest happens after either.
+    last = motion.end_s if drive is not None else max(motion.stop_s, 0.0) + scenario.tail_s
+    channels = {}
+    for name, column in COLUMNS.items():
+        sensor = getattr(scenario.sensors, name)
+        if sensor is None:
+            continue
+        time = np.arange(1, max(int(last * sensor.rate_hz + 1e-6), 1) + 1) / sensor.rate_hz
+        if drive is not None and name == "force":
+            values = np.array([motion.sensed(force) for force in drive.force_n(time)])
+        else:
+            values = getattr(motion, column)(time)
+        channels[name] = _measured(scenario, sensor, time, values, random)
+    return MadeShot(plan, plant, motion, channels)
+
+
+class _Drive:
+    """Sum of sines in random phase: smooth, and band-limited well below any sampling rate."""
+
+    def __init__(self, scenario: CampaignScenario, random: np.random.Generator) -> None:
+        drive = scenario.drive
+        frequencies = random.uniform(drive.band_hz[0], drive.band_hz[1], drive.lines)
+        self._rates = 2.0 * np.pi * frequencies
+        self._phases = random.uniform(0.0, 2.0 * np.pi, drive.lines)
+        self._amplitude = drive.rms_n * math.sqrt(2.0 / drive.lines)
+
+    def force_n(self, time: Any) -> Any:
+        angles = np.multiply.outer(time, self._rates) + self._phases
+        return self._amplitude * np.sin(angles).sum(axis=-1)
+
+
+def _measured(
+    scenario: CampaignScenario,
+    sensor: SensorScenario,
+    time: Samples,
+    values: Samples,
+    random: np.random.Generator,
+) -> tuple[Samples, Samples]:
+    noise = random.standard_normal(len(time))
+    if scenario.noise.colour == "coloured":
+        # First-order autoregressive noise of unit variance, stationary from the first sample on.
+        keep = math.exp(-1.0 / (sensor.rate_hz * scenario.noise.correlation_time_s))
+        noise[1:] *= math.sqrt(1.0 - keep * keep)
+        noise = lfilter([1.0], [1.0, -keep], noise)
+    measured = values + sensor.noise_std * noise
+    if sensor.resolution > 0.0:
+        measured = np.rint(measured / sensor.resolution) * sensor.resolution
+    lost = int(sensor.gap_share * len(time))
+    if lost:
+        first = int(random.integers(0, len(time) - lost + 1))
+        keep_them = np.ones(len(time), dtype=bool)
+        keep_them[first : first + lost] = False
+        return time[keep_them], measured[keep_them]
+    return time, measured
+
+
+def write(scenario: CampaignScenario, directory: Path) -> Path:
+    """Make the campaign, write it to `directory` and its truth beside it; returns the truth file.
+
+    Raises
+    ------
+    CampaignError
+        One of the two exists already, or cannot be written.
+    """
+    truth = directory.with_name(directory.name + ".truth.json")
+    for place in (directory, truth):
+        if place.exists() and not (place.is_dir() and not any(place.iterdir())):
+            message = f"{place}: exists already; choose another name or remove it"
+            raise CampaignError(message)
+    base, shots = make(scenario)
+    beside = directory.with_name(f".{directory.name}.partial")
+    try:
+        shutil.rmtree(beside, ignore_errors=True)
+        (beside / "traces").mkdir(parents=True)
+        (beside / "campaign.yaml").write_text(_header(scenario), encoding="utf-8")
+        (beside / "shots.csv").write_text(_table(scenario, shots), encoding="utf-8")
+        for shot in shots:
+            (beside / "traces" / f"{shot.plan.number}.csv").write_text(_trace(shot), encoding="utf-8")
+        truth.write_text(json.dumps(_truth(scenario, base, shots), indent=1) + "\n", encoding="utf-8")
+        if directory.is_dir():
+            directory.rmdir()
+        beside.rename(directory)
+    except OSError as error:
+        message = f"{directory}: cannot be written: {error.strerror}"
+        raise CampaignError(message) from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+    return truth
+
+
+def _header(scenario: CampaignScenario) -> str:
+    lines = ["format: 1", f"excitation: {scenario.excitation}", f"gravity_m_s2: {scenario.gravity_m_s2:g}"]
+    if scenario.excitation == "tap":
+        lines += ["actuator:", f"  stroke_m: {scenario.stroke_m:.9g}"]
+    lines.append("sensors:")
+    for name in COLUMNS:
+        sensor = getattr(scenario.sensors, name)
+        if sensor is not None:
+            unit = "n" if name == "force" else "m"
+            noise = f"{sensor.noise_std:.9g}" if scenario.noise.stated and sensor.noise_std > 0.0 else "null"
+            lines.append(f"  {name}: {{rate_hz: {sensor.rate_hz:.9g}, noise_std_{unit}: {noise}}}")
+    return "\n".join(lines) + "\n"
+
+
+def _table(scenario: CampaignScenario, shots: Sequence[MadeShot]) -> str:
+    is_tap = scenario.excitation == "tap"
+    names = ["shot", *(["velocity_mm_per_min"] if is_tap else []), "mass_kg", "direction", "batch", "dwell_s"]
+    starts = any(start != 0.0 for start in scenario.starts_m)
+    rows = [names + (["start_m"] if starts else [])]
+    for shot in shots:
+        plan = shot.plan
+        row = [str(plan.number)] + ([f"{plan.velocity:.9g}"] if is_tap else [])
+        row += [f"{plan.mass_kg:.9g}" if scenario.mass_stated else "", str(plan.direction)]
+        row += [scenario.batches[plan.batch], f"{plan.dwell_s:.9g}"]
+        rows.append(row + ([f"{plan.start_m:.9g}"] if starts else []))
+    return "".join(",".join(row) + "\n" for row in rows)
+
+
+def _trace(shot: MadeShot) -> str:
+    times = np.unique(np.concatenate([time for time, _ in shot.channels.values()]))
+    columns = [[f"{time:.9g}" for time in times.tolist()]]
+    for time, values in shot.channels.values():
+        cells = [""] * len(times)
+        for place, value in zip(np.searchsorted(times, time).tolist(), values.tolist(), strict=True):
+            cells[place] = f"{value:.9g}"
+        columns.append(cells)
+    header = ",".join(["time_s", *(COLUMNS[name] for name in shot.channels)])
+    return "\n".join([header, *(",".join(row) for row in zip(*columns, strict=True))]) + "\n"
+
+
+def _truth(scenario: CampaignScenario, base: Plant, shots: Sequence[MadeShot]) -> dict[str, Any]:
+    return {
+        "effect": "+".join(scenario.hide) or "none",
+        "effects": {name: dict(parameters) for name, parameters in base.effects.items()},
+        "seed": scenario.seed,
+        "base": {"k": base.stiffness_n_per_m, "b": base.damping_n_s_per_m},
+        "mus": base.mu_s,
+        "ratio": scenario.plant.ratio,
+        "shots": [
+            {
+                "shot": shot.plan.number,
+                "mu_s": shot.motion.mu_s,
+                "mu_k": shot.motion.mu_k,
+                "factor": shot.plan.factor,
+                "mass_kg": shot.plan.mass_kg,
+                "peak_force_n": shot.motion.peak_force_n,
+                "sliding_distance_m": _or_none(shot.motion.sliding_distance_m),
+                "displacement_m": shot.motion.displacement_m,
+            }
+            for shot in shots
+        ],
+    }
+
+
+def _or_none(value: float) -> float | None:
+    return None if math.isnan(value) else value
