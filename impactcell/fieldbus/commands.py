@@ -1,8 +1,8 @@
-"""Positioning taps: commanded with a read-back and a handshake, so that none is made twice and none by accident.
+"""Positioning taps: commanded with a read-back and a handshake, so that none is made twice or by accident.
 
-The parameters are written and read back; only then the command's sequence number is written, and a change of that
-is what the module acts on. Writing the same number again does nothing, so a command whose answer was lost with the
-connection is repeated safely.
+The parameters are written and read back; only then the command's sequence number is written, and a change of
+that is what the module acts on. Writing the same number again does nothing, so a command whose answer was
+lost with the link is repeated safely.
 """
 
 import asyncio
@@ -59,19 +59,19 @@ class Positioner:
         """
         self._check(command)
         async with self._one_at_a_time:
-            sequence = 0
+            commanded = False
             try:
                 async with asyncio.timeout(self._patience_s):
-                    before = await self._report()
+                    session, before = await self._report()
                     if before.state != "ready":
                         raise PositioningError(
                             f"{self._module.cell}: module takes no command, it is {before.state}"
                         )
-                    sequence = before.accepted % (2**32 - 1) + 1
                     await self._load(command)
-                    return await self._execute(sequence)
+                    commanded = True
+                    return await self._execute(session, before.accepted % (2**32 - 1) + 1)
             except TimeoutError:
-                struck = "the part may have been struck" if sequence else "nothing has been commanded"
+                struck = "the part may have been struck" if commanded else "nothing has been commanded"
                 raise PositioningError(
                     f"{self._module.cell}: tap not finished within {self._patience_s:g} s; {struck}"
                 ) from None
@@ -91,18 +91,18 @@ class Positioner:
         if command.direction not in (-1, 1):
             raise PositioningError(f"{cell}: tap direction must be 1 or -1, not {command.direction}")
 
-    async def _report(self) -> PositioningReport:
-        """Return a fresh report, waiting for the link if it is down."""
+    async def _report(self) -> tuple[int, PositioningReport]:
+        """Return session and a fresh report, waiting for the link if it is down."""
         while True:
             await self._module.wait_connected()
             try:
-                found = (await self._module.read_report()).positioning
+                report = await self._module.read_report()
             except (LinkError, ProtocolError):
                 await asyncio.sleep(_POLL_S)
                 continue
-            if found is None:
+            if report.positioning is None:
                 raise PositioningError(f"{self._module.cell}: the map lacks registers of a positioning cell")
-            return found
+            return report.session, report.positioning
 
     async def _load(self, command: TapCommand) -> None:
         """Write the parameters and read them back."""
@@ -120,8 +120,8 @@ class Positioner:
                     if shown.tobytes() != words.tobytes():
                         register = registers[name]
                         raise PositioningError(
-                            f"{self._module.cell}: register {name} ({register.address}) does not show what was "
-                            "written; nothing has been commanded"
+                            f"{self._module.cell}: register {name} ({register.address}) does not show what "
+                            "was written; nothing has been commanded"
                         )
             except (LinkError, ProtocolError):
                 await asyncio.sleep(_POLL_S)
@@ -130,26 +130,25 @@ class Positioner:
             else:
                 return
 
-    async def _execute(self, sequence: int) -> int:
+    async def _execute(self, session: int, sequence: int) -> int:
         """Write the sequence number until the module has it, and wait for the outcome."""
         cell = self._module.cell
+        written = False
         while True:
-            await self._module.wait_connected()
-            try:
-                await self._module.device.write({"command_sequence": sequence})
-            except (LinkError, ProtocolError):
-                await asyncio.sleep(_POLL_S)
-            except ModbusExceptionError as error:
-                raise PositioningError(f"{cell}: {error}; nothing has been commanded") from error
-            else:
-                break
-        while True:
-            shown = await self._report()
+            now, shown = await self._report()
+            if now != session:
+                raise PositioningError(f"{cell}: module was started anew during tap {sequence}")
             if shown.accepted == sequence:
                 if shown.result == "done":
                     return shown.cycle
                 if shown.result != "executing":
                     raise PositioningError(f"{cell}: tap {sequence}: {shown.result}")
-            elif shown.accepted == 0 and shown.state != "executing":
-                raise PositioningError(f"{cell}: module was started anew during tap {sequence}")
+            elif not written:
+                try:
+                    await self._module.device.write({"command_sequence": sequence})
+                    written = True
+                except (LinkError, ProtocolError):
+                    continue  # whether it arrived is seen in the next report
+                except ModbusExceptionError as error:
+                    raise PositioningError(f"{cell}: {error}; nothing has been commanded") from error
             await asyncio.sleep(_POLL_S)
