@@ -6,8 +6,11 @@ from impactcell.errors import PhysicsError, PredictionError
 from impactcell.prediction.equations import by_distance, by_force, combined, mix, out_of_range
 from impactcell.prediction.model import Model
 from impactcell.prediction.reading import Reading, Slide, peak_force, slide
+from impactcell.prediction.waveform import Waveform, braking_friction, fit
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
 
+WIDE_GAP = 3.0
+"""Residuals so many times the noise make the waveform's own standard deviation doubtful."""
 NOT_READ = Reading(math.nan, math.nan)
 
 
@@ -56,16 +59,41 @@ def estimate(capture: Capture, model: Model) -> FrictionEstimate:
     except PredictionError as fault:
         mu_force = mu_distance = mu_combined = _coefficient(str(fault))
     mu_s, estimator = _published(mu_combined, mu_force, mu_distance)
+    mu_k = _mu_k(model, slid, mu_s, capture.mass_kg)
+    gap = math.nan
+    if not force_fault and slid is not None:
+        try:
+            found = fit(capture, model, slid)
+        except PredictionError as fault:
+            mu_s = _warned(mu_s, f"no waveform estimate: {fault}")
+        else:
+            mu_s, mu_k, gap = _from_waveform(model, capture, found)
+            estimator = Estimator.WAVEFORM
     return FrictionEstimate(
         mu_s=mu_s,
-        mu_k=_mu_k(model, slid, mu_s),
+        mu_k=mu_k,
         by_force=mu_force,
         by_distance=mu_distance,
         combined=mu_combined,
         estimator=estimator,
         peak_force_n=peak.value,
         sliding_distance_m=distance.value,
+        gap=gap,
     )
+
+
+def _from_waveform(model: Model, capture: Capture, found: Waveform) -> tuple[Coefficient, Coefficient, float]:
+    """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
+    warnings = []
+    if model.predictors:
+        mixed = mix(model, capture.mass_kg)
+        warnings.append(out_of_range(model, mixed, capture.velocity_m_s, found.mu_s, capture.stroke_m))
+    if found.gap > WIDE_GAP:
+        warnings.append(f"residuals are {found.gap:.3g} times the sensors' noise: the model lacks something")
+    told = "mu_s through mu_k/mu_s of the model: the part moved at once" if found.immediate > 0.5 else ""
+    mu_s = Coefficient(found.mu_s, found.mu_s_std, Quality.GOOD, told)
+    mu_k = Coefficient(found.mu_k, found.mu_k_std, Quality.GOOD)
+    return _warned(mu_s, *warnings), _warned(mu_k, *warnings), found.gap
 
 
 def _peak(capture: Capture) -> tuple[Reading, str]:
@@ -124,12 +152,11 @@ def _published(
     return mu_combined, Estimator.NONE
 
 
-def _mu_k(model: Model, slid: Slide | None, mu_s: Coefficient) -> Coefficient:
+def _mu_k(model: Model, slid: Slide | None, mu_s: Coefficient, mass_kg: float) -> Coefficient:
     """mu_k from the mean deceleration of the slide, or, without one, from mu_s through the ratio."""
-    if slid is not None and slid.deceleration.value > 0.0:
-        gravity = model.plant.gravity_m_s2
-        value, std = slid.deceleration.value / gravity, slid.deceleration.std / gravity
-        return Coefficient(value, std, Quality.UNCERTAIN, "mean over the slide, viscous part included")
+    if slid is not None and (value := braking_friction(model, mass_kg, slid)) > 0.0:
+        std = slid.deceleration.std / model.plant.gravity_m_s2
+        return Coefficient(value, std, Quality.UNCERTAIN, "from the mean deceleration of the slide")
     if mu_s.quality < Quality.BAD:
         ratio = model.ratio
         std = ratio * math.hypot(mu_s.std, mu_s.value * model.prior.ratio_std / ratio)

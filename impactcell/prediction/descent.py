@@ -1,0 +1,137 @@
+"""Gauss-Newton descent of a tap's posterior on one side of the kink of immediate breakaway."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impactcell.errors import NotConvergedError, PhysicsError
+from impactcell.prediction.posterior import Side
+from impactcell.prediction.response import JUST_SLIPPING, PARAMETERS, RATIO, Response
+from impactcell.records import Samples
+
+Indices = NDArray[np.intp]
+
+MOST_STEPS = 25
+SETTLED = 0.02
+"""Length of a step, in posterior standard deviations, below which the fit is at its minimum."""
+WORSE = 0.01
+"""Half a sum of squares may rise by this much in a step: nothing statistically, yet more than rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Belief:
+    """Prior in theta: mean, and one over its standard deviation; 0 where nothing is known.
+
+    Attributes
+    ----------
+    mean, weight : ndarray, shape (4,)
+    free : ndarray of int
+        Indices of what is fitted.
+    """
+
+    mean: Samples
+    weight: Samples
+    free: Indices
+
+    def cost(self, theta: Samples) -> float:
+        """Half the sum of squares of the prior."""
+        return 0.5 * float(np.sum((self.weight[self.free] * (theta - self.mean)[self.free]) ** 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Minimum:
+    """Where a descent ended, and the linear model there.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (4,)
+    side : int
+    residual : ndarray, shape (n,)
+    jacobian : ndarray, shape (n, 4)
+    cost : float
+        Half the sum of squares, data and prior.
+    """
+
+    theta: Samples
+    side: int
+    residual: Samples
+    jacobian: Samples
+    cost: float
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares of the data's residuals."""
+        return float(self.residual @ self.residual)
+
+    def as_side(self, known: Belief, misfit: float = 1.0) -> Side:
+        """Give the quadratic about the minimum, the data's weight divided by `misfit` squared."""
+        free = known.free
+        slope = self.jacobian[:, free] / misfit
+        residual = self.residual / misfit
+        prior = known.weight[free] ** 2
+        curvature = slope.T @ slope + np.diag(prior)
+        away = (self.theta - known.mean)[free]
+        gradient = slope.T @ residual + prior * away
+        step = -np.linalg.solve(curvature, gradient)
+        mean = self.theta.copy()
+        mean[free] += step
+        covariance = np.zeros((PARAMETERS, PARAMETERS))
+        covariance[np.ix_(free, free)] = np.linalg.inv(curvature)
+        cost = 0.5 * float(residual @ residual + prior @ away**2) + 0.5 * float(gradient @ step)
+        _, log_determinant = np.linalg.slogdet(curvature)
+        return Side(mean, covariance, cost, -float(log_determinant), self.side)
+
+
+def descend(response: Response, known: Belief, start: Samples, side: int) -> Minimum:
+    """Find the minimum of data and prior, with the model of one side continued across the kink.
+
+    Below the kink (`side` -1) the model is that of immediate breakaway. Above it (`side` +1) the residuals
+    are continued linearly along mu_k/mu_s from the kink.
+
+    Raises
+    ------
+    NotConvergedError
+        No minimum after `MOST_STEPS` steps.
+    """
+    theta = start.copy()
+    residual, jacobian = _linear(response, theta, side)
+    cost = 0.5 * float(residual @ residual) + known.cost(theta)
+    free, prior = known.free, known.weight[known.free] ** 2
+    damping = 0.0
+    for _ in range(MOST_STEPS):
+        slope = jacobian[:, free]
+        curvature = slope.T @ slope + np.diag(prior)
+        gradient = slope.T @ residual + prior * (theta - known.mean)[free]
+        step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
+        if not np.isfinite(step).all():
+            break
+        if float(step @ curvature @ step) < SETTLED**2 and damping <= 1e-3:
+            return Minimum(theta, side, residual, jacobian, cost)
+        moved = theta.copy()
+        moved[free] += np.clip(step, -0.5, 0.5)
+        try:
+            new_residual, new_jacobian = _linear(response, moved, side)
+            new_cost = 0.5 * float(new_residual @ new_residual) + known.cost(moved)
+        except PhysicsError:
+            new_cost = math.inf
+        if new_cost <= cost + WORSE:
+            theta, residual, jacobian, cost = moved, new_residual, new_jacobian, new_cost
+            damping = 0.0 if damping < 1e-2 else 0.1 * damping
+        else:
+            damping = max(10.0 * damping, 1e-2)
+            if damping > 1e8:
+                break
+    raise NotConvergedError("the waveform fit did not settle; the capture may not be of this plant")
+
+
+def _linear(response: Response, theta: Samples, side: int) -> tuple[Samples, Samples]:
+    """Residuals and their derivative, those above the kink continued linearly below it."""
+    at = theta
+    if side > 0 and (below := response.kink(theta) + JUST_SLIPPING) < 0.0:
+        at = theta.copy()
+        at[RATIO] += below
+    residual = response.residuals(at, side)
+    jacobian = response.jacobian(at, residual, side)
+    return residual + jacobian[:, RATIO] * (theta[RATIO] - at[RATIO]), jacobian

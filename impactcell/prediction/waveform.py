@@ -1,0 +1,183 @@
+"""mu_s and mu_k from the whole waveform of a tap: maximum a posteriori, with k and b as nuisances.
+
+Gauss-Newton on the blocks of a capture (`impactcell.prediction.response`), started from the curvature of
+the slide. Priors are those of the model: mu_k is free; mu_k/mu_s, k and b are log-normal about its plant's.
+Where breakaway may be immediate the posterior has a kink and is fitted on either side of it
+(`impactcell.prediction.posterior`): mu_s is then seen only through the prior on mu_k/mu_s, and its
+standard deviation says so.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
+from impactcell.prediction.blocks import NOTHING, Blocks
+from impactcell.prediction.descent import Belief, descend
+from impactcell.prediction.model import Model
+from impactcell.prediction.posterior import Posterior, mixture
+from impactcell.prediction.reading import Slide, checked, noise_std, refuse_clipped, slide
+from impactcell.prediction.response import (
+    DAMPING,
+    MU_K,
+    PARAMETERS,
+    RATIO,
+    STIFFNESS,
+    Response,
+    parameters,
+    respond,
+    with_parameters,
+)
+from impactcell.records import Capture, Channel, Samples
+
+FAR_FROM_KINK = 6.0
+"""Standard deviations of z beyond which the other side of the kink has no weight."""
+OF_MU_K = np.array([1.0, 0.0, 0.0, 0.0])
+OF_MU_S = np.array([1.0, -1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waveform:
+    """Outcome of a waveform fit.
+
+    Attributes
+    ----------
+    mu_s, mu_s_std, mu_k, mu_k_std : float
+        Posterior means and standard deviations.
+    theta : ndarray, shape (4,)
+        Most probable ln(mu_k, mu_k/mu_s, k, b).
+    posterior : Posterior
+        Of theta.
+    immediate : float
+        Probability that the part moved at once, so that the capture does not show mu_s.
+    gap : float
+        RMS of the residuals of single samples over the sensors' noise; 1 = noise.
+    misfit : float
+        The same for blocks; the standard deviations are widened by it where it is above 1.
+    """
+
+    mu_s: float
+    mu_s_std: float
+    mu_k: float
+    mu_k_std: float
+    theta: Samples
+    posterior: Posterior
+    immediate: float
+    gap: float
+    misfit: float
+
+    def interval(self, level: float = 0.95) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Equal-tailed credible intervals of mu_s and of mu_k."""
+        mu_s, mu_k = (self.posterior.interval(of, level) for of in (OF_MU_S, OF_MU_K))
+        return (math.exp(mu_s[0]), math.exp(mu_s[1])), (math.exp(mu_k[0]), math.exp(mu_k[1]))
+
+
+def belief(model: Model, *, fixed_ratio: bool = False) -> Belief:
+    """Prior of a tap's parameters; with `fixed_ratio` mu_k/mu_s is the plant's exactly, as in the paper."""
+    plant, prior = model.plant, model.prior
+    weight = np.array(
+        [
+            0.0,
+            model.ratio / prior.ratio_std,
+            plant.stiffness_n_per_m / prior.stiffness_std_n_per_m,
+            plant.damping_n_s_per_m / prior.damping_std_n_s_per_m,
+        ]
+    )
+    free = np.array([MU_K, STIFFNESS, DAMPING] if fixed_ratio else [MU_K, RATIO, STIFFNESS, DAMPING])
+    return Belief(parameters(plant), weight, free)
+
+
+def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_ratio: bool = False) -> Waveform:
+    """Fit the whole waveform of one tap.
+
+    Parameters
+    ----------
+    capture : Capture
+        With force and position.
+    model : Model
+    slid : Slide, optional
+        The slide as read off this capture, where that has been done already.
+    fixed_ratio : bool
+        Take mu_k/mu_s as exactly the plant's, as the paper does.
+
+    Raises
+    ------
+    CaptureError, ClippedForceError, NoBreakawayError, NoSeparationError, NoStopError
+        The capture cannot be used.
+    NotConvergedError
+        The fit did not reach a minimum.
+    """
+    force = checked(capture.force, "force")
+    refuse_clipped(force)
+    slid = slid or slide(capture)
+    known = belief(model, fixed_ratio=fixed_ratio)
+    theta = known.mean.copy()
+    theta[MU_K] = math.log(max(braking_friction(model, capture.mass_kg, slid), 1e-3))
+    if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
+        raise CaptureError("the part's mass or the actuator's velocity is not known")
+    try:
+        response = respond(capture, with_parameters(model.plant, theta), slid.separation_s)
+        return _fit(response, known, theta, capture)
+    except PhysicsError as fault:
+        raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
+    except np.linalg.LinAlgError as fault:
+        raise NotConvergedError(f"the fit is singular: {fault}") from fault
+
+
+def _fit(response: Response, known: Belief, start: Samples, capture: Capture) -> Waveform:
+    first = 1 if response.kink(start) >= 0.0 else -1
+    found = descend(response, known, start, first)
+    form = np.zeros(PARAMETERS)
+    form[[MU_K, RATIO, DAMPING]] = 1.0, -1.0, -1.0
+    offset = response.kink(found.theta) - float(form @ found.theta)
+    fits = [found]
+    spread = math.sqrt(float(form @ found.as_side(known).covariance @ form))
+    if first * response.kink(found.theta) < FAR_FROM_KINK * spread:
+        fits.append(descend(response, known, found.theta, -first))
+    best = min(fits, key=lambda one: one.cost)
+    misfit = math.sqrt(best.chi2 / max(response.size - len(known.free), 1))
+    sides = tuple(one.as_side(known, max(misfit, 1.0)) for one in fits)
+    if len(sides) == 1:
+        sides = (replace(sides[0], sign=0),)
+    posterior = mixture(sides, form, offset)
+    slips_at_once = [one.side < 0 for one in fits]
+    (mu_s, mu_s_std), (mu_k, mu_k_std) = (_moments(posterior, of) for of in (OF_MU_S, OF_MU_K))
+    return Waveform(
+        mu_s=mu_s,
+        mu_s_std=mu_s_std,
+        mu_k=mu_k,
+        mu_k_std=mu_k_std,
+        theta=best.theta,
+        posterior=posterior,
+        immediate=float(posterior.weights[slips_at_once].sum()),
+        gap=_gap(response, best.theta, capture),
+        misfit=misfit,
+    )
+
+
+def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
+    """Mean and standard deviation of exp(`of` @ theta)."""
+    mean, std = posterior.moments(of)
+    value = math.exp(mean + 0.5 * std * std)
+    return value, value * math.sqrt(math.expm1(std * std))
+
+
+def _gap(response: Response, theta: Samples, capture: Capture) -> float:
+    """RMS of the residuals of every sample over the noise of its sensor."""
+    whole = replace(response, force=_every_sample(capture.force), position=_every_sample(capture.position))
+    residual = whole.residuals(theta)
+    return math.sqrt(float(residual @ residual) / len(residual))
+
+
+def _every_sample(channel: Channel | None) -> Blocks:
+    if channel is None:
+        return NOTHING
+    return Blocks(channel.time_s, channel.values, np.full(len(channel.values), noise_std(channel)))
+
+
+def braking_friction(model: Model, mass_kg: float, slid: Slide) -> float:
+    """mu_k from the mean deceleration of a slide, less what viscous friction took of it."""
+    viscous = model.plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
+    mean_speed = slid.distance.value / max(slid.stop_s - slid.separation_s, 1e-9)
+    return (slid.deceleration.value - viscous * mean_speed / mass_kg) / model.plant.gravity_m_s2
