@@ -23,7 +23,8 @@ async def leak_check() -> AsyncIterator[None]:
     """Fail when the test leaves a task running."""
     before = asyncio.all_tasks()
     yield
-    leaked = {task for task in asyncio.all_tasks() - before if not task.done()}
+    after = asyncio.all_tasks() - before - {asyncio.current_task()}
+    leaked = {task for task in after if not task.done()}
     assert not leaked, f"tasks left running: {sorted(task.get_name() for task in leaked)}"
 
 

@@ -2,7 +2,8 @@
 
 The window shows one slot of the ring. Its sequence number is read before and after the samples: only if it is
 even and has not changed, if slot, session and cycle are the wanted ones and the CRC fits, is the reading
-used. A reading that the link interrupts is taken up where it stopped, if the window still shows the same.
+used. A reading that the link interrupts is taken up where it stopped, if the window still shows the same and
+there is a CRC to prove the whole.
 """
 
 import asyncio
@@ -107,6 +108,8 @@ class CaptureReader:
             except FieldbusError as error:
                 if not self._progressed():
                     self._failures += 1
+                if "capture_crc32" not in self._registers:
+                    self._reading = None
                 if self._failures < _ATTEMPTS:
                     raise
                 reason = f"the link failed each time: {error}"

@@ -160,6 +160,11 @@ class FrameReader:
     def __init__(self) -> None:
         self._held = b""
 
+    @property
+    def pending(self) -> int:
+        """Bytes that are held back because their frame is not complete."""
+        return len(self._held)
+
     def feed(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
         """Take in `data`; yield transaction, unit and PDU of each complete frame.
 

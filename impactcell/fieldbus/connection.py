@@ -74,6 +74,7 @@ class Connection(asyncio.Protocol):
         self._waiting: deque[Part] = deque()
         self._flying: dict[int, Part] = {}
         self._busy: dict[asyncio.TimerHandle, Part] = {}
+        self._unconfirmed: list[Exchange] = []
         self._timer: asyncio.TimerHandle | None = None
         self._resting: asyncio.TimerHandle | None = None
 
@@ -105,8 +106,9 @@ class Connection(asyncio.Protocol):
         transport, self._transport = self._transport, None
         if transport is not None:
             transport.abort()
-        for part in pending:
-            part.exchange.fail(error)
+        for exchange in (*self._unconfirmed, *(part.exchange for part in pending)):
+            exchange.fail(error)
+        self._unconfirmed.clear()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take over a fresh connection (called by asyncio)."""
@@ -125,8 +127,13 @@ class Connection(asyncio.Protocol):
         try:
             for transaction, unit, pdu in self._reader.feed(data):
                 self._answer(transaction, unit, pdu)
+            if not self._reader.pending:
+                self._confirm()
         except ProtocolError as error:
             self.give_up(ProtocolError(f"{self.link}: {error}"))
+            return
+        if self._reader.pending and not self._flying:
+            self.give_up(ProtocolError(f"{self.link}: more bytes than were asked for"))
             return
         if self.link.pause_s and self._resting is None:
             self._resting = self._loop.call_later(self.link.pause_s, self._rested)
@@ -184,17 +191,29 @@ class Connection(asyncio.Protocol):
         try:
             data = check_reply(part.request, pdu)
         except ModbusExceptionError as refused:
+            self._confirm()
             del self._flying[transaction]
             self._refused(part, refused)
             return
+        self._confirm()
         del self._flying[transaction]
         exchange = part.exchange
         exchange.data[part.offset : part.offset + len(data)] = data
         exchange.missing.discard(part.offset)
         if not exchange.missing:
             self.round_trip_s = self._loop.time() - part.sent_s
+            self._unconfirmed.append(exchange)
+
+    def _confirm(self) -> None:
+        """Hand over what is complete, now that the stream is known to be in step.
+
+        A frame that lost bytes fills up with the first ones of the next frame and looks whole; only what
+        comes after it shows that. So a reply counts once nothing, or another good reply, follows it.
+        """
+        for exchange in self._unconfirmed:
             if not exchange.done.done():
                 exchange.done.set_result(None)
+        self._unconfirmed.clear()
 
     def _refused(self, part: Part, refused: ModbusExceptionError) -> None:
         if (

@@ -56,7 +56,7 @@ def declared_fields(
     Parameters
     ----------
     mapping : mapping
-        A parsed map file: `format`, `name`, `word_order` and `registers`.
+        A parsed map file: `format`, `name`, `word_order` and the mapping `registers`.
     units, kinds : container of str
         What `unit` and `type` may be.
     """
@@ -69,11 +69,8 @@ def declared_fields(
     order = mapping.get("word_order", "big")
     if order not in _ORDERS:
         faults.append("word_order must be big or little")
-    registers = mapping.get("registers")
-    if not isinstance(registers, Mapping):
-        return name, {}, [*faults, "registers must be a mapping of names to registers"]
     sound: dict[str, dict[str, Any]] = {}
-    for key, entry in registers.items():
+    for key, entry in mapping["registers"].items():
         found = list(_entry_faults(entry, units, kinds))
         faults += [f"register {key}: {fault}" for fault in found]
         if not found:

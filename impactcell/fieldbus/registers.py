@@ -37,7 +37,7 @@ class RegisterMap:
     registers: Mapping[str, Register]
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any]) -> "RegisterMap":
+    def from_mapping(cls, mapping: object) -> "RegisterMap":
         """Map from a parsed map file.
 
         Raises
@@ -46,13 +46,13 @@ class RegisterMap:
             Listing every fault: unknown keys, wrong types, overlaps, addresses outside 0..65535, missing
             registers.
         """
+        if not isinstance(mapping, Mapping) or not isinstance(mapping.get("registers"), Mapping):
+            raise MapError("register map: must be a mapping with format, name and registers")
         name, declared, faults = declared_fields(mapping, units=SI_FACTOR, kinds=KINDS)
         registers = {key: Register(**values) for key, values in declared.items()}
-        faults += list(_layout_faults(registers.values()))
-        faults += [
-            f"register {key} is missing" for key in REQUIRED if key not in mapping.get("registers", {})
-        ]
-        faults += list(_window_faults(registers))
+        faults += _layout_faults(registers.values())
+        faults += [f"register {key} is missing" for key in REQUIRED if key not in mapping["registers"]]
+        faults += _window_faults(registers)
         if faults:
             raise MapError(f"register map {name}: " + "; ".join(faults))
         return cls(name, registers)
