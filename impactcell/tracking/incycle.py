@@ -56,13 +56,15 @@ def start(
     mean: Samples | None = None,
     covariance: Samples | None = None,
 ) -> InCycleFilter:
-    """Begin before the first sample; by default within ten sigma of 0, velocity and acceleration wide open."""
+    """Begin before the first sample; by default within ten sigma of 0, velocity and acceleration open."""
     return InCycleFilter(
         interval_s,
         position_std,
         density,
         np.zeros(3) if mean is None else np.array(mean, dtype=np.float64),
-        np.diag([100.0 * position_std**2, 1.0, 100.0]) if covariance is None else np.array(covariance, dtype=np.float64),
+        np.diag([100.0 * position_std**2, 1.0, 100.0])
+        if covariance is None
+        else np.array(covariance, dtype=np.float64),
         np.zeros(3),
     )
 
@@ -107,9 +109,7 @@ def filter_block(state: InCycleFilter, position_m: Samples) -> tuple[InCycleFilt
         state.steady,
         filtered,
     )
-    fresh = InCycleFilter(
-        state.interval_s, state.position_std, state.density, mean, covariance, gain, steady
-    )
+    fresh = InCycleFilter(state.interval_s, state.position_std, state.density, mean, covariance, gain, steady)
     return fresh, filtered
 
 
@@ -134,7 +134,9 @@ def _filter(
         # P = F P F' + Q, written out; P is symmetric
         p00 = p[0, 0] + 2.0 * T * p[0, 1] + 2.0 * half * p[0, 2] + T * T * p[1, 1]
         p00 += 2.0 * T * half * p[1, 2] + half * half * p[2, 2] + noise[0, 0]
-        p01 = p[0, 1] + T * p[0, 2] + T * p[1, 1] + (T * T + half) * p[1, 2] + half * T * p[2, 2] + noise[0, 1]
+        p01 = (
+            p[0, 1] + T * p[0, 2] + T * p[1, 1] + (T * T + half) * p[1, 2] + half * T * p[2, 2] + noise[0, 1]
+        )
         p02 = p[0, 2] + T * p[1, 2] + half * p[2, 2] + noise[0, 2]
         p11 = p[1, 1] + 2.0 * T * p[1, 2] + T * T * p[2, 2] + noise[1, 1]
         p12 = p[1, 2] + T * p[2, 2] + noise[1, 2]

@@ -1,0 +1,182 @@
+"""Friction along one stroke from each capture, and whether this cycle is like the others of its material."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.records import Capture, Evidence, Quality, Samples, Signature
+from impactcell.tracking import deviation, profile
+from impactcell.tracking import reference as references
+from impactcell.tracking.reference import Reference
+from impactcell.tracking.slide import NoSlideError, find_slide
+
+FEWEST_OF_MATERIAL = 5  # cycles of a new material before its cycles are judged
+GIVEN_UP = 10  # deviant cycles in a row that are rather another material
+
+
+@dataclass(frozen=True, slots=True)
+class SignatureSettings:
+    """Grid and design of the signature.
+
+    Attributes
+    ----------
+    length_m : float
+        Distance slid at the last grid point.
+    points : int
+        Grid points from 0 to `length_m`.
+    learned_cycles : int
+        Cycles from which a cell learns how its cycles vary before any is judged.
+    false_alarm_cycles : float
+        Designed mean number of cycles between false alarms.
+    """
+
+    length_m: float = 4e-3
+    points: int = 33
+    learned_cycles: int = 50
+    false_alarm_cycles: float = 100_000.0
+
+    @property
+    def grid_m(self) -> Samples:
+        """Grid points, shape (points,)."""
+        return np.linspace(0.0, self.length_m, self.points)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SignatureState:
+    """What is kept between cycles; `impactcell.values` writes it bit for bit."""
+
+    reference: Reference = field(default_factory=Reference)
+    batch_id: str = ""
+    deviant_run: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SignatureTracked:
+    """Outcome of one capture.
+
+    Attributes
+    ----------
+    deviation : Evidence or None
+        Set if the cycle is deviant.
+    judged : bool
+        Whether the cycle could be judged at all.
+    """
+
+    state: SignatureState
+    signature: Signature
+    deviation: Evidence | None
+    judged: bool
+
+
+def initial_state(settings: SignatureSettings) -> SignatureState:
+    """State before the first capture."""
+    return SignatureState(references.empty(settings.points + 2))
+
+
+def update(
+    settings: SignatureSettings,
+    state: SignatureState,
+    capture: Capture,
+    *,
+    batch_id: str = "",
+    restart: bool = False,
+    separation_s: float | None = None,
+    viscous_per_mass: float = 0.0,
+    gravity_m_s2: float = 9.81,
+    period_s: float = math.nan,
+) -> SignatureTracked:
+    """Take one capture into the state.
+
+    Parameters
+    ----------
+    batch_id : str
+        Material; another one restarts the reference.
+    restart : bool
+        The tracker found a batch shift: restart the reference.
+    separation_s : float or None
+        Last loss of contact, if it is known; else it is found in the capture.
+    viscous_per_mass : float
+        k_v / m of the model, 1/s: one cycle cannot tell it from mu(x).
+    period_s : float
+        Time between cycles.
+    """
+    if restart or (batch_id and batch_id != state.batch_id and state.batch_id):
+        state = replace(state, reference=references.restart(state.reference), deviant_run=0)
+    if batch_id:
+        state = replace(state, batch_id=batch_id)
+    grid = settings.grid_m
+    try:
+        slide = find_slide(capture, separation_s)
+    except NoSlideError as error:
+        nothing = np.full(settings.points, math.nan)
+        signature = Signature(grid, nothing, nothing, math.nan, math.nan, math.nan, Quality.BAD, str(error))
+        return SignatureTracked(state, signature, None, judged=False)
+    seen = profile.information(slide, grid, gravity_m_s2, viscous_per_mass)
+    friction, std = _published(seen, settings)
+    known = state.reference
+    if known.cycles < settings.learned_cycles or known.weight < FEWEST_OF_MATERIAL:
+        left = max(settings.learned_cycles - known.cycles, FEWEST_OF_MATERIAL - int(known.weight))
+        reason = f"the reference is being learned, {left} more cycles"
+        signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
+        return SignatureTracked(_learned(state, seen, settings, None), signature, None, judged=False)
+    usual = float(np.nanmean(friction))
+    verdict = deviation.judge(known, seen, grid, usual)
+    limit = 1.0 / settings.false_alarm_cycles
+    deviant = verdict.p_value < limit
+    signature = Signature(
+        grid,
+        friction,
+        std,
+        verdict.t_squared,
+        verdict.spe,
+        verdict.at_m if deviant else math.nan,
+        Quality.GOOD,
+    )
+    evidence = _evidence(settings, verdict, capture.cycle, period_s) if deviant else None
+    return SignatureTracked(_learned(state, seen, settings, verdict), signature, evidence, judged=True)
+
+
+def _published(seen: profile.Information, settings: SignatureSettings) -> tuple[Samples, Samples]:
+    """Friction and its standard deviation on the grid, nan where the part did not get."""
+    penalty = profile.roughness(settings.points + 2)
+    mean, covariance, _ = profile.smooth(seen.matrix, seen.vector, penalty)
+    on_grid = profile.on_grid(settings.points)
+    friction = on_grid @ mean
+    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", on_grid, covariance, on_grid), 0.0))
+    beyond = settings.grid_m > seen.reached_m
+    friction[beyond] = std[beyond] = math.nan
+    return friction, std
+
+
+def _learned(
+    state: SignatureState,
+    seen: profile.Information,
+    settings: SignatureSettings,
+    verdict: deviation.Verdict | None,
+) -> SignatureState:
+    """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
+    penalty = profile.roughness(settings.points + 2)
+    if verdict is None:
+        return replace(state, reference=references.learn(state.reference, seen, penalty), deviant_run=0)
+    if verdict.p_value < 1.0 / settings.false_alarm_cycles:
+        run = state.deviant_run + 1
+        if run < GIVEN_UP:
+            return replace(state, deviant_run=run)
+        fresh = references.learn(references.restart(state.reference), seen, penalty)
+        return replace(state, reference=fresh, deviant_run=0)
+    fresh = references.learn(state.reference, seen, penalty)
+    if verdict.spe_freedom > 0:
+        ratio = verdict.spe / verdict.spe_freedom
+        fresh = replace(fresh, spe_sum=fresh.spe_sum + ratio, spe_count=fresh.spe_count + 1)
+    return replace(state, reference=fresh, deviant_run=0)
+
+
+def _evidence(
+    settings: SignatureSettings, verdict: deviation.Verdict, cycle: int, period_s: float
+) -> Evidence:
+    """Statistic and threshold as -log10 of p-values."""
+    rarity = -math.log10(max(verdict.p_value, 1e-300))
+    cycles = settings.false_alarm_cycles
+    days = cycles * period_s / 86_400.0
+    return Evidence(rarity, math.log10(cycles), cycle, verdict.size, verdict.size_std, cycles, days)
