@@ -32,7 +32,10 @@ class Event:
 
 
 class Sampled(NamedTuple):
-    """Channels at the times asked for; force positive in compression, the others signed along +1."""
+    """Channels at the times asked for.
+
+    Force is positive in compression; the others count along +1, from where the part lay.
+    """
 
     force_n: Samples
     position_m: Samples

@@ -1,7 +1,7 @@
 """What is struck and how: the plant and its effects, and one tap as commanded."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from impactcell.errors import PhysicsError
@@ -32,7 +32,7 @@ class Plant:
     mu_s: float
     mu_k: float
     gravity_m_s2: float = 9.81
-    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    effects: Mapping[str, Mapping[str, float | Sequence[float]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse a plant that no part can have."""

@@ -1,1 +1,24 @@
-"""Physical effects that join the nominal model; one file is one named effect."""
+"""The library of physical effects: one file is one named effect.
+
+A file of this package defines one `EFFECT`; that file is all it takes for the effect to be simulated, fitted
+and offered everywhere.
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from impactcell.physics.effect import Effect
+
+
+def _discover() -> Mapping[str, Effect]:
+    found: dict[str, Effect] = {}
+    for module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name):
+        effect = importlib.import_module(f"{__name__}.{module.name}").EFFECT
+        found[effect.identifier] = effect
+    return MappingProxyType(found)
+
+
+LIBRARY: Mapping[str, Effect] = _discover()
+"""Every effect by its identifier."""

@@ -1,0 +1,26 @@
+"""Actuator droop: the actuator slows down under load."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def loss(w: float, force: float, _c: float, _d: float, p: Numbers) -> float:
+    """W' = (c F - w) / tau."""
+    return (p[0] * force - w) / p[1]
+
+
+EFFECT = Effect(
+    identifier="actuator_droop",
+    kind=Kind.ACTUATOR,
+    equation="y' = v - w, tau w' + w = c F",
+    reference="Load regulation of a speed-controlled drive: Leonhard, Control of Electrical Drives, "
+    "Springer (2001)",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
+    parameters=(
+        Parameter("speed_loss_m_per_s_n", "m/(s N)", null=0.0, lower=0.0, upper=0.001, typical=5e-05),
+        Parameter("time_constant_s", "s", null=math.nan, lower=1e-05, upper=1.0, typical=0.003),
+    ),
+    laws={LawKind.LOSS: loss},
+)

@@ -1,0 +1,25 @@
+"""Actuator ramp: the actuator needs time to reach its speed."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def run_up(t: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """min(t / t_r, 1)."""
+    return t / p[0] if t < p[0] else 1.0
+
+
+def end(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """t_r."""
+    return p[0]
+
+
+EFFECT = Effect(
+    identifier="actuator_ramp",
+    kind=Kind.ACTUATOR,
+    equation="y' grows linearly from 0 to v in t_r",
+    reference="Trapezoidal velocity profile of motion controllers",
+    phases=(Phase.PRELOAD, Phase.LOADING),
+    parameters=(Parameter("ramp_time_s", "s", null=0.0, lower=0.0, upper=0.05, typical=0.002),),
+    laws={LawKind.SPEED: run_up, LawKind.UNTIL: end},
+)

@@ -1,0 +1,31 @@
+"""Adhesion: a film between actuator and part pulls after separation, until it breaks."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def pull(gap: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """Return A (1 - gap/l)."""
+    return p[0] * (1.0 - gap / p[1])
+
+
+def reach(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """L, and none without a force."""
+    return p[1] if p[0] != 0.0 else 0.0
+
+
+EFFECT = Effect(
+    identifier="adhesion",
+    kind=Kind.CONTACT,
+    equation="pull -A (1 - gap/l) after separation, gap < l",
+    reference="Liquid bridge of constant volume, linearised: Israelachvili, Intermolecular and "
+    "Surface Forces, 3rd ed. (2011), chapter 17",
+    phases=(Phase.FREE_SLIDE,),
+    parameters=(
+        Parameter("force_n", "N", null=0.0, lower=0.0, upper=200.0, typical=10.0),
+        Parameter("range_m", "m", null=math.nan, lower=1e-06, upper=0.01, typical=0.0003),
+    ),
+    laws={LawKind.PULL: pull, LawKind.REACH: reach},
+)

@@ -1,0 +1,20 @@
+"""Channel skew: force is recorded late against position."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def delay(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """Return the delay."""
+    return p[0]
+
+
+EFFECT = Effect(
+    identifier="channel_skew",
+    kind=Kind.SENSOR,
+    equation="force recorded at t is that of t - delay",
+    reference="Inter-channel delay of multiplexed converters: IEEE 1057 (2017)",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
+    parameters=(Parameter("delay_s", "s", null=0.0, lower=-0.01, upper=0.01, typical=0.0003),),
+    laws={LawKind.DELAY: delay},
+)

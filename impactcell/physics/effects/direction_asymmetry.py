@@ -1,0 +1,24 @@
+"""Direction asymmetry: friction differs between the two directions of slip."""
+
+from collections.abc import Sequence
+
+from impactcell.physics.effect import ONE, Covariates, Effect, Factors, Kind, Parameter, Phase
+from impactcell.records import Samples
+
+
+def factors(parameters: Sequence[Samples], shots: Covariates) -> Factors:
+    """1 + a direction on mu_s and mu_k."""
+    factor = 1.0 + parameters[0] * shots.direction
+    return Factors(factor, factor, ONE)
+
+
+EFFECT = Effect(
+    identifier="direction_asymmetry",
+    kind=Kind.BETWEEN_SHOTS,
+    equation="mu (1 + a direction)",
+    reference="Ratchet-like asperities: Zmitrowicz, Models of kinematics dependent anisotropic "
+    "friction, Int. J. Solids Struct. 39 (2002)",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.BETWEEN_SHOTS),
+    parameters=(Parameter("relative_amplitude", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
+    between=factors,
+)

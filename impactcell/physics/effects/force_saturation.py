@@ -1,0 +1,23 @@
+"""Saturation of the force channel: its amplifier or converter ends at a limit."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def shown(force: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """min(F, F_max)."""
+    return min(p[0], force)
+
+
+EFFECT = Effect(
+    identifier="force_saturation",
+    kind=Kind.SENSOR,
+    equation="min(F, F_max)",
+    reference="Overrange of a measuring amplifier",
+    phases=(Phase.LOADING, Phase.UNLOADING),
+    parameters=(Parameter("limit_n", "N", null=math.inf, lower=1.0, upper=math.inf, typical=200.0),),
+    laws={LawKind.READING: shown},
+    order=3,
+)

@@ -1,0 +1,21 @@
+"""Gain error of the force sensor."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def shown(force: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """F (1 + e)."""
+    return force * (1.0 + p[0])
+
+
+EFFECT = Effect(
+    identifier="force_sensor_gain",
+    kind=Kind.SENSOR,
+    equation="F (1 + e)",
+    reference="Span error: ISO 376 (2011)",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
+    parameters=(Parameter("relative_error", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
+    laws={LawKind.READING: shown},
+    order=1,
+)

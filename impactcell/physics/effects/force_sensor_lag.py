@@ -1,0 +1,20 @@
+"""Lag of the force sensor: its amplifier is a low-pass filter."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def time_constant(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """Tau."""
+    return p[0]
+
+
+EFFECT = Effect(
+    identifier="force_sensor_lag",
+    kind=Kind.SENSOR,
+    equation="tau F_m' + F_m = F",
+    reference="First-order instrument: Doebelin, Measurement Systems, McGraw-Hill (2003), chapter 3",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
+    parameters=(Parameter("time_constant_s", "s", null=0.0, lower=0.0, upper=0.02, typical=0.0003),),
+    laws={LawKind.LAG: time_constant},
+)

@@ -1,0 +1,21 @@
+"""Zero error of the force sensor."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def shown(force: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """F + F_0."""
+    return force + p[0]
+
+
+EFFECT = Effect(
+    identifier="force_sensor_offset",
+    kind=Kind.SENSOR,
+    equation="F + F_0",
+    reference="Zero error: ISO 376 (2011)",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.STOP),
+    parameters=(Parameter("offset_n", "N", null=0.0, lower=-100.0, upper=100.0, typical=2.0),),
+    laws={LawKind.READING: shown},
+    order=2,
+)

@@ -1,0 +1,23 @@
+"""Friction that drifts from the first shot to the last."""
+
+from collections.abc import Sequence
+
+from impactcell.physics.effect import ONE, Covariates, Effect, Factors, Kind, Parameter, Phase
+from impactcell.records import Samples
+
+
+def factors(parameters: Sequence[Samples], shots: Covariates) -> Factors:
+    """1 + c (shot/N - 1/2) on mu_s and mu_k."""
+    factor = 1.0 + parameters[0] * (shots.shot / shots.shots - 0.5)
+    return Factors(factor, factor, ONE)
+
+
+EFFECT = Effect(
+    identifier="friction_drift",
+    kind=Kind.BETWEEN_SHOTS,
+    equation="mu (1 + c (shot/N - 1/2))",
+    reference="Running-in and wear: Blau, On the nature of running-in, Tribol. Int. 38 (2005)",
+    phases=(Phase.BETWEEN_SHOTS,),
+    parameters=(Parameter("relative_change", "1", null=0.0, lower=-0.9, upper=0.9, typical=0.05),),
+    between=factors,
+)

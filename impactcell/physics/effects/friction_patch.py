@@ -1,0 +1,26 @@
+"""Friction patch: one place on the table is rougher or smoother."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def factor(x: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """1 + a exp(-(x - x_0)²/2w²)."""
+    return 1.0 + p[0] * math.exp(-0.5 * ((x - p[1]) / p[2]) ** 2)
+
+
+EFFECT = Effect(
+    identifier="friction_patch",
+    kind=Kind.FRICTION,
+    equation="mu (1 + a exp(-(x - x_0)²/2w²))",
+    reference="A local wear scar or contamination, as a Gaussian",
+    phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
+    parameters=(
+        Parameter("amplitude", "1", null=0.0, lower=-0.9, upper=3.0, typical=0.3),
+        Parameter("position_m", "m", null=math.nan, lower=-0.1, upper=0.1, typical=0.003),
+        Parameter("width_m", "m", null=math.nan, lower=5e-05, upper=0.05, typical=0.0005),
+    ),
+    laws={LawKind.SCALE: factor},
+)

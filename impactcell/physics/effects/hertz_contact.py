@@ -1,0 +1,22 @@
+"""Hertzian contact: the contact stiffens as its area grows."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def stiffening(d: float, _b: float, k: float, _d: float, p: Numbers) -> float:
+    """K d^n - k d, odd in d."""
+    return k * (math.copysign(abs(d) ** p[0], d) - d)
+
+
+EFFECT = Effect(
+    identifier="hertz_contact",
+    kind=Kind.CONTACT,
+    equation="k d^n, n free (k in N/m^n)",
+    reference="Johnson, Contact Mechanics, Cambridge (1985), chapter 4",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
+    parameters=(Parameter("exponent", "1", null=1.0, lower=0.7, upper=1.8, typical=1.1),),
+    laws={LawKind.CONTACT: stiffening},
+)

@@ -1,0 +1,24 @@
+"""Hunt-Crossley damping: the contact's damping grows with its indentation, on approach and departure."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def damping(d: float, rate: float, _c: float, _d: float, p: Numbers) -> float:
+    """C d d'."""
+    return p[0] * d * rate
+
+
+EFFECT = Effect(
+    identifier="hunt_crossley_damping",
+    kind=Kind.CONTACT,
+    equation="c d d' beside b, on approach and departure",
+    reference="Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, "
+    "J. Appl. Mech. 42 (1975)",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
+    parameters=(
+        Parameter("damping_n_s_per_m2", "N s/m²", null=0.0, lower=0.0, upper=20000000.0, typical=500000.0),
+    ),
+    laws={LawKind.CONTACT: damping},
+    dissipates=True,
+)

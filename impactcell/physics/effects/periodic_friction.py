@@ -1,0 +1,26 @@
+"""Periodic friction: the surface has a lay, as from milling or grinding."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def factor(x: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """1 + a sin(2 pi x/p + phase)."""
+    return 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2])
+
+
+EFFECT = Effect(
+    identifier="periodic_friction",
+    kind=Kind.FRICTION,
+    equation="mu (1 + a sin(2 pi x/p + phase))",
+    reference="First harmonic of a surface texture: ISO 21920-2 (2021)",
+    phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
+    parameters=(
+        Parameter("amplitude", "1", null=0.0, lower=0.0, upper=0.9, typical=0.1),
+        Parameter("period_m", "m", null=math.nan, lower=0.0001, upper=0.1, typical=0.002),
+        Parameter("phase_rad", "rad", null=math.nan, lower=-math.pi, upper=math.pi, typical=1.0),
+    ),
+    laws={LawKind.SCALE: factor},
+)

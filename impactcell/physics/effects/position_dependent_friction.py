@@ -1,0 +1,20 @@
+"""Friction that changes along the table, in proportion to the position."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def factor(x: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """1 + a x."""
+    return 1.0 + p[0] * x
+
+
+EFFECT = Effect(
+    identifier="position_dependent_friction",
+    kind=Kind.FRICTION,
+    equation="mu (1 + a x)",
+    reference="First order of any slow variation of the surface",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
+    parameters=(Parameter("gradient_per_m", "1/m", null=0.0, lower=-50.0, upper=50.0, typical=10.0),),
+    laws={LawKind.SCALE: factor},
+)

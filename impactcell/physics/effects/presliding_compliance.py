@@ -1,0 +1,27 @@
+"""Presliding compliance: stick is a spring until it breaks away; after a stop it re-anchors without force."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def stiffness(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """s0."""
+    return p[0]
+
+
+EFFECT = Effect(
+    identifier="presliding_compliance",
+    kind=Kind.FRICTION,
+    equation="elastic stick of stiffness s0 up to mu_s m g",
+    reference="Courtney-Pratt and Eisner, The effect of a tangential force on the contact of "
+    "metallic bodies, Proc. R. Soc. A 238 (1957)",
+    phases=(Phase.PRELOAD, Phase.STOP, Phase.DRIVEN),
+    parameters=(
+        Parameter(
+            "stiffness_n_per_m", "N/m", null=math.inf, lower=100000.0, upper=math.inf, typical=10000000.0
+        ),
+    ),
+    laws={LawKind.STICK: stiffness},
+)

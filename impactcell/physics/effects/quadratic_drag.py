@@ -1,0 +1,23 @@
+"""Quadratic drag: a fluid is pushed aside."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def drag(_a: float, v: float, _c: float, _d: float, p: Numbers) -> float:
+    """-c x' abs(x')."""
+    return -p[0] * v * abs(v)
+
+
+EFFECT = Effect(
+    identifier="quadratic_drag",
+    kind=Kind.BODY,
+    equation="-c x' abs(x')",
+    reference="Rayleigh, On the resistance of fluids, Phil. Mag. 2 (1876)",
+    phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
+    parameters=(
+        Parameter("drag_coefficient_n_s2_per_m2", "N s²/m²", null=0.0, lower=0.0, upper=5000.0, typical=50.0),
+    ),
+    laws={LawKind.BODY: drag},
+    dissipates=True,
+)

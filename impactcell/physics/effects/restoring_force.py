@@ -1,0 +1,22 @@
+"""Restoring force: a spring, a cable or a membrane pulls the part towards x = 0."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def spring(x: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """-k_r x."""
+    return -p[0] * x
+
+
+EFFECT = Effect(
+    identifier="restoring_force",
+    kind=Kind.BODY,
+    equation="-k_r x on the part",
+    reference="Hooke's law",
+    phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
+    parameters=(
+        Parameter("stiffness_n_per_m", "N/m", null=0.0, lower=-5000.0, upper=20000.0, typical=500.0),
+    ),
+    laws={LawKind.BODY: spring},
+)

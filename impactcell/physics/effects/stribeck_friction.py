@@ -1,0 +1,26 @@
+"""Stribeck friction: kinetic friction is larger in slow slip, where the film is not yet carried."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def excess(speed: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+    """Dmu exp(-(x'/v_s)²)."""
+    return p[0] * math.exp(-((speed / p[1]) ** 2))
+
+
+EFFECT = Effect(
+    identifier="stribeck_friction",
+    kind=Kind.FRICTION,
+    equation="mu_k + dmu exp(-(x'/v_s)²)",
+    reference="Bo and Pavelescu, The friction-speed relation, Wear 82 (1982)",
+    phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
+    parameters=(
+        Parameter("friction_increase", "1", null=0.0, lower=0.0, upper=0.5, typical=0.03),
+        Parameter("stribeck_velocity_m_s", "m/s", null=math.nan, lower=0.0001, upper=1.0, typical=0.02),
+    ),
+    laws={LawKind.KINETIC: excess},
+    dissipates=True,
+)

@@ -1,0 +1,22 @@
+"""Tilted surface: gravity has a component along the axis; the normal force stays m g."""
+
+import math
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def downhill(_a: float, _b: float, m: float, g: float, p: Numbers) -> float:
+    """-m g sin(a)."""
+    return -m * g * math.sin(p[0])
+
+
+EFFECT = Effect(
+    identifier="surface_tilt",
+    kind=Kind.BODY,
+    equation="-m g sin(a), a > 0 uphill along +1",
+    reference="Newtonian mechanics of the inclined plane",
+    phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.STOP, Phase.DRIVEN),
+    parameters=(Parameter("tilt_rad", "rad", null=0.0, lower=-0.1, upper=0.1, typical=0.005),),
+    laws={LawKind.BODY: downhill},
+)

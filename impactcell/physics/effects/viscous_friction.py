@@ -1,0 +1,24 @@
+"""Viscous friction: a lubricated surface resists in proportion to the speed."""
+
+from impactcell.compiled import Numbers
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def resistance(_a: float, v: float, _c: float, _d: float, p: Numbers) -> float:
+    """-k_v x'."""
+    return -p[0] * v
+
+
+EFFECT = Effect(
+    identifier="viscous_friction",
+    kind=Kind.FRICTION,
+    equation="-k_v x'",
+    reference="Equation (2) of the source paper; Olsson et al., Friction models and friction "
+    "compensation, Eur. J. Control 4 (1998)",
+    phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
+    parameters=(
+        Parameter("viscous_coefficient_n_s_per_m", "N s/m", null=0.0, lower=0.0, upper=1000.0, typical=60.0),
+    ),
+    laws={LawKind.BODY: resistance},
+    dissipates=True,
+)

@@ -1,0 +1,300 @@
+"""Many taps at once: arrays of parameters in, samples and figures out, without objects for each tap."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.compiled import compiled
+from impactcell.errors import PhysicsError
+from impactcell.physics import layout as at
+from impactcell.physics.course import integrate
+from impactcell.physics.effects import LIBRARY
+from impactcell.physics.plant import Plant, Strike
+from impactcell.physics.program import assemble, columns, parameter_vector
+from impactcell.records import Samples
+
+LONGEST_S = 600.0
+NONE = np.empty(0)
+
+
+@compiled
+def integrate_all(
+    rows: Samples,
+    laws: at.Whole,
+    horizon: float,
+    goal: int,
+    cursors: at.Whole,
+    times: Samples,
+    out: Samples,
+    figures: Samples,
+) -> None:
+    """Integrate every tap; row i goes with cursors i."""
+    no_drive = np.empty(0)
+    no_kinds = np.empty(0, np.int64)
+    no_times = np.empty(0)
+    cursor = np.empty(at.CURSORS, np.int64)
+    for i in range(rows.shape[0]):
+        cursor[:] = cursors[i]
+        integrate(rows[i], laws, no_drive, horizon, goal, cursor, times, out, no_kinds, no_times, figures[i])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traces:
+    """Samples of every tap, end to end; empty where a channel was not asked for.
+
+    Attributes
+    ----------
+    force_n, position_m, actuator_m, velocity_m_s : ndarray
+        Shape (samples,), or (q, samples) for derivatives.
+    """
+
+    force_n: Samples
+    position_m: Samples
+    actuator_m: Samples
+    velocity_m_s: Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Figures:
+    """Figures of every tap, each of shape (n,); nan where a tap has no such figure.
+
+    Attributes
+    ----------
+    peak_force_n : as the sensor shows it, over all contacts
+    displacement_m : first contact to rest, along the tap
+    sliding_distance_m, separation_s : from, and time of, the last loss of contact
+    breakaway_s, peak_s, halt_s, stop_s : times
+    at_rest : bool; False for a part that was still moving at the end of the allowed time
+    """
+
+    peak_force_n: Samples
+    displacement_m: Samples
+    sliding_distance_m: Samples
+    breakaway_s: Samples
+    peak_s: Samples
+    separation_s: Samples
+    halt_s: Samples
+    stop_s: Samples
+    at_rest: Samples
+
+
+class Ensemble:
+    """A set of taps with fixed sample times, to be integrated for many parameter vectors.
+
+    Parameters
+    ----------
+    taps : sequence of Strike
+        n taps.
+    effects : sequence of str
+        Identifiers of the effects at work; their parameters join the parameter vector.
+    force_time_s, position_time_s, actuator_time_s, velocity_time_s : sequence of ndarray, optional
+        For each channel the ascending sample times of each tap, n arrays (of any lengths, empty allowed).
+    gravity_m_s2 : float
+    initial_speed_m_s : ndarray of shape (n,), optional
+        Free slides: no contact, the part slides from t = 0 with this speed along the shot's direction.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What a parameter vector holds: "stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k", then
+        "effect.parameter" ("effect.parameter[1]", ... where there is one for each batch after the first).
+
+    Raises
+    ------
+    PhysicsError
+        For effects the library does not have, or sample times that do not ascend.
+    """
+
+    def __init__(
+        self,
+        taps: Sequence[Strike],
+        effects: Sequence[str] = (),
+        *,
+        force_time_s: Sequence[Samples] | None = None,
+        position_time_s: Sequence[Samples] | None = None,
+        actuator_time_s: Sequence[Samples] | None = None,
+        velocity_time_s: Sequence[Samples] | None = None,
+        gravity_m_s2: float = 9.81,
+        initial_speed_m_s: Samples | None = None,
+    ) -> None:
+        self._columns = columns(taps)
+        if initial_speed_m_s is not None:
+            self._columns["initial_speed_m_s"] = np.asarray(initial_speed_m_s, dtype=np.float64)
+        self.batches = 1 + max((tap.batch for tap in taps), default=0)
+        self._program = assemble(tuple(effects), self.batches)
+        self.names = self._program.names
+        self.gravity_m_s2 = gravity_m_s2
+        self._count = len(taps)
+        self._cursors = np.zeros((len(taps), at.CURSORS), dtype=np.int64)
+        pieces: list[Samples] = []
+        self._channels: list[slice] = []
+        total = 0
+        for channel, given in enumerate((force_time_s, position_time_s, actuator_time_s, velocity_time_s)):
+            begin = total
+            for i in range(len(taps)):
+                times = NONE if given is None else np.asarray(given[i], dtype=np.float64)
+                if times.size and not (np.diff(times) >= 0.0).all():
+                    raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
+                pieces.append(times)
+                self._cursors[i, channel] = total
+                total += times.size
+                self._cursors[i, at.CHANNELS + channel] = total
+            self._channels.append(slice(begin, total))
+        self._times = np.concatenate(pieces) if pieces else NONE
+
+    def parameters(self, plant: Plant) -> Samples:
+        """Parameter vector of `plant`, shape (len(names),); its effects must be among the ensemble's."""
+        foreign = set(plant.effects) - set(self._program.effects)
+        if foreign:
+            raise PhysicsError(f"the ensemble was made without {', '.join(sorted(foreign))}")
+        return parameter_vector(plant, self._program, self.batches)
+
+    def _rows(
+        self,
+        parameters: Samples,
+        friction_factor: Samples | float,
+        mass_kg: Samples | None,
+        initial_speed_m_s: Samples | None,
+    ) -> Samples:
+        taps = self._columns
+        if mass_kg is not None:
+            taps = {**taps, "mass_kg": mass_kg}
+        if initial_speed_m_s is not None:
+            taps = {**taps, "initial_speed_m_s": initial_speed_m_s}
+        table = np.broadcast_to(np.asarray(parameters, np.float64), (self._count, len(self.names)))
+        rows = self._program.rows(table, self.gravity_m_s2, taps)
+        rows[:, at.MU_S] *= friction_factor
+        rows[:, at.MU_K] *= friction_factor
+        return rows
+
+    def traces(
+        self,
+        parameters: Samples,
+        friction_factor: Samples | float = 1.0,
+        *,
+        mass_kg: Samples | None = None,
+        initial_speed_m_s: Samples | None = None,
+    ) -> Traces:
+        """Integrate every tap and sample it at the ensemble's times.
+
+        Parameters
+        ----------
+        parameters : ndarray
+            Shape (len(names),), or (n, len(names)) for a vector a tap. No ranges are checked.
+        friction_factor : float or ndarray of shape (n,)
+            Multiplies mu_s and mu_k of each shot.
+        mass_kg, initial_speed_m_s : ndarray of shape (n,), optional
+            Instead of the taps' own.
+        """
+        rows = self._rows(parameters, friction_factor, mass_kg, initial_speed_m_s)
+        return self._split(self._sampled(rows))
+
+    def _sampled(self, rows: Samples) -> Samples:
+        out = np.empty(self._times.size)
+        figures = np.empty((self._count, at.FIGURES))
+        integrate_all(
+            rows, self._program.laws, LONGEST_S, at.TO_LAST_SAMPLE, self._cursors, self._times, out, figures
+        )
+        return out
+
+    def _split(self, out: Samples) -> Traces:
+        force, position, actuator, velocity = (out[..., channel] for channel in self._channels)
+        return Traces(force, position, actuator, velocity)
+
+    def sensitivities(
+        self,
+        parameters: Samples,
+        wrt: Sequence[str],
+        friction_factor: Samples | float = 1.0,
+        *,
+        mass_kg: Samples | None = None,
+        initial_speed_m_s: Samples | None = None,
+        relative_step: float = 1e-5,
+    ) -> Traces:
+        """Differentiate the samples with respect to the parameters named; shape (len(wrt), samples).
+
+        "friction_factor" and "initial_speed_m_s" are also possible: each shot's own samples with respect
+        to its own value. Central differences; one-sided where a step would leave the parameter's range.
+        """
+        table = np.array(np.broadcast_to(np.asarray(parameters, np.float64), (self._count, len(self.names))))
+        made = np.empty((len(wrt), self._times.size))
+        for q, name in enumerate(wrt):
+            ends: list[Samples] = []
+            if name in {"friction_factor", "initial_speed_m_s"}:
+                speed = self._columns["initial_speed_m_s"] if initial_speed_m_s is None else initial_speed_m_s
+                steps = [relative_step, -relative_step]
+                for step in steps:
+                    factor, moved = friction_factor, speed
+                    if name == "friction_factor":
+                        factor = friction_factor * (1.0 + step)
+                    else:
+                        moved = speed * (1.0 + step)
+                    ends.append(self._sampled(self._rows(table, factor, mass_kg, moved)))
+                base = friction_factor if name == "friction_factor" else speed
+                width = 2.0 * relative_step * np.broadcast_to(np.asarray(base, np.float64), self._count)
+                made[q] = (ends[0] - ends[1]) / self._each_sample(width)
+                continue
+            column = self.names.index(name)
+            lower, upper, typical = parameter_range(name)
+            step = relative_step * max(float(np.max(np.abs(table[:, column]))), 0.1 * typical)
+            above = step if np.all(table[:, column] + step <= upper) else 0.0
+            below = step if np.all(table[:, column] - step >= lower) else 0.0
+            for change in (above, -below):
+                moved_table = table.copy()
+                moved_table[:, column] += change
+                ends.append(
+                    self._sampled(self._rows(moved_table, friction_factor, mass_kg, initial_speed_m_s))
+                )
+            made[q] = (ends[0] - ends[1]) / (above + below)
+        return self._split(made)
+
+    def _each_sample(self, values: Samples) -> Samples:
+        spread = np.empty(self._times.size)
+        for channel in range(at.CHANNELS):
+            for i in range(self._count):
+                spread[self._cursors[i, channel] : self._cursors[i, at.CHANNELS + channel]] = values[i]
+        return spread
+
+    def figures(
+        self,
+        parameters: Samples,
+        friction_factor: Samples | float = 1.0,
+        *,
+        mass_kg: Samples | None = None,
+        horizon_s: float = LONGEST_S,
+    ) -> Figures:
+        """Peak force, displacement, sliding distance and times of events, without any samples."""
+        rows = self._rows(parameters, friction_factor, mass_kg, None)
+        return figures_of(rows, self._program.laws, horizon_s)
+
+
+def figures_of(rows: Samples, laws: at.Whole, horizon_s: float = LONGEST_S) -> Figures:
+    """Figures of taps given by `rows`, shape (n, width)."""
+    table = np.empty((rows.shape[0], at.FIGURES))
+    cursors = np.zeros((rows.shape[0], at.CURSORS), dtype=np.int64)
+    integrate_all(rows, laws, horizon_s, at.TO_REST, cursors, NONE, NONE, table)
+    return Figures(
+        peak_force_n=table[:, at.PEAK_FORCE],
+        displacement_m=table[:, at.DISPLACEMENT],
+        sliding_distance_m=table[:, at.DISTANCE],
+        breakaway_s=table[:, at.BREAKAWAY_TIME],
+        peak_s=table[:, at.PEAK_TIME],
+        separation_s=table[:, at.SEPARATION_TIME],
+        halt_s=table[:, at.HALT_TIME],
+        stop_s=table[:, at.STOP_TIME],
+        at_rest=table[:, at.STATUS] == at.AT_REST,
+    )
+
+
+def parameter_range(name: str) -> tuple[float, float, float]:
+    """Lower and upper end of a parameter's range, and its typical magnitude, by its name in `names`."""
+    if "." not in name:
+        typical = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.2, "mu_k": 0.15}[name]
+        return 0.0, math.inf, typical
+    identifier, rest = name.split(".", 1)
+    for parameter in LIBRARY[identifier].parameters:
+        if parameter.name == rest.partition("[")[0]:
+            return parameter.lower, parameter.upper, parameter.typical
+    raise PhysicsError(f"no parameter is called {name}")
