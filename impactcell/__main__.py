@@ -79,8 +79,9 @@ def run(cells: Cells, *, quiet: Quiet = False, verbose: Verbose = False) -> None
     """Run the service; SIGTERM ends it cleanly, SIGHUP reloads what can be reloaded."""
     del quiet, verbose
     from impactcell.service import run as run_service
+    from impactcell.settings import read_cells
 
-    run_service(cells)
+    run_service(read_cells(cells))
 
 
 @app.command()

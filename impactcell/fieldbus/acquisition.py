@@ -7,7 +7,7 @@ the link does: that is said in `Module.status` and in the `faults` of a `Recepti
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
@@ -173,7 +173,7 @@ class Module:
             except FieldbusError as error:
                 log.info("%s: acknowledgement of cycle %d will be repeated: %s", self.cell, mark.cycle, error)
 
-    async def captures(self, after: Mark | None = None) -> AsyncIterator[Reception]:
+    async def captures(self, after: Mark | None = None) -> AsyncGenerator[Reception]:
         """Yield each cycle after `after` once, in order; ends only when it is closed.
 
         Parameters

@@ -162,16 +162,16 @@ class Alarms(Section):
 
     wear_limit: Positive
     """mu_s at which the surface counts as worn."""
-    wear_probability_on: Probability = 0.9
+    wear_probability_on: Probability = 0.95
     """The wear alarm comes when P(level > limit) passes this ..."""
     wear_probability_off: Probability = 0.5
     """... and goes when it falls below this."""
     false_alarm_cycles: Annotated[float, Field(ge=100)] = 100_000.0
     """Designed mean number of cycles between two false alarms of one rule."""
-    on_delay_cycles: Annotated[int, Field(ge=0)] = 0
-    """Cycles a rule must hold before its alarm comes."""
-    off_delay_cycles: Annotated[int, Field(ge=0)] = 0
-    """Cycles a rule must be clear before its alarm goes."""
+    on_delay_cycles: Annotated[int, Field(ge=0)] | None = None
+    """Cycles a rule must hold before its alarm comes; absent: each rule's own delay."""
+    off_delay_cycles: Annotated[int, Field(ge=0)] | None = None
+    """Cycles a rule must be clear before its alarm goes; absent: each rule's own delay."""
 
     @model_validator(mode="after")
     def _hysteresis(self) -> Self:
@@ -207,12 +207,12 @@ class OpcUa(Section):
 
     endpoint: Annotated[str, AfterValidator(_endpoint)] = "opc.tcp://127.0.0.1:4840/impactcell"
     """Where SCADA connects; an address other than loopback opens it to the network."""
-    users_file: InputFile | None = None
-    """Users and roles, made by `impactcell users`; absent: nobody may log in with a password."""
-    certificates_dir: AnyPath | None = None
+    users_file: AnyPath = Field(default="users.yaml", validate_default=True)
+    """Users and roles, made by `impactcell users`; while there is none, nobody can log in."""
+    certificates_dir: AnyPath = Field(default="pki", validate_default=True)
     """Own, trusted and rejected certificates, made by `impactcell certs`."""
-    allow_insecure_sessions_without_login: bool = False
-    """Opens sessions over security policy None with the Observer role: for demonstrations only."""
+    allow_sessions_without_encryption: bool = False
+    """Opens sessions over security policy None, where anybody can listen; every start then warns."""
     max_sessions: Annotated[int, Field(ge=1)] = 100
     """Sessions beyond this are refused."""
 
@@ -258,7 +258,7 @@ class CellSettings(Section):
     signature: SignatureGrid = SignatureGrid()
     positioning: Positioning | None = None
     """Absent: the cell only watches."""
-    opcua: OpcUa = OpcUa()
+    opcua: OpcUa = Field(default={}, validate_default=True)
     journal: Journal | None = None
     """Absent: nothing is kept over a restart."""
     monitoring: Monitoring | None = None

@@ -1,0 +1,164 @@
+"""The whole process: every cell a task, cells of one endpoint on one OPC UA server, signals, readiness."""
+
+import asyncio
+import contextlib
+import logging
+import signal
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+
+from impactcell.scada import Server
+from impactcell.service import systemd
+from impactcell.service.actions import CellActions
+from impactcell.service.design import cell_description, server_settings
+from impactcell.service.monitoring import Monitoring
+from impactcell.service.past import JournalHistory
+from impactcell.service.running import Observer, RunningCell
+from impactcell.settings import Cell
+
+log = logging.getLogger("impactcell.service")
+
+RESTART_S = 1.0
+"""A cell that met a fault of ours is begun anew after this long."""
+
+
+class Service:
+    """Runs cells until told to stop.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+    observe : callable, optional
+        Called with the cell's name and each snapshot, after it was published.
+
+    Raises
+    ------
+    JournalError
+        A journal cannot be opened; nothing has been started.
+    """
+
+    def __init__(self, cells: Sequence[Cell], observe: Observer | None = None) -> None:
+        self._cells = tuple(cells)
+        self._observe = observe
+        self.running: dict[str, RunningCell] = {}
+        self.endpoints: dict[str, str] = {}
+        """Where each cell is to be found, once `run` has started."""
+
+    async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
+        """Run until `stop` is set; `started` is called when every endpoint listens."""
+        self.running = {cell.name: RunningCell(cell, self._observe) for cell in self._cells}
+        async with contextlib.AsyncExitStack() as stack:
+            await stack.enter_async_context(self._monitoring())
+            servers = {}
+            for endpoint in dict.fromkeys(cell.settings.opcua.endpoint for cell in self._cells):
+                servers[endpoint] = await stack.enter_async_context(self._server(endpoint))
+            for cell in self._cells:
+                self.endpoints[cell.name] = servers[cell.settings.opcua.endpoint].endpoint
+            tasks = [
+                asyncio.create_task(
+                    self._keep_running(running, servers[running.cell.settings.opcua.endpoint]), name=name
+                )
+                for name, running in self.running.items()
+            ]
+            tasks.append(asyncio.create_task(_watchdog(), name="watchdog"))
+            systemd.notify("READY=1")
+            if started is not None:
+                started()
+            try:
+                await stop.wait()
+            finally:
+                systemd.notify("STOPPING=1")
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+                for running in self.running.values():
+                    await running.close()
+
+    async def reload(self) -> None:
+        """Read every cell's files again; see `RunningCell.reload`."""
+        systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
+        for running in self.running.values():
+            await running.reload()
+        systemd.notify("READY=1")
+
+    def _server(self, endpoint: str) -> Server:
+        cells = [cell for cell in self._cells if cell.settings.opcua.endpoint == endpoint]
+        running = {cell.name: self.running[cell.name] for cell in cells}
+        return Server(
+            server_settings(cells[0]),
+            [cell_description(cell) for cell in cells],
+            JournalHistory({name: one.worker for name, one in running.items()}),
+            CellActions(running),
+        )
+
+    @contextlib.asynccontextmanager
+    async def _monitoring(self) -> AsyncIterator[None]:
+        wanted = dict.fromkeys(cell.settings.monitoring for cell in self._cells)
+        listeners = [one for one in wanted if one is not None]
+        with contextlib.ExitStack() as stack:
+            for one in listeners:
+                http = stack.enter_context(
+                    Monitoring(one.host, one.port, lambda: [cell.health for cell in self.running.values()])
+                )
+                log.info("health and metrics at http://%s:%d", http.host, http.port)
+            yield
+
+    async def _keep_running(self, running: RunningCell, server: Server) -> None:
+        """Begin a cell anew after a fault of ours, so that it stops neither itself nor the others."""
+        while True:
+            try:
+                await running.run(server)
+            except asyncio.CancelledError:
+                raise
+            except Exception:
+                running.log.exception("a fault of this program; the cell is begun anew in %g s", RESTART_S)
+                server.mark_bad(running.cell.name, time.time_ns())
+                await asyncio.sleep(RESTART_S)
+
+
+def run(cells: Sequence[Cell]) -> None:
+    """Run the service until SIGTERM or Ctrl-C; SIGHUP reloads.
+
+    Raises
+    ------
+    SettingsError, JournalError
+        The service cannot start.
+    KeyboardInterrupt
+        Ended by Ctrl-C, after a clean shutdown.
+    """
+    interrupted = asyncio.run(_until_signalled(Service(cells)))
+    if interrupted:
+        raise KeyboardInterrupt
+
+
+async def _until_signalled(service: Service) -> bool:
+    loop, stop = asyncio.get_running_loop(), asyncio.Event()
+    by: list[signal.Signals] = []
+    reloads: set[asyncio.Task[None]] = set()
+
+    def end(number: signal.Signals) -> None:
+        by.append(number)
+        stop.set()
+
+    def reload() -> None:
+        task = loop.create_task(service.reload())
+        reloads.add(task)
+        task.add_done_callback(reloads.discard)
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, end, number)
+    loop.add_signal_handler(signal.SIGHUP, reload)
+    await service.run(stop, lambda: _say_started(service))
+    return signal.SIGINT in by
+
+
+def _say_started(service: Service) -> None:
+    for cell, endpoint in service.endpoints.items():
+        log.info("cell=%s at %s", cell, endpoint)
+
+
+async def _watchdog() -> None:
+    interval_s = systemd.watchdog_interval_s()
+    while interval_s is not None:
+        systemd.notify("WATCHDOG=1")
+        await asyncio.sleep(interval_s)

@@ -1,0 +1,205 @@
+"""One running cell: cycles in from its module, snapshots out to OPC UA."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from impactcell.alarms import Finding
+from impactcell.cell import Announcement
+from impactcell.errors import ImpactCellError, PositioningError
+from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
+from impactcell.journal.retention import Retention
+from impactcell.journal.store import AuditEntry, Journal
+from impactcell.records import Alarm, AlarmName, Evidence, PositioningState, Snapshot
+from impactcell.scada import ModuleState, Server
+from impactcell.service.design import cell_design, module_link, retention
+from impactcell.service.logs import CellLogger
+from impactcell.service.monitoring import CellHealth
+from impactcell.service.worker import Worker
+from impactcell.settings import Cell, read_cell
+
+TICK_S = 1.0
+STALE_PERIODS = 10.0
+STALE_AT_LEAST_S = 5.0
+
+Observer = Callable[[str, Snapshot], None]
+
+
+class RunningCell:
+    """Module, worker and nodes of one cell.
+
+    Parameters
+    ----------
+    cell : Cell
+    observe : callable, optional
+        Called with the cell's name and each snapshot, after it was published.
+
+    Raises
+    ------
+    JournalError
+        The journal cannot be opened.
+    """
+
+    def __init__(self, cell: Cell, observe: Observer | None = None) -> None:
+        self.cell = cell
+        self.log = CellLogger(cell.name)
+        settings = cell.settings.journal
+        journal = None if settings is None else Journal(settings.file, cell.name)
+        keep = Retention() if settings is None else retention(settings)
+        self.worker = Worker(cell_design(cell), journal, keep)
+        self.server: Server | None = None
+        self._observe = observe
+        self._module = Module(cell.name, module_link(cell), cell.register_map, self._link_changed)
+        self._link_news: asyncio.Queue[ModuleStatus] = asyncio.Queue()
+        self._last_cycle_s = time.monotonic()
+        self._stale = False
+        self._model_seen_ns = cell.settings.model.stat().st_mtime_ns
+
+    @property
+    def status(self) -> ModuleStatus:
+        """State of the link and counts."""
+        return self._module.status
+
+    @property
+    def health(self) -> CellHealth:
+        """What monitoring shows of the cell."""
+        status, snapshot = self._module.status, self.worker.snapshot
+        return CellHealth(
+            cell=self.cell.name,
+            connected=status.connected,
+            cycles=status.received,
+            missed=status.missed,
+            last_cycle=snapshot.cycle if snapshot else 0,
+            round_trip_ms=status.round_trip_s * 1e3,
+            mu_s=snapshot.friction.mu_s.value if snapshot else float("nan"),
+            wear_level=snapshot.wear.level if snapshot else float("nan"),
+            alarms_active=sum(alarm.active for alarm in self.worker.alarms),
+            journal_ok=not self.worker.journal_fault,
+        )
+
+    async def run(self, server: Server) -> None:
+        """Run until cancelled."""
+        self.server = server
+        self._show_restored(server)
+        try:
+            async with asyncio.TaskGroup() as group:
+                group.create_task(self._acquire(), name=f"{self.cell.name} cycles")
+                group.create_task(self._follow_link(), name=f"{self.cell.name} link")
+                group.create_task(self._tick(), name=f"{self.cell.name} clock")
+        finally:
+            await self._module.close()
+
+    async def close(self) -> None:
+        """Finish what has begun, and close the journal."""
+        await self.worker.close()
+
+    async def reload(self) -> None:
+        """Take over from the cell's files what can change without a restart: model, tracking, alarms."""
+        try:
+            fresh = read_cell(self.cell.path)
+        except ImpactCellError as error:
+            self.log.warning("not reloaded, all goes on as before: %s", error)
+            return
+        fixed = [
+            name
+            for name in ("cell", "module", "opcua", "journal", "monitoring", "identification")
+            if getattr(fresh.settings, name) != getattr(self.cell.settings, name)
+        ]
+        if fixed:
+            self.log.warning("changed, but taken over only by a restart: %s", ", ".join(fixed))
+        self.cell = replace(self.cell, settings=fresh.settings, model=fresh.model)
+        self._model_seen_ns = fresh.settings.model.stat().st_mtime_ns
+        await self.worker.redesign(cell_design(self.cell))
+        self.log.info("reloaded; model %s", fresh.model.name)
+
+    async def set_target(self, target_m: float, audit: AuditEntry) -> None:
+        """Start a positioning task."""
+        del target_m, audit
+        raise PositioningError(f"{self.cell.name}: this cell has no positioning; add it to {self.cell.path}")
+
+    async def abort_positioning(self, audit: AuditEntry) -> None:
+        """End the positioning task that runs."""
+        del audit
+        raise PositioningError(f"{self.cell.name}: this cell has no positioning; add it to {self.cell.path}")
+
+    async def _acquire(self) -> None:
+        async with contextlib.aclosing(self._module.captures(after=self.worker.durable)) as receptions:
+            async for reception in receptions:
+                await self._take(reception)
+
+    async def _take(self, reception: Reception) -> None:
+        capture = reception.capture
+        processed = await self.worker.process(capture, PositioningState(), self._announcement())
+        if processed.durable is not None:
+            await self._module.acknowledge(processed.durable)
+        for note in processed.stepped.notes:
+            self.log.info("%s", note, cycle=capture.cycle)
+        snapshot = processed.stepped.snapshot
+        self._last_cycle_s, self._stale = time.monotonic(), False
+        if self.server is not None:
+            self.server.publish(self.cell.name, snapshot)
+            self._show_module(self.server)
+        await self._look_at_journal()
+        if self._observe is not None:
+            self._observe(self.cell.name, snapshot)
+
+    def _announcement(self) -> Announcement | None:
+        report = self._module.report
+        if report is None or report.batch is None or not report.batch.sequence:
+            return None
+        return Announcement(report.batch.sequence, report.batch.from_cycle)
+
+    def _link_changed(self, status: ModuleStatus) -> None:
+        self._link_news.put_nowait(status)
+
+    async def _follow_link(self) -> None:
+        while True:
+            status = await self._link_news.get()
+            if self.server is not None:
+                if not status.connected:
+                    self.server.mark_bad(self.cell.name, time.time_ns())
+                self._show_module(self.server)
+            await self._find(Finding(AlarmName.MODULE_CONNECTION, not status.connected, status.reason))
+
+    async def _look_at_journal(self) -> None:
+        fault = self.worker.journal_fault
+        active = any(a.active for a in self.worker.alarms if a.name is AlarmName.JOURNAL_FAULT)
+        if bool(fault) != active:
+            if fault:
+                self.log.error("%s", fault)
+            await self._find(Finding(AlarmName.JOURNAL_FAULT, bool(fault), fault, Evidence()))
+
+    async def _find(self, finding: Finding) -> None:
+        self._show_alarms(await self.worker.find(finding, time.time_ns()))
+
+    async def _tick(self) -> None:
+        while True:
+            await asyncio.sleep(TICK_S)
+            self._show_alarms(await self.worker.pass_time(time.time_ns()))
+            silent_s = time.monotonic() - self._last_cycle_s
+            late = silent_s > max(STALE_AT_LEAST_S, STALE_PERIODS * self.worker.period_s)
+            if late and not self._stale and self.server is not None and self._module.status.connected:
+                self._stale = True
+                self.server.mark_stale(self.cell.name, time.time_ns())
+            with contextlib.suppress(FileNotFoundError):  # a file being replaced: look again at the next tick
+                if self.cell.settings.model.stat().st_mtime_ns != self._model_seen_ns:
+                    await self.reload()
+
+    def _show_restored(self, server: Server) -> None:
+        self._show_alarms(self.worker.alarms)
+        self._show_module(server)
+        if self.worker.snapshot is not None:
+            server.publish(self.cell.name, self.worker.snapshot)
+            server.mark_stale(self.cell.name, self.worker.snapshot.time_ns)
+
+    def _show_alarms(self, moved: tuple[Alarm, ...]) -> None:
+        if self.server is not None:
+            for alarm in moved:
+                self.server.alarm(self.cell.name, alarm)
+
+    def _show_module(self, server: Server) -> None:
+        status = self._module.status
+        state = ModuleState(status.connected, status.received, status.missed, status.round_trip_s)
+        server.module(self.cell.name, state, time.time_ns())

@@ -1,0 +1,220 @@
+"""The state of one cell and its journal, in a thread of their own: estimators stay off the event loop."""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from impactcell import cell as core
+from impactcell import values
+from impactcell.alarms import Finding, Occurrence, Transition
+from impactcell.cell import Announcement, CellDesign, CellState, Stepped
+from impactcell.errors import JournalError
+from impactcell.fieldbus.ring import Mark
+from impactcell.journal.retention import Retention
+from impactcell.journal.store import AuditEntry, Journal
+from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Snapshot
+
+T = TypeVar("T")
+
+log = logging.getLogger(__name__)
+
+BACKLOG = 64
+"""Cycles kept in memory while the journal cannot be written."""
+THIN_EVERY = 256
+"""Cycles between two looks at what the journal may drop."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Durable:
+    """What a restart goes on from: the state, and the last snapshot to show until a cycle comes."""
+
+    state: CellState
+    snapshot: Snapshot | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Processed:
+    """Outcome of one cycle, and the last cycle that is safely stored (None: none yet)."""
+
+    stepped: Stepped
+    durable: Mark | None
+
+
+class Worker:
+    """Applies `impactcell.cell` to one cell, one thing after the other, and stores what came of it.
+
+    Every public coroutine runs its work in the cell's own thread, in the order of the calls.
+
+    Parameters
+    ----------
+    design : CellDesign
+    journal : Journal or None
+        None keeps nothing over a restart.
+    keep : Retention
+    """
+
+    def __init__(self, design: CellDesign, journal: Journal | None, keep: Retention) -> None:
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"cell-{design.name}")
+        self._design = design
+        self._journal = journal
+        self._keep = keep
+        self._backlog: deque[Callable[[Journal], None]] = deque()
+        self._since_thinned = 0
+        self.journal_fault = ""
+        self.dropped = 0
+        restored = self._restore()
+        self._state = restored.state
+        self._snapshot = restored.snapshot
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Alarms as they are now."""
+        return self._state.alarms.alarms
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """The last cycle; after a restart the one before it, None if there was none."""
+        return self._snapshot
+
+    @property
+    def period_s(self) -> float:
+        """Mean time between cycles, 0 before it is known."""
+        return self._state.period_s
+
+    @property
+    def durable(self) -> Mark | None:
+        """The last cycle that is safely stored."""
+        position = None if self._journal is None else self._journal.position()
+        return None if position is None else Mark(position.session, position.cycle)
+
+    async def process(
+        self, capture: Capture, positioning: PositioningState, announcement: Announcement | None
+    ) -> Processed:
+        """Take one cycle through the pipeline and store it."""
+        return await self._run(lambda: self._process(capture, positioning, announcement))
+
+    async def find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
+        """Take what a rule beside the cycles says; the alarms that moved."""
+        return await self._run(lambda: self._find(finding, time_ns))
+
+    async def pass_time(self, time_ns: int) -> tuple[Alarm, ...]:
+        """End every shelving whose time is over; the alarms that moved."""
+        return await self._run(lambda: self._pass_time(time_ns))
+
+    async def act(self, name: AlarmName, occurrence: Occurrence, audit: AuditEntry) -> Transition:
+        """Apply a person's action on a condition, and write down who did it."""
+        return await self._run(lambda: self._act(name, occurrence, audit))
+
+    async def change(self, change: Callable[[CellState], CellState], audit: AuditEntry) -> None:
+        """Change the state by a person's command, and write down who did it."""
+        await self._run(lambda: self._change(change, audit))
+
+    async def redesign(self, design: CellDesign) -> None:
+        """Go on with other settings or another model, from the next cycle on."""
+
+        def swap() -> None:
+            self._design = design
+
+        await self._run(swap)
+
+    async def read(self, question: Callable[[Journal], T]) -> T | None:
+        """Ask the journal; None without one."""
+        journal = self._journal
+        return None if journal is None else await self._run(lambda: question(journal))
+
+    async def close(self) -> None:
+        """Finish what has begun, and close the journal."""
+        if self._journal is not None:
+            await self._run(self._journal.close)
+        self._thread.shutdown()
+
+    async def _run(self, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+
+    def _restore(self) -> Durable:
+        blob = None if self._journal is None else self._journal.state()
+        if blob is None:
+            return Durable(core.initial_state(self._design))
+        try:
+            return values.loads(Durable, blob)
+        except ValueError as error:
+            log.warning(
+                "cell=%s the journal's state is of another version (%s); tracking begins anew, cycles go on",
+                self._design.name,
+                error,
+            )
+            return Durable(core.initial_state(self._design))
+
+    def _process(
+        self, capture: Capture, positioning: PositioningState, announcement: Announcement | None
+    ) -> Processed:
+        stepped = core.step(self._design, self._state, capture, positioning, announcement)
+        self._state, self._snapshot = stepped.state, stepped.snapshot
+        if self._journal is None:
+            return Processed(stepped, Mark(capture.session, capture.cycle))
+        self._since_thinned += 1
+        blob = self._blob()
+        self._store(lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed))
+        return Processed(stepped, self.durable)
+
+    def _blob(self) -> bytes:
+        return values.dumps(Durable(self._state, self._snapshot))
+
+    def _store(self, entry: Callable[[Journal], None]) -> None:
+        """Write `entry` after all that could not be written before: no state may be ahead of its cycles."""
+        if self._journal is None:
+            return
+        self._backlog.append(entry)
+        if len(self._backlog) > BACKLOG:
+            self._backlog.popleft()
+            self.dropped += 1
+            log.error(
+                "cell=%s the journal cannot be written; its oldest waiting entry is lost", self._design.name
+            )
+        self._write_backlog(self._journal)
+
+    def _write_backlog(self, journal: Journal) -> None:
+        try:
+            while self._backlog:
+                self._backlog[0](journal)
+                self._backlog.popleft()
+            if self._since_thinned >= THIN_EVERY:
+                self._since_thinned = 0
+                journal.thin(self._keep, self._state.time_ns)
+            self.journal_fault = ""
+        except JournalError as error:
+            self.journal_fault = str(error)
+
+    def _find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
+        self._state, moved = core.find(self._design, self._state, finding, time_ns)
+        if moved:
+            self._record(moved, None)
+        return moved
+
+    def _pass_time(self, time_ns: int) -> tuple[Alarm, ...]:
+        self._state, moved = core.pass_time(self._state, time_ns)
+        if moved:
+            self._record(moved, None)
+        return moved
+
+    def _act(self, name: AlarmName, occurrence: Occurrence, audit: AuditEntry) -> Transition:
+        self._state, done = core.act(self._state, name, occurrence)
+        result = "Good" if done.refusal is None else done.refusal.value
+        self._record((done.alarm,) if done.effects else (), _with_result(audit, result))
+        return done
+
+    def _change(self, change: Callable[[CellState], CellState], audit: AuditEntry) -> None:
+        self._state = change(self._state)
+        self._record((), audit)
+
+    def _record(self, moved: tuple[Alarm, ...], audit: AuditEntry | None) -> None:
+        blob = self._blob()
+        self._store(lambda journal: journal.record(blob, moved, audit))
+
+
+def _with_result(audit: AuditEntry, result: str) -> AuditEntry:
+    return replace(audit, result=result)
