@@ -2,12 +2,17 @@
 
 # ruff: noqa: ARG001  # an intrinsic's arguments are read from its signature, not by name
 
+import functools
+import hashlib
+import inspect
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
 from numba import cfunc, njit, types
+from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -38,13 +43,39 @@ Law = Callable[[float, float, float, float, Numbers], float]
 _POINTERS: dict[Law, Any] = {}
 
 
+@functools.cache
+def _digest(directory: Path) -> str:
+    """Digest of the sources in a directory and of this file."""
+    hashed = hashlib.sha256()
+    for source in [Path(__file__), *sorted(directory.glob("*.py"))]:
+        hashed.update(source.read_bytes())
+    return hashed.hexdigest()
+
+
+class _Cache(FunctionCache):
+    """Machine code on disk, used again only while every source beside the function is the same.
+
+    By itself numba looks at the function's own file, and would go on using code into which an older
+    version of a function from another file has been compiled.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        self._digest = _digest(Path(inspect.getfile(function)).parent)
+
+    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+        return (*super()._index_key(signature, codegen), self._digest)  # type: ignore[no-untyped-call]
+
+
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` to machine code on its first call, cached on disk between processes.
 
     IEEE arithmetic is kept (no fast-math): NaN and infinity mean the same as in Python, and a
-    replay gives the same bits.
+    replay gives the same bits. What it calls of other compiled functions should lie in its own directory.
     """
-    return cast("Callable[P, R]", njit(cache=True, error_model="numpy", nogil=True)(function))
+    dispatcher: Any = njit(error_model="numpy", nogil=True)(function)
+    dispatcher._cache = _Cache(function)  # noqa: SLF001  # what njit(cache=True) does, with the plain cache
+    return cast("Callable[P, R]", dispatcher)
 
 
 def address(law: Law) -> int:

@@ -49,7 +49,7 @@ def contact_force(z: Numbers, speed: float, mode: Integers, row: Numbers, progra
 
 @compiled
 def body_force(t: float, z: Numbers, memo: Numbers, row: Numbers, program: Integers) -> float:
-    """Sum the forces on the part other than contact and Coulomb friction, along the tap [N]."""
+    """Sum up the forces on the part other than contact and Coulomb friction, along the tap [N]."""
     direction = row[at.DIRECTION]
     force = memo[at.DRIVE] + memo[at.DRIVE_SLOPE] * (t - memo[at.DRIVE_TIME])
     if program[at.BODY + 1] > program[at.BODY]:
