@@ -19,7 +19,7 @@ from scipy.special import chdtrc, fdtrc, ndtr
 
 from impactcell.records import Samples
 from impactcell.tracking import profile
-from impactcell.tracking.reference import COMPONENTS, Reference
+from impactcell.tracking.reference import COMPONENTS, Reference, without_variation
 
 SHARES = {"t_squared": 0.1, "spe": 0.1, "level": 0.2, "tilt": 0.2, "bump": 0.2, "ripple": 0.2}
 BUMP_WIDTHS_M = (0.2e-3, 0.4e-3, 0.8e-3)
@@ -96,11 +96,11 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
     grow = 1.0 + 1.0 / reference.weight
     y = (slide.vector - slide.matrix @ reference.mean) / math.sqrt(grow)
     G, C = slide.matrix, reference.components
-    GC = G @ C
-    inner = np.linalg.inv(np.eye(COMPONENTS) + C.T @ GC)
-    u = y - GC @ (inner @ (C.T @ y))
-    P = G - GC @ inner @ GC.T
-    t_squared, spe, freedom, spe_scale = _squares(reference, G, C, y)
+    P, u = without_variation(C, G, y)
+    # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
+    t_squared, spe, freedom, spe_scale = _squares(
+        reference, *without_variation(C[:, COMPONENTS:], G, y), C[:, :COMPONENTS]
+    )
     found = {
         "t_squared": _hotelling(t_squared, reference.cycles),
         "spe": float(chdtrc(freedom, spe / spe_scale)) if freedom > 0 else 1.0,
@@ -121,7 +121,7 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
     )
 
 
-def _squares(reference: Reference, G: Samples, C: Samples, y: Samples) -> tuple[float, float, int, float]:
+def _squares(reference: Reference, G: Samples, y: Samples, C: Samples) -> tuple[float, float, int, float]:
     """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom and scale."""
     values, vectors = np.linalg.eigh(G)
     seen = values > LEAST_INFORMATION

@@ -1,11 +1,17 @@
 """What friction along the stroke usually looks like: the mean of a material, and how cycles differ from it.
 
-The mean is the pooled least-squares profile of the material's cycles, slowly forgetting, so that wear
-does not pass for deviance. Between cycles friction varies along three principal components, learned from
-smoothed profiles with the part that is only sensor noise taken out; they outlive a change of material.
+A cycle's deviation from its material's mean is a mixed model (Laird & Ware 1982, Biometrics 38:963)::
+
+    beta_c = m + B a_c,   a_c ~ N(0, Lambda),   B: the lowest cosines along the grid
+
+Lambda comes from incremental EM (Neal & Hinton 1998), which takes out what is only sensor noise and does
+not mind that slides end in different places. The mean is the generalised least-squares one, slowly
+forgetting, so that wear does not pass for deviance. Lambda outlives a change of material.
 """
 
+import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -13,9 +19,11 @@ from scipy.linalg import cho_factor, cho_solve
 from impactcell.records import Samples
 from impactcell.tracking import profile
 
-COMPONENTS = 3
+COMPONENTS = 3  # principal components of T^2
+MODES = 6  # cosines in which cycles are allowed to vary
 MEMORY = 300.0  # cycles the mean remembers
-RELEARN = (1.0, 1.2)  # components are found anew when so many times more cycles have been seen
+FIRST_SPREAD = 0.05  # of the friction itself: how much cycles vary before anything is known
+FIRST_WEIGHT = 0.5  # cycles that guess counts for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,13 +40,11 @@ class Reference:
     strength : float
         Smoothing of the mean.
     cycles : int
-        Cycles the components rest on.
-    learned : int
-        Cycles they rested on when they were last found.
-    scatter, noise : ndarray, shape (j, j)
-        Summed outer products of smoothed deviations, and of their sensor noise.
-    components : ndarray, shape (j, 3)
-        Directions, columns; scaled to standard deviation one.
+        Cycles that Lambda rests on.
+    scatter : ndarray, shape (6, 6)
+        Summed second moments of a.
+    components : ndarray, shape (j, 6)
+        Principal components as columns, largest first, scaled to their standard deviations.
     spe_sum : float
         Summed SPE over its degrees of freedom, of judged normal cycles.
     spe_count : int
@@ -50,58 +56,82 @@ class Reference:
     mean: Samples = field(default_factory=lambda: np.zeros(0))
     strength: float = 0.0
     cycles: int = 0
-    learned: int = 0
-    scatter: Samples = field(default_factory=lambda: np.zeros((0, 0)))
-    noise: Samples = field(default_factory=lambda: np.zeros((0, 0)))
-    components: Samples = field(default_factory=lambda: np.zeros((0, COMPONENTS)))
+    scatter: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
+    components: Samples = field(default_factory=lambda: np.zeros((0, MODES)))
     spe_sum: float = 0.0
     spe_count: int = 0
 
 
 def empty(coefficients: int) -> Reference:
     """Before the first cycle."""
-    square = np.zeros((coefficients, coefficients))
-    line = np.zeros(coefficients)
-    return Reference(0.0, square, line, line, 0.0, 0, 0, square, square, np.zeros((coefficients, COMPONENTS)))
+    square, line = np.zeros((coefficients, coefficients)), np.zeros(coefficients)
+    return Reference(matrix=square, vector=line, mean=line, components=np.zeros((coefficients, MODES)))
 
 
 def restart(reference: Reference) -> Reference:
     """Another material: its mean is learned anew, how cycles vary is kept."""
-    return replace(
-        reference, weight=0.0, matrix=np.zeros_like(reference.matrix), vector=np.zeros_like(reference.vector)
-    )
+    square, line = np.zeros_like(reference.matrix), np.zeros_like(reference.vector)
+    return replace(reference, weight=0.0, matrix=square, vector=line)
+
+
+def without_variation(components: Samples, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
+    """Information on the mean rather than on one cycle: (G^-1 + C C')^-1, and the vector that goes with it."""
+    image = matrix @ components
+    inner = np.eye(components.shape[1]) + components.T @ image
+    solved = np.linalg.solve(inner, np.column_stack([image.T, components.T @ vector]))
+    return matrix - image @ solved[:, :-1], vector - image @ solved[:, -1]
 
 
 def learn(reference: Reference, slide: profile.Information, penalty: Samples) -> Reference:
     """Take one normal cycle into the reference."""
+    if reference.cycles == 0 and reference.weight == 0.0:
+        reference = _first(reference, slide, penalty)
+    if reference.weight >= 1.0:
+        reference = _learn_variation(reference, slide)
     kept = 1.0 - 1.0 / MEMORY if reference.weight >= MEMORY else 1.0
-    weight = min(reference.weight + 1.0, MEMORY)
-    matrix, vector = reference.matrix * kept + slide.matrix, reference.vector * kept + slide.vector
+    own_matrix, own_vector = without_variation(reference.components, slide.matrix, slide.vector)
+    matrix, vector = reference.matrix * kept + own_matrix, reference.vector * kept + own_vector
     strength = reference.strength
-    if strength == 0.0 or reference.weight in (0.0, 4.0, 16.0, 64.0):
+    if reference.weight in (0.0, 4.0, 16.0, 64.0):
         _, _, strength = profile.smooth(matrix, vector, penalty)
     mean = cho_solve(cho_factor(matrix + strength * penalty), vector)
-    fresh = replace(reference, weight=weight, matrix=matrix, vector=vector, mean=mean, strength=strength)
-    return fresh if reference.weight < 1.0 else _learn_scatter(reference, fresh, slide, penalty)
+    weight = min(reference.weight + 1.0, MEMORY)
+    return replace(reference, weight=weight, matrix=matrix, vector=vector, mean=mean, strength=strength)
 
 
-def _learn_scatter(
-    before: Reference, fresh: Reference, slide: profile.Information, penalty: Samples
-) -> Reference:
-    """Add this cycle's deviation from the mean of those before it."""
-    own = slide.vector - slide.matrix @ before.mean
-    # smoothed as much as the mean of one cycle would be
-    strength = fresh.strength
-    smoothing = cho_factor(slide.matrix + strength * penalty)
-    deviation = cho_solve(smoothing, own)
-    noise = cho_solve(smoothing, cho_solve(smoothing, slide.matrix).T)
-    # a mean of w cycles has 1/w of their variance
-    share = before.weight / (before.weight + 1.0)
-    scatter = before.scatter + share * np.outer(deviation, deviation)
-    cycles = before.cycles + 1
-    fresh = replace(fresh, scatter=scatter, noise=before.noise + noise, cycles=cycles)
-    if cycles < 2 * COMPONENTS or cycles < RELEARN[1] * before.learned:
-        return fresh
-    values, vectors = np.linalg.eigh((scatter - fresh.noise) / cycles)
-    leading = np.maximum(values[::-1][:COMPONENTS], 0.0)
-    return replace(fresh, components=vectors[:, ::-1][:, :COMPONENTS] * np.sqrt(leading), learned=cycles)
+def _first(reference: Reference, slide: profile.Information, penalty: Samples) -> Reference:
+    mean, _, _ = profile.smooth(slide.matrix, slide.vector, penalty)
+    spread = FIRST_SPREAD * abs(float(np.median(mean)))
+    falling = (spread / np.arange(1.0, MODES + 1.0)) ** 2
+    scatter = FIRST_WEIGHT * np.diag(falling)
+    return replace(reference, scatter=scatter, components=_principal(scatter / FIRST_WEIGHT, len(mean)))
+
+
+def _learn_variation(reference: Reference, slide: profile.Information) -> Reference:
+    """One step of incremental EM on this cycle's deviation from the mean of those before it."""
+    basis = cosines(len(reference.mean))
+    spread = reference.scatter / (reference.cycles + FIRST_WEIGHT)
+    # the deviation also holds the error of the mean, 1 / weight of a cycle's variance
+    share = reference.weight / (reference.weight + 1.0)
+    own = slide.vector - slide.matrix @ reference.mean
+    known = basis.T @ slide.matrix @ basis
+    posterior = np.linalg.inv(np.linalg.inv(spread) / 1.0 + known * share)
+    score = posterior @ (basis.T @ own) * share
+    scatter = reference.scatter + np.outer(score, score) + posterior
+    cycles = reference.cycles + 1
+    components = _principal(scatter / (cycles + FIRST_WEIGHT), len(reference.mean))
+    return replace(reference, scatter=(scatter + scatter.T) / 2.0, cycles=cycles, components=components)
+
+
+def _principal(spread: Samples, coefficients: int) -> Samples:
+    values, vectors = np.linalg.eigh(spread)
+    scaled = vectors[:, ::-1] * np.sqrt(np.maximum(values[::-1], 0.0))
+    return cosines(coefficients) @ scaled
+
+
+@lru_cache(maxsize=8)
+def cosines(coefficients: int) -> Samples:
+    """Lowest cosines along the grid, of unit mean square, shape (j, 6)."""
+    place = (np.arange(coefficients) + 0.5) / coefficients
+    modes = np.cos(math.pi * np.outer(place, np.arange(MODES)))
+    return modes / np.sqrt((modes**2).mean(axis=0))
