@@ -37,7 +37,27 @@ def _parser() -> argparse.ArgumentParser:
     campaign.add_argument("--hide", action="append", default=[], metavar="EFFECT", help="repeatable")
     campaign.add_argument("--seed", type=int, help="in place of the scenario's")
     campaign.set_defaults(run=_campaign)
+    serve = verbs.add_parser("serve", help="serve a scenario over Modbus TCP until SIGTERM")
+    serve.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
+    serve.add_argument("--port", type=int, help="in place of the scenario's; 0 lets the system choose")
+    serve.add_argument(
+        "--truth", type=Path, metavar="FILE", help="write what really happened, a JSON line a cycle"
+    )
+    serve.set_defaults(run=_serve)
     return parser
+
+
+def _serve(options: argparse.Namespace) -> int:
+    from simulator.scenario import read_scenario
+    from simulator.serving import read_register_map, run
+
+    scenario = read_scenario(options.scenario)
+    registers = read_register_map(options.scenario.parent / scenario.register_map)
+    if options.port is not None:
+        scenario = scenario.model_copy(
+            update={"listen": scenario.listen.model_copy(update={"port": options.port})}
+        )
+    return run(scenario, registers, options.truth)
 
 
 def _campaign(options: argparse.Namespace) -> int:

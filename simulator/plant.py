@@ -86,6 +86,12 @@ class Motion:
         return self._last("stop")
 
     @property
+    def halt_s(self) -> float:
+        """Time at which the actuator halts; 0 where it never runs or halts with the loss of contact."""
+        halt = self._last("halt")
+        return 0.0 if math.isnan(halt) else halt
+
+    @property
     def end_s(self) -> float:
         """Time up to which the motion was followed."""
         return self._path.end_s
@@ -193,11 +199,8 @@ class Motion:
             states = piece.states(time[chosen]).T
             if lag is not None:
                 out[chosen] = states[:, lag[0]]
-            elif piece.phase.contact is Contact.APART:
-                out[chosen] = 0.0
             else:
-                pairs = zip(time[chosen].tolist(), states.tolist(), strict=True)
-                out[chosen] = [forces.contact(piece.phase, t, z)[0] for t, z in pairs]
+                out[chosen] = forces.contact_along(piece.phase, time[chosen], states)
         out[time < 0.0] = 0.0
         return out
 

@@ -13,7 +13,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from simulator.effects import Effect, Parameter, Shot, build
+
+Samples = NDArray[np.float64]
 
 
 class Contact(enum.Enum):
@@ -116,12 +121,16 @@ class Forces:
         self._contact_force = _overriding(effects, "contact_force")
         self._pull = _overriding(effects, "pull")
         self._speed = _overriding(effects, "actuator_speed")
+        self._sensed = _overriding(sorted(effects, key=lambda entry: entry.sensor_stage), "sensed")
         place = 3
         self._states: list[tuple[Effect, int, int]] = []
         for effect in effects:
             if effect.absolute_tolerance:
                 self._states.append((effect, place, place + len(effect.absolute_tolerance)))
                 place += len(effect.absolute_tolerance)
+        acting = ("spring_force", "contact_damping", "contact_force", "state_contact_force", "pull")
+        driving = ("actuator_speed", "speed_loss", "compliance")
+        self._plain_contact = not any(_overriding(effects, name) for name in acting + driving)
         self._loss = self._with_states("speed_loss")
         self._state_force = self._with_states("state_force")
         self._state_contact_force = self._with_states("state_contact_force")
@@ -193,6 +202,19 @@ class Forces:
         force = max(force, 0.0)
         return force, free - compliance * force
 
+    def contact_along(self, phase: Phase, time: Samples, states: Samples) -> Samples:
+        """Contact force at many times of one phase; `states` has shape (n, states)."""
+        if self._plain_contact and phase.contact is not Contact.NEAR:
+            if phase.contact is Contact.APART:
+                return np.zeros(len(time))
+            force = self.stiffness * np.maximum(states[:, 2] - states[:, 0], 0.0)
+            if phase.closing:
+                force += self.damping * ((0.0 if phase.halted else self.velocity) - states[:, 1])
+            return np.maximum(force, 0.0)
+        return np.array(
+            [self.contact(phase, t, z)[0] for t, z in zip(time.tolist(), states.tolist(), strict=True)]
+        )
+
     def body(self, t: float, z: Sequence[float]) -> float:
         """All else that acts on the part but dry friction, along the shot."""
         x = self.start + self.sign * z[0]
@@ -262,8 +284,8 @@ class Forces:
 
     def sensed(self, force: float) -> float:
         """Return what the force channel shows for a force that has passed its lag."""
-        for effect in sorted(self.effects, key=lambda entry: entry.sensor_stage):
-            force = effect.sensed(force)
+        for sensed in self._sensed:
+            force = sensed(force)
         return force
 
     @property

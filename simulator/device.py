@@ -1,0 +1,324 @@
+"""The FPGA measuring module as a state machine: time goes in by `update`, registers are read and written.
+
+Nothing here knows of sockets, clocks or files. What the registers mean stands in the map file
+(config/maps/fpga-v1.yaml); a map without some of the registers gives a module without what they are for.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from impactcell.fieldbus.registers import RegisterMap, Words
+from simulator.cycle import Tap
+from simulator.image import Image
+from simulator.plant import NeverAtRestError, Strike, tap
+from simulator.process import encounter
+from simulator.recorder import record
+from simulator.scenario import Scenario
+from simulator.tasks import PartSequence
+
+MM_PER_MIN: Final = 1e-3 / 60.0
+READY, RUNNING, FAULT = 1, 2, 4
+NONE, EXECUTING, DONE, REFUSED_VALUE, REFUSED_STATE, ABORTED, FAILED = range(7)
+NO_SLOT: Final = 0xFFFF
+MOST_STEPS_PER_UPDATE: Final = 8
+
+Truth = Mapping[str, Any]
+
+
+class Device:
+    """One module with its actuator, its part and its sensors.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    registers : RegisterMap
+        The layout it speaks.
+    session : int
+        Number of this start of the module.
+    epoch_ns : int
+        Time of day at `now_s`; 0 for a module whose clock is not set.
+    now_s : float
+        The caller's clock at the start, in seconds.
+    on_truth : callable, optional
+        Given the truth of every cycle as it ends, and the outcome of every positioning task.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        registers: RegisterMap,
+        *,
+        session: int = 1,
+        epoch_ns: int = 0,
+        now_s: float = 0.0,
+        on_truth: Callable[[Truth], None] | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self._image = Image(registers, session)
+        self._room = {
+            name: registers[name].count for name in ("force", "position", "actuator") if name in registers
+        }
+        self._epoch_ns = epoch_ns
+        self._began_s = now_s
+        self._now_s = 0.0
+        self._on_truth = on_truth
+        self._tap: Tap | None = None
+        self._made = 0
+        self._next_s = math.inf if scenario.strikes is None else scenario.strikes.period_s
+        self._rested_s = 0.0
+        self._busy_until_s = -math.inf
+        self._batch_id = ""
+        self._parts = PartSequence(scenario, 0.0)
+        self._image.put("serial_number", scenario.serial_number)
+        self._image.put("firmware_version", 0x0100)
+        self._reset()
+
+    def _reset(self) -> None:
+        """Set the registers as a start of the module does."""
+        self._tap = None
+        for name in (
+            "acknowledged_cycle",
+            "overwritten_count",
+            "command_accepted",
+            "command_cycle",
+            "command_result",
+        ):
+            self._image.put(name, 0)
+        for name in ("command_sequence", "command_abort"):
+            self._image.put(name, 0)
+        self._image.put("newest_slot", NO_SLOT)
+        self._image.put("state", READY)
+        self._image.put("positioning_state", READY if self.scenario.positioning else NONE)
+        self._show_part()
+        self._announce()
+
+    @property
+    def cycle(self) -> int:
+        """Number of the last complete cycle; 0 before the first."""
+        return int(self._image.get("cycle_counter"))
+
+    def update(self, now_s: float) -> None:
+        """Bring the module to the caller's time `now_s`; a time that goes back is taken as no time passing.
+
+        After a long gap, or far accelerated, a few cycles are made at a time and the module's own time lags
+        behind until the calls that follow.
+        """
+        target_s = max((now_s - self._began_s) * self.scenario.acceleration, self._now_s)
+        for _ in range(MOST_STEPS_PER_UPDATE):
+            if self._due_s() > target_s:
+                self._now_s = target_s
+                return
+            self._step()
+
+    @property
+    def due_s(self) -> float:
+        """The caller's time at which something happens next; inf if nothing will by itself."""
+        return self._began_s + self._due_s() / self.scenario.acceleration
+
+    def _due_s(self) -> float:
+        if self._tap is not None:
+            return self._tap.ends_s
+        strikes = self.scenario.strikes
+        if strikes is None:
+            return self._parts.due_s
+        if strikes.cycles is not None and self._made >= strikes.cycles:
+            return math.inf
+        return max(self._next_s, self._rested_s)
+
+    def _step(self) -> None:
+        self._now_s = max(self._now_s, self._due_s())
+        if self._tap is not None:
+            self._finish(self._tap)
+        elif self.scenario.strikes is None:
+            self._parts.advance(self._now_s)
+            self._show_part()
+        else:
+            self._strike_on_schedule()
+
+    def _strike_on_schedule(self) -> None:
+        strikes = self.scenario.strikes
+        if strikes is None:
+            return
+        self._next_s += strikes.period_s
+        velocities, directions = strikes.velocities_mm_per_min, strikes.directions
+        if strikes.order == "in_turn":
+            velocity = velocities[self._made % len(velocities)]
+            direction = directions[self._made % len(directions)]
+        else:
+            random = np.random.default_rng([self.scenario.seed, self._made, 1])
+            velocity = float(random.choice(velocities))
+            direction = 1 if random.choice(directions) == 1 else -1
+        # The part is put back after every strike of a schedule.
+        mass_kg = self.scenario.part.mass_kg
+        self._strike(Strike(velocity * MM_PER_MIN, mass_kg, strikes.stroke_m, direction), sequence=0)
+
+    def _strike(self, commanded: Strike, sequence: int) -> None:
+        self._made += 1
+        met = encounter(self.scenario, self._made, commanded.start_m, commanded.direction)
+        strike = replace(
+            commanded,
+            dwell_s=self._now_s - self._rested_s,
+            shot=self._made,
+            shots=max(self._made, 1000),
+            batch=self.scenario.batches.index(met.batch),
+        )
+        try:
+            motion = tap(met.plant, strike)
+        except NeverAtRestError:
+            self._image.put("state", FAULT)
+            self._end_command(sequence, FAILED)
+            return
+        self._tap = Tap(strike, met, motion, self._now_s, sequence)
+        self._image.put("state", RUNNING)
+
+    def _finish(self, done: Tap) -> None:
+        """Put the cycle into the ring, now that the part is at rest."""
+        scenario = self.scenario
+        self._tap = None
+        faulty = next((entry.kind for entry in scenario.faulty_captures if entry.cycle == self._made), "")
+        samples, rates = record(scenario, done.motion, self._room, done.met.random, faulty)
+        time_ns = self._time_ns(done.began_s)
+        header = done.header(time_ns, self._batch_id, mass_stated=scenario.part.mass_stated) | rates
+        self._rested_s = self._now_s
+        self._image.put("state", READY)
+        if scenario.positioning is not None:
+            self._parts.moved(done.position_m, self._now_s)
+        cycle = self._image.complete(samples, header)
+        if scenario.positioning is not None:
+            self._image.put("command_cycle", cycle)
+            self._end_command(done.sequence, ABORTED if self._image.get("command_abort") else DONE)
+        self._tell(done.truth(self._image.session, cycle, time_ns))
+        self._show_part()
+        self._announce()
+
+    def _time_ns(self, own_s: float) -> int:
+        return self._epoch_ns and self._epoch_ns + round(own_s / self.scenario.acceleration * 1e9)
+
+    def _tell(self, truth: Truth) -> None:
+        if self._on_truth is not None:
+            self._on_truth(truth)
+
+    def read(self, table: str, address: int, count: int) -> Words:
+        """Return registers; LookupError beyond the map, BlockingIOError while the module is made busy."""
+        if self._now_s < self._busy_until_s:
+            raise BlockingIOError
+        return self._image.read(table, address, count)
+
+    def write(self, address: int, words: Words) -> None:
+        """Write registers, and act on them.
+
+        Raises
+        ------
+        LookupError
+            The map does not let them be written.
+        ValueError
+            There is no such slot.
+        BlockingIOError
+            The module is made busy.
+        """
+        if self._now_s < self._busy_until_s:
+            raise BlockingIOError
+        commanded = self._image.get("command_sequence")
+        self._image.write(address, words)
+        self._take_batch()
+        if self._image.get("command_abort"):
+            self._abort()
+        if self._image.get("command_sequence") not in (0, commanded):
+            self._command(int(self._image.get("command_sequence")))
+
+    def _announce(self) -> None:
+        """Announce the batch that begins within the next two cycles."""
+        known = [
+            entry for entry in self.scenario.batches if entry.announced and entry.from_cycle <= self._made + 2
+        ]
+        if known and known[-1].id != self._image.get("batch_announced"):
+            self._image.put("batch_from_cycle", max(known[-1].from_cycle - self._made, 1) + self.cycle)
+            self._image.put("batch_announced", known[-1].id)
+            self._image.put("batch_sequence", int(self._image.get("batch_sequence")) + 1)
+        self._take_batch()
+
+    def _take_batch(self) -> None:
+        if self._image.get("batch_sequence") and self._image.get("batch_from_cycle") <= self.cycle + 1:
+            self._batch_id = str(self._image.get("batch_announced"))
+
+    def _show_part(self) -> None:
+        part = self._parts.part
+        self._image.put("part_position", self._parts.position_m)
+        self._image.put("part_mass", part.mass_kg if self.scenario.part.mass_stated else math.nan)
+        if self._parts.number > int(self._image.get("target_sequence")):
+            self._image.put("target_position", part.target_m)
+            self._image.put("target_sequence", self._parts.number)
+        for outcome in self._parts.outcomes():
+            self._tell(outcome)
+
+    def _command(self, sequence: int) -> None:
+        positioning = self.scenario.positioning
+        if positioning is None or self._tap is not None or self._image.get("state") != READY:
+            self._end_command(sequence, REFUSED_STATE)
+            return
+        self._image.put("command_cycle", 0)
+        velocity, stroke = (
+            float(self._image.get("command_velocity")),
+            float(self._image.get("command_stroke")),
+        )
+        direction = int(self._image.get("command_direction"))
+        # The registers are single precision: a limit itself must not be refused for its last bit.
+        most_velocity = positioning.most_velocity_mm_per_min * MM_PER_MIN * (1.0 + 1e-6)
+        most_stroke = positioning.most_stroke_m * (1.0 + 1e-6)
+        possible = 0.0 < velocity <= most_velocity and 0.0 < stroke <= most_stroke
+        if not possible or direction not in positioning.directions:
+            self._end_command(sequence, REFUSED_VALUE)
+            return
+        self._image.put("command_accepted", sequence)
+        self._image.put("command_result", EXECUTING)
+        self._image.put("positioning_state", EXECUTING)
+        part = self._parts
+        self._strike(
+            Strike(velocity, part.part.mass_kg, stroke, direction, start_m=part.position_m), sequence
+        )
+
+    def _end_command(self, sequence: int, result: int) -> None:
+        self._image.put("command_accepted", sequence)
+        self._image.put("command_result", result)
+        if self._tap is None:
+            self._image.put("positioning_state", READY if self.scenario.positioning else NONE)
+            self._image.put("command_abort", 0)
+
+    def _abort(self) -> None:
+        """Halt the actuator where it is; what it has set in motion slides on."""
+        under_way = self._tap
+        if under_way is None:
+            self._image.put("command_abort", 0)
+            return
+        elapsed_s = self._now_s - under_way.began_s
+        if elapsed_s >= under_way.motion.halt_s:
+            return
+        travelled = abs(float(under_way.motion.actuator_m(np.array([elapsed_s]))[0]))
+        strike = replace(under_way.strike, stroke_m=max(travelled, 1e-9))
+        self._tap = replace(under_way, strike=strike, motion=tap(under_way.met.plant, strike))
+
+    def restart(self) -> int:
+        """Lose everything and start anew with the counter at zero; returns the new session."""
+        session = self._image.restart()
+        self._image.put("batch_announced", "")
+        self._reset()
+        return session
+
+    def set_counter(self, value: int) -> None:
+        """Go on counting after `value`."""
+        self._image.put("cycle_counter", value)
+
+    def busy(self, seconds: float) -> None:
+        """Refuse every request for so many of the module's seconds."""
+        self._busy_until_s = self._now_s + seconds
+
+    def overrun(self, cycles: int) -> None:
+        """Make so many cycles at once."""
+        for _ in range(cycles):
+            made = self.cycle
+            while self.cycle == made and math.isfinite(self._due_s()):
+                self._step()

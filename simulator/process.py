@@ -1,0 +1,80 @@
+"""Which plant a strike meets: wear, batch, scatter, deviation, new effects. Pure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulator.effects import Parameter
+from simulator.plant import Plant
+from simulator.scenario import DEVIATION_EFFECT, Batch, Deviation, Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Encounter:
+    """What one strike meets, and why.
+
+    Attributes
+    ----------
+    batch : Batch
+        The batch that is really there, announced or not.
+    deviation : str
+        Kind of a deviant cycle; empty for a normal one.
+    random : Generator
+        For what is measured of this strike: the same for the same strike, whatever came before.
+    """
+
+    plant: Plant
+    batch: Batch
+    deviation: str
+    random: np.random.Generator
+
+
+def encounter(scenario: Scenario, number: int, start_m: float, direction: int) -> Encounter:
+    """Plant met by the strike of this number, counted from 1, on a part that lies at `start_m`.
+
+    The number is that of the scenario's cycles; a restart of the module changes its counter, not this.
+    """
+    random = np.random.default_rng([scenario.seed, number])
+    plant = scenario.plant
+    batch = [entry for entry in scenario.batches if entry.from_cycle <= number][-1]
+    worn = scenario.wear.mu_s_per_1000_cycles * max(number - scenario.wear.from_cycle, 0) / 1000.0
+    factor = 1.0 + scenario.scatter.friction * random.standard_normal()
+    ratio = plant.ratio * (1.0 + scenario.scatter.ratio * random.standard_normal())
+    effects: dict[str, Mapping[str, Parameter]] = dict(plant.effects)
+    for appearance in scenario.appearances:
+        if appearance.from_cycle <= number:
+            effects |= appearance.effects
+    deviation = next((entry for entry in scenario.deviations if entry.cycle == number), None)
+    if deviation is not None:
+        if deviation.kind == "level":
+            factor *= 1.0 + deviation.size
+        else:
+            effects[DEVIATION_EFFECT[deviation.kind]] = _along_stroke(deviation, start_m, direction)
+    mu_s = (plant.mu_s + worn + batch.shift) * factor
+    return Encounter(
+        plant=Plant(
+            stiffness_n_per_m=plant.stiffness_n_per_m,
+            damping_n_s_per_m=plant.damping_n_s_per_m,
+            mu_s=max(float(mu_s), 1e-3),
+            mu_k=max(float(mu_s * min(ratio, 1.0)), 1e-3),
+            gravity_m_s2=plant.gravity_m_s2,
+            effects=effects,
+        ),
+        batch=batch,
+        deviation="" if deviation is None else deviation.kind,
+        random=random,
+    )
+
+
+def _along_stroke(deviation: Deviation, start_m: float, direction: int) -> Mapping[str, Parameter]:
+    """Parameters in table coordinates of a deviation that is told along the stroke."""
+    match deviation.kind:
+        case "bump":
+            place = start_m + direction * deviation.at_m
+            return {"amplitude": deviation.size, "position_m": place, "width_m": deviation.width_m}
+        case "tilt":
+            return {"gradient_per_m": direction * deviation.size}
+        case _:
+            phase = -2.0 * np.pi * start_m / deviation.period_m
+            return {"amplitude": deviation.size, "period_m": deviation.period_m, "phase_rad": float(phase)}

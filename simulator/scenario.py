@@ -1,0 +1,217 @@
+"""What a served cell does: plant, strikes, wear, batches, deviant cycles, sensors, and positioning tasks."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from simulator.effects import LIBRARY, UNLISTED
+from simulator.scenario_file import ScenarioModel, load
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Cycle = Annotated[int, Field(ge=1)]
+Rate = Annotated[int, Field(ge=1, le=1_000_000)]
+Effects = dict[str, dict[str, float | list[float]]]
+
+
+def _known(effects: Effects) -> Effects:
+    for identifier, parameters in effects.items():
+        kind = LIBRARY.get(identifier) or UNLISTED.get(identifier)
+        if kind is None:
+            message = f"unknown effect {identifier!r}; known: {', '.join([*LIBRARY, *UNLISTED])}"
+            raise ValueError(message)
+        if set(parameters) != set(kind.defaults):
+            message = f"{identifier} has the parameters {', '.join(kind.defaults)}"
+            raise ValueError(message)
+    return effects
+
+
+class Listen(ScenarioModel):
+    """Where the module answers; port 0 lets the system choose."""
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 0
+    device_id: Annotated[int, Field(ge=0, le=255)] = 1
+    control_port: Annotated[int, Field(ge=0, le=65535)] | None = None
+
+
+class CellPlant(ScenarioModel):
+    """The reference plant and the effects that always act."""
+
+    stiffness_n_per_m: Positive = 6.5e5
+    damping_n_s_per_m: NotNegative = 465.0
+    mu_s: Positive = 0.2
+    ratio: Annotated[float, Field(gt=0, le=1)] = 0.76
+    gravity_m_s2: Positive = 9.81
+    effects: Effects = Field(default={"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}})
+
+    _check = field_validator("effects")(_known)
+
+
+class Part(ScenarioModel):
+    """What lies on the table."""
+
+    mass_kg: Positive = 18.9
+    mass_stated: bool = True
+
+
+class Strikes(ScenarioModel):
+    """The schedule; velocities and directions are taken in turn, or drawn."""
+
+    period_s: Positive = 1.0
+    velocities_mm_per_min: list[Positive] = Field([4000.0], min_length=1)
+    directions: list[Literal[1, -1]] = Field([1], min_length=1)
+    order: Literal["in_turn", "random"] = "in_turn"
+    stroke_m: Positive = 0.0015
+    cycles: Annotated[int, Field(ge=0)] | None = None
+
+
+class Scatter(ScenarioModel):
+    """From cycle to cycle: both coefficients together, and their ratio; standard deviations."""
+
+    friction: NotNegative = 0.012
+    ratio: NotNegative = 0.0
+
+
+class Wear(ScenarioModel):
+    """Steady change of mu_s, mu_k following by the ratio."""
+
+    mu_s_per_1000_cycles: float = 0.0
+    from_cycle: Cycle = 1
+
+
+class Batch(ScenarioModel):
+    """A batch of material; `shift` is its mu_s against the first batch. The PLC may say nothing of it."""
+
+    from_cycle: Cycle
+    id: Annotated[str, Field(min_length=1, max_length=32)]
+    shift: float = 0.0
+    announced: bool = True
+
+
+class Deviation(ScenarioModel):
+    """One cycle that differs along its stroke; distances count from where the part lay.
+
+    bump: `size` (relative) around `at_m`, `width_m` wide; level: `size` everywhere; tilt: friction grows by
+    `size` per metre; ripple: `size` with `period_m`.
+    """
+
+    cycle: Cycle
+    kind: Literal["bump", "level", "tilt", "ripple"]
+    size: float
+    at_m: float = 0.004
+    width_m: Positive = 0.0004
+    period_m: Positive = 0.001
+
+
+class Appearance(ScenarioModel):
+    """Effects that act from some cycle on."""
+
+    from_cycle: Cycle
+    effects: Effects
+
+    _check = field_validator("effects")(_known)
+
+
+class Sensor(ScenarioModel):
+    """Rate and white noise of one channel, N or m; `longest_s` bounds the record."""
+
+    rate_hz: Rate
+    noise_std: NotNegative
+    longest_s: Positive
+
+
+class Sensors(ScenarioModel):
+    """What the module records: force during contact, position and actuator during the whole motion."""
+
+    force: Sensor = Sensor(rate_hz=1_000_000, noise_std=0.4, longest_s=0.02)
+    position: Sensor = Sensor(rate_hz=20_000, noise_std=1.5e-6, longest_s=0.2)
+    actuator: Sensor | None = None
+
+
+class FaultyCapture(ScenarioModel):
+    """One cycle whose capture is of no use, to see what is made of it."""
+
+    cycle: Cycle
+    kind: Literal["empty", "constant_force", "saturated", "no_separation", "not_a_number", "no_force"]
+
+
+class Task(ScenarioModel):
+    """One part to be positioned."""
+
+    target_m: float
+    start_m: float = 0.0
+    mass_kg: Positive = 18.9
+    tolerance_m: Positive = 5e-5
+    most_taps: Annotated[int, Field(ge=1)] = 200
+
+
+class Positioning(ScenarioModel):
+    """Strikes on command: what the actuator can do, and the parts that come one after the other."""
+
+    most_velocity_mm_per_min: Positive = 6000.0
+    most_stroke_m: Positive = 0.0015
+    directions: list[Literal[1, -1]] = Field([1], min_length=1)
+    pause_s: NotNegative = 1.0
+    tasks: list[Task] = Field([])
+
+
+class Scenario(ScenarioModel):
+    """A served cell; see config/sim/prototype.yaml for the keys with their meaning."""
+
+    format: Literal[1]
+    name: str = "prototype"
+    serial_number: Annotated[str, Field(max_length=16)] = "SIM-0001"
+    register_map: str
+    listen: Listen = Listen()
+    seed: Annotated[int, Field(ge=0)] = 1
+    acceleration: Positive = 1.0
+    plant: CellPlant = CellPlant()
+    part: Part = Part()
+    strikes: Strikes | None = None
+    positioning: Positioning | None = None
+    scatter: Scatter = Scatter()
+    wear: Wear = Wear()
+    batches: list[Batch] = Field([Batch(from_cycle=1, id="A")], min_length=1)
+    deviations: list[Deviation] = Field([])
+    appearances: list[Appearance] = Field([])
+    faulty_captures: list[FaultyCapture] = Field([])
+    sensors: Sensors = Sensors()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.strikes is None) == (self.positioning is None):
+            message = "give either `strikes` (on a schedule) or `positioning` (on command)"
+            raise ValueError(message)
+        cycles = [batch.from_cycle for batch in self.batches]
+        if cycles[0] != 1 or sorted(set(cycles)) != cycles:
+            message = "batches: the first begins with cycle 1, and each later one after the one before"
+            raise ValueError(message)
+        busy = set(self.plant.effects).union(*(entry.effects for entry in self.appearances))
+        for deviation in self.deviations:
+            if DEVIATION_EFFECT.get(deviation.kind) in busy:
+                needed = DEVIATION_EFFECT[deviation.kind]
+                message = f"deviations: {deviation.kind} needs {needed}, which acts already"
+                raise ValueError(message)
+        return self
+
+
+DEVIATION_EFFECT: Mapping[str, str] = {
+    "bump": "friction_patch",
+    "tilt": "position_dependent_friction",
+    "ripple": "periodic_friction",
+}
+"""Effect that makes each kind of deviant cycle; a level is a factor of friction and needs none."""
+
+
+def read_scenario(file: Path) -> Scenario:
+    """Read a scenario.
+
+    Raises
+    ------
+    SettingsError
+        Every fault at once, as `file:line:column: key.path: message`.
+    """
+    return load(file, Scenario)

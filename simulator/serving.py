@@ -1,0 +1,128 @@
+"""Serves a scenario over Modbus TCP until it is told to stop."""
+
+import asyncio
+import contextlib
+import json
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from impactcell.errors import MapError, SettingsError
+from impactcell.fieldbus.registers import RegisterMap
+from simulator.control import Control
+from simulator.device import Device, Truth
+from simulator.faults import FaultInjector
+from simulator.modbus_server import ModbusServer
+from simulator.scenario import Scenario
+from simulator.scenario_file import read_yaml
+
+LONGEST_NAP_S = 0.5
+
+
+def read_register_map(file: Path) -> RegisterMap:
+    """Read a register map.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read, or is no map.
+    """
+    content, _ = read_yaml(file)
+    try:
+        return RegisterMap.from_mapping(content)
+    except (MapError, TypeError, AttributeError) as error:
+        message = f"{file}: {error}"
+        raise SettingsError(message) from error
+
+
+@contextlib.contextmanager
+def _truths(file: Path | None) -> Iterator[Callable[[Truth], None] | None]:
+    """Give a function that writes each truth as a JSON line to `file`, at once; None without a file."""
+    if file is None:
+        yield None
+        return
+    with file.open("w", encoding="utf-8") as out:
+
+        def write(truth: Truth) -> None:
+            out.write(json.dumps(truth) + "\n")
+            out.flush()
+
+        yield write
+
+
+async def serve(scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None) -> None:
+    """Serve until SIGTERM or SIGINT; prints one JSON line with the addresses once it listens."""
+    loop = asyncio.get_running_loop()
+    stop = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop.set)
+    try:
+        with _truths(truth_file) as tell:
+            epoch_ns = time.time_ns()
+            device = Device(
+                scenario,
+                registers,
+                session=epoch_ns // 1_000_000_000 % (2**32 - 1) + 1,
+                epoch_ns=epoch_ns,
+                now_s=loop.time(),
+                on_truth=tell,
+            )
+            await _serve(scenario, device, stop)
+    finally:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.remove_signal_handler(number)
+
+
+async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> None:
+    loop = asyncio.get_running_loop()
+    listen = scenario.listen
+    faults = FaultInjector(scenario.seed)
+    server = ModbusServer(
+        device,
+        listen.device_id,
+        host=listen.host,
+        port=listen.port,
+        faults=faults,
+        before=lambda: device.update(loop.time()),
+    )
+
+    def restart() -> int:
+        server.drop_clients()
+        return device.restart()
+
+    actions: dict[str, Callable[..., object]] = {
+        "restart": restart,
+        "set_counter": device.set_counter,
+        "busy": device.busy,
+        "overrun": device.overrun,
+        "drop_clients": server.drop_clients,
+    }
+    async with contextlib.AsyncExitStack() as stack:
+        await stack.enter_async_context(server)
+        started = {
+            "cell": scenario.name,
+            "host": listen.host,
+            "port": server.port,
+            "device_id": listen.device_id,
+        }
+        if listen.control_port is not None:
+            control = await stack.enter_async_context(Control(faults, actions, listen.control_port))
+            started["control_port"] = control.port
+        print(json.dumps(started), flush=True)  # noqa: T201 - the address is this verb's output
+        while not stop.is_set():
+            device.update(loop.time())
+            nap_s = min(max(device.due_s - loop.time(), 0.0), LONGEST_NAP_S)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(stop.wait(), nap_s)
+
+
+def run(scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None) -> int:
+    """Serve in an event loop of its own; returns the exit code."""
+    try:
+        asyncio.run(serve(scenario, registers, truth_file))
+    except OSError as error:
+        print(f"{scenario.name}: cannot listen or write: {error.strerror or error}", file=sys.stderr)  # noqa: T201
+        return 1
+    return 0
