@@ -113,7 +113,9 @@ def corrupt(fault: Fault, reply: bytes, draw: random.Random) -> bytes:
     body = reply[8:]
     match fault.kind:
         case FaultKind.WRONG_TRANSACTION:
-            transaction = (transaction + draw.choice((-1, 1, 0x100, 0x4000))) & 0xFFFF
+            transaction = (
+                transaction + draw.choice((-1, 1, 0x100, 0x4000, draw.randrange(1, 0x10000)))
+            ) & 0xFFFF
         case FaultKind.WRONG_PROTOCOL:
             protocol = draw.randrange(1, 0x10000)
         case FaultKind.WRONG_UNIT:

@@ -70,7 +70,13 @@ class ScriptedDevice:
         self.put("cycle_counter", counter)
         self.put("ring_cycle", np.zeros(self.registers.slots, dtype=np.int64))
         self._selected = 0
+        self._newest = 0
         self._show()
+
+    @property
+    def next_slot(self) -> int:
+        """Slot that the next cycle goes to; the oldest is there."""
+        return (self._newest + 1) % self.registers.slots
 
     def complete(self, samples: Mapping[str, ArrayLike], **header: float | str) -> int:
         """Finish a cycle: put it into the oldest slot and raise the counter; return its number.
@@ -78,13 +84,14 @@ class ScriptedDevice:
         `samples` holds force, position and actuator in SI; `header` any register of the window.
         """
         cycle = int(self.get("cycle_counter")) % _LAST_CYCLE + 1
-        slot = int(cycle % self.registers.slots)
+        slot = self.next_slot
         words = self._encoded(slot, cycle, samples, header)
         self._slots[slot] = _Slot(words)
         ring = np.array(self.get("ring_cycle"))
         ring[slot] = cycle
         if slot == self._selected:
             self._show()
+        self._newest = slot
         self.put("ring_cycle", ring)
         if "newest_slot" in self.registers:
             self.put("newest_slot", slot)

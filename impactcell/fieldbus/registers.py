@@ -8,7 +8,7 @@ SI value = raw code × scale × SI factor of the unit.
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 

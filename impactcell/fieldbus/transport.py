@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import itertools
+import random
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -13,7 +15,19 @@ from impactcell.fieldbus.connection import Connection, Exchange, Part
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import WIRE, Words
 
+_STRIDE: Final = 40_503
+"""Odd, so that it visits all 16-bit numbers; 2^16 over the golden ratio, so that neighbours lie far apart."""
 _READ_FUNCTION: Final = {"holding": Function.READ_HOLDING, "input": Function.READ_INPUT}
+
+
+def _transactions() -> Iterator[int]:
+    """Yield transaction ids: each of the 65 536 once before any comes again.
+
+    They start anywhere, so that a gateway's late reply to an earlier client is not for one of ours, and lie
+    far apart, so that a peer that is off by a little never hits another request in flight.
+    """
+    start = random.getrandbits(16)
+    return ((start + number * _STRIDE) & 0xFFFF for number in itertools.count())
 
 
 class PartialBlock:
@@ -52,7 +66,7 @@ class ModbusClient:
     def __init__(self, link: ModuleLink) -> None:
         self.link = link
         self._connection: Connection | None = None
-        self._transactions = (number & 0xFFFF for number in itertools.count(1))
+        self._transactions = _transactions()
 
     @property
     def connected(self) -> bool:

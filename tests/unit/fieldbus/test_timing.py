@@ -1,0 +1,61 @@
+"""When to poll and when to connect again; the time is the test's own."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+from impactcell.fieldbus.backoff import CEILING_S, Backoff
+from impactcell.fieldbus.polling import FINE_S, IDLE_S, QUIET_S, PollSchedule
+
+
+def follow(periods_s: list[float], round_trip_s: float = 1e-4) -> tuple[list[float], float]:
+    """Poll through cycles with these periods; returns how late each was seen, and polls per cycle."""
+    schedule, now_s, due_s = PollSchedule(), 0.0, 0.0
+    late, polls = [], 0
+    for period_s in periods_s:
+        due_s += period_s
+        while now_s < due_s:
+            now_s += schedule.delay_s(now_s, round_trip_s)
+            polls += 1
+        late.append(now_s - due_s)
+        schedule.saw_cycle(now_s)
+    return late, polls / len(periods_s)
+
+
+def test_regular_cycles_are_seen_soon_with_few_polls() -> None:
+    jitter = np.random.default_rng(1).normal(0.5, 0.002, 300)
+    late, polls = follow(list(jitter))
+    assert np.quantile(late[20:], 0.99) < 2 * FINE_S
+    assert polls < 50  # three milliseconds all the time would be 167
+
+
+def test_irregular_cycles_are_never_seen_later_than_the_quiet_poll() -> None:
+    periods = np.random.default_rng(2).exponential(0.4, 500) + 0.1
+    late, _ = follow(list(periods))
+    assert np.quantile(late, 0.99) <= IDLE_S
+    assert np.quantile(late, 0.9) <= 2 * QUIET_S
+
+
+def test_an_idle_module_is_left_in_peace() -> None:
+    schedule = PollSchedule()
+    schedule.saw_cycle(0.0)
+    schedule.saw_cycle(0.5)
+    assert schedule.delay_s(60.0, 1e-4) == IDLE_S
+
+
+def test_a_slow_line_has_rest_between_polls() -> None:
+    assert PollSchedule().delay_s(0.0, 0.2) == pytest.approx(0.6)
+    assert PollSchedule().delay_s(0.0, math.nan) > 0.0
+
+
+def test_backoff_grows_with_jitter_to_its_ceiling_and_begins_anew() -> None:
+    backoff = Backoff(random.Random(3))
+    delays = [backoff.next_delay_s() for _ in range(200)]
+    assert delays[0] <= 0.02
+    assert max(delays) <= CEILING_S == 0.5
+    assert min(delays[10:]) >= 0.5 * CEILING_S
+    assert len(set(delays)) == 200
+    backoff.reset()
+    assert backoff.next_delay_s() <= 0.02
