@@ -61,8 +61,8 @@ def demo(
     *,
     cycles: Annotated[int | None, typer.Option(min=1, help="End by itself after this many cycles.")] = None,
     scenario: Annotated[
-        str, typer.Option(help="What happens in the cell: diagnostics, new-effect or positioning.")
-    ] = "diagnostics",
+        str, typer.Option(help="What happens in the cell: demo, new-effect or positioning.")
+    ] = "demo",
     as_json: Annotated[bool, typer.Option("--json", help="Print one summary object last.")] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

@@ -13,8 +13,6 @@ which `impactcell.values` writes and reads back bit for bit.
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from impactcell import alarms
 from impactcell.alarms import AlarmSettings, AlarmState, Finding, Occurrence, Transition
 from impactcell.prediction import Model, estimate
@@ -27,12 +25,20 @@ from impactcell.records import (
     FrictionEstimate,
     PositioningState,
     Quality,
-    Signature,
     Snapshot,
 )
-from impactcell.tracking import Reading, Tracked, TrackerSettings, TrackerState, gap, reset_wear, track
+from impactcell.tracking import (
+    Reading,
+    Tracked,
+    TrackerSettings,
+    TrackerState,
+    gap,
+    reset_wear,
+    signature,
+    track,
+)
+from impactcell.tracking.signature import SignatureSettings, SignatureState, SignatureTracked
 
-NO_SIGNATURE = Signature(np.zeros(0), np.zeros(0), np.zeros(0), math.nan, math.nan, math.nan, Quality.BAD)
 PERIOD_GAIN = 0.05
 """How fast the mean time between cycles follows."""
 
@@ -54,6 +60,7 @@ class CellDesign:
     name: str
     model: Model
     tracker: TrackerSettings
+    signature: SignatureSettings
     alarms: AlarmSettings
     mass_kg: float | None = None
     stroke_m: float | None = None
@@ -84,6 +91,7 @@ class CellState:
     """All that a cell keeps between cycles."""
 
     tracker: TrackerState
+    signature: SignatureState
     gap: gap.GapState
     alarms: AlarmState
     cycle: int = 0
@@ -114,7 +122,12 @@ class Stepped:
 
 def initial_state(design: CellDesign) -> CellState:
     """State of a cell that has seen nothing."""
-    return CellState(TrackerState(), gap.GapState(), alarms.initial_state(design.alarms))
+    return CellState(
+        TrackerState(),
+        signature.initial_state(design.signature),
+        gap.GapState(),
+        alarms.initial_state(design.alarms),
+    )
 
 
 def step(
@@ -134,14 +147,16 @@ def step(
         state.tracker,
         Reading.of(capture.cycle, capture.time_ns, friction, batch_id, expected=expected),
     )
+    signed = _sign(design, state, capture, tracked, period_s)
     gapped = gap.follow(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
-    findings = _findings(design, state, capture, tracked, gapped, period_s)
+    findings = _findings(design, state, capture, tracked, signed, gapped, period_s)
     alarm_state, moved = alarms.after_cycle(
         design.alarms, state.alarms, findings, capture.cycle, capture.time_ns, announced=tracked.expected
     )
     after = replace(
         state,
         tracker=tracked.state,
+        signature=signed.state,
         gap=gapped.state,
         alarms=alarm_state,
         cycle=capture.cycle,
@@ -156,7 +171,7 @@ def step(
         friction=friction,
         wear=tracked.wear,
         batch=tracked.batch,
-        signature=NO_SIGNATURE,
+        signature=signed.signature,
         positioning=positioning,
         alarms=alarm_state.alarms,
         model_name=design.model.name,
@@ -212,6 +227,25 @@ def renew_surface(state: CellState) -> CellState:
     return replace(state, tracker=reset_wear(state.tracker))
 
 
+def _sign(
+    design: CellDesign, state: CellState, capture: Capture, tracked: Tracked, period_s: float
+) -> SignatureTracked:
+    """Friction along the stroke, with the viscous part that the model knows taken out."""
+    plant = design.model.plant
+    viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
+    slope = viscous / capture.mass_kg if isinstance(viscous, float) and capture.mass_kg > 0.0 else 0.0
+    return signature.update(
+        design.signature,
+        state.signature,
+        capture,
+        batch_id=tracked.batch.batch_id,
+        restart=tracked.shift is not None,
+        viscous_per_mass=slope,
+        gravity_m_s2=plant.gravity_m_s2,
+        period_s=period_s,
+    )
+
+
 def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
     return (
         channel if channel is None or channel.noise_std is not None else replace(channel, noise_std=noise_std)
@@ -255,6 +289,7 @@ def _findings(
     state: CellState,
     capture: Capture,
     tracked: Tracked,
+    signed: SignatureTracked,
     gapped: gap.GapTracked,
     period_s: float,
 ) -> list[Finding]:
@@ -262,6 +297,7 @@ def _findings(
     found = [
         alarms.wear_limit(design.alarms, tracked.wear, capture.cycle, active=wear_active),
         alarms.batch_shift(tracked.shift),
+        alarms.deviant_cycle(signed.deviation, signed.signature.deviates_at_m, judged=signed.judged),
         Finding(AlarmName.MODEL_GAP, gapped.exceeds, _gap_message(gapped), gapped.evidence),
     ]
     return [replace(one, evidence=_rated(design, one.evidence, period_s)) for one in found]

@@ -13,6 +13,7 @@ from impactcell.scada import CellDescription, Limits, Machine, Ranges, ServerSet
 from impactcell.settings import Cell
 from impactcell.settings.sections import Journal
 from impactcell.tracking import BatchKnowledge, TrackerSettings
+from impactcell.tracking.signature import SignatureSettings
 
 MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
 
@@ -29,6 +30,12 @@ def cell_design(cell: Cell) -> CellDesign:
         tracker=TrackerSettings(
             wear_limit=settings.alarms.wear_limit,
             batch=BatchKnowledge(settings.tracking.batch),
+            false_alarm_cycles=settings.alarms.false_alarm_cycles,
+        ),
+        signature=SignatureSettings(
+            length_m=settings.signature.length_mm * MM,
+            points=settings.signature.points,
+            learned_cycles=settings.signature.learning_cycles,
             false_alarm_cycles=settings.alarms.false_alarm_cycles,
         ),
         alarms=alarm_settings(cell),

@@ -153,8 +153,6 @@ class Tracking(Section):
 
     batch: Literal["known", "unknown"] = "known"
     """known: the PLC names every batch; unknown: changes of batch are found from the friction."""
-    learning_cycles: Annotated[int, Field(ge=5)] = 30
-    """Cycles from which the scatter is learned before alarms are trusted."""
 
 
 class Alarms(Section):
@@ -180,13 +178,15 @@ class Alarms(Section):
         return self
 
 
-class SignatureGrid(Section):
-    """The grid along the stroke on which friction is shown."""
+class Signature(Section):
+    """Friction along the stroke."""
 
-    spacing_mm: Positive = 0.1
-    """Distance between grid points."""
-    points: Annotated[int, Field(ge=4, le=200)] = 30
+    length_mm: Positive = 4.0
+    """Distance slid at the last grid point."""
+    points: Annotated[int, Field(ge=4, le=200)] = 33
     """Number of grid points."""
+    learning_cycles: Annotated[int, Field(ge=10)] = 50
+    """Cycles from which the cell learns how its cycles vary before any is judged."""
 
 
 class Positioning(Section):
@@ -255,7 +255,7 @@ class CellSettings(Section):
     sensors: Sensors = Sensors()
     tracking: Tracking = Tracking()
     alarms: Alarms
-    signature: SignatureGrid = SignatureGrid()
+    signature: Signature = Signature()
     positioning: Positioning | None = None
     """Absent: the cell only watches."""
     opcua: OpcUa = Field(default={}, validate_default=True)

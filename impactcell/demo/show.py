@@ -1,0 +1,189 @@
+"""The demo from beginning to end: set up, show each cycle, sum up."""
+
+import asyncio
+import contextlib
+import json
+import math
+import shutil
+import signal
+import sys
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from rich.console import Console
+from rich.live import Live
+
+from impactcell.demo.stage import USER, Stage, set_up
+from impactcell.demo.view import Scene, render
+from impactcell.errors import ImpactCellError
+from impactcell.records import Snapshot
+from impactcell.service import Service
+
+SHOWN = 400
+PATIENCE_S = 60.0
+"""Without a cycle for so long, the demo has failed."""
+
+
+def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
+    """Run the demo until Ctrl-C, or for `cycles` cycles.
+
+    Raises
+    ------
+    SettingsError
+        There is no such scenario.
+    ImpactCellError
+        The simulator did not start, or no cycle came.
+    """
+    with set_up(scenario, cycles) as stage:
+        show = _Show(stage, cycles)
+        if as_json or not sys.stdout.isatty():
+            interrupted = asyncio.run(show.run(_plain if not as_json else _nothing))
+        else:
+            interrupted = asyncio.run(_live(show))
+    if as_json:
+        print(json.dumps(show.summary()))  # noqa: T201 - the result of the verb
+    if interrupted and cycles is not None:
+        raise KeyboardInterrupt
+
+
+@dataclass(slots=True)
+class _Show:
+    """Runs the service over the stage and keeps what it said."""
+
+    stage: Stage
+    cycles: int | None
+    snapshots: deque[Snapshot] = field(default_factory=lambda: deque(maxlen=SHOWN))
+    seen: int = 0
+    raised: list[dict[str, Any]] = field(default_factory=list)
+    service: Service | None = None
+    endpoint: str = ""
+    missed: int = 0
+
+    async def run(self, draw: Callable[["_Show", Snapshot], None]) -> bool:
+        """Run to the end; True if it was ended by Ctrl-C."""
+        stop, done = asyncio.Event(), asyncio.Event()
+        news = asyncio.Event()
+
+        def observe(_: str, snapshot: Snapshot) -> None:
+            self._take(snapshot)
+            news.set()
+            draw(self, snapshot)
+            if self.cycles is not None and self.seen >= self.cycles:
+                done.set()
+                stop.set()
+
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, stop.set)
+        self.service = Service([self.stage.cell], observe)
+        watch = asyncio.create_task(self._watch(news, stop))
+        try:
+            await self.service.run(stop, self._started)
+        finally:
+            watch.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await watch
+        return not done.is_set()
+
+    def _started(self) -> None:
+        assert self.service is not None  # noqa: S101 - it calls us
+        self.endpoint = self.service.endpoints[self.stage.cell.name]
+
+    def _take(self, snapshot: Snapshot) -> None:
+        assert self.service is not None  # noqa: S101 - it calls us
+        self.missed = self.service.running[self.stage.cell.name].status.missed
+        before = {alarm.name: alarm.active for alarm in self.snapshots[-1].alarms} if self.snapshots else {}
+        self.raised += [
+            {"alarm": alarm.name.value, "cycle": snapshot.cycle, "message": alarm.message}
+            for alarm in snapshot.alarms
+            if alarm.active and not before.get(alarm.name, False)
+        ]
+        self.snapshots.append(snapshot)
+        self.seen += 1
+
+    async def _watch(self, news: asyncio.Event, stop: asyncio.Event) -> None:
+        while True:
+            news.clear()
+            try:
+                async with asyncio.timeout(PATIENCE_S):
+                    await news.wait()
+            except TimeoutError:
+                stop.set()
+                reason = self.service.running[self.stage.cell.name].status.reason if self.service else ""
+                raise ImpactCellError(
+                    f"no cycle for {PATIENCE_S:g} s: {reason or 'the module is silent'}"
+                ) from None
+
+    def scene(self) -> Scene:
+        """Return what the live view shows now."""
+        last = self.snapshots[-1].cycle if self.snapshots else 0
+        told = [text for cycle, text in self.stage.story if cycle <= last]
+        who = f"user {USER}, password {self.stage.password}"
+        return Scene(
+            self.stage.cell.name, f"{self.endpoint} · {who}", told[-1] if told else "", list(self.snapshots)
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """One object that says how the demo went; null for what is not known."""
+        last = self.snapshots[-1]
+        return {
+            "cell": self.stage.cell.name,
+            "endpoint": self.endpoint,
+            "cycles": self.seen,
+            "missed": self.missed,
+            "last_cycle": last.cycle,
+            "mu_s": _number(last.friction.mu_s.value),
+            "mu_s_std": _number(last.friction.mu_s.std),
+            "mu_k": _number(last.friction.mu_k.value),
+            "estimator": last.friction.estimator.value,
+            "quality": last.friction.mu_s.quality.name.lower(),
+            "wear": {
+                "level": _number(last.wear.level),
+                "level_std": _number(last.wear.level_std),
+                "rate_per_1000_cycles": _number(last.wear.rate_per_cycle * 1000),
+                "limit": _number(last.wear.limit),
+                "cycles_to_limit": _number(last.wear.cycles_to_limit),
+            },
+            "batch": {
+                "id": last.batch.batch_id,
+                "offset": _number(last.batch.offset),
+                "last_shift": _number(last.batch.last_shift),
+                "last_shift_cycle": last.batch.last_shift_cycle,
+            },
+            "alarms": self.raised,
+            "story": [{"cycle": cycle, "what": text} for cycle, text in self.stage.story],
+        }
+
+
+async def _live(show: _Show) -> bool:
+    console = Console()
+    with Live(console=console, auto_refresh=False, screen=True) as live:
+
+        def draw(now: _Show, _: Snapshot) -> None:
+            live.update(render(now.scene(), min(shutil.get_terminal_size().columns, 160)), refresh=True)
+
+        live.update(render(show.scene(), min(console.width, 160)), refresh=True)
+        interrupted = await show.run(draw)
+    if show.snapshots:
+        console.print(render(show.scene(), min(console.width, 160)))
+    return interrupted
+
+
+def _plain(_: _Show, snapshot: Snapshot) -> None:
+    mu_s = snapshot.friction.mu_s
+    active = ", ".join(alarm.name.value for alarm in snapshot.alarms if alarm.active)
+    print(  # noqa: T201 - the view of a demo without a terminal
+        f"cycle {snapshot.cycle}: mu_s {mu_s.value:.4f} ± {mu_s.std:.4f}, batch {snapshot.batch.batch_id}"
+        f"{', ' + active if active else ''}",
+        flush=True,
+    )
+
+
+def _nothing(_: _Show, __: Snapshot) -> None:
+    """Draw nothing: the summary is all that is asked for."""
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,168 @@
+"""What the demo runs on: a simulator in a process of its own, and a cell made to talk to it."""
+
+import contextlib
+import json
+import secrets
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import yaml
+
+from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.scada import Role
+from impactcell.scada.users import User, with_password, write_users
+from impactcell.settings import Cell, read_cell
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+SCENARIOS = ("demo", "new-effect", "positioning")
+USER = "demo"
+PREFERRED_PORT = 4840
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A cell whose module answers, and the user who may look at it.
+
+    Attributes
+    ----------
+    cell : Cell
+    story : tuple of (int, str)
+        What happens in the cell: from which cycle on, and in words.
+    password : str
+        Of the user `demo`; made anew for each demo.
+    """
+
+    cell: Cell
+    story: tuple[tuple[int, str], ...]
+    password: str
+
+
+@contextlib.contextmanager
+def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
+    """Start the simulator with a scenario of `config/sim`; what it needs is gone afterwards.
+
+    Raises
+    ------
+    SettingsError
+        There is no such scenario.
+    ImpactCellError
+        The simulator did not start.
+    """
+    source = CONFIG / "sim" / f"{scenario}.yaml"
+    if scenario not in SCENARIOS:
+        raise SettingsError(f"there is no scenario '{scenario}'; choose one of {', '.join(SCENARIOS)}")
+    directory = Path(tempfile.mkdtemp(prefix="impactcell-demo-"))
+    try:
+        content = yaml.safe_load(source.read_text(encoding="utf-8"))
+        content["register_map"] = str((source.parent / content["register_map"]).resolve())
+        content = paced(content, cycles)
+        played = directory / "scenario.yaml"
+        played.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+        password = secrets.token_urlsafe(9)
+        write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
+        with _simulator(played) as port:
+            yield Stage(_cell(scenario, directory, port), story(content), password)
+    finally:
+        shutil.rmtree(directory, ignore_errors=True)
+
+
+def paced(content: dict, cycles: int | None) -> dict:  # type: ignore[type-arg]
+    """Move what happens in a scenario to where a demo of `cycles` cycles has it in view."""
+    if cycles is None:
+        return content
+    happenings = [
+        entry[key]
+        for section, key in (
+            ("batches", "from_cycle"),
+            ("deviations", "cycle"),
+            ("appearances", "from_cycle"),
+        )
+        for entry in content.get(section, [])
+    ]
+    last = max([1, *happenings])
+    scale = min(1.0, 0.9 * cycles / last)
+
+    def moved(entry: dict, key: str) -> dict:  # type: ignore[type-arg]
+        return {**entry, key: max(1, round(entry[key] * scale))}
+
+    return {
+        **content,
+        "batches": [moved(entry, "from_cycle") for entry in content.get("batches", [])],
+        "deviations": [moved(entry, "cycle") for entry in content.get("deviations", [])],
+        "appearances": [moved(entry, "from_cycle") for entry in content.get("appearances", [])],
+    }
+
+
+def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-arg]
+    """Tell what a scenario does, from which cycle on."""
+    told = [(1, "the surface wears: mu_s grows slowly")] if content.get("wear") else []
+    told += [
+        (batch["from_cycle"], f"batch {batch['id']} is on the table")
+        for batch in content.get("batches", [])
+        if batch["from_cycle"] > 1
+    ]
+    told += [
+        (deviation["cycle"], f"cycle {deviation['cycle']} is odd: a {deviation['kind']} along its stroke")
+        for deviation in content.get("deviations", [])
+    ]
+    told += [
+        (entry["from_cycle"], f"a new effect acts in the plant: {', '.join(entry['effects'])}")
+        for entry in content.get("appearances", [])
+    ]
+    return tuple(sorted(told))
+
+
+@contextlib.contextmanager
+def _simulator(scenario: Path) -> Iterator[int]:
+    process = subprocess.Popen(  # noqa: S603 - our own simulator
+        [sys.executable, "-m", "simulator", "serve", str(scenario)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=CONFIG.parent,
+    )
+    try:
+        assert process.stdout is not None  # noqa: S101 - a pipe was asked for
+        line = process.stdout.readline()
+        if not line:
+            _, errors = process.communicate(timeout=5)
+            raise ImpactCellError(f"the simulator did not start: {errors.strip()}")
+        yield int(json.loads(line)["port"])
+    finally:
+        process.terminate()
+        process.communicate()
+
+
+def _cell(scenario: str, directory: Path, port: int) -> Cell:
+    cell = read_cell(CONFIG / "cells" / f"{scenario}.yaml")
+    settings = cell.settings
+    changed = settings.model_copy(
+        update={
+            "module": settings.module.model_copy(update={"port": port}),
+            "opcua": settings.opcua.model_copy(
+                update={
+                    "endpoint": f"opc.tcp://127.0.0.1:{_free_port()}/impactcell",
+                    "users_file": directory / "users.yaml",
+                    "certificates_dir": directory / "pki",
+                }
+            ),
+            "journal": settings.journal.model_copy(update={"file": directory / "demo.sqlite"})
+            if settings.journal
+            else None,
+        }
+    )
+    return replace(cell, settings=changed)
+
+
+def _free_port() -> int:
+    """Prefer the customary port of OPC UA; any free one where it is taken."""
+    for port in (PREFERRED_PORT, 0):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)) as free:
+            return int(free.getsockname()[1])
+    raise ImpactCellError("no free port on loopback")
