@@ -26,7 +26,7 @@ class Chosen(NamedTuple):
 @compiled
 def shortlist(
     table: Samples, remaining: float, z: Samples, mass: Samples, tolerance: float, penalty: float,
-    grid: Samples, cost: Samples, overshoot: Samples, aims: Samples, kept: int,
+    step: float, cost: Samples, overshoot: Samples, aims: Samples, kept: int,
 ) -> tuple[Samples, Samples, Samples]:  # fmt: skip
     """Velocity index, position on the stroke axis (fractional index) and cost of the best taps.
 
@@ -46,8 +46,8 @@ def shortlist(
                 continue
             if centre <= remaining + 2.0 * tolerance:
                 c, _ = expect(
-                    remaining, table[i, j], z, mass, tolerance, penalty, grid, cost, overshoot,
-                    grid.size, bound,
+                    remaining, table[i, j], z, mass, tolerance, penalty, step, cost, overshoot,
+                    cost.size, bound,
                 )  # fmt: skip
                 if c < best:
                     best, place, bound = c, float(j), min(bound, c)
@@ -66,7 +66,7 @@ def shortlist(
                     for q in range(nodes):
                         row[q] = table[i, j, q] + part * (table[i, j + 1, q] - table[i, j, q])
                     c, _ = expect(
-                        remaining, row, z, mass, tolerance, penalty, grid, cost, overshoot, grid.size, bound
+                        remaining, row, z, mass, tolerance, penalty, step, cost, overshoot, cost.size, bound
                     )  # fmt: skip
                     if c < best:
                         best, place, bound = c, j + part, min(bound, c)
@@ -83,7 +83,7 @@ def shortlist(
 def weigh(
     velocity: float, strokes: Samples, rows: Samples, z: Samples, mass: Samples, part_mass: float,
     gravity: float, remaining: float, tolerance: float, penalty: float,
-    grid: Samples, cost: Samples, overshoot: Samples,
+    step: float, cost: Samples, overshoot: Samples,
 ) -> tuple[Samples, Samples]:  # fmt: skip
     """Weigh each stroke at one velocity by the model itself: expected cost and overshoot probability."""
     moved = np.empty((strokes.size, z.size))
@@ -94,7 +94,7 @@ def weigh(
             costs[j], risks[j] = math.inf, 1.0
         else:
             costs[j], risks[j] = expect(
-                remaining, moved[j], z, mass, tolerance, penalty, grid, cost, overshoot, grid.size, math.inf
+                remaining, moved[j], z, mass, tolerance, penalty, step, cost, overshoot, cost.size, math.inf
             )  # fmt: skip
     return costs, risks
 

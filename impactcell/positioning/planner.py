@@ -11,15 +11,18 @@ from impactcell.physics import Plant
 from impactcell.positioning import belief as beliefs
 from impactcell.positioning.belief import Belief
 from impactcell.positioning.choice import choose
+from impactcell.positioning.learning import learn
 from impactcell.positioning.response import displacement_of
 from impactcell.positioning.spread import MIDDLE, Z, distribution, plants, scenarios, spread_table
 from impactcell.positioning.value import AIMS, CostToGo, cost_to_go
 from impactcell.records import Samples
 
-SLOWEST_M_S = 0.003
+SLOWEST_M_S = 0.005
 VELOCITIES = 24
-STROKES = 120
+STROKES = 60
 MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
+CAUTION = (1.0, 20.0)  # factors on that multiplier, tried in turn until a tap is within the bound
+SAME_MASS = 0.02
 STALE = np.array([0.012, 0.03, 0.06, 0.02, 2.0])  # change of the belief after which a table is made anew
 
 
@@ -63,6 +66,7 @@ class _Part(NamedTuple):
     """What has been worked out for parts of one mass, and the belief it was worked out from."""
 
     mass_kg: float
+    caution: float
     belief: Belief
     table: Samples
     value: CostToGo
@@ -118,7 +122,7 @@ class TapPlanner:
         viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
         self._gravity = plant.gravity_m_s2
         self._belief = beliefs.prior(
-            plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, viscous
+            plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, float(np.max(viscous))
         )
 
     @property
@@ -181,24 +185,23 @@ class TapPlanner:
                 "and this cell cannot push it back"
             )
         distance = abs(remaining_m)
-        part = self._worked_out(mass_kg)
-        furthest = float(np.nanmax(part.table[:, :, MIDDLE]))
-        if not furthest > 0.0:
-            return Unreachable(
-                f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
-                f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
-            )
         rows = scenarios(self._belief)
-        penalty = MULTIPLIER / self.overshoot_probability
         least = 1.0
-        for multiplier in (penalty, 30.0 * penalty):
-            chosen, least = choose(
+        for caution in CAUTION:
+            part = self._worked_out(mass_kg, caution)
+            if not np.nanmax(part.table[:, :, MIDDLE]) > 0.0:
+                return Unreachable(
+                    f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
+                    f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
+                )
+            chosen, met = choose(
                 distance, part.table, self._velocities, self._strokes, rows, Z, part.value, AIMS,
-                tolerance=self.tolerance_m, penalty=multiplier, bound=self.overshoot_probability,
+                tolerance=self.tolerance_m, penalty=self._penalty(caution), bound=self.overshoot_probability,
                 part_mass=mass_kg, gravity=self._gravity,
             )  # fmt: skip
             if chosen is not None:
                 break
+            least = min(least, met)
         else:
             return Unreachable(
                 f"{distance * 1e6:.1f} µm remain, and every tap for a part of {mass_kg:.3g} kg overshoots "
@@ -237,7 +240,7 @@ class TapPlanner:
                 tap.velocity_m_s, tap.stroke_m, plants(states[:, :5]), factor, mass_kg, self._gravity
             )
 
-        self._belief = beliefs.learn(self._belief, response, moved_m)
+        self._belief = learn(self._belief, response, moved_m)
 
     def observe_friction(self, mu_k: float, std: float, batch_changed: bool = False) -> None:  # noqa: FBT001, FBT002
         """Take over the tracker's kinetic coefficient; `batch_changed`: friction has just stepped.
@@ -251,28 +254,30 @@ class TapPlanner:
             raise PositioningError(f"cannot use a friction of {mu_k} +- {std}")
         self._belief = beliefs.told_friction(self._belief, mu_k, std, batch_changed=batch_changed)
 
-    def _worked_out(self, mass_kg: float) -> _Part:
+    def _penalty(self, caution: float) -> float:
+        return MULTIPLIER * caution / self.overshoot_probability
+
+    def _worked_out(self, mass_kg: float, caution: float) -> _Part:
         """Table of taps and cost to go for this mass, made anew where the belief has moved on."""
         for n, part in enumerate(self._parts):
-            if abs(part.mass_kg / mass_kg - 1.0) < 0.02 and self._still_holds(part):
+            near = abs(part.mass_kg / mass_kg - 1.0) < SAME_MASS and part.caution == caution
+            if near and self._still_holds(part):
                 self._parts.append(self._parts.pop(n))
                 return part
-        rows = scenarios(self._belief)
-        table = spread_table(self._velocities, self._strokes, rows, Z, mass_kg, self._gravity)
+        table = self._table(self._belief, mass_kg)
+        value = CostToGo(1.0, np.ones(1), np.ones(1))
         if np.nanmax(table[:, :, MIDDLE]) > 0.0:
             later = beliefs.foreseen(self._belief)
-            ahead = table
-            if (np.diag(self._belief.cov) > 1.2 * np.diag(later.cov)).any():
-                ahead = spread_table(
-                    self._velocities, self._strokes, scenarios(later), Z, mass_kg, self._gravity
-                )  # fmt: skip
-            value = cost_to_go(ahead, Z, self.tolerance_m, MULTIPLIER / self.overshoot_probability)
-        else:
-            value = CostToGo(np.ones(1), np.ones(1), np.ones(1))
-        part = _Part(mass_kg, self._belief, table, value)
+            less = (np.diag(self._belief.cov) > 1.2 * np.diag(later.cov)).any()
+            ahead = self._table(later, mass_kg) if less else table
+            value = cost_to_go(ahead, Z, self.tolerance_m, self._penalty(caution))
+        part = _Part(mass_kg, caution, self._belief, table, value)
         self._parts.append(part)
         del self._parts[:-64]
         return part
+
+    def _table(self, belief: Belief, mass_kg: float) -> Samples:
+        return spread_table(self._velocities, self._strokes, scenarios(belief), Z, mass_kg, self._gravity)
 
     def _still_holds(self, part: _Part) -> bool:
         moved = np.abs(self._belief.mean - part.belief.mean)

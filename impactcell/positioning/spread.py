@@ -2,7 +2,7 @@
 
 Uncertainty is split into the line along which friction varies (and, with it, whatever is correlated with
 it), followed exactly at the nodes `Z` whatever the displacement does there, and the directions across,
-each taken at one standard deviation and added in quadrature.
+each taken at one standard deviation and added by `reach`.
 """
 
 import math
@@ -57,9 +57,7 @@ def distribution(
 ) -> None:  # fmt: skip
     """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m.
 
-    `rows` as from `scenarios`. Directions across are added in quadrature to the deviation from the
-    middle node, keeping its sign; where a node deviates to the wrong side by less, friction's usual side
-    (less friction, further) is taken, which errs to the side of overshoot.
+    `rows` as from `scenarios`.
     """
     nodes, count = z.size, strokes.size
     middle = nodes // 2
@@ -78,19 +76,40 @@ def distribution(
         for j in range(count):
             step = max(abs(course[j] - out[j, middle]), abs(other[j] - out[j, middle]))
             square[j] += step * step
+    line = np.empty(nodes)
     for j in range(count):
-        centre = out[j, middle]
+        line[:] = out[j]
+        aside = math.sqrt(square[j])
         for q in range(nodes):
-            if q == middle:
-                continue
-            deviation = out[j, q] - centre
-            aside = abs(z[q]) * math.sqrt(square[j])
-            usual = -1.0 if z[q] > 0.0 else 1.0
-            if deviation * usual >= 0.0:
-                out[j, q] = centre + usual * math.sqrt(deviation * deviation + aside * aside)
-            elif aside > abs(deviation):
-                out[j, q] = centre + usual * aside
-            out[j, q] = max(out[j, q], 0.0)
+            if q != middle:
+                out[j, q] = max(reach(line, z, q, middle, aside), 0.0)
+
+
+@compiled
+def reach(line: Samples, z: Samples, q: int, middle: int, aside: float) -> float:
+    """Displacement at node `q` with what lies across the line, one standard deviation `aside`, added.
+
+    Where the displacement follows friction as usual (less friction, further) deviations add in
+    quadrature. Elsewhere, and at least, it is the furthest (or nearest) displacement on the circle of
+    radius |z_q| in the plane of the line and what lies across it: the first-order reliability method
+    (Hasofer and Lind, 1974) on a line that is not straight.
+    """
+    usual = -1.0 if z[q] > 0.0 else 1.0
+    radius = abs(z[q])
+    centre = line[middle]
+    deviation = line[q] - centre
+    furthest = 0.0
+    for n in range(z.size):
+        if abs(z[n]) <= radius:
+            value = (line[n] - centre) * usual + aside * math.sqrt(radius * radius - z[n] * z[n])
+            furthest = max(furthest, value)
+    if deviation * usual >= 0.0:
+        furthest = max(furthest, math.hypot(deviation, aside * radius))
+    elif furthest < 0.1 * abs(deviation):
+        return float(
+            line[q]
+        )  # a fold of the displacement which all but the tap's own friction leaves in place
+    return float(centre + usual * furthest)
 
 
 @compiled

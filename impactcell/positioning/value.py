@@ -26,9 +26,9 @@ SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
 
 
 class CostToGo(NamedTuple):
-    """W and the overshoot probability on a grid of remaining distances, all shape (n,)."""
+    """W and the overshoot probability at remaining distances 0, step, 2 step, ... (m), shape (n,)."""
 
-    remaining_m: Samples
+    step_m: float
     cost: Samples
     overshoot: Samples
 
@@ -41,34 +41,24 @@ def beyond(z: float) -> float:
 
 
 @compiled
-def at(grid: Samples, values: Samples, r: float) -> float:
-    """Linear interpolation on an increasing grid; beyond its end, the mean slope of its second half."""
-    n = grid.size
-    if r <= grid[0]:
-        return float(values[0])
-    if r >= grid[n - 1]:
-        middle = n - 1
-        while middle > 0 and grid[middle] > 0.5 * grid[n - 1]:
-            middle -= 1
-        slope = (values[n - 1] - values[middle]) / (grid[n - 1] - grid[middle])
-        return float(values[n - 1] + slope * (r - grid[n - 1]))
-    low, high = 0, n - 1
-    while high - low > 1:
-        half = (low + high) // 2
-        if grid[half] <= r:
-            low = half
-        else:
-            high = half
-    part = (r - grid[low]) / (grid[high] - grid[low])
-    return float(values[low] + part * (values[high] - values[low]))
+def ahead(step: float, values: Samples, known: int, r: float) -> float:
+    """Interpolate `values`, of which `known` are there; beyond them, the mean slope of their second half."""
+    place = r / step
+    n = int(place)
+    if n + 1 < known:
+        return float(values[n] + (place - n) * (values[n + 1] - values[n]))
+    last = known - 1
+    half = last // 2
+    slope = (values[last] - values[half]) / (last - half) if last > half else 0.0
+    return float(values[last] + slope * (place - last))
 
 
 @compiled
 def expect(
     remaining: float, moved: Samples, z: Samples, mass: Samples, tolerance: float, penalty: float,
-    grid: Samples, cost: Samples, overshoot: Samples, known: int, bound: float,
+    step: float, cost: Samples, overshoot: Samples, known: int, bound: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Weigh one tap: expected cost and overshoot probability and all that follow it.
+    """Weigh one tap: expected cost and overshoot probability of it and all that follow it.
 
     Parameters
     ----------
@@ -77,26 +67,27 @@ def expect(
     mass : ndarray, shape (q - 1,)
         Normal probability between neighbouring nodes.
     known : int
-        How many points of the grid hold a cost already; one tap that leaves the part beyond them stays
-        where it is, and is charged for by the return of the same question.
+        How many points of `cost` and `overshoot` are known. A tap that leaves the part beyond them, or
+        where it was, leads back to the question that is being asked.
     bound : float
-        A cost above which the answer does not matter: the sweep then stops.
+        A cost above which the answer does not matter: inf is returned as soon as it is passed.
     """
     total, risk, again = 1.0, 0.0, 0.0
-    for q in range(mass.size):
+    intervals = mass.size
+    whole = known == cost.size
+    reached = step * (known - 1)
+    for turn in range(intervals):  # from the middle outwards: the bound is passed early
+        q = intervals // 2 + (turn + 1) // 2 * (1 if turn % 2 == 0 else -1)
         a, b = remaining - moved[q], remaining - moved[q + 1]
         near, far = min(a, b), max(a, b)
-        if moved[q] <= STALL_M and moved[q + 1] <= STALL_M:
-            again += mass[q]
-            total += mass[q] * STALL_PENALTY
-        elif near > tolerance:
+        if near > tolerance:
             r = 0.5 * (a + b)
-            if known > 0 and r <= grid[known - 1]:
-                total += mass[q] * at(grid[:known], cost[:known], r)
-                risk += mass[q] * at(grid[:known], overshoot[:known], r)
-            elif known == grid.size:
-                total += mass[q] * at(grid, cost, r)
-                risk += mass[q] * overshoot[known - 1]
+            if moved[q] <= STALL_M and moved[q + 1] <= STALL_M:
+                again += mass[q]
+                total += mass[q] * STALL_PENALTY
+            elif whole or r <= reached:
+                total += mass[q] * ahead(step, cost, known, r)
+                risk += mass[q] * ahead(step, overshoot, known, min(r, reached))
             else:
                 again += mass[q]
         elif far < -tolerance:
@@ -113,10 +104,10 @@ def expect(
             if far > tolerance:
                 cut = z[q] + (tolerance - a) * slope
                 part = beyond(cut) - beyond(z[q + 1]) if a < b else beyond(z[q]) - beyond(cut)
-                r = 0.5 * (tolerance + far)
-                if known > 0:
-                    total += part * at(grid[:known], cost[:known], min(r, grid[known - 1]))
-                    risk += part * at(grid[:known], overshoot[:known], min(r, grid[known - 1]))
+                r = min(0.5 * (tolerance + far), reached)
+                if r > tolerance:
+                    total += part * ahead(step, cost, known, r)
+                    risk += part * ahead(step, overshoot, known, r)
                 else:
                     again += part
         if total > bound:
@@ -163,11 +154,13 @@ def taps_by_displacement(table: Samples, targets: Samples, z: Samples) -> Sample
 @compiled
 def sweep(
     grid: Samples, targets: Samples, taps: Samples, aims: Samples, z: Samples, mass: Samples,
-    tolerance: float, penalty: float, cost: Samples, overshoot: Samples,
+    tolerance: float, penalty: float, step: float, cost: Samples, overshoot: Samples,
 ) -> None:  # fmt: skip
-    """Fill `cost` and `overshoot` on the grid of remaining distances, from the tolerance outwards."""
+    """Fill `cost` and `overshoot`, solving on `grid` from the tolerance outwards and interpolating."""
     nodes = z.size
     row = np.empty(nodes)
+    known = int(tolerance / step) + 1  # zero inside the tolerance
+    before, cost_before, risk_before = tolerance, 1.0, 0.0
     for n in range(grid.size):
         r = grid[n]
         best, risk = math.inf, 1.0
@@ -179,7 +172,7 @@ def sweep(
             for s in range(SLOTS):
                 if not math.isnan(taps[m, s, 0]):
                     c, p = expect(
-                        r, taps[m, s], z, mass, tolerance, penalty, grid, cost, overshoot, n, best
+                        r, taps[m, s], z, mass, tolerance, penalty, step, cost, overshoot, known, best
                     )  # fmt: skip
                     if c < best:
                         best, risk = c, p
@@ -193,13 +186,19 @@ def sweep(
                 for q in range(nodes):
                     row[q] = taps[m - 1, s, q] + part * (taps[m, s, q] - taps[m - 1, s, q])
                 if not math.isnan(row[0]):
-                    c, p = expect(r, row, z, mass, tolerance, penalty, grid, cost, overshoot, n, best)
+                    c, p = expect(r, row, z, mass, tolerance, penalty, step, cost, overshoot, known, best)
                     if c < best:
                         best, risk = c, p
         if best == math.inf:  # nothing helps from here: as costly as an overshoot
-            best = penalty
-            risk = 1.0
-        cost[n], overshoot[n] = best, risk
+            best, risk = penalty, 1.0
+        if n == 0:
+            cost_before, risk_before = best, risk
+        while known < cost.size and known * step <= r:
+            part = (known * step - before) / (r - before)
+            cost[known] = cost_before + part * (best - cost_before)
+            overshoot[known] = risk_before + part * (risk - risk_before)
+            known += 1
+        before, cost_before, risk_before = r, best, risk
 
 
 def spacing(first: float, last: float, step: float, ratio: float) -> Samples:
@@ -219,12 +218,12 @@ def between(z: Samples) -> Samples:
 
 def cost_to_go(table: Samples, z: Samples, tolerance: float, penalty: float) -> CostToGo:
     """Sweep for one part: `table` (m) as from `spread_table`, shape (velocities, strokes, nodes)."""
-    middle = table[:, :, z.size // 2]
-    furthest = float(np.nanmax(middle))
-    grid = spacing(1.0001 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
+    furthest = float(np.nanmax(table[:, :, z.size // 2]))
+    step = max(0.5 * tolerance, 2.5e-4 * furthest)
+    grid = spacing(1.25 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
     targets = spacing(min(0.5 * tolerance, 5e-6), furthest, 0.25 * tolerance, 0.03)
     targets = targets[targets <= furthest]
     taps = taps_by_displacement(table, targets, z)
-    cost, overshoot = np.zeros(grid.size), np.zeros(grid.size)
-    sweep(grid, targets, taps, AIMS, z, between(z), tolerance, penalty, cost, overshoot)
-    return CostToGo(grid, cost, overshoot)
+    cost, overshoot = np.zeros(int(grid[-1] / step)), np.zeros(int(grid[-1] / step))
+    sweep(grid, targets, taps, AIMS, z, between(z), tolerance, penalty, step, cost, overshoot)
+    return CostToGo(step, cost, overshoot)
