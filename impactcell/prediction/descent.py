@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from impactcell.errors import NotConvergedError, PhysicsError
 from impactcell.prediction.posterior import Side
-from impactcell.prediction.response import JUST_SLIPPING, PARAMETERS, RATIO, Response
+from impactcell.prediction.response import JUST_STICKING, PARAMETERS, RATIO, Response
 from impactcell.records import Samples
 
 Indices = NDArray[np.intp]
@@ -129,9 +129,8 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
 def _linear(response: Response, theta: Samples, side: int) -> tuple[Samples, Samples]:
     """Residuals and their derivative, those above the kink continued linearly below it."""
     at = theta
-    if side > 0 and (below := response.kink(theta) + JUST_SLIPPING) < 0.0:
+    if side > 0 and (below := response.kink(theta) - JUST_STICKING) < 0.0:
         at = theta.copy()
         at[RATIO] += below
-    residual = response.residuals(at, side)
-    jacobian = response.jacobian(at, residual, side)
+    residual, jacobian = response.linear(at, side)
     return residual + jacobian[:, RATIO] * (theta[RATIO] - at[RATIO]), jacobian

@@ -4,11 +4,13 @@ theta = ln(mu_k, mu_k / mu_s, k, b). Relative steps in it are of one size whatev
 """
 
 import math
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
-from impactcell.physics import Plant, Strike, strike
+from impactcell.errors import PhysicsError
+from impactcell.physics import Ensemble, Plant, Strike, strike
 from impactcell.prediction.blocks import (
     FINE_FORCE_BLOCK_S,
     FINE_POSITION_BLOCK_S,
@@ -22,9 +24,11 @@ from impactcell.records import Capture, Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING = range(4)
 PARAMETERS = 4
+JUST_STICKING = 1e-7
+"""z above which the model is that of a part that sticks first."""
+AWAY = np.array([1.0, -1.0, 1.0, -1.0])
+"""Senses of small steps in theta that do not make a part slip that sticks."""
 STEP = 1e-5
-JUST_SLIPPING = -1e-7
-"""z at which mu_s m g lies just below the damper's first force: breakaway is immediate."""
 KINK_SPAN_S = 1.5e-4
 
 
@@ -56,64 +60,85 @@ def parameters(plant: Plant) -> Samples:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Response:
     """A capture in blocks, and the model that should reproduce them.
 
-    Attributes
+    Parameters
     ----------
-    plant, tap : Plant, Strike
+    plant : Plant
+        Its effects and gravity are kept; its four nominal parameters are those asked for.
+    tap : Strike
     force, position : Blocks
     """
 
-    plant: Plant
-    tap: Strike
-    force: Blocks
-    position: Blocks
+    def __init__(self, plant: Plant, tap: Strike, force: Blocks, position: Blocks) -> None:
+        self.tap = tap
+        self.force_time_s, self.position_time_s = force.time_s, position.time_s
+        self.size = len(force.values) + len(position.values)
+        self._values = np.concatenate([force.values, position.values])
+        self._weights = 1.0 / np.concatenate([force.std, position.std])
+        self._weight_n = tap.mass_kg * plant.gravity_m_s2
+        copies = PARAMETERS + 1
+        self._ensemble = Ensemble(
+            [tap] * copies,
+            tuple(plant.effects),
+            force_time_s=[force.time_s] * copies,
+            position_time_s=[position.time_s] * copies,
+            gravity_m_s2=plant.gravity_m_s2,
+        )
+        self._force_count = len(force.values)
+        self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
 
-    @property
-    def size(self) -> int:
-        """Number of residuals."""
-        return len(self.force.values) + len(self.position.values)
+    def doubted(self, factor: Samples) -> "Response":
+        """Give the same response with the standard deviation of each residual multiplied, shape (n,)."""
+        other = copy(self)
+        other._weights = self._weights / factor  # noqa: SLF001  # its own copy
+        return other
 
     def kink(self, theta: Samples) -> float:
         """Give z = ln(mu_s m g / (b v)), positive where the part sticks first."""
-        weight = self.tap.mass_kg * self.plant.gravity_m_s2 / self.tap.velocity_m_s
-        return float(theta[MU_K] - theta[RATIO] - theta[DAMPING]) + math.log(weight)
+        ahead = float(theta[MU_K] - theta[RATIO] - theta[DAMPING])
+        return ahead + math.log(self._weight_n / self.tap.velocity_m_s)
 
-    def residuals(self, theta: Samples, side: int = 0) -> Samples:
-        """Normalised residuals, data minus model, shape (n,).
+    def linear(self, theta: Samples, side: int = 0) -> tuple[Samples, Samples]:
+        """Normalised residuals, data minus model, shape (n,), and their derivative, shape (n, 4).
+
+        The derivative is that of a step which leads away from the kink into the side that sticks.
 
         Parameters
         ----------
         theta : ndarray, shape (4,)
         side : int
             -1: as if breakaway were immediate, whatever mu_s. 0 or +1: as the parameters say.
-        """
-        plant = with_parameters(self.plant, theta)
-        if side < 0 and (above := self.kink(theta) - JUST_SLIPPING) > 0.0:
-            plant = replace(plant, mu_s=plant.mu_s * math.exp(-above))
-        motion = strike(plant, self.tap)
-        force = motion.sample(self.force.time_s).force_n if len(self.force.time_s) else self.force.values
-        position = motion.sample(self.position.time_s).position_m
-        return np.concatenate(
-            [
-                (self.force.values - force) / self.force.std,
-                (self.position.values - position) / self.position.std,
-            ]
-        )
 
-    def jacobian(self, theta: Samples, residual: Samples, side: int = 0) -> Samples:
-        """Differentiate the residuals, shape (n, 4), by steps that lead away from the kink."""
-        columns = []
-        for index, sign in ((MU_K, 1.0), (RATIO, -1.0), (STIFFNESS, 1.0), (DAMPING, -1.0)):
-            if side < 0 and index == RATIO:
-                columns.append(np.zeros(self.size))
-                continue
-            moved = theta.copy()
-            moved[index] += sign * STEP
-            columns.append((self.residuals(moved, side) - residual) / (sign * STEP))
-        return np.column_stack(columns)
+        Raises
+        ------
+        PhysicsError
+            The motion is not finite with these parameters.
+        """
+        rows = np.tile(theta, (PARAMETERS + 1, 1))
+        for index, sign in enumerate(AWAY):
+            rows[index + 1, index] += sign * STEP
+        model = self._model(rows, side)
+        residual = (self._values - model[0]) * self._weights
+        jacobian = ((model[0] - model[1:]) * self._weights).T / (AWAY * STEP)
+        return residual, jacobian
+
+    def _model(self, rows: Samples, side: int) -> Samples:
+        """Blocks of the model for each row of parameters, shape (rows, n)."""
+        mu_k, ratio, stiffness, damping = np.exp(rows).T
+        mu_s = mu_k / ratio
+        if side < 0:
+            mu_s = np.minimum(mu_s, damping * self.tap.velocity_m_s / self._weight_n * (1.0 - 1e-7))
+        table = self._table.copy()
+        table[:, :PARAMETERS] = np.column_stack([stiffness, damping, mu_s, mu_k])
+        traces = self._ensemble.traces(table)
+        model = np.concatenate(
+            [traces.force_n.reshape(len(rows), -1), traces.position_m.reshape(len(rows), -1)], axis=1
+        )
+        if not np.isfinite(model).all():
+            raise PhysicsError("the motion is not finite with these parameters")
+        return model
 
 
 def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
-from impactcell.prediction.blocks import NOTHING, Blocks
+from impactcell.physics import Plant, strike
 from impactcell.prediction.descent import Belief, descend
 from impactcell.prediction.model import Model
 from impactcell.prediction.posterior import Posterior, mixture
@@ -25,11 +25,12 @@ from impactcell.prediction.response import (
     RATIO,
     STIFFNESS,
     Response,
+    commanded,
     parameters,
     respond,
     with_parameters,
 )
-from impactcell.records import Capture, Channel, Samples
+from impactcell.records import Capture, Samples
 
 FAR_FROM_KINK = 6.0
 """Standard deviations of z beyond which the other side of the kink has no weight."""
@@ -118,14 +119,14 @@ def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_rati
         raise CaptureError("the part's mass or the actuator's velocity is not known")
     try:
         response = respond(capture, with_parameters(model.plant, theta), slid.separation_s)
-        return _fit(response, known, theta, capture)
+        return _fit(response, known, theta, capture, model.plant)
     except PhysicsError as fault:
         raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
     except np.linalg.LinAlgError as fault:
         raise NotConvergedError(f"the fit is singular: {fault}") from fault
 
 
-def _fit(response: Response, known: Belief, start: Samples, capture: Capture) -> Waveform:
+def _fit(response: Response, known: Belief, start: Samples, capture: Capture, plant: Plant) -> Waveform:
     first = 1 if response.kink(start) >= 0.0 else -1
     found = descend(response, known, start, first)
     form = np.zeros(PARAMETERS)
@@ -151,7 +152,7 @@ def _fit(response: Response, known: Belief, start: Samples, capture: Capture) ->
         theta=best.theta,
         posterior=posterior,
         immediate=float(posterior.weights[slips_at_once].sum()),
-        gap=_gap(response, best.theta, capture),
+        gap=_gap(plant, best.theta, capture),
         misfit=misfit,
     )
 
@@ -163,21 +164,22 @@ def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
     return value, value * math.sqrt(math.expm1(std * std))
 
 
-def _gap(response: Response, theta: Samples, capture: Capture) -> float:
+def _gap(plant: Plant, theta: Samples, capture: Capture) -> float:
     """RMS of the residuals of every sample over the noise of its sensor."""
-    whole = replace(response, force=_every_sample(capture.force), position=_every_sample(capture.position))
-    residual = whole.residuals(theta)
-    return math.sqrt(float(residual @ residual) / len(residual))
-
-
-def _every_sample(channel: Channel | None) -> Blocks:
-    if channel is None:
-        return NOTHING
-    return Blocks(channel.time_s, channel.values, np.full(len(channel.values), noise_std(channel)))
+    total, count = 0.0, 0
+    motion = strike(with_parameters(plant, theta), commanded(capture))
+    for channel, force in ((capture.force, True), (capture.position, False)):
+        if channel is not None:
+            model = motion.sample(channel.time_s)
+            residual = (channel.values - (model.force_n if force else model.position_m)) / noise_std(channel)
+            total += float(residual @ residual)
+            count += len(residual)
+    return math.sqrt(total / count)
 
 
 def braking_friction(model: Model, mass_kg: float, slid: Slide) -> float:
     """mu_k from the mean deceleration of a slide, less what viscous friction took of it."""
-    viscous = model.plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
+    effect = model.plant.effects.get("viscous_friction", {})
+    viscous = float(np.mean(effect.get("viscous_coefficient_n_s_per_m", 0.0)))
     mean_speed = slid.distance.value / max(slid.stop_s - slid.separation_s, 1e-9)
     return (slid.deceleration.value - viscous * mean_speed / mass_kg) / model.plant.gravity_m_s2
