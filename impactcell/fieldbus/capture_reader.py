@@ -10,7 +10,7 @@ import asyncio
 from dataclasses import dataclass
 from typing import Final
 
-from impactcell.errors import FieldbusError, ModbusExceptionError
+from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.mapped import MappedDevice
 from impactcell.fieldbus.registers import Value, Words, capture_crc32
@@ -19,7 +19,9 @@ from impactcell.fieldbus.transport import PartialBlock
 from impactcell.records import Capture
 
 _ATTEMPTS: Final = 5
-"""Readings of one cycle that may be discarded, or break off without progress, before it is given up."""
+"""Readings of one cycle that may be discarded before it is given up."""
+_BREAKS: Final = 30
+"""Times that the link may fail on one cycle, without getting further, before it is given up."""
 _PAUSE_S: Final = 0.001
 """Rest after the first discarded reading, doubled with each: the module may be writing the slot."""
 _ARRAYS: Final = ("force", "position", "actuator")
@@ -73,6 +75,7 @@ class CaptureReader:
         self._reading: _Reading | None = None
         self._failing: Want | None = None
         self._failures = 0
+        self._breaks = 0
         self._least = 0
 
     async def fetch(self, want: Want) -> ReadCapture | None:
@@ -87,7 +90,7 @@ class CaptureReader:
             If the link fails; the next call for the same cycle goes on where this one stopped.
         """
         if self._failing is None or self._failing.mark != want.mark:
-            self._failing, self._failures, self._reading = want, 0, None
+            self._failing, self._failures, self._breaks, self._reading = want, 0, 0, None
         reason = "it kept changing while it was read; does another client select slots?"
         while self._failures < _ATTEMPTS:
             try:
@@ -105,12 +108,14 @@ class CaptureReader:
                 reason = fault
             except ModbusExceptionError as error:
                 reason = str(error)
+                if self._progressed():
+                    continue
             except FieldbusError as error:
                 if not self._progressed():
-                    self._failures += 1
-                if "capture_crc32" not in self._registers:
-                    self._reading = None
-                if self._failures < _ATTEMPTS:
+                    self._breaks += 1
+                if isinstance(error, ProtocolError) or "capture_crc32" not in self._registers:
+                    self._reading = None  # what came before the fault may be wrong too
+                if self._breaks < _BREAKS:
                     raise
                 reason = f"the link failed each time: {error}"
                 break
