@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from impactcell.alarms import Event
 from impactcell.records import Alarm, AlarmName, Quality
 
 
@@ -134,42 +135,18 @@ class Actor:
     address: str
 
 
-class Refusal(enum.Enum):
-    """Why an action on a condition or a cell is refused; each has its status code in the standard."""
-
-    ALREADY_ENABLED = "BadConditionAlreadyEnabled"
-    ALREADY_DISABLED = "BadConditionAlreadyDisabled"
-    DISABLED = "BadConditionDisabled"
-    ALREADY_ACKNOWLEDGED = "BadConditionBranchAlreadyAcked"
-    ALREADY_CONFIRMED = "BadConditionBranchAlreadyConfirmed"
-    ALREADY_SHELVED = "BadConditionAlreadyShelved"
-    NOT_SHELVED = "BadConditionNotShelved"
-    SHELVING_TIME = "BadShelvingTimeOutOfRange"
-    EVENT_UNKNOWN = "BadEventIdUnknown"
-    OUT_OF_RANGE = "BadOutOfRange"
-    INVALID_STATE = "BadInvalidState"
-    FAILED = "BadUnexpectedError"
-
-
 class RefusedError(Exception):
-    """An action that was refused; nothing has changed."""
+    """An action that was refused; nothing has changed.
 
-    def __init__(self, refusal: Refusal, reason: str = "") -> None:
-        super().__init__(reason or refusal.value)
-        self.refusal = refusal
+    Parameters
+    ----------
+    code : str
+        Name of the OPC UA status code, as `impactcell.alarms.Refusal` and `BadOutOfRange` give it.
+    """
 
-
-class ConditionAction(enum.Enum):
-    """What a person may do to a condition (OPC UA Part 9)."""
-
-    ACKNOWLEDGE = "Acknowledge"
-    CONFIRM = "Confirm"
-    COMMENT = "AddComment"
-    ENABLE = "Enable"
-    DISABLE = "Disable"
-    SHELVE_TIMED = "TimedShelve"
-    SHELVE_ONCE = "OneShotShelve"
-    UNSHELVE = "Unshelve"
+    def __init__(self, code: str, reason: str = "") -> None:
+        super().__init__(reason or code)
+        self.code = code
 
 
 class Actions(Protocol):
@@ -191,13 +168,17 @@ class Actions(Protocol):
         self,
         cell: str,
         alarm: AlarmName,
-        action: ConditionAction,
+        event: Event,
         actor: Actor,
         *,
-        comment: str | None = None,
-        shelve_s: float | None = None,
+        comment: str = "",
+        shelve_s: float = 0.0,
     ) -> Alarm:
-        """Apply an action through the life cycle in `impactcell.alarms`; the new state of the condition."""
+        """Apply a person's action through `impactcell.alarms.act`; the new state of the condition.
+
+        The action is one of acknowledge, confirm, comment, enable, disable and the three of shelving. A
+        `Transition` that carries a refusal is raised as `RefusedError(refusal.value)`.
+        """
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,14 +1,16 @@
 """The OPC UA server of the service: cells in, nodes out."""
 
-import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from types import TracebackType
 from typing import Self
+from urllib.parse import urlsplit
 
 from asyncua import Server as AsyncuaServer
+from asyncua import ua
 
-from impactcell.records import Alarm, Snapshot
+from impactcell.records import Alarm, AlarmName, Snapshot
+from impactcell.scada.conditions import Condition
 from impactcell.scada.descriptions import (
     Actions,
     CellDescription,
@@ -16,11 +18,15 @@ from impactcell.scada.descriptions import (
     ModuleState,
     ServerSettings,
 )
+from impactcell.scada.host import Host, aggregate_functions
+from impactcell.scada.instances import link
+from impactcell.scada.mends.eventfilter import Event
+from impactcell.scada.mends.histories import Histories
+from impactcell.scada.methods import bind_cell, bind_condition, bind_refresh
+from impactcell.scada.nodes import HISTORY
 from impactcell.scada.publishing import CellValues
-from impactcell.scada.space import CellSpace, load_types
+from impactcell.scada.space import CellSpace, cell_notifiers, load_types, method_declarations
 from impactcell.scada.values import Values
-
-_log = logging.getLogger(__name__)
 
 
 class Server:
@@ -39,6 +45,13 @@ class Server:
         Where HistoryRead finds the past.
     actions : Actions
         Where methods and actions on conditions go.
+
+    Raises
+    ------
+    AccessError
+        On entering: certificate, key, users file or address are unusable.
+    SettingsError
+        On entering: a name of a cell cannot be part of a NodeId, or is there twice.
     """
 
     def __init__(
@@ -52,36 +65,57 @@ class Server:
         self._descriptions = tuple(cells)
         self._history = history
         self._actions = actions
-        self._server = AsyncuaServer()
-        self._cells: Mapping[str, CellValues] = {}
+        self._cells: dict[str, CellValues] = {}
+        self._conditions: dict[tuple[str, AlarmName], Condition] = {}
+        self._host: Host | None = None
 
     @property
     def endpoint(self) -> str:
-        """URL the server listens on."""
-        return self._settings.endpoint
+        """URL the server listens on, with the port that was taken where the settings ask for a free one."""
+        url = urlsplit(self._settings.endpoint)
+        port = self._host.port if self._host is not None else url.port
+        return url._replace(netloc=f"{url.netloc.rpartition(':')[0]}:{port}").geturl()
 
     async def __aenter__(self) -> Self:
-        server = self._server
-        server.iserver.disabled_clock = True
-        await server.init()
-        server.set_endpoint(self._settings.endpoint)
-        await load_types(server)
-        values = Values(server.iserver.aspace)
-        uris = await server.get_namespace_array()
-        now = datetime.now(UTC)
-        self._cells = {
-            description.name: CellValues(
-                CellSpace(server, uris, description), values, server.iserver.aspace, now
-            )
-            for description in self._descriptions
-        }
-        await server.start()
+        model = AsyncuaServer()
+        await model.init()
+        model.iserver.method_service.stop()
+        await model.set_application_uri(self._settings.application_uri)
+        await load_types(model)
+        space = model.iserver.aspace
+        values = Values(space)
+        host = Host(self._settings, space, values)
+        for function in aggregate_functions():
+            for folder in (
+                ua.ObjectIds.HistoryServerCapabilities_AggregateFunctions,
+                ua.ObjectIds.Server_ServerCapabilities_AggregateFunctions,
+            ):
+                link(space, ua.NodeId(folder), ua.NodeId(ua.ObjectIds.Organizes), function)
+        uris = await model.get_namespace_array()
+        variables: dict[ua.NodeId, tuple[str, str]] = {}
+        notifiers: dict[ua.NodeId, str] = {}
+        for description in self._descriptions:
+            cell = CellSpace(model, uris, description)
+            name = description.name
+            self._cells[name] = CellValues(cell, values, space, datetime.now(UTC))
+            variables.update({cell.path(path): (name, path) for path in HISTORY})
+            notifiers[cell.node] = name
+            bind_cell(host.calls, cell, method_declarations(space, cell.kind), self._actions)
+            for alarm in AlarmName:
+                condition = Condition(cell, alarm, values, cell_notifiers(cell))
+                self._conditions[name, alarm] = condition
+                bind_condition(host.calls, cell, condition, self._actions, self.alarm)
+        bind_refresh(host.calls, host.monitoring, self._conditions)
+        histories = Histories(space, self._history, variables, notifiers, self._event_of)
+        await host.start(histories.services())
+        self._host = host
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        await self._server.stop()
+        if self._host is not None:
+            await self._host.stop()
 
     def publish(self, cell: str, snapshot: Snapshot) -> None:
         """Show all that one cycle has to say, its alarms included."""
@@ -94,6 +128,9 @@ class Server:
 
         Call it for every condition after a restart too, with the states that were stored.
         """
+        event = self._conditions[cell, alarm.name].update(alarm)
+        if event is not None and self._host is not None:
+            self._host.monitoring.event(event)
 
     def module(self, cell: str, state: ModuleState, time_ns: int) -> None:
         """Show the state of the link to the module."""
@@ -106,3 +143,6 @@ class Server:
     def mark_stale(self, cell: str, time_ns: int) -> None:
         """Nothing new for a while: all figures of a cycle become Uncertain and keep their last values."""
         self._cells[cell].stale(time_ns)
+
+    def _event_of(self, cell: str, alarm: Alarm) -> Event:
+        return self._conditions[cell, alarm.name].event(alarm)

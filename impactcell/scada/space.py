@@ -5,6 +5,7 @@ from importlib.resources import as_file, files
 from typing import Any, Final
 
 from asyncua import ua
+from asyncua.server.address_space import AddressSpace
 
 from impactcell.errors import SettingsError
 from impactcell.records import AlarmName
@@ -57,6 +58,10 @@ class CellSpace:
     ----------
     node : NodeId
         The cell itself, source and notifier of its events.
+    kind : NodeId
+        Its type.
+    folder : NodeId
+        The folder that holds all cells.
     """
 
     def __init__(self, server: Any, uris: list[str], description: CellDescription) -> None:
@@ -69,11 +74,17 @@ class CellSpace:
         self._cells = uris.index(CELLS_URI)
         self._types = uris.index(TYPES_URI)
         self.node = ua.NodeId(description.name, self._cells)
-        kind = self._named(ua.NodeId(ua.ObjectIds.BaseObjectType), "ImpactCellType", ua.ObjectIds.HasSubtype)
-        parent = self._named(ua.NodeId(ua.ObjectIds.ObjectsFolder), "ImpactCells", ua.ObjectIds.Organizes)
+        if self.node in self._space:
+            raise SettingsError(f"cell {description.name!r} is there twice")
+        self.kind = self._named(
+            ua.NodeId(ua.ObjectIds.BaseObjectType), "ImpactCellType", ua.ObjectIds.HasSubtype
+        )
+        self.folder = parent = self._named(
+            ua.NodeId(ua.ObjectIds.ObjectsFolder), "ImpactCells", ua.ObjectIds.Organizes
+        )
         instantiate(
             self._space,
-            kind,
+            self.kind,
             self.node,
             ua.QualifiedName(description.name, self._cells),
             f"Cell {description.name}.",
@@ -120,7 +131,7 @@ class CellSpace:
             if value is None:
                 continue
             node = self.path(f"Identification/{name}")
-            kind = ua.VariantType(read(self._space, node, ua.AttributeIds.DataType).Identifier)  # type: ignore[attr-defined]
+            kind = ua.VariantType(read(self._space, node, ua.AttributeIds.DataType).Identifier)
             if kind is ua.VariantType.LocalizedText:
                 value = ua.LocalizedText(value)
             set_attribute(self._space, node, ua.AttributeIds.Value, value, kind)
@@ -162,3 +173,17 @@ class CellSpace:
             for name, value, kind in defaults:
                 place = ua.NodeId(f"{settings.Identifier}/{name}", settings.NamespaceIndex)
                 set_attribute(self._space, place, ua.AttributeIds.Value, value, kind)
+
+
+def cell_notifiers(cell: CellSpace) -> frozenset[ua.NodeId]:
+    """Nodes that report the events of a cell: itself, the folder of the cells, the server."""
+    return frozenset({cell.node, cell.folder, ua.NodeId(ua.ObjectIds.Server)})
+
+
+def method_declarations(space: AddressSpace, kind: ua.NodeId) -> dict[str, ua.NodeId]:
+    """Methods of a type, by name."""
+    return {
+        reference.BrowseName.Name: reference.NodeId
+        for reference in space[kind].references
+        if reference.IsForward and reference.NodeClass == ua.NodeClass.Method
+    }

@@ -26,6 +26,13 @@ def moment(time_ns: int) -> datetime:
     return datetime.fromtimestamp(seconds, UTC).replace(microsecond=rest // 1000)
 
 
+def nanoseconds(time: datetime) -> int:
+    """Nanoseconds since 1970 of a time; without a zone it is UTC, as OPC UA sends it."""
+    aware = time if time.tzinfo is not None else time.replace(tzinfo=UTC)
+    since = aware - datetime(1970, 1, 1, tzinfo=UTC)
+    return ((since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds) * 1_000
+
+
 class Sample:
     """A value that was written once and goes out to many: each form of it is encoded once.
 

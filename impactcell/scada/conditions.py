@@ -1,0 +1,235 @@
+"""Conditions of a cell as OPC UA shows them: nodes and events made from `Alarm` records, nothing more.
+
+What an alarm may do next is decided in `impactcell.alarms`; here its state is only told.
+"""
+
+import hashlib
+import time
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from asyncua import ua
+
+from impactcell.alarms import retained
+from impactcell.records import Alarm, AlarmName, Shelving
+from impactcell.scada.mends.eventfilter import Event, Path
+from impactcell.scada.space import CellSpace
+from impactcell.scada.values import GOOD, Values, moment
+
+MAX_SHELVE_S: Final = 24 * 3600.0
+"""Longest time a condition can be shelved: nobody remembers longer why."""
+KEPT_EVENT_IDS: Final = 100
+
+_LT: Final = ua.VariantType.LocalizedText
+_CLASSES: Final = {
+    AlarmName.WEAR_LIMIT: ("MaintenanceConditionClass", ua.ObjectIds.MaintenanceConditionClassType),
+    AlarmName.MODULE_CONNECTION: ("SystemConditionClass", ua.ObjectIds.SystemConditionClassType),
+    AlarmName.JOURNAL_FAULT: ("SystemConditionClass", ua.ObjectIds.SystemConditionClassType),
+}
+_PROCESS: Final = ("ProcessConditionClass", ua.ObjectIds.ProcessConditionClassType)
+_INPUTS: Final = {
+    AlarmName.WEAR_LIMIT: "Wear/Level",
+    AlarmName.BATCH_SHIFT: "Batch/Offset",
+    AlarmName.DEVIANT_CYCLE: "Signature/TSquared",
+    AlarmName.MODULE_CONNECTION: "Module/Connected",
+    AlarmName.MODEL_GAP: "Model/Gap",
+    AlarmName.POSITIONING_FAULT: "Positioning/Remaining",
+}
+_SHELVING: Final[dict[Shelving, tuple[str, int]]] = {
+    Shelving.UNSHELVED: ("Unshelved", ua.ObjectIds.ShelvedStateMachineType_Unshelved),
+    Shelving.TIMED: ("Timed Shelved", ua.ObjectIds.ShelvedStateMachineType_TimedShelved),
+    Shelving.ONE_SHOT: ("One Shot Shelved", ua.ObjectIds.ShelvedStateMachineType_OneShotShelved),
+}
+_STATES: Final[dict[str, tuple[Callable[[Alarm], bool], str, str]]] = {
+    "ActiveState": (lambda a: a.active, "Active", "Inactive"),
+    "AckedState": (lambda a: a.acknowledged, "Acknowledged", "Unacknowledged"),
+    "ConfirmedState": (lambda a: a.confirmed, "Confirmed", "Unconfirmed"),
+    "SuppressedState": (lambda a: a.suppressed, "Suppressed", "Unsuppressed"),
+    "OutOfServiceState": (lambda a: a.out_of_service, "Out of Service", "In Service"),
+}
+# Part 9, 5.5.2: all else that a disabled condition says of itself is Bad_ConditionDisabled.
+_TOLD_WHEN_DISABLED: Final = frozenset(
+    {
+        *("EventId", "EventType", "SourceNode", "SourceName", "Time", "ReceiveTime", "Message", "Severity"),
+        *("ConditionClassId", "ConditionClassName", "ConditionName", "BranchId", "Retain", "EnabledState"),
+        *("Comment", "ClientUserId", "MaxTimeShelved"),
+    }
+)
+_DISABLED: Final = ua.StatusCode(ua.StatusCodes.BadConditionDisabled)
+
+
+def event_id(cell: str, alarm: Alarm) -> bytes:
+    """EventId of the event that told this state: the same state has the same id, also after a restart."""
+    return hashlib.sha256(f"{cell}\0{alarm!r}".encode()).digest()[:16]
+
+
+def unshelve_ms(alarm: Alarm) -> float:
+    """Milliseconds until a shelving ends: 0 where there is none, the longest where nothing ends it."""
+    if alarm.shelving is Shelving.UNSHELVED:
+        return 0.0
+    if alarm.shelved_until_ns <= 0:
+        return MAX_SHELVE_S * 1e3
+    return max((alarm.shelved_until_ns - time.time_ns()) / 1e6, 0.0)
+
+
+class Condition:
+    """One condition: its present state, its nodes, and the EventIds a client may act on."""
+
+    def __init__(
+        self, cell: CellSpace, name: AlarmName, values: Values, notifiers: frozenset[ua.NodeId]
+    ) -> None:
+        self.cell = cell.description.name
+        self.name = name
+        self.node = cell.path(name.value)
+        self.alarm = Alarm(name)
+        self._space = cell
+        self._values = values
+        self._notifiers = notifiers
+        self._kind = cell.alarm_type(name)
+        self._known: dict[bytes, None] = {}
+        self._last_severity = 0
+        input_path = _INPUTS.get(name)
+        self._input = cell.path(input_path) if input_path else ua.NodeId()
+        self._show(self.alarm)
+
+    def update(self, alarm: Alarm) -> Event | None:
+        """Take a new state; the event that tells it, None where nothing has changed."""
+        new = event_id(self.cell, alarm)
+        if new == event_id(self.cell, self.alarm):
+            return None
+        if alarm.active and not alarm.acknowledged and (self.alarm.acknowledged or not self.alarm.active):
+            # A newly raised alarm: what was acknowledged before cannot stand for it.
+            self._known.clear()
+        self._last_severity = self.alarm.severity
+        self.alarm = alarm
+        self._known[new] = None
+        while len(self._known) > KEPT_EVENT_IDS:
+            del self._known[next(iter(self._known))]
+        self._show(alarm)
+        return self.event(alarm)
+
+    def knows(self, given: bytes | None) -> bool:
+        """Whether an EventId was told since the alarm was raised."""
+        return given in self._known
+
+    def event(self, alarm: Alarm) -> Event:
+        """Make the event that tells a state."""
+        fields = dict(self._fields(alarm))
+        if not alarm.enabled:
+            bad = ua.Variant(_DISABLED, ua.VariantType.StatusCode)
+            fields = {p: v if not p or p[0] in _TOLD_WHEN_DISABLED else bad for p, v in fields.items()}
+        return Event(self._kind, fields, self._notifiers)
+
+    def present(self) -> Event | None:
+        """Make the event of the present state for a refresh; None where it is not to be shown."""
+        return self.event(self.alarm) if retained(self.alarm) else None
+
+    def _show(self, alarm: Alarm) -> None:
+        time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
+        for path, variant in self._fields(alarm):
+            if not path:
+                continue
+            status = GOOD if alarm.enabled or path[0] in _TOLD_WHEN_DISABLED else _DISABLED
+            node = self._space.path("/".join((self.name.value, *path)))
+            self._values.write(node, ua.DataValue(variant, status, time_of, datetime.now(UTC)))
+
+    def _fields(self, alarm: Alarm) -> Iterator[tuple[Path, ua.Variant]]:
+        time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
+        yield from _plain(
+            {
+                "EventId": (event_id(self.cell, alarm), ua.VariantType.ByteString),
+                "EventType": (self._kind, ua.VariantType.NodeId),
+                "SourceNode": (self._space.node, ua.VariantType.NodeId),
+                "SourceName": (self.cell, ua.VariantType.String),
+                "Time": (time_of, ua.VariantType.DateTime),
+                "ReceiveTime": (time_of, ua.VariantType.DateTime),
+                "Message": (ua.LocalizedText(alarm.message or alarm.name.value), _LT),
+                "Severity": (alarm.severity, ua.VariantType.UInt16),
+                "ConditionName": (alarm.name.value, ua.VariantType.String),
+                "BranchId": (ua.NodeId(), ua.VariantType.NodeId),
+                "Retain": (retained(alarm), ua.VariantType.Boolean),
+                "ClientUserId": (alarm.user, ua.VariantType.String),
+                "Comment": (ua.LocalizedText(alarm.comment), _LT),
+                "Quality": (GOOD, ua.VariantType.StatusCode),
+                "LastSeverity": (self._last_severity, ua.VariantType.UInt16),
+                "InputNode": (self._input, ua.VariantType.NodeId),
+                "MaxTimeShelved": (MAX_SHELVE_S * 1e3, ua.VariantType.Double),
+                "SuppressedOrShelved": (
+                    alarm.suppressed or alarm.out_of_service or alarm.shelving is not Shelving.UNSHELVED,
+                    ua.VariantType.Boolean,
+                ),
+            }
+        )
+        yield (), ua.Variant(self.node, ua.VariantType.NodeId)
+        class_name, class_id = _CLASSES.get(alarm.name, _PROCESS)
+        yield ("ConditionClassId",), ua.Variant(ua.NodeId(class_id), ua.VariantType.NodeId)
+        yield ("ConditionClassName",), ua.Variant(ua.LocalizedText(class_name), _LT)
+        for name in ("Quality", "LastSeverity", "Comment"):
+            yield (name, "SourceTimestamp"), ua.Variant(time_of, ua.VariantType.DateTime)
+        yield from self._states(alarm, time_of)
+        yield from _evidence(alarm)
+
+    @staticmethod
+    def _states(alarm: Alarm, time_of: datetime) -> Iterator[tuple[Path, ua.Variant]]:
+        enabled = "Enabled" if alarm.enabled else "Disabled"
+        shown = enabled
+        for name, (test, yes, no) in _STATES.items():
+            on = test(alarm)
+            yield (name,), ua.Variant(ua.LocalizedText(yes if on else no), _LT)
+            yield (name, "Id"), ua.Variant(on, ua.VariantType.Boolean)
+            if name == "ActiveState":
+                yield (name, "TransitionTime"), ua.Variant(time_of, ua.VariantType.DateTime)
+                shown = yes if on and alarm.enabled else enabled
+        text, state = _SHELVING[alarm.shelving]
+        if alarm.enabled and alarm.shelving is not Shelving.UNSHELVED:
+            shown = text
+        yield ("EnabledState",), ua.Variant(ua.LocalizedText(enabled), _LT)
+        yield ("EnabledState", "Id"), ua.Variant(alarm.enabled, ua.VariantType.Boolean)
+        yield ("EnabledState", "EffectiveDisplayName"), ua.Variant(ua.LocalizedText(shown), _LT)
+        yield ("EnabledState", "TransitionTime"), ua.Variant(time_of, ua.VariantType.DateTime)
+        yield ("ShelvingState", "CurrentState"), ua.Variant(ua.LocalizedText(text), _LT)
+        yield ("ShelvingState", "CurrentState", "Id"), ua.Variant(ua.NodeId(state), ua.VariantType.NodeId)
+        yield ("ShelvingState", "UnshelveTime"), ua.Variant(unshelve_ms(alarm), ua.VariantType.Double)
+
+
+def _plain(fields: dict[str, tuple[Any, ua.VariantType]]) -> Iterator[tuple[Path, ua.Variant]]:
+    for name, (value, kind) in fields.items():
+        yield (name,), ua.Variant(value, kind)
+
+
+def _evidence(alarm: Alarm) -> Iterator[tuple[Path, ua.Variant]]:
+    found = alarm.evidence
+    yield ("CycleNumber",), ua.Variant(alarm.cycle, ua.VariantType.UInt32)
+    yield ("ChangeCycle",), ua.Variant(found.change_cycle, ua.VariantType.UInt32)
+    for name, value in (
+        ("Statistic", found.statistic),
+        ("Threshold", found.threshold),
+        ("Size", found.size),
+        ("SizeStdDev", found.size_std),
+        ("FalseAlarmCycles", found.false_alarm_cycles),
+        ("FalseAlarmDays", found.false_alarm_days),
+    ):
+        yield (name,), ua.Variant(float(value), ua.VariantType.Double)
+
+
+def refresh_event(kind: int) -> Event:
+    """Make the event that opens or closes a refresh."""
+    now = datetime.now(UTC)
+    server = ua.NodeId(ua.ObjectIds.Server)
+    identity = hashlib.sha256(f"{kind} {now.isoformat()}".encode()).digest()[:16]
+    fields = dict(
+        _plain(
+            {
+                "EventId": (identity, ua.VariantType.ByteString),
+                "EventType": (ua.NodeId(kind), ua.VariantType.NodeId),
+                "SourceNode": (server, ua.VariantType.NodeId),
+                "SourceName": ("Server", ua.VariantType.String),
+                "Time": (now, ua.VariantType.DateTime),
+                "ReceiveTime": (now, ua.VariantType.DateTime),
+                "Message": (ua.LocalizedText("Refresh"), _LT),
+                "Severity": (1, ua.VariantType.UInt16),
+            }
+        )
+    )
+    return Event(ua.NodeId(kind), fields, frozenset({server}), unfiltered=True)

@@ -1,0 +1,196 @@
+"""Methods of cells and conditions: from a Call to the service, with rights, ranges and an audit trail."""
+
+import logging
+import math
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from typing import Any, Final
+
+from asyncua import ua
+
+from impactcell.alarms import Event
+from impactcell.records import Alarm, AlarmName
+from impactcell.scada.conditions import MAX_SHELVE_S, Condition, refresh_event
+from impactcell.scada.descriptions import Actions, CellDescription, RefusedError
+from impactcell.scada.mends.calls import Argument, ArgumentError, Calls, Method
+from impactcell.scada.mends.codec import FaultError
+from impactcell.scada.mends.dispatch import Context
+from impactcell.scada.mends.monitoring import Monitoring
+from impactcell.scada.nodes import MM_PER_M, target_range_mm
+from impactcell.scada.rights import CONDITION_AREAS, Area
+from impactcell.scada.space import CellSpace
+
+_audit: Final = logging.getLogger("impactcell.audit")
+
+MAX_BATCH_ID: Final = 64
+MAX_COMMENT: Final = 1_000
+
+_EVENT_ID: Final = Argument("EventId", ua.VariantType.ByteString)
+_COMMENT: Final = Argument("Comment", ua.VariantType.LocalizedText)
+_SHELVING_TIME: Final = Argument("ShelvingTime", ua.VariantType.Double)
+
+_ids = ua.ObjectIds
+# Action: name of the method, its NodeIds on the types, its arguments.
+_CONDITION_METHODS: Final[Mapping[Event, tuple[str, tuple[int, ...], tuple[Argument, ...]]]] = {
+    Event.ENABLE: ("Enable", (_ids.ConditionType_Enable,), ()),
+    Event.DISABLE: ("Disable", (_ids.ConditionType_Disable,), ()),
+    Event.COMMENT: ("AddComment", (_ids.ConditionType_AddComment,), (_EVENT_ID, _COMMENT)),
+    Event.ACKNOWLEDGE: (
+        "Acknowledge",
+        (_ids.AcknowledgeableConditionType_Acknowledge,),
+        (_EVENT_ID, _COMMENT),
+    ),
+    Event.CONFIRM: ("Confirm", (_ids.AcknowledgeableConditionType_Confirm,), (_EVENT_ID, _COMMENT)),
+    Event.SHELVE_TIMED: (
+        "ShelvingState/TimedShelve",
+        (_ids.ShelvedStateMachineType_TimedShelve, _ids.AlarmConditionType_ShelvingState_TimedShelve),
+        (_SHELVING_TIME,),
+    ),
+    Event.SHELVE_ONE_SHOT: (
+        "ShelvingState/OneShotShelve",
+        (_ids.ShelvedStateMachineType_OneShotShelve, _ids.AlarmConditionType_ShelvingState_OneShotShelve),
+        (),
+    ),
+    Event.UNSHELVE: (
+        "ShelvingState/Unshelve",
+        (_ids.ShelvedStateMachineType_Unshelve, _ids.AlarmConditionType_ShelvingState_Unshelve),
+        (),
+    ),
+}
+
+Tell = Callable[[str, Alarm], None]
+
+
+def _text(value: object, index: int) -> str:
+    """Take a comment: an absent one leaves the last one standing (Part 9, 5.5.6)."""
+    text = (value.Text or "") if isinstance(value, ua.LocalizedText) else ""
+    if len(text) > MAX_COMMENT:
+        raise ArgumentError(index, ua.StatusCodes.BadOutOfRange)
+    return text
+
+
+async def _audited(context: Context, what: str, work: Awaitable[Any]) -> Any:
+    actor = context.actor
+    who = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
+    try:
+        done = await work
+    except RefusedError as refused:
+        _audit.warning("%s: %s: refused, %s: %s", who, what, refused.code, refused)
+        raise
+    _audit.info("%s: %s: done", who, what)
+    return done
+
+
+def bind_cell(calls: Calls, space: CellSpace, types: Mapping[str, ua.NodeId], actions: Actions) -> None:
+    """Make the methods of a cell callable."""
+    description: CellDescription = space.description
+    cell = description.name
+
+    async def start_batch(context: Context, given: Sequence[Any]) -> None:
+        batch, expected = (given[0] or "").strip(), given[1]
+        if not 0 < len(batch) <= MAX_BATCH_ID or not batch.isprintable():
+            raise ArgumentError(0, ua.StatusCodes.BadOutOfRange)
+        work = actions.start_batch(cell, batch, expected=expected, actor=context.actor)
+        await _audited(context, f"{cell}: StartBatch({batch!r}, expected={expected})", work)
+
+    async def reset_wear(context: Context, given: Sequence[Any]) -> None:
+        comment = _text(given[0], 0)
+        await _audited(
+            context, f"{cell}: ResetWear({comment!r})", actions.reset_wear(cell, comment, context.actor)
+        )
+
+    async def set_target(context: Context, given: Sequence[Any]) -> None:
+        low, high = target_range_mm(description.ranges)
+        target = given[0]
+        if not math.isfinite(target) or not low <= target <= high:
+            raise ArgumentError(0, ua.StatusCodes.BadOutOfRange)
+        work = actions.set_target(cell, target / MM_PER_M, context.actor)
+        await _audited(context, f"{cell}: SetTarget({target} mm)", work)
+
+    async def abort(context: Context, _given: Sequence[Any]) -> None:
+        await _audited(context, f"{cell}: AbortPositioning()", actions.abort_positioning(cell, context.actor))
+
+    text, flag = ua.VariantType.String, ua.VariantType.Boolean
+    for name, area, arguments, run in (
+        (
+            "StartBatch",
+            Area.START_BATCH,
+            (Argument("BatchId", text), Argument("Expected", flag)),
+            start_batch,
+        ),
+        ("ResetWear", Area.RESET_WEAR, (_COMMENT,), reset_wear),
+        ("SetTarget", Area.SET_TARGET, (Argument("Target", ua.VariantType.Double),), set_target),
+        ("AbortPositioning", Area.ABORT_POSITIONING, (), abort),
+    ):
+        method = Method(area, arguments, run)
+        calls.bind(space.node, space.path(name), method)
+        calls.bind(space.node, types[name], method)
+
+
+def bind_condition(
+    calls: Calls, space: CellSpace, condition: Condition, actions: Actions, tell: Tell
+) -> None:
+    """Make the methods of a condition callable, on itself and on its shelving state."""
+    shelving = space.path(f"{condition.name.value}/ShelvingState")
+    for event, (name, type_ids, arguments) in _CONDITION_METHODS.items():
+        method = Method(CONDITION_AREAS[event], arguments, _action(condition, event, actions, tell))
+        own = space.path(f"{condition.name.value}/{name}")
+        for owner in (condition.node, shelving) if "/" in name else (condition.node,):
+            for each in (own, *(ua.NodeId(number) for number in type_ids)):
+                calls.bind(owner, each, method)
+
+
+def _action(
+    condition: Condition, event: Event, actions: Actions, tell: Tell
+) -> Callable[[Context, Sequence[Any]], Awaitable[None]]:
+    async def act(context: Context, given: Sequence[Any]) -> None:
+        comment, shelve_s = "", 0.0
+        if event in (Event.ACKNOWLEDGE, Event.CONFIRM, Event.COMMENT):
+            if condition.alarm.enabled and not condition.knows(given[0]):
+                raise FaultError(ua.StatusCodes.BadEventIdUnknown)
+            comment = _text(given[1], 1)
+        elif event is Event.SHELVE_TIMED:
+            shelve_s = given[0] / 1e3
+            if not 0.0 < shelve_s <= MAX_SHELVE_S:
+                raise FaultError(ua.StatusCodes.BadShelvingTimeOutOfRange)
+        elif event is Event.SHELVE_ONE_SHOT:
+            shelve_s = MAX_SHELVE_S
+        what = f"{condition.cell}: {condition.name.value}: {event.value}"
+        if comment:
+            what += f" ({comment!r})"
+        if event is Event.SHELVE_TIMED:
+            what += f" ({shelve_s:g} s)"
+        work = actions.act_on_condition(
+            condition.cell, condition.name, event, context.actor, comment=comment, shelve_s=shelve_s
+        )
+        tell(condition.cell, await _audited(context, what, work))
+
+    return act
+
+
+def bind_refresh(
+    calls: Calls, monitoring: Monitoring, conditions: Mapping[tuple[str, AlarmName], Condition]
+) -> None:
+    """Make ConditionRefresh and ConditionRefresh2 callable."""
+
+    def events() -> list[Any]:
+        shown = [event for condition in conditions.values() if (event := condition.present()) is not None]
+        return [
+            refresh_event(_ids.RefreshStartEventType),
+            *shown,
+            refresh_event(_ids.RefreshEndEventType),
+        ]
+
+    async def refresh(context: Context, given: Sequence[Any]) -> None:
+        monitoring.refresh(context.session, given[0], None, events())
+
+    async def refresh_item(context: Context, given: Sequence[Any]) -> None:
+        monitoring.refresh(context.session, given[0], given[1], events())
+
+    number = ua.VariantType.UInt32
+    one = Method(Area.REFRESH, (Argument("SubscriptionId", number),), refresh)
+    two = Method(
+        Area.REFRESH, (Argument("SubscriptionId", number), Argument("MonitoredItemId", number)), refresh_item
+    )
+    owner = ua.NodeId(_ids.ConditionType)
+    calls.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh), one)
+    calls.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh2), two)

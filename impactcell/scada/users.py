@@ -1,0 +1,172 @@
+"""The users file: who may log in, with which password or certificate, in which role.
+
+A YAML file that only its owner can read::
+
+    users:
+    - name: ops
+      role: operator
+      password: $argon2id$v=19$m=19456,t=2,p=1$...
+    - name: press-line
+      role: observer
+      certificate: 5F2D...          # SHA-256 fingerprint of the user's certificate
+"""
+
+import contextlib
+import os
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import yaml
+from argon2 import PasswordHasher
+from argon2.exceptions import Argon2Error, InvalidHashError
+
+from impactcell.errors import AccessError
+from impactcell.scada.descriptions import Role
+
+# OWASP's first recommendation for argon2id: 19 MiB, 2 passes, 1 lane.
+_HASHER: Final = PasswordHasher(time_cost=2, memory_cost=19_456, parallelism=1)
+_UNKNOWN: Final = (
+    "$argon2id$v=19$m=19456,t=2,p=1$bm9ib2R5a25vd3NpdA$YzE0ZGQ2ZDYzZjI2ZTQ2MmI1ZGFkYjE5ZTQ0ZWYyZDQ"
+)
+"""A hash no password fits: an unknown name takes as long as a wrong password."""
+
+
+@dataclass(frozen=True, slots=True)
+class User:
+    """One entry of the users file."""
+
+    name: str
+    role: Role
+    password: str | None = None
+    certificate: str | None = None
+
+
+def read_users(path: Path) -> dict[str, User]:
+    """Read a users file; an absent file holds nobody.
+
+    Raises
+    ------
+    AccessError
+        The file cannot be read or is not a users file; the message names the entry.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return {}
+    except (OSError, UnicodeDecodeError) as error:
+        raise AccessError(f"{path}: cannot be read: {error}") from error
+    try:
+        data = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise AccessError(f"{path}: not YAML: {error}") from error
+    entries = data.get("users") if isinstance(data, dict) else None
+    if not isinstance(entries, list):
+        raise AccessError(f"{path}: not a users file; make one with `impactcell users add {path}`")
+    users: dict[str, User] = {}
+    for number, entry in enumerate(entries, 1):
+        user = _user(entry, f"{path}: user {number}")
+        if user.name in users:
+            raise AccessError(f"{path}: user {number}: {user.name!r} is there twice")
+        users[user.name] = user
+    return users
+
+
+def _user(entry: object, where: str) -> User:
+    if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
+        raise AccessError(f"{where}: has no name")
+    unknown = set(entry) - {"name", "role", "password", "certificate"}
+    if unknown:
+        raise AccessError(f"{where}: does not know {', '.join(sorted(map(str, unknown)))}")
+    roles = {role.name.lower(): role for role in Role}
+    if entry.get("role") not in roles:
+        raise AccessError(f"{where}: the role is one of {', '.join(roles)}")
+    password, certificate = entry.get("password"), entry.get("certificate")
+    if not isinstance(password, str | None) or not isinstance(certificate, str | None):
+        raise AccessError(f"{where}: password and certificate are text")
+    if password is None and certificate is None:
+        raise AccessError(f"{where}: has neither password nor certificate")
+    return User(entry["name"], roles[entry["role"]], password, certificate)
+
+
+def write_users(path: Path, users: dict[str, User]) -> None:
+    """Replace a users file in one step; only its owner can read it.
+
+    Raises
+    ------
+    AccessError
+        The file cannot be written.
+    """
+    entries = [
+        {
+            key: value
+            for key, value in (
+                ("name", user.name),
+                ("role", user.role.name.lower()),
+                ("password", user.password),
+                ("certificate", user.certificate),
+            )
+            if value is not None
+        }
+        for user in users.values()
+    ]
+    text = yaml.safe_dump({"users": entries}, sort_keys=False, allow_unicode=True)
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(name).replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError, UnboundLocalError):
+            Path(name).unlink()
+        raise AccessError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def with_password(user: User, password: str) -> User:
+    """Give a user a password, which is kept as an argon2id hash only."""
+    return replace(user, password=_HASHER.hash(password))
+
+
+def verify(user: User | None, password: str) -> bool:
+    """Check a password; takes as long for a user who does not exist."""
+    known = user.password if user is not None and user.password is not None else _UNKNOWN
+    try:
+        return _HASHER.verify(known, password)
+    except (Argon2Error, InvalidHashError):
+        return False
+
+
+class Users:
+    """The users file as it is now: read anew whenever it has changed."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stamp: tuple[int, int, int] | None = None
+        self._users: dict[str, User] = {}
+        self.current()
+
+    def current(self) -> dict[str, User]:
+        """Users of the file, by name.
+
+        Raises
+        ------
+        AccessError
+            The file has become unreadable; nobody may log in until it is mended.
+        """
+        try:
+            status = self._path.stat()
+            stamp: tuple[int, int, int] | None = (status.st_mtime_ns, status.st_size, status.st_ino)
+        except OSError:
+            stamp = None
+        if stamp != self._stamp or stamp is None:
+            self._users = read_users(self._path)
+            self._stamp = stamp
+        return self._users
+
+    def by_certificate(self, fingerprint: str) -> User | None:
+        """Find the user a certificate belongs to."""
+        for user in self.current().values():
+            if user.certificate is not None and user.certificate.upper() == fingerprint:
+                return user
+        return None
