@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from simulator.effects import LIBRARY, UNLISTED
+from simulator.fault_schedule import ScheduledFault
 from simulator.scenario_file import ScenarioModel, load
 
 Positive = Annotated[float, Field(gt=0)]
@@ -178,6 +179,7 @@ class Scenario(ScenarioModel):
     deviations: list[Deviation] = Field([])
     appearances: list[Appearance] = Field([])
     faulty_captures: list[FaultyCapture] = Field([])
+    faults: list[ScheduledFault] = Field([])
     sensors: Sensors = Sensors()
 
     @model_validator(mode="after")

@@ -13,6 +13,7 @@ from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
 from simulator.control import Control
 from simulator.device import Device, Truth
+from simulator.fault_schedule import arm
 from simulator.faults import FaultInjector
 from simulator.modbus_server import ModbusServer
 from simulator.scenario import Scenario
@@ -110,6 +111,8 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
         if listen.control_port is not None:
             control = await stack.enter_async_context(Control(faults, actions, listen.control_port))
             started["control_port"] = control.port
+        for handle in arm(scenario.faults, faults, actions):
+            stack.callback(handle.cancel)
         print(json.dumps(started), flush=True)  # noqa: T201 - the address is this verb's output
         while not stop.is_set():
             device.update(loop.time())
