@@ -1,6 +1,8 @@
 """Model files: what `impactcell calibrate` writes and a cell's YAML names."""
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -10,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 from impactcell import yamlfile
 from impactcell.errors import ImpactCellError, SettingsError
 from impactcell.physics import Plant
+from impactcell.physics.effects import LIBRARY
 from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predictor, Prior, Sensitivity
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -42,7 +45,7 @@ class PlantFile(_Part):
     mu_s: Positive
     mu_k: Positive
     gravity_m_s2: Positive = 9.81
-    effects: dict[str, dict[str, FiniteFloat | ParameterFile]] = {}
+    effects: dict[str, dict[str, FiniteFloat | ParameterFile | list[FiniteFloat]]] = {}
 
 
 class PriorFile(_Part):
@@ -104,10 +107,11 @@ class ModelFile(_Part):
     provenance: dict[str, str] = {}
 
     @model_validator(mode="after")
-    def _masses_differ(self) -> Self:
-        masses = [predictor.mass_kg for predictor in self.predictors]
-        if len(set(masses)) < len(masses):
-            raise ValueError("two predictors have the same mass_kg")
+    def _one_predictor_a_tap(self) -> Self:
+        ranges = sorted((one.mass_kg, *one.velocity_range_m_s) for one in self.predictors)
+        for (mass, _, last), (next_mass, first, _) in pairwise(ranges):
+            if mass == next_mass and first < last:
+                raise ValueError(f"two predictors for {mass:.6g} kg have velocities in common")
         return self
 
 
@@ -120,6 +124,25 @@ def read_model(path: Path) -> Model:
         Listing every fault as `file:line:column: message`.
     """
     file, positions = yamlfile.read(path, ModelFile)
+    faults = []
+    for identifier, parameters in file.plant.effects.items():
+        place = ("plant", "effects", identifier)
+        if identifier not in LIBRARY:
+            near = yamlfile.nearest(identifier, LIBRARY)
+            faults.append(yamlfile.complaint(path, positions.key(place), f"no effect {identifier!r}; {near}"))
+            continue
+        known = [parameter.name for parameter in LIBRARY[identifier].parameters]
+        faults += [
+            yamlfile.complaint(
+                path,
+                positions.key((*place, name)),
+                f"{identifier} has no parameter {name!r}; {yamlfile.nearest(name, known)}",
+            )
+            for name in parameters
+            if name not in known
+        ]
+    if faults:
+        raise SettingsError("\n".join(faults))
     try:
         return _from_file(file)
     except ImpactCellError as fault:
@@ -145,7 +168,7 @@ def write_model(model: Model, path: Path) -> None:
 
 
 def _from_file(file: ModelFile) -> Model:
-    effects: dict[str, dict[str, float]] = {}
+    effects: dict[str, dict[str, float | Sequence[float]]] = {}
     intervals: dict[str, dict[str, tuple[float, float]]] = {}
     for identifier, parameters in file.plant.effects.items():
         effects[identifier] = {}
@@ -155,7 +178,7 @@ def _from_file(file: ModelFile) -> Model:
                 if given.ci95 is not None:
                     intervals.setdefault(identifier, {})[name] = given.ci95
             else:
-                effects[identifier][name] = given
+                effects[identifier][name] = tuple(given) if isinstance(given, list) else given
     plant = Plant(
         stiffness_n_per_m=file.plant.stiffness_n_per_m,
         damping_n_s_per_m=file.plant.damping_n_s_per_m,
@@ -174,7 +197,7 @@ def _from_file(file: ModelFile) -> Model:
             force_sensitivity=Sensitivity(**one.force_sensitivity.model_dump()),
             distance_sensitivity=Sensitivity(**one.distance_sensitivity.model_dump()),
         )
-        for one in sorted(file.predictors, key=lambda predictor: predictor.mass_kg)
+        for one in sorted(file.predictors, key=lambda one: (one.mass_kg, one.velocity_range_m_s))
     )
     return Model(
         name=file.name,
@@ -190,7 +213,9 @@ def _from_file(file: ModelFile) -> Model:
 def _to_mapping(model: Model) -> dict[str, object]:
     plant, prior = model.plant, model.prior
 
-    def parameter(effect: str, name: str, value: float) -> object:
+    def parameter(effect: str, name: str, value: float | Sequence[float]) -> object:
+        if isinstance(value, Sequence):
+            return _floats(value)
         interval = model.intervals.get(effect, {}).get(name)
         return float(value) if interval is None else {"value": float(value), "ci95": _floats(interval)}
 
@@ -227,7 +252,7 @@ def _to_mapping(model: Model) -> dict[str, object]:
     return mapping
 
 
-def _floats(values: tuple[float, ...]) -> list[float]:
+def _floats(values: Sequence[float]) -> list[float]:
     return [float(value) for value in values]
 
 

@@ -124,7 +124,8 @@ def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> M
         f"plant fitted to {len(fitted.used)} of {len(shots)} shots: k {plant.stiffness_n_per_m:.6g} ± "
         f"{prior.stiffness_std_n_per_m:.2g} N/m, b {plant.damping_n_s_per_m:.5g} ± "
         f"{prior.damping_std_n_s_per_m:.2g} N s/m, "
-        f"mu_k/mu_s {fitted.model.ratio:.4f} ± {prior.ratio_std:.2g}; residuals {fitted.gap:.3g} times the noise\n"
+        f"mu_k/mu_s {fitted.model.ratio:.4f} ± {prior.ratio_std:.2g}; "
+        f"residuals {fitted.gap:.3g} times the noise\n"
     )
     return fitted.model
 

@@ -3,15 +3,17 @@
 Nothing here is random and nothing depends on the order of work: the same plant gives the same bits.
 """
 
+import enum
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from impactcell.errors import PhysicsError, PredictionError
-from impactcell.physics import Plant, Strike, strike
+from impactcell.physics import EventKind, Plant, Strike, strike
 from impactcell.prediction.equations import Mix
 from impactcell.prediction.model import (
     REFERENCE_VELOCITY,
@@ -23,8 +25,8 @@ from impactcell.prediction.model import (
 )
 from impactcell.records import Samples
 
-VELOCITIES = 9
-FRICTIONS = 9
+REGIME_GRID = 41
+NARROWEST = 4
 PERTURBED = 0.01
 
 
@@ -44,36 +46,79 @@ class Sweep:
     sliding_distance_m: Samples
 
 
+class Regime(enum.Enum):
+    """What equation (5) describes: each of the first two by coefficients of its own, the last not at all."""
+
+    CLEAN = "separated before the actuator halted"
+    HALTED = "halted within the contact"
+    EITHER = "one or the other, depending on friction"
+    CAUGHT = "caught again, or stuck"
+
+
+def regimes(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> list[Regime]:
+    """Tell the regime of each velocity over all frictions."""
+    ratio = plant.mu_k / plant.mu_s
+    found = []
+    for velocity in velocities.tolist():
+        kinds = {
+            _regime(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity))
+            for mu in frictions.tolist()
+        }
+        if Regime.CAUGHT in kinds:
+            found.append(Regime.CAUGHT)
+        else:
+            found.append(kinds.pop() if len(kinds) == 1 else Regime.EITHER)
+    return found
+
+
+def _regime(plant: Plant, tap: Strike) -> Regime:
+    try:
+        motion = strike(plant, tap)
+        separations = [event.time_s for event in motion.events if event.kind is EventKind.SEPARATION]
+        if len(separations) != 1 or motion.sliding_distance_m <= 0.0:
+            return Regime.CAUGHT
+    except PhysicsError:
+        return Regime.CAUGHT
+    return Regime.HALTED if tap.stroke_m / tap.velocity_m_s < separations[0] else Regime.CLEAN
+
+
+def spans(found: Sequence[Regime], velocities: Samples) -> list[tuple[float, float]]:
+    """Velocities between which one describable regime holds; neighbours meet where it changes."""
+    kept: list[tuple[float, float]] = []
+    for caught, run in groupby(range(len(found)), key=lambda index: found[index] is Regime.CAUGHT):
+        indices = list(run)
+        if caught or len(indices) < NARROWEST:
+            continue
+        clean = [index for index in indices if found[index] is Regime.CLEAN]
+        halted = [index for index in indices if found[index] is Regime.HALTED]
+        low, high = float(velocities[indices[0]]), float(velocities[indices[-1]])
+        if min(len(clean), len(halted)) < NARROWEST:
+            kept.append((low, high))
+        else:
+            meet = 0.5 * float(velocities[clean[-1]] + velocities[halted[0]])
+            kept += [(low, meet), (meet, high)]
+    return kept
+
+
 def sweep(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Sweep:
     """Strike the plant at every velocity and friction, mu_k / mu_s kept.
 
-    Velocities at which the part does not slide free at every friction are left out.
-
     Raises
     ------
-    PredictionError
-        Fewer than three velocities are left.
+    PhysicsError
+        A part does not slide free.
     """
     ratio = plant.mu_k / plant.mu_s
-    kept, peaks, slid = [], [], []
-    for velocity in velocities:
-        try:
-            row = [
-                figures(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=float(velocity)))
+    table = np.array(
+        [
+            [
+                figures(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity))
                 for mu in frictions.tolist()
             ]
-        except PhysicsError:
-            continue
-        kept.append(velocity)
-        peaks.append([peak for peak, _ in row])
-        slid.append([length for _, length in row])
-    if len(kept) < 3:
-        raise PredictionError(
-            f"a part of {tap.mass_kg:.4g} kg slides free at fewer than three velocities between "
-            f"{6e4 * velocities[0]:.4g} and {6e4 * velocities[-1]:.4g} mm/min; "
-            "tap faster, or with a longer stroke"
-        )
-    return Sweep(np.array(kept), frictions, np.array(peaks), np.array(slid))
+            for velocity in velocities.tolist()
+        ]
+    )
+    return Sweep(velocities, frictions, table[:, :, 0], table[:, :, 1])
 
 
 def figures(plant: Plant, tap: Strike) -> tuple[float, float]:
@@ -115,12 +160,12 @@ def fit_distance(swept: Sweep) -> DistanceForm:
 
 
 def predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Predictor:
-    """Fit both equations for one mass and find how they depend on what the plant takes as known."""
+    """Fit both equations for one mass in one regime; find how they depend on what is taken as known."""
     swept = sweep(plant, tap, velocities, frictions)
     fitted = Predictor(
         mass_kg=tap.mass_kg,
         mu_s_range=(float(frictions[0]), float(frictions[-1])),
-        velocity_range_m_s=(float(swept.velocity_m_s[0]), float(swept.velocity_m_s[-1])),
+        velocity_range_m_s=(float(velocities[0]), float(velocities[-1])),
         force=fit_force(swept),
         distance=fit_distance(swept),
     )
@@ -131,7 +176,7 @@ def predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples
     }
     force, slid = {}, {}
     for name, other in changed.items():
-        force[name], slid[name] = _sensitivities(fitted, plant, other, tap, swept)
+        force[name], slid[name] = _sensitivities(fitted, plant, other, tap)
     return replace(fitted, force_sensitivity=Sensitivity(**force), distance_sensitivity=Sensitivity(**slid))
 
 
@@ -144,6 +189,10 @@ def calibrate(
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Predictor, ...]:
     """Fit equations (4) and (5) for a range of masses.
+
+    Where the actuator halts within the contact, the distance follows other coefficients than where it does
+    not: a mass then has two predictors, for two ranges of velocity. Velocities at which the part is caught
+    again are left out.
 
     Parameters
     ----------
@@ -162,23 +211,31 @@ def calibrate(
         The part slides free at too few velocities.
     """
     found = []
+    grid = np.linspace(velocities_m_s[0], velocities_m_s[-1], REGIME_GRID)
     for done, mass in enumerate(masses_kg):
         if progress is not None:
             progress(done, len(masses_kg))
-        found.append(predictor(plant, replace(tap, mass_kg=float(mass)), velocities_m_s, frictions))
+        mine = replace(tap, mass_kg=float(mass))
+        for low, high in spans(regimes(plant, mine, grid, frictions), grid):
+            inside = np.linspace(low, high, len(velocities_m_s))
+            found.append(predictor(plant, mine, inside, frictions))
     if progress is not None:
         progress(len(masses_kg), len(masses_kg))
+    if not found:
+        raise PredictionError(
+            f"no part of {masses_kg[0]:.4g}-{masses_kg[-1]:.4g} kg slides free of the actuator between "
+            f"{6e4 * velocities_m_s[0]:.4g} and {6e4 * velocities_m_s[-1]:.4g} mm/min; "
+            "tap faster, or with another stroke"
+        )
     return tuple(found)
 
 
-def _sensitivities(
-    fitted: Predictor, plant: Plant, other: Plant, tap: Strike, swept: Sweep
-) -> tuple[float, float]:
+def _sensitivities(fitted: Predictor, plant: Plant, other: Plant, tap: Strike) -> tuple[float, float]:
     """Mean relative change of both predicted mu_s per relative change of one property of the plant."""
     ratio = other.mu_k / other.mu_s
     mixed = Mix(tap.mass_kg, ((1.0, fitted),), inside=True)
     force, slid = [], []
-    for velocity in swept.velocity_m_s[[0, len(swept.velocity_m_s) // 2, -1]].tolist():
+    for velocity in np.linspace(*fitted.velocity_range_m_s, 3).tolist():
         mu = plant.mu_s
         try:
             peak, length = figures(

@@ -11,7 +11,7 @@ from itertools import pairwise
 from impactcell.errors import NegativeRootError, PredictionError
 from impactcell.prediction.model import REFERENCE_VELOCITY, DistanceForm, Model, Predictor, Sensitivity
 from impactcell.prediction.reading import Reading
-from impactcell.records import Coefficient, Quality
+from impactcell.records import Capture, Coefficient, Quality
 
 LOWEST_MU = 1e-3
 
@@ -58,27 +58,43 @@ def distance(form: DistanceForm, mu_s: float, velocity_m_s: float) -> float:
     return square + offset
 
 
-def mix(model: Model, mass_kg: float) -> Mix:
-    """Choose the predictors for a mass.
+def mix(model: Model, mass_kg: float, velocity_m_s: float) -> Mix:
+    """Choose the predictors for a mass and velocity.
 
     Raises
     ------
     PredictionError
-        The model has not been calibrated, or the mass is not known.
+        The model has not been calibrated, or the mass or velocity is not known.
     """
-    predictors = model.predictors
-    if not predictors:
+    if not model.predictors:
         raise PredictionError(f"model {model.name!r} has no predictors: run `impactcell calibrate`")
     if not (math.isfinite(mass_kg) and mass_kg > 0.0):
         raise PredictionError("the part's mass is not known")
-    close = min(predictors, key=lambda one: abs(one.mass_kg - mass_kg))
-    if abs(close.mass_kg / mass_kg - 1.0) < 1e-3:
-        return Mix(mass_kg, ((1.0, close),), inside=True)
-    for low, high in pairwise(predictors):
-        if low.mass_kg < mass_kg < high.mass_kg:
-            share = math.log(mass_kg / low.mass_kg) / math.log(high.mass_kg / low.mass_kg)
-            return Mix(mass_kg, ((1.0 - share, low), (share, high)), inside=True)
-    return Mix(mass_kg, ((1.0, close),), inside=False)
+    if not (math.isfinite(velocity_m_s) and velocity_m_s > 0.0):
+        raise PredictionError("the actuator's velocity is not known")
+    masses = sorted({one.mass_kg for one in model.predictors})
+    close = min(masses, key=lambda mass: abs(mass - mass_kg))
+    if abs(close / mass_kg - 1.0) < 1e-3:
+        return Mix(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=True)
+    for low, high in pairwise(masses):
+        if low < mass_kg < high:
+            share = math.log(mass_kg / low) / math.log(high / low)
+            parts = (
+                (1.0 - share, _for_velocity(model, low, velocity_m_s)),
+                (share, _for_velocity(model, high, velocity_m_s)),
+            )
+            return Mix(mass_kg, parts, inside=True)
+    return Mix(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=False)
+
+
+def _for_velocity(model: Model, mass_kg: float, velocity_m_s: float) -> Predictor:
+    """Predictor of a mass whose velocities contain this one, or come nearest to it."""
+
+    def away(one: Predictor) -> float:
+        low, high = one.velocity_range_m_s
+        return max(low - velocity_m_s, velocity_m_s - high, 0.0)
+
+    return min((one for one in model.predictors if one.mass_kg == mass_kg), key=away)
 
 
 def by_force(model: Model, mixed: Mix, velocity_m_s: float, peak: Reading) -> Coefficient:
@@ -184,7 +200,10 @@ def force_weight(mixed: Mix, mu_s: float, velocity_m_s: float) -> float:
 
 
 def out_of_range(model: Model, mixed: Mix, velocity_m_s: float, mu_s: float, stroke_m: float) -> str:
-    """Say in which ways a tap lies outside the calibration; empty where it does not."""
+    """Say in which ways a tap lies outside the calibration; empty where it does not.
+
+    `mu_s` is not judged where it is nan.
+    """
     reasons = []
     if not mixed.inside:
         low, high = model.predictors[0].mass_kg, model.predictors[-1].mass_kg
@@ -205,6 +224,28 @@ def out_of_range(model: Model, mixed: Mix, velocity_m_s: float, mu_s: float, str
         reasons.append(
             f"stroke {_millimetres(stroke_m)} is not the {_millimetres(model.stroke_m)} of the calibration"
         )
+    return "; ".join(reasons)
+
+
+def beyond_calibration(model: Model, capture: Capture, mu_s: float) -> str:
+    """Say in which ways a tap lies outside all that was calibrated, whatever the regime."""
+    if not model.predictors:
+        return ""
+    masses = [one.mass_kg for one in model.predictors]
+    velocities = [end for one in model.predictors for end in one.velocity_range_m_s]
+    frictions = [end for one in model.predictors for end in one.mu_s_range]
+    reasons = []
+    for name, value, ends, unit, scale in (
+        ("mass", capture.mass_kg, masses, " kg", 1.0),
+        ("velocity", capture.velocity_m_s, velocities, " mm/min", 6e4),
+        ("mu_s", mu_s, frictions, "", 1.0),
+    ):
+        low, high = min(ends), max(ends)
+        if not low * (1 - 1e-3) <= value <= high * (1 + 1e-3):
+            reasons.append(
+                f"{name} {scale * value:.4g}{unit} is outside the calibrated "
+                f"{scale * low:.4g}-{scale * high:.4g}{unit}"
+            )
     return "; ".join(reasons)
 
 

@@ -3,7 +3,14 @@
 import math
 
 from impactcell.errors import PhysicsError, PredictionError
-from impactcell.prediction.equations import by_distance, by_force, combined, mix, out_of_range
+from impactcell.prediction.equations import (
+    beyond_calibration,
+    by_distance,
+    by_force,
+    combined,
+    mix,
+    out_of_range,
+)
 from impactcell.prediction.model import Model
 from impactcell.prediction.reading import Reading, Slide, peak_force, slide
 from impactcell.prediction.waveform import Waveform, braking_friction, fit
@@ -33,7 +40,7 @@ def estimate(capture: Capture, model: Model) -> FrictionEstimate:
     mu_combined = _coefficient("; ".join(dict.fromkeys(filter(None, (force_fault, slide_fault)))))
     warning = ""
     try:
-        mixed = mix(model, capture.mass_kg)
+        mixed = mix(model, capture.mass_kg, capture.velocity_m_s)
         warning = out_of_range(model, mixed, capture.velocity_m_s, math.nan, capture.stroke_m)
         try:
             if math.isfinite(peak.value):
@@ -84,10 +91,7 @@ def estimate(capture: Capture, model: Model) -> FrictionEstimate:
 
 def _from_waveform(model: Model, capture: Capture, found: Waveform) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
-    warnings = []
-    if model.predictors:
-        mixed = mix(model, capture.mass_kg)
-        warnings.append(out_of_range(model, mixed, capture.velocity_m_s, found.mu_s, capture.stroke_m))
+    warnings = [beyond_calibration(model, capture, found.mu_s)]
     if found.gap > WIDE_GAP:
         warnings.append(f"residuals are {found.gap:.3g} times the sensors' noise: the model lacks something")
     told = "mu_s through mu_k/mu_s of the model: the part moved at once" if found.immediate > 0.5 else ""

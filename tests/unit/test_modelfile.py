@@ -59,7 +59,17 @@ def test_the_prototype_is_the_reference_plant() -> None:
         ("mu_s: 0.2", "mu_s: -0.2", "plant.mu_s: should be greater than 0, not -0.2"),
         ("mu_s: 0.2", "mu_s: .nan", "plant.mu_s: should be a finite number"),
         ("format: 1", "format: 7", "format: should be 1, not 7"),
-        ("mass_kg: 25.2", "mass_kg: 18.9", "two predictors have the same mass_kg"),
+        ("mass_kg: 25.2", "mass_kg: 18.9", "two predictors for 18.9 kg have velocities in common"),
+        (
+            "viscous_friction",
+            "viscous_fricton",
+            "no effect 'viscous_fricton'; did you mean 'viscous_friction'?",
+        ),
+        (
+            "viscous_coefficient",
+            "viscous_koefficient",
+            "viscous_friction has no parameter 'viscous_koefficient",
+        ),
         ("mu_s: 0.2", "mu_k: 0.2", "key 'mu_k' is given twice"),
     ],
 )
