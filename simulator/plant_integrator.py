@@ -22,6 +22,9 @@ LENGTH_TOLERANCE = 1e-14
 SPEED_TOLERANCE = 1e-12
 FORCE_TOLERANCE = 1e-9
 SETTLE_S = 0.25
+HALVINGS = 40
+LONGEST_CONTACT_STEP_S = 1e-3
+LONGEST_SLIDE_STEP_S = 1e-2
 FAR_AWAY_M = 1e9
 MOST_EVENTS = 100_000
 
@@ -186,6 +189,7 @@ class _Run:
             np.array(self.z),
             until,
             rtol=RELATIVE_TOLERANCE,
+            max_step=self._longest_step_s(),
             atol=np.array(forces.absolute_tolerance),  # type: ignore[arg-type]  # the stubs know scalars only
         )
         while solver.status == "running":
@@ -203,6 +207,12 @@ class _Run:
             self.t, self.z = ended, solver.y.tolist()
             if self.ends_at_rest and phase.halted and not phase.slip and ended - self.still_since > SETTLE_S:
                 return
+
+    def _longest_step_s(self) -> float:
+        """Return how long a step may be, so that its continuous output is as exact as its end."""
+        if self.phase.slip == 0 and self.forces.presliding == 0.0:
+            return float("inf")
+        return LONGEST_CONTACT_STEP_S if self.phase.contact is Contact.TOUCHING else LONGEST_SLIDE_STEP_S
 
     def _change(self, name: str) -> None:
         if len(self.events) > MOST_EVENTS:
@@ -270,6 +280,14 @@ def _locate(guard: Guard, dense: Any, before: float, after: float) -> float:
     def value(time: float) -> float:
         return guard(time, dense(time).tolist())
 
-    if value(before) <= 0.0:
-        return before
-    return float(brentq(value, before, after, xtol=1e-16, rtol=1e-14))
+    low = before
+    if value(low) <= 0.0:
+        # A phase often begins with its guard at zero and rising, as a gap that has just opened: the failure
+        # is then a later one, which may lie well within the first look.
+        span = after - before
+        low = next(
+            (t for t in (before + span * 0.5**j for j in range(1, HALVINGS)) if value(t) > 0.0), before
+        )
+        if low == before:
+            return before
+    return float(brentq(value, low, after, xtol=1e-16, rtol=1e-14))
