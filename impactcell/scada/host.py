@@ -52,7 +52,7 @@ class Host:
         self._settings = settings
         self._space = space
         self._values = values
-        self._trust = TrustList(settings.pki)
+        self._trust = TrustList(settings.pki, settings.application_uri)
         self._logins = Logins(Users(settings.users), self._trust)
         self._sessions = Sessions(settings.limits)
         self._endpoints = Endpoints(settings, self._trust.own_certificate)

@@ -28,6 +28,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 
 from impactcell.errors import AccessError
+from impactcell.scada.certificates import make_certificate, own_hosts, write_pair
 
 _log = logging.getLogger(__name__)
 
@@ -87,15 +88,15 @@ def der(certificate: x509.Certificate) -> bytes:
 
 
 class TrustList:
-    """The folders of a pki directory.
+    """The folders of a pki directory; made with a new certificate where there is none.
 
     Raises
     ------
     AccessError
-        The server's own certificate or key is absent or cannot be read.
+        The server's own certificate or key is absent, does not fit or cannot be read.
     """
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, application_uri: str) -> None:
         self._directory = directory
         for folder in FOLDERS:
             try:
@@ -103,11 +104,16 @@ class TrustList:
             except OSError as error:
                 raise AccessError(f"{directory / folder}: {error.strerror}") from error
         own = directory / "own" / "cert.der"
-        if not own.is_file():
-            raise AccessError(f"{own}: no certificate; make one with `impactcell certs make {directory}`")
+        key = directory / "own" / "key.pem"
+        if not own.exists() and not key.exists():
+            write_pair(directory / "own", *make_certificate("impactcell", application_uri, own_hosts()))
+            _log.warning("%s: made a certificate for %s; clients have to trust it", own, application_uri)
         self.certificate = read_certificate(own)
         self.own_certificate = der(self.certificate)
-        key = directory / "own" / "key.pem"
+        if application_uri not in application_uris(self.own_certificate):
+            raise AccessError(
+                f"{own}: made for another application URI than {application_uri}; make a new one"
+            )
         try:
             private_key = serialization.load_pem_private_key(key.read_bytes(), None)
         except OSError as error:
