@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.compiled import compiled
-from impactcell.positioning.spread import distribution
+from impactcell.positioning.spread import COARSE_Z, Z, distribution
 from impactcell.positioning.value import CostToGo, between, expect
 from impactcell.records import Samples
 
-KEPT = 6  # taps of the table that are refined
-FINE = 13  # strokes tried between the neighbours of one of them, and again between the best two
+KEPT = 5  # taps of the table that are refined
+FINE = 11  # strokes tried between the neighbours of one of them, and again between the best two
 
 
 class Chosen(NamedTuple):
@@ -100,7 +100,7 @@ def weigh(
 
 
 def choose(
-    remaining: float, table: Samples, velocities: Samples, strokes: Samples, rows: Samples, z: Samples,
+    remaining: float, table: Samples, velocities: Samples, strokes: Samples, rows: Samples,
     value: CostToGo, aims: Samples, *, tolerance: float, penalty: float, bound: float, part_mass: float,
     gravity: float,
 ) -> tuple[Chosen | None, float]:  # fmt: skip
@@ -108,9 +108,9 @@ def choose(
 
     The tap is None where none is within the bound.
     """
-    mass = between(z)
+    coarse, mass = between(COARSE_Z), between(Z)
     which, where, what = shortlist(
-        table, remaining, z, mass, tolerance, penalty, *value, aims, KEPT
+        table, remaining, COARSE_Z, coarse, tolerance, penalty, *value, aims, KEPT
     )  # fmt: skip
     best: Chosen | None = None
     least = 1.0
@@ -121,7 +121,7 @@ def choose(
             fine = tried
             for _ in range(2):
                 costs, risks = weigh(
-                    velocity, fine, rows, z, mass, part_mass, gravity, remaining,
+                    velocity, fine, rows, Z, mass, part_mass, gravity, remaining,
                     tolerance, penalty, *value,
                 )  # fmt: skip
                 least = min(least, float(risks.min()))

@@ -13,7 +13,7 @@ from impactcell.positioning.belief import Belief
 from impactcell.positioning.choice import choose
 from impactcell.positioning.learning import learn
 from impactcell.positioning.response import displacement_of
-from impactcell.positioning.spread import MIDDLE, Z, distribution, plants, scenarios, spread_table
+from impactcell.positioning.spread import COARSE_Z, Z, distribution, plants, scenarios, spread_table
 from impactcell.positioning.value import AIMS, CostToGo, cost_to_go
 from impactcell.records import Samples
 
@@ -22,8 +22,8 @@ VELOCITIES = 24
 STROKES = 60
 MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
 CAUTION = (1.0, 20.0)  # factors on that multiplier, tried in turn until a tap is within the bound
-SAME_MASS = 0.02
-STALE = np.array([0.012, 0.03, 0.06, 0.02, 2.0])  # change of the belief after which a table is made anew
+SAME_MASS = 0.03
+STALE = np.array([0.02, 0.04, 0.08, 0.03, 2.0])  # change of the belief after which a table is made anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,17 +185,17 @@ class TapPlanner:
                 "and this cell cannot push it back"
             )
         distance = abs(remaining_m)
-        rows = scenarios(self._belief)
+        rows = scenarios(self._belief, Z)
         least = 1.0
         for caution in CAUTION:
             part = self._worked_out(mass_kg, caution)
-            if not np.nanmax(part.table[:, :, MIDDLE]) > 0.0:
+            if not np.nanmax(part.table[:, :, COARSE_Z.size // 2]) > 0.0:
                 return Unreachable(
                     f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
                     f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
                 )
             chosen, met = choose(
-                distance, part.table, self._velocities, self._strokes, rows, Z, part.value, AIMS,
+                distance, part.table, self._velocities, self._strokes, rows, part.value, AIMS,
                 tolerance=self.tolerance_m, penalty=self._penalty(caution), bound=self.overshoot_probability,
                 part_mass=mass_kg, gravity=self._gravity,
             )  # fmt: skip
@@ -216,7 +216,7 @@ class TapPlanner:
             velocity_m_s=chosen.velocity_m_s,
             stroke_m=chosen.stroke_m,
             direction=1 if remaining_m > 0.0 else -1,
-            expected_m=float(moved[0, MIDDLE]),
+            expected_m=float(moved[0, Z.size // 2]),
             lowest_m=float(inside.min()),
             highest_m=float(inside.max()),
             expected_taps=chosen.cost,
@@ -266,18 +266,20 @@ class TapPlanner:
                 return part
         table = self._table(self._belief, mass_kg)
         value = CostToGo(1.0, np.ones(1), np.ones(1))
-        if np.nanmax(table[:, :, MIDDLE]) > 0.0:
+        if np.nanmax(table[:, :, COARSE_Z.size // 2]) > 0.0:
             later = beliefs.foreseen(self._belief)
             less = (np.diag(self._belief.cov) > 1.2 * np.diag(later.cov)).any()
             ahead = self._table(later, mass_kg) if less else table
-            value = cost_to_go(ahead, Z, self.tolerance_m, self._penalty(caution))
+            value = cost_to_go(ahead, COARSE_Z, self.tolerance_m, self._penalty(caution))
         part = _Part(mass_kg, caution, self._belief, table, value)
         self._parts.append(part)
         del self._parts[:-64]
         return part
 
     def _table(self, belief: Belief, mass_kg: float) -> Samples:
-        return spread_table(self._velocities, self._strokes, scenarios(belief), Z, mass_kg, self._gravity)
+        return spread_table(
+            self._velocities, self._strokes, scenarios(belief, COARSE_Z), COARSE_Z, mass_kg, self._gravity
+        )
 
     def _still_holds(self, part: _Part) -> bool:
         moved = np.abs(self._belief.mean - part.belief.mean)

@@ -1,7 +1,7 @@
 """Predictive distribution of the displacement, for many taps at once.
 
 Uncertainty is split into the line along which friction varies (and, with it, whatever is correlated with
-it), followed exactly at the nodes `Z` whatever the displacement does there, and the directions across,
+it), followed exactly at the nodes `z` whatever the displacement does there, and the directions across,
 each taken at one standard deviation and added by `reach`.
 """
 
@@ -15,12 +15,12 @@ from impactcell.positioning.response import displacements
 from impactcell.records import Samples
 
 Z = np.array([-4.2, -3.3, -2.6, -1.9, -1.2, -0.6, 0.0, 0.6, 1.2, 1.9, 2.6, 3.3, 4.2])
-MIDDLE = 6
+COARSE_Z = np.array([-3.8, -2.8, -1.8, -0.85, 0.0, 0.85, 1.8, 2.8, 3.8])  # for tables of many taps
 ACROSS = 4
 
 
-def scenarios(belief: Belief) -> Samples:
-    """Parameter rows (k, b, mu_s, mu_k, k_v), shape (len(Z) + 2 * ACROSS, 5): the line, then +-1 across."""
+def scenarios(belief: Belief, z: Samples) -> Samples:
+    """Parameter rows (k, b, mu_s, mu_k, k_v), shape (len(z) + 2 * ACROSS, 5): the line, then +-1 across."""
     cov = belief.cov.copy()
     cov[FRICTION, FRICTION] += belief.scatter**2
     sigma = math.sqrt(cov[FRICTION, FRICTION])
@@ -28,13 +28,13 @@ def scenarios(belief: Belief) -> Samples:
     across = cov[1:, 1:] - np.outer(along[1:], along[1:])
     values, vectors = np.linalg.eigh(across)
     steps = (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    theta = np.empty((Z.size + 2 * ACROSS, 5))
+    theta = np.empty((z.size + 2 * ACROSS, 5))
     theta[:] = belief.mean
-    theta[: Z.size] += np.outer(Z, along)
+    theta[: z.size] += np.outer(z, along)
     # ln(1 + s z) to second order: a factor of friction is normal, not log-normal
-    theta[: Z.size, FRICTION] -= 0.5 * min(sigma, 0.1) ** 2 * Z**2
-    theta[Z.size : Z.size + ACROSS, 1:] += steps
-    theta[Z.size + ACROSS :, 1:] -= steps
+    theta[: z.size, FRICTION] -= 0.5 * min(sigma, 0.1) ** 2 * z**2
+    theta[z.size : z.size + ACROSS, 1:] += steps
+    theta[z.size + ACROSS :, 1:] -= steps
     return plants(theta)
 
 

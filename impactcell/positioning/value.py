@@ -22,6 +22,7 @@ from impactcell.records import Samples
 STALL_PENALTY = 60.0  # taps that a tap which moves nothing costs: it stops a sequence
 STALL_M = 2e-7
 AIMS = np.array([-0.4, 0.0, 0.4, 0.8, 1.4, 2.2])  # short of the target, in tolerances
+FAR = 0.7  # a tap whose median leaves this much more to do than the best is not weighed
 SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
 
 
@@ -148,6 +149,9 @@ def taps_by_displacement(table: Samples, targets: Samples, z: Samples) -> Sample
                             score[n, s] = value
                             best[n, s] = row
                     n += 1
+    for n in range(targets.size):
+        if best[n, 0, 0] == best[n, 1, 0] and best[n, 0, nodes - 1] == best[n, 1, nodes - 1]:
+            best[n, 1] = math.nan  # one and the same tap
     return best
 
 
@@ -169,6 +173,9 @@ def sweep(
             m = last - 1 - backward
             if targets[m] < 0.2 * r and targets[m] < 0.5 * targets[targets.size - 1]:
                 break
+            left = r - targets[m]
+            if left > tolerance and 1.0 + ahead(step, cost, known, left) > best + FAR:
+                continue
             for s in range(SLOTS):
                 if not math.isnan(taps[m, s, 0]):
                     c, p = expect(
@@ -183,8 +190,10 @@ def sweep(
                 continue
             part = (wanted - targets[m - 1]) / (targets[m] - targets[m - 1])
             for s in range(SLOTS):
+                before_it = taps[m - 1, s] if not math.isnan(taps[m - 1, s, 0]) else taps[m - 1, 0]
+                behind_it = taps[m, s] if not math.isnan(taps[m, s, 0]) else taps[m, 0]
                 for q in range(nodes):
-                    row[q] = taps[m - 1, s, q] + part * (taps[m, s, q] - taps[m - 1, s, q])
+                    row[q] = before_it[q] + part * (behind_it[q] - before_it[q])
                 if not math.isnan(row[0]):
                     c, p = expect(r, row, z, mass, tolerance, penalty, step, cost, overshoot, known, best)
                     if c < best:
