@@ -8,7 +8,7 @@ One tap, with its events, figures and samples::
     motion.sample(time_s).force_n
 
 Positions count from where the part lay, positive along +1, whatever `start_m` is; the laws of effects see the
-position on the table. `slide` is the same without an actuator.
+position on the table. `slide` is the same without an actuator, `drive` under a measured force.
 
 For fits and planners, `Ensemble` integrates many taps for a vector of parameters in one compiled call, at
 some tens of microseconds a tap:
@@ -34,8 +34,10 @@ a `Plant`. Samples are smooth in the parameters while the sequence of events is 
 `impactcell.physics.effects.LIBRARY` holds every effect by its identifier; a new effect is one new file there.
 """
 
+from impactcell.physics.drive import drive
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 from impactcell.physics.ensemble import Ensemble, Figures, Traces
+from impactcell.physics.modified_euler import GridMotion, strike_modified_euler
 from impactcell.physics.motion import Event, EventKind, Motion, Sampled
 from impactcell.physics.plant import Plant, Strike
 from impactcell.physics.tap import slide, strike
@@ -46,6 +48,7 @@ __all__ = [
     "Event",
     "EventKind",
     "Figures",
+    "GridMotion",
     "Kind",
     "LawKind",
     "Motion",
@@ -55,6 +58,8 @@ __all__ = [
     "Sampled",
     "Strike",
     "Traces",
+    "drive",
     "slide",
     "strike",
+    "strike_modified_euler",
 ]

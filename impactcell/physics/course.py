@@ -8,7 +8,7 @@ from impactcell.compiled import Integers, Numbers, compiled, integers, numbers, 
 from impactcell.physics import layout as at
 from impactcell.physics.ends import after_end, all_taken, before_contact, finish, last_sample
 from impactcell.physics.events import first_event, margin, next_kink, state_at
-from impactcell.physics.phases import begin, enter_interval, note_breakaway, pass_event, touch
+from impactcell.physics.phases import begin, enter_interval, note_breakaway, pass_event, prepare, touch
 from impactcell.physics.runge_kutta import EXTENDED, STAGES, error, interpolant, stages
 from impactcell.physics.sensing import POWERS, find_peak, force_polynomial, lagged, take_samples
 from impactcell.records import Samples
@@ -97,9 +97,13 @@ def follow(
     figures[at.EVENT_COUNT] = 0.0
     figures[at.STATUS] = at.STILL_MOVING
     t = 0.0
+    prepare(t if drives < 2 else drive[0], memo, row, program)
     if drives > 1:
         t = drive[0]
-        enter_interval(0, drive, drives, mode, memo)
+        first = 0
+        while first + 2 < drives and drive[first + 1] - memo[at.DELAY_S] <= t:
+            first += 1
+        enter_interval(first, drive, drives, mode, memo, row, program)
     begin(t, z, mode, memo, row, program)
     if (mode[at.SLIP] == 1 or mode[at.SLIP] == -1) and z[at.SPEED_OF_PART] == 0.0:
         note_breakaway(t, figures, cursor, event_kinds, event_times)
@@ -131,7 +135,7 @@ def follow(
                 figures[at.STATUS] = at.STILL_MOVING
         limit = min(last, memo[at.NEXT_KINK_S])
         if drives > 1:
-            limit = min(limit, drive[mode[at.INTERVAL] + 1])
+            limit = min(limit, drive[mode[at.INTERVAL] + 1] - memo[at.DELAY_S])
         whole = limit - (t + h) < 1e-3 * h
         step = limit - t if whole else h
         stages(0 if fresh else 1, STAGES + 1, t, step, z, mode, memo, row, program, K, scratch)
@@ -186,10 +190,10 @@ def follow(
             memo[at.NEXT_KINK_S] = next_kink(t, row, program)
             touch(t, z, mode, row, program)
             fresh = True
-        if whole and drives > 1 and t >= drive[mode[at.INTERVAL] + 1]:
+        if whole and drives > 1 and t >= drive[mode[at.INTERVAL] + 1] - memo[at.DELAY_S]:
             if mode[at.INTERVAL] + 2 >= drives:
                 break
-            enter_interval(mode[at.INTERVAL] + 1, drive, drives, mode, memo)
+            enter_interval(mode[at.INTERVAL] + 1, drive, drives, mode, memo, row, program)
             fresh = True
     figures[at.STEP_COUNT] = steps
     after_end(t, z, mode, memo, row, program, cursor, times, out)

@@ -23,6 +23,8 @@ NONE = np.empty(0)
 def integrate_all(
     rows: Samples,
     laws: at.Whole,
+    drives: Samples,
+    drive_ends: at.Whole,
     horizon: float,
     goal: int,
     cursors: at.Whole,
@@ -31,13 +33,13 @@ def integrate_all(
     figures: Samples,
 ) -> None:
     """Integrate every tap; row i goes with cursors i."""
-    no_drive = np.empty(0)
     no_kinds = np.empty(0, np.int64)
     no_times = np.empty(0)
     cursor = np.empty(at.CURSORS, np.int64)
     for i in range(rows.shape[0]):
         cursor[:] = cursors[i]
-        integrate(rows[i], laws, no_drive, horizon, goal, cursor, times, out, no_kinds, no_times, figures[i])
+        drive = drives[drive_ends[i] : drive_ends[i + 1]]
+        integrate(rows[i], laws, drive, horizon, goal, cursor, times, out, no_kinds, no_times, figures[i])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +96,9 @@ class Ensemble:
     gravity_m_s2 : float
     initial_speed_m_s : ndarray of shape (n,), optional
         Free slides: no contact, the part slides from t = 0 with this speed along the shot's direction.
+    drives : sequence of (time_s, force_n), optional
+        Driven parts: no contact but a measured force along +1, linear between its ascending times; the part
+        begins at the first of them with `initial_speed_m_s`, at rest where that is not given.
 
     Attributes
     ----------
@@ -118,6 +123,7 @@ class Ensemble:
         velocity_time_s: Sequence[Samples] | None = None,
         gravity_m_s2: float = 9.81,
         initial_speed_m_s: Samples | None = None,
+        drives: Sequence[tuple[Samples, Samples]] | None = None,
     ) -> None:
         self._columns = columns(taps)
         if initial_speed_m_s is not None:
@@ -143,6 +149,18 @@ class Ensemble:
                 self._cursors[i, at.CHANNELS + channel] = total
             self._channels.append(slice(begin, total))
         self._times = np.concatenate(pieces) if pieces else NONE
+        self._drives, self._drive_ends = NONE, np.zeros(len(taps) + 1, dtype=np.int64)
+        if drives is not None:
+            self._take_drives(drives, given_speed=initial_speed_m_s is not None)
+
+    def _take_drives(self, drives: Sequence[tuple[Samples, Samples]], *, given_speed: bool) -> None:
+        for i, (time_s, force_n) in enumerate(drives):
+            if len(time_s) < 2 or len(time_s) != len(force_n) or not (np.diff(time_s) > 0.0).all():
+                raise PhysicsError(f"drive {i}: needs two samples or more, at ascending times")
+            self._drive_ends[i + 1] = self._drive_ends[i] + 2 * len(time_s)
+        self._drives = np.concatenate([np.concatenate(drive).astype(np.float64) for drive in drives])
+        if not given_speed:
+            self._columns["initial_speed_m_s"] = np.zeros(self._count)
 
     def parameters(self, plant: Plant) -> Samples:
         """Parameter vector of `plant`, shape (len(names),); its effects must be among the ensemble's."""
@@ -195,7 +213,16 @@ class Ensemble:
         out = np.empty(self._times.size)
         figures = np.empty((self._count, at.FIGURES))
         integrate_all(
-            rows, self._program.laws, LONGEST_S, at.TO_LAST_SAMPLE, self._cursors, self._times, out, figures
+            rows,
+            self._program.laws,
+            self._drives,
+            self._drive_ends,
+            LONGEST_S,
+            at.TO_LAST_SAMPLE,
+            self._cursors,
+            self._times,
+            out,
+            figures,
         )
         return out
 
@@ -274,7 +301,8 @@ def figures_of(rows: Samples, laws: at.Whole, horizon_s: float = LONGEST_S) -> F
     """Figures of taps given by `rows`, shape (n, width)."""
     table = np.empty((rows.shape[0], at.FIGURES))
     cursors = np.zeros((rows.shape[0], at.CURSORS), dtype=np.int64)
-    integrate_all(rows, laws, horizon_s, at.TO_REST, cursors, NONE, NONE, table)
+    undriven = np.zeros(rows.shape[0] + 1, dtype=np.int64)
+    integrate_all(rows, laws, NONE, undriven, horizon_s, at.TO_REST, cursors, NONE, NONE, table)
     return Figures(
         peak_force_n=table[:, at.PEAK_FORCE],
         displacement_m=table[:, at.DISPLACEMENT],

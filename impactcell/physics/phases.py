@@ -7,7 +7,7 @@ import numpy as np
 from impactcell.compiled import Integers, Numbers, compiled, invoke
 from impactcell.physics import layout as at
 from impactcell.physics.events import hold_or_slip, next_kink
-from impactcell.physics.forces import actuator_speed, body_force, contact_force
+from impactcell.physics.forces import actuator_speed, body_force, contact_force, reading
 
 
 @compiled
@@ -20,8 +20,8 @@ def first_law(kind: int, missing: float, row: Numbers, program: Integers) -> flo
 
 
 @compiled
-def begin(t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers) -> None:
-    """Set up the first phase: first contact at t = 0, or a part that already slides."""
+def prepare(t: float, memo: Numbers, row: Numbers, program: Integers) -> None:
+    """Read the laws that are plain numbers, once for the whole tap."""
     stick = first_law(at.STICK, np.inf, row, program)
     memo[at.STICK_STIFFNESS] = stick if math.isfinite(stick) else 0.0
     memo[at.ADHESION_REACH] = first_law(at.REACH, 0.0, row, program)
@@ -29,6 +29,11 @@ def begin(t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, pro
     memo[at.DELAY_S] = first_law(at.DELAY, 0.0, row, program)
     memo[at.NEXT_KINK_S] = next_kink(t, row, program)
     memo[at.NATURAL_STEP_S] = 0.2 * math.sqrt(row[at.MASS] / row[at.STIFFNESS])
+
+
+@compiled
+def begin(t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers) -> None:
+    """Set up the first phase: first contact at t = 0, or a part that already slides."""
     if math.isnan(row[at.INITIAL_SPEED]):
         mode[at.ZONE] = at.TOUCHING
         mode[at.DAMPER] = 1
@@ -46,12 +51,34 @@ def begin(t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, pro
 
 
 @compiled
-def enter_interval(i: int, drive: Numbers, drives: int, mode: Integers, memo: Numbers) -> None:
-    """Take up the driving force between its samples i and i + 1."""
+def unread(shown: float, row: Numbers, program: Integers) -> float:
+    """Find the force at which the sensor shows `shown` [N]; where it is saturated, `shown` itself."""
+    force = shown
+    for _ in range(20):
+        miss = reading(force, row, program) - shown
+        delta = 1e-3 * (1.0 + abs(force))
+        slope = (reading(force + delta, row, program) - reading(force - delta, row, program)) / (2.0 * delta)
+        if abs(slope) < 1e-3 or abs(miss) < 1e-13 * (1.0 + abs(shown)):
+            break
+        force -= miss / slope
+    return force
+
+
+@compiled
+def enter_interval(
+    i: int, drive: Numbers, drives: int, mode: Integers, memo: Numbers, row: Numbers, program: Integers
+) -> None:
+    """Take up the driving force between its measured samples i and i + 1.
+
+    The force is the measured one with the sensor's laws undone: it came out of them.
+    """
     mode[at.INTERVAL] = i
-    memo[at.DRIVE_TIME] = drive[i]
-    memo[at.DRIVE] = drive[drives + i]
-    memo[at.DRIVE_SLOPE] = (drive[drives + i + 1] - drive[drives + i]) / (drive[i + 1] - drive[i])
+    first = unread(drive[drives + i], row, program)
+    second = unread(drive[drives + i + 1], row, program)
+    slope = (second - first) / (drive[i + 1] - drive[i])
+    memo[at.DRIVE_TIME] = drive[i] - memo[at.DELAY_S]
+    memo[at.DRIVE] = first + memo[at.LAG_S] * slope
+    memo[at.DRIVE_SLOPE] = slope
 
 
 @compiled

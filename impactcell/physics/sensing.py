@@ -135,7 +135,7 @@ def find_peak(
     figures: Numbers,
 ) -> None:
     """Raise the peak force to the largest within this step."""
-    if mode[at.ZONE] < at.TOUCHING and memo[at.LAG_S] == 0.0:
+    if mode[at.ZONE] == at.ABSENT or (mode[at.ZONE] != at.TOUCHING and memo[at.LAG_S] == 0.0):
         return
     best = -np.inf
     best_at = 0.0
