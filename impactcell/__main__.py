@@ -10,6 +10,8 @@ from typing import Annotated
 
 import typer
 
+from impactcell.commands.access_cli import certs, users
+from impactcell.commands.options import Cell, Cells, Directory, OptionalCell, Quiet, Verbose
 from impactcell.errors import (
     AccessError,
     CampaignError,
@@ -23,33 +25,12 @@ from impactcell.errors import (
 BAD_INPUT = (AccessError, CampaignError, ForeignJournalError, MapError, SeriesError, SettingsError)
 
 
-def _be_quiet(quiet: bool) -> None:  # noqa: FBT001 - typer's callback signature
-    if quiet:
-        logging.getLogger("impactcell").setLevel(logging.ERROR)
-
-
-def _be_verbose(verbose: bool) -> None:  # noqa: FBT001 - typer's callback signature
-    if verbose:
-        logging.getLogger("impactcell").setLevel(logging.DEBUG)
-
-
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Only errors.", callback=_be_quiet)]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="More of what happens.", callback=_be_verbose)]
-Cells = Annotated[list[Path], typer.Argument(metavar="CELL.yaml...", help="One file a cell.")]
-Cell = Annotated[Path, typer.Argument(metavar="CELL.yaml")]
-OptionalCell = Annotated[
-    Path | None, typer.Option("--cell", metavar="CELL.yaml", help="Use this cell's model.")
-]
-Directory = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write.")]
-
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="Friction from taps: estimated, tracked, alarmed and used, beside a PLC.",
 )
-users = typer.Typer(no_args_is_help=True, help="Users of the OPC UA server.")
-certs = typer.Typer(no_args_is_help=True, help="Certificates of the OPC UA server.")
 model = typer.Typer(no_args_is_help=True, help="The model a cell runs with.")
 app.add_typer(users, name="users")
 app.add_typer(certs, name="certs")
@@ -199,6 +180,23 @@ def figures(output: Directory, *, quiet: Quiet = False, verbose: Verbose = False
     for path in draw(output):
         if not quiet:
             typer.echo(path)
+
+
+@model.command("accept")
+def model_accept(
+    cell: Cell,
+    extended: Annotated[
+        Path, typer.Argument(metavar="MODEL.yaml", help="As the discrepancy workflow wrote it.")
+    ],
+    *,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Put an extended model into service; a running cell takes it over without losing its state."""
+    del quiet, verbose
+    from impactcell.commands.accept import accept
+
+    accept(cell, extended)
 
 
 def main(arguments: list[str] | None = None) -> None:

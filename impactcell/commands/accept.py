@@ -1,0 +1,33 @@
+"""`impactcell model accept`: an extended model into service, without losing what the cell has learned."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from impactcell.commands.calibrate import calibrated
+from impactcell.modelfile import read_model, write_model
+from impactcell.settings import read_cell
+
+
+def accept(cell: Path, extended: Path) -> None:
+    """Calibrate an extended model for the cell and put it in the place of the cell's model file.
+
+    The model that it replaces is kept beside it as `<name>.previous.yaml`. A running service sees the new
+    file within a second and goes on with it from the next cycle; tracker, alarms and journal stay.
+
+    Raises
+    ------
+    SettingsError
+        A file cannot be read or written.
+    PredictionError
+        The part would not slide free over the calibrated range.
+    """
+    given = read_cell(cell)
+    model = calibrated(replace(given, model=read_model(extended)))
+    target = given.settings.model
+    previous = target.with_name(f"{target.stem}.previous{target.suffix}")
+    previous.write_bytes(target.read_bytes())
+    write_model(model, target)
+    sys.stdout.write(
+        f"{given.name} runs with model {model.name} from the next cycle on; before: {previous}\n"
+    )
