@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
-from impactcell.physics import Plant, strike
+from impactcell.physics import Ensemble, Plant
 from impactcell.prediction.descent import Belief, descend
 from impactcell.prediction.model import Model
 from impactcell.prediction.posterior import Posterior, mixture
@@ -166,15 +166,19 @@ def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
 
 def _gap(plant: Plant, theta: Samples, capture: Capture) -> float:
     """RMS of the residuals of every sample over the noise of its sensor."""
-    total, count = 0.0, 0
-    motion = strike(with_parameters(plant, theta), commanded(capture))
-    for channel, force in ((capture.force, True), (capture.position, False)):
-        if channel is not None:
-            model = motion.sample(channel.time_s)
-            residual = (channel.values - (model.force_n if force else model.position_m)) / noise_std(channel)
-            total += float(residual @ residual)
-            count += len(residual)
-    return math.sqrt(total / count)
+    force, position = checked(capture.force, "force"), checked(capture.position, "position")
+    ensemble = Ensemble(
+        [commanded(capture)],
+        tuple(plant.effects),
+        force_time_s=[force.time_s],
+        position_time_s=[position.time_s],
+        gravity_m_s2=plant.gravity_m_s2,
+    )
+    traces = ensemble.traces(ensemble.parameters(with_parameters(plant, theta)))
+    of_force = (force.values - traces.force_n) / noise_std(force)
+    of_position = (position.values - traces.position_m) / noise_std(position)
+    total = float(np.square(of_force).sum() + np.square(of_position).sum())
+    return math.sqrt(total / (len(of_force) + len(of_position)))
 
 
 def braking_friction(model: Model, mass_kg: float, slid: Slide) -> float:
