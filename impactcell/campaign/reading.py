@@ -1,6 +1,7 @@
 """Reads a whole campaign directory, or says everything that is wrong with it at once."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from impactcell.campaign.contents import Campaign, Excitation, Sensor
@@ -28,7 +29,8 @@ def read(directory: Path) -> Campaign:
     Returns
     -------
     Campaign
-        In SI units, shots in the order of `shots.csv`.
+        In SI units, shots in the order of `shots.csv`. Positions count from where the part lay before the
+        shot, also where the traces have places on the table.
 
     Raises
     ------
@@ -58,12 +60,37 @@ def read(directory: Path) -> Campaign:
         raise AssertionError(message)
     return Campaign(
         excitation=header.excitation,
-        shots=tuple(shots),
+        shots=_from_start(_from_start(tuple(shots), "position"), "actuator"),
         gravity_m_s2=header.gravity_m_s2,
         stroke_m=header.stroke_m,
         sensors=header.sensors,
         columns=table[0],
     )
+
+
+def _from_start(shots: tuple[Capture, ...], name: str) -> tuple[Capture, ...]:
+    """Count a channel from where the part lay, should the campaign have recorded places on the table.
+
+    The format says that a shot starts at `start_m`, not whether `position_m` is counted from there; the first
+    samples of all shots together tell.
+    """
+    from_start = from_table = 0.0
+    for shot in shots:
+        channel: Channel | None = getattr(shot, name)
+        if channel is not None:
+            from_start += abs(channel.values[0])
+            from_table += abs(channel.values[0] - shot.start_m)
+    if from_start <= from_table:
+        return shots
+    return tuple(_shifted(shot, name) for shot in shots)
+
+
+def _shifted(shot: Capture, name: str) -> Capture:
+    channel: Channel | None = getattr(shot, name)
+    if channel is None:
+        return shot
+    moved = replace(channel, values=channel.values - shot.start_m)
+    return replace(shot, position=moved) if name == "position" else replace(shot, actuator=moved)
 
 
 def _check_orphans(traces: Path, numbers: set[int], faults: Faults) -> None:

@@ -73,6 +73,23 @@ def test_defaults_where_columns_are_missing(tmp_path: Path) -> None:
     assert shot.covariates == {"heading_deg": -12.5, "note": "left"}
 
 
+@pytest.mark.parametrize("on_table", [False, True])
+def test_positions_count_from_where_the_part_lay(tmp_path: Path, *, on_table: bool) -> None:
+    shots = "shot,velocity_mm_per_min,start_m\n1,3000,0.01\n2,3000,-0.02\n"
+    traces = {
+        f"_{shot}": "time_s,position_m,actuator_m\n"
+        + "".join(
+            f"{t},{on_table * start + 0.05 * t},{on_table * start + 0.06 * t}\n" for t in (0.01, 0.02, 0.03)
+        )
+        for shot, start in ((1, 0.01), (2, -0.02))
+    }
+    for shot in read(campaign(tmp_path / "c", shots=shots, **traces)).shots:
+        assert shot.position is not None
+        assert shot.actuator is not None
+        np.testing.assert_allclose(shot.position.values, [0.0005, 0.001, 0.0015], atol=1e-12)
+        np.testing.assert_allclose(shot.actuator.values, [0.0006, 0.0012, 0.0018], atol=1e-12)
+
+
 def test_start_position_and_covariates_are_kept(tmp_path: Path) -> None:
     shots = "shot,velocity_mm_per_min,start_m,temperature_c\n1,3000,0.01,21.5\n2,3000,,22\n"
     got = read(campaign(tmp_path / "c", shots=shots))

@@ -36,7 +36,7 @@ def captures(draw: st.DrawFn, number: int) -> Capture:
         stroke_m=0.0015,
         batch_id=draw(st.one_of(st.none(), st.text("ABC,\" '", min_size=1).map(str.strip).filter(bool))),
         dwell_s=draw(st.one_of(st.just(float("nan")), st.floats(0, 1e4))),
-        start_m=draw(st.floats(-1, 1)),
+        start_m=0.0,
         covariates={"temperature_c": draw(FINITE)},
     )
 
