@@ -23,10 +23,12 @@ from impactcell.scada.mends.channel import Channels
 from impactcell.scada.mends.codec import bound_null_arrays
 from impactcell.scada.mends.connection import Connection
 from impactcell.scada.mends.dispatch import MAX_OPERATIONS, Dispatcher, Service
-from impactcell.scada.mends.histories import AGGREGATES, MOST_NODES, PAGE
+from impactcell.scada.mends.histories import MOST_NODES
 from impactcell.scada.mends.monitored import MonitoredItems
 from impactcell.scada.mends.monitoring import Monitoring
+from impactcell.scada.mends.processed import AGGREGATES
 from impactcell.scada.mends.sessions import MAX_CONTINUATIONS, Sessions
+from impactcell.scada.mends.spans import PAGE
 from impactcell.scada.mends.views import Views
 from impactcell.scada.trust import TrustList
 from impactcell.scada.users import Users

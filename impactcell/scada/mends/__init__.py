@@ -21,7 +21,7 @@ subscriptions, reads, calls, history - is not used at all; these modules take it
 `monitored`         items that exist, with the filters they can have
 `monitoring`        Republish, TransferSubscriptions, subscriptions that belong to their session
 `eventfilter`       OfType with subtypes, three-valued where clauses
-`histories`         time bounds, continuation, aggregates, events
+`histories`         rights, events; with `spans` time bounds and continuation, `processed` aggregates
 `wire`              values encoded once for all subscribers
 ==================  =================================================================================
 """

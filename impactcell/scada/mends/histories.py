@@ -4,45 +4,22 @@ Mended: asyncua keeps history in memory or in a table of its own, mistakes the e
 continuation points that survive values with equal times, and no aggregates.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
-from impactcell.records import Quality
-from impactcell.scada.aggregates import Aggregate, Interval, Treatment, intervals, process
-from impactcell.scada.descriptions import HistorySource, HistoryValue
+from impactcell.scada.descriptions import HistorySource
 from impactcell.scada.mends.codec import FaultError
 from impactcell.scada.mends.dispatch import Context, Service, bounded
 from impactcell.scada.mends.eventfilter import Event, EventFilter
+from impactcell.scada.mends.processed import read_processed
+from impactcell.scada.mends.spans import Series, Span, data_value, rest, span
 from impactcell.scada.rights import Area, Right, allowed
-from impactcell.scada.values import STATUS, moment, nanoseconds, with_timestamps
+from impactcell.scada.values import with_timestamps
 
-PAGE: Final = 1_000
 MOST_NODES: Final = 100
-MOST_INTERVALS: Final = 1_000_000
-BEGINNING: Final = ua.get_win_epoch()
-
-AGGREGATES: Final = {
-    ua.NodeId(ua.ObjectIds.AggregateFunction_Average): Aggregate.AVERAGE,
-    ua.NodeId(ua.ObjectIds.AggregateFunction_Minimum): Aggregate.MINIMUM,
-    ua.NodeId(ua.ObjectIds.AggregateFunction_Maximum): Aggregate.MAXIMUM,
-    ua.NodeId(ua.ObjectIds.AggregateFunction_Count): Aggregate.COUNT,
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """A question about a span of time: `left` values at most are still wanted, None for all."""
-
-    start_ns: int | None
-    end_ns: int | None
-    newest_first: bool
-    left: int | None
-    resume: bytes | None = None
-
 
 EventOf = Callable[[str, Any], Event]
 """Makes the event again that an alarm's transition was told with."""
@@ -105,7 +82,7 @@ class Histories:
                 return result
             details = wanted.HistoryReadDetails
             self._check(node, context, events=isinstance(details, ua.ReadEventDetails))
-            data, rest = await self._ask(node.NodeId, details, index, state)
+            data, left = await self._ask(node.NodeId, details, index, state)
         except FaultError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
@@ -115,7 +92,7 @@ class Histories:
         else:
             empty = not data.Events
         result.HistoryData = data
-        result.ContinuationPoint = kept.keep(rest) if rest is not None else None
+        result.ContinuationPoint = kept.keep(left) if left is not None else None
         if empty:
             result.StatusCode = ua.StatusCode(ua.StatusCodes.GoodNoData)
         return result
@@ -140,162 +117,50 @@ class Histories:
         if node.IndexRange:
             raise FaultError(ua.StatusCodes.BadIndexRangeInvalid)
 
+    def _series(self, node: ua.NodeId) -> Series:
+        return Series(self._source, *self._variables[node])
+
     async def _raw(
         self, node: ua.NodeId, details: ua.ReadRawModifiedDetails, state: Span | None
     ) -> tuple[ua.HistoryData, Span | None]:
-        if details.ReturnBounds:
-            raise FaultError(ua.StatusCodes.BadHistoryOperationUnsupported)
-        span = state or _span(details.StartTime, details.EndTime, details.NumValuesPerNode)
-        cell, variable = self._variables[node]
-        values, rest = await self._page(cell, variable, span)
-        data = ua.HistoryData()
-        data.DataValues = [_data_value(value) for value in values]
-        return data, rest
-
-    async def _page(self, cell: str, variable: str, span: Span) -> tuple[Sequence[HistoryValue], Span | None]:
-        most = PAGE if span.left is None else min(PAGE, span.left)
-        page = await self._source.values(
-            cell,
-            variable,
-            span.start_ns,
-            span.end_ns,
-            most,
-            newest_first=span.newest_first,
-            resume=span.resume,
+        series = self._series(node)
+        asked = state or span(
+            details.StartTime, details.EndTime, details.NumValuesPerNode, bounds=details.ReturnBounds
         )
-        return page.values, _rest(span, len(page.values), page.resume)
+        values, left = await series.page(asked)
+        data = ua.HistoryData()
+        data.DataValues = [data_value(value) for value in values]
+        if asked.bounds is not None:
+            start, end = asked.bounds
+            if state is None and (not values or values[0].time_ns != start):
+                data.DataValues.insert(0, await series.bound(start, later=asked.newest_first))
+            if left is None:
+                data.DataValues.append(await series.bound(end, later=not asked.newest_first))
+        return data, left
 
     async def _processed(
         self, node: ua.NodeId, details: ua.ReadProcessedDetails, kind: ua.NodeId, state: int | None
     ) -> tuple[ua.HistoryData, int | None]:
-        aggregate = AGGREGATES.get(kind)
-        if aggregate is None:
-            raise FaultError(ua.StatusCodes.BadAggregateNotSupported)
-        treatment = _treatment(details.AggregateConfiguration)
-        if (
-            details.StartTime <= BEGINNING
-            or details.EndTime <= BEGINNING
-            or details.StartTime == details.EndTime
-        ):
-            raise FaultError(ua.StatusCodes.BadInvalidTimestampArgument)
-        if not 0.0 <= details.ProcessingInterval < 1e15:
-            raise FaultError(ua.StatusCodes.BadAggregateInvalidInputs)
-        start, end = nanoseconds(details.StartTime), nanoseconds(details.EndTime)
-        step = int(details.ProcessingInterval * 1e6)
-        if step and abs(end - start) // step > MOST_INTERVALS:
-            raise FaultError(ua.StatusCodes.BadAggregateInvalidInputs)
-        at = state if state is not None else start
-        wanted: list[Interval] = []
-        rest: int | None = None
-        for interval in intervals(at, end, step):
-            if len(wanted) == PAGE:
-                rest = interval.start_ns
-                break
-            wanted.append(interval)
         data = ua.HistoryData()
-        data.DataValues = await self._aggregate(self._variables[node], aggregate, wanted, treatment)
-        return data, rest
-
-    async def _aggregate(
-        self, variable: tuple[str, str], aggregate: Aggregate, wanted: list[Interval], treatment: Treatment
-    ) -> list[ua.DataValue]:
-        first, last = await self._ends(*variable)
-        span = Span(
-            min(min(i.start_ns, i.end_ns) for i in wanted),
-            max(max(i.start_ns, i.end_ns) for i in wanted),
-            newest_first=wanted[0].start_ns > wanted[0].end_ns,
-            left=None,
-        )
-        held: list[HistoryValue] = []
-        rest: Span | None = span
-        results = []
-        for interval in wanted:
-            # Values come in the order of the intervals: read on until one lies beyond this interval.
-            while rest is not None and (
-                not held or held[-1].time_ns in interval or _before(held[-1], interval)
-            ):
-                values, rest = await self._page(*variable, rest)
-                held.extend(values)
-            inside = [value for value in held if value.time_ns in interval]
-            held = [value for value in held if not (value.time_ns in interval or _before(value, interval))]
-            low, high = sorted((interval.start_ns, interval.end_ns))
-            within = first is not None and last is not None and high > first and low <= last
-            results.append(process(aggregate, interval, inside, treatment, within=within))
-        kind = ua.VariantType.Int32 if aggregate is Aggregate.COUNT else ua.VariantType.Double
-        return [
-            ua.DataValue(
-                None if r.value is None else ua.Variant(r.value, kind),
-                ua.StatusCode(r.status),
-                moment(r.time_ns),
-            )
-            for r in results
-        ]
-
-    async def _ends(self, cell: str, variable: str) -> tuple[int | None, int | None]:
-        first = await self._source.values(cell, variable, None, None, 1)
-        last = await self._source.values(cell, variable, None, None, 1, newest_first=True)
-        if not first.values or not last.values:
-            return None, None
-        return first.values[0].time_ns, last.values[0].time_ns
+        data.DataValues, left = await read_processed(self._series(node), details, kind, state)
+        return data, left
 
     async def _events(
         self, node: ua.NodeId, details: ua.ReadEventDetails, state: Span | None
     ) -> tuple[ua.HistoryEvent, Span | None]:
         wanted = EventFilter(self._space, details.Filter)
-        span = state or _span(details.StartTime, details.EndTime, details.NumValuesPerNode)
+        asked = state or span(details.StartTime, details.EndTime, details.NumValuesPerNode)
         cell = self._notifiers[node]
-        most = PAGE if span.left is None else min(PAGE, span.left)
         page = await self._source.alarms(
-            cell, span.start_ns, span.end_ns, most, newest_first=span.newest_first, resume=span.resume
+            cell,
+            asked.start_ns,
+            asked.end_ns,
+            asked.page,
+            newest_first=asked.newest_first,
+            resume=asked.resume,
         )
         data = ua.HistoryEvent()
         events = [self._event_of(cell, alarm) for alarm in page.alarms]
         passed = [event for event in events if wanted.passes(event)]
         data.Events = [ua.HistoryEventFieldList(wanted.select(event).EventFields) for event in passed]
-        return data, _rest(span, len(passed), page.resume)
-
-
-def _before(value: HistoryValue, interval: Interval) -> bool:
-    forward = interval.start_ns <= interval.end_ns
-    return value.time_ns < interval.start_ns if forward else value.time_ns > interval.start_ns
-
-
-def _rest(span: Span, given: int, resume: bytes | None) -> Span | None:
-    left = None if span.left is None else span.left - given
-    if resume is None or left == 0:
-        return None
-    return replace(span, left=left, resume=resume)
-
-
-def _span(start: Any, end: Any, most: int) -> Span:
-    """Read the bounds of a question (Part 11, 6.4.3.2): two of start, end and number are needed.
-
-    The start belongs to the span and the end does not, in whichever direction time runs.
-    """
-    begin = nanoseconds(start) if start is not None and start > BEGINNING else None
-    finish = nanoseconds(end) if end is not None and end > BEGINNING else None
-    left = most or None
-    if (begin is None) + (finish is None) + (left is None) > 1:
-        raise FaultError(ua.StatusCodes.BadInvalidTimestampArgument)
-    if begin is None:
-        # Backwards from the end, which is where the question begins and so belongs to it.
-        return Span(None, finish, newest_first=True, left=left)
-    if finish is None:
-        return Span(begin, None, newest_first=False, left=left)
-    if begin > finish:
-        return Span(finish + 1, begin, newest_first=True, left=left)
-    return Span(begin, max(finish - 1, begin), newest_first=False, left=left)
-
-
-def _treatment(given: ua.AggregateConfiguration) -> Treatment:
-    if given.UseServerCapabilitiesDefaults:
-        return Treatment()
-    bad, good = given.PercentDataBad, given.PercentDataGood
-    if bad > 100 or good > 100 or bad + good < 100:
-        raise FaultError(ua.StatusCodes.BadAggregateConfigurationRejected)
-    return Treatment(given.TreatUncertainAsBad, bad, good)
-
-
-def _data_value(value: HistoryValue) -> ua.DataValue:
-    variant = ua.Variant(value.value, ua.VariantType.Double)
-    return ua.DataValue(variant, STATUS[Quality(value.quality)], moment(value.time_ns), moment(value.time_ns))
+        return data, rest(asked, len(passed), page.resume)
