@@ -1,0 +1,336 @@
+"""Each effect against its law in closed form, at its null value, and on what it may act."""
+
+import itertools
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from simulator.effects import LIBRARY, UNLISTED, build
+from simulator.plant import Motion, Plant, Shot, Strike, free_slide, tap
+
+G = 9.81
+PLANT = Plant(6.5e5, 465.0, 0.2, 0.152)
+STRIKE = Strike(0.06, 18.9, stroke_m=0.0015, start_m=0.002, dwell_s=20.0, shot=3, shots=10, batch=1)
+TIME = np.arange(1, 1200) * 1e-4
+
+VOCABULARY = {
+    *("viscous_friction", "stribeck_friction", "quadratic_drag", "surface_tilt", "hertz_contact"),
+    *("hunt_crossley_damping", "actuator_droop", "actuator_ramp", "position_dependent_friction"),
+    *("periodic_friction", "friction_patch", "adhesion", "presliding_compliance", "restoring_force"),
+    *("mass_error", "force_sensor_lag", "force_sensor_gain", "force_sensor_offset", "force_saturation"),
+    *("channel_skew", "stiction_ageing", "friction_drift", "batch_shift", "direction_asymmetry"),
+}
+NULL = {
+    "hertz_contact": {"exponent": 1.0},
+    "force_saturation": {"limit_n": 1e9},
+    "presliding_compliance": {"stiffness_n_per_m": 1e9},
+    "batch_shift": {"relative_change": (0.0,)},
+    "stribeck_friction": {"friction_increase": 0.0, "stribeck_velocity_m_s": 0.04},
+    "adhesion": {"force_n": 0.0, "range_m": 3e-4},
+    "actuator_droop": {"speed_loss_m_per_s_n": 0.0, "time_constant_s": 0.003},
+    "periodic_friction": {"amplitude": 0.0, "period_m": 0.001, "phase_rad": 0.0},
+    "friction_patch": {"amplitude": 0.0, "position_m": 0.003, "width_m": 0.001},
+}
+
+
+def struck(effects: dict[str, dict[str, object]], strike: Strike = STRIKE) -> Motion:
+    return tap(replace(PLANT, effects=effects), strike)
+
+
+def slid(name: str, speed: float = 0.15, shot: Shot | None = None, **parameters: float) -> Motion:
+    return free_slide(replace(PLANT, effects={name: parameters}), 18.9, speed, shot)
+
+
+def test_the_whole_vocabulary_and_nothing_else() -> None:
+    assert set(LIBRARY) == VOCABULARY
+    assert len(UNLISTED) >= 6
+    assert not set(UNLISTED) & VOCABULARY
+
+
+def test_one_file_an_effect() -> None:
+    root = Path(__file__).parents[3] / "simulator" / "effects"
+    assert {file.stem for file in root.glob("*.py")} - {"__init__", "law"} == VOCABULARY
+
+
+@pytest.mark.parametrize("name", sorted(VOCABULARY))
+def test_vanishes_at_its_null_value(name: str) -> None:
+    null = NULL.get(name) or dict.fromkeys(LIBRARY[name].defaults, 0.0)
+    # The damper's first jolt b v makes elastic stick ring at any stiffness: only without b its limit is rigid.
+    elastic = name == "presliding_compliance"
+    plant = replace(PLANT, damping_n_s_per_m=0.0) if elastic else PLANT
+    nominal, motion = tap(plant, STRIKE), tap(replace(plant, effects={name: null}), STRIKE)
+    tolerance = 1e-4 if elastic else 1e-9
+    assert motion.sliding_distance_m == pytest.approx(nominal.sliding_distance_m, rel=tolerance)
+    assert motion.peak_force_n == pytest.approx(nominal.peak_force_n, rel=tolerance)
+    np.testing.assert_allclose(motion.position_m(TIME), nominal.position_m(TIME), atol=0.01 * tolerance)
+    np.testing.assert_allclose(motion.force_n(TIME), nominal.force_n(TIME), atol=300.0 * max(tolerance, 1e-8))
+
+
+@pytest.mark.parametrize("name", sorted([*LIBRARY, *UNLISTED]))
+def test_shows_at_its_default_strength(name: str) -> None:
+    defaults = dict((LIBRARY.get(name) or UNLISTED[name]).defaults)
+    # Stiction shows in slow taps only, saturation in fast ones.
+    velocity = 0.035 if name == "stiction_ageing" else 0.06
+    strike = replace(STRIKE, mass_kg=25.2, velocity_m_s=velocity, start_m=0.0)
+    nominal, motion = struck({}, strike), struck({name: defaults}, strike)
+    force = np.abs(motion.force_n(TIME) - nominal.force_n(TIME)).max()
+    position = np.abs(motion.position_m(TIME) - nominal.position_m(TIME)).max()
+    assert force > 0.8 or position > 3e-6
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in sorted(VOCABULARY) if name.startswith(("force_s", "channel"))]
+)
+def test_sensors_move_nothing(name: str) -> None:
+    motion = struck({name: dict(LIBRARY[name].defaults)})
+    np.testing.assert_allclose(motion.position_m(TIME), struck({}).position_m(TIME), atol=1e-12)
+
+
+def test_all_at_once() -> None:
+    effects = {name: dict(kind.defaults) for name, kind in LIBRARY.items()}
+    motion = struck(effects)
+    assert np.isfinite(motion.force_n(TIME)).all()
+    assert motion.displacement_m > 0.0
+
+
+def test_viscous_slide() -> None:
+    motion = slid("viscous_friction", viscous_coefficient_n_s_per_m=60.0)
+    rate, steady = 60.0 / 18.9, 0.152 * G * 18.9 / 60.0
+    stop = math.log1p(0.15 / steady) / rate
+    assert motion.stop_s == pytest.approx(stop, rel=1e-10)
+    assert motion.displacement_m == pytest.approx(0.15 / rate - steady * stop, rel=1e-9)
+
+
+def test_quadratic_slide() -> None:
+    motion = slid("quadratic_drag", drag_coefficient_n_s2_per_m2=250.0)
+    expected = 18.9 / 500.0 * math.log1p(250.0 * 0.15**2 / (0.152 * 18.9 * G))
+    assert motion.displacement_m == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_tilted_slide(direction: int) -> None:
+    motion = slid("surface_tilt", shot=Shot(direction=direction), tilt_rad=0.02)
+    expected = 0.15**2 / (2.0 * G * (0.152 + direction * math.sin(0.02)))
+    assert motion.displacement_m == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_restored_slide(direction: int) -> None:
+    start, k_r, mass = 0.01, 300.0, 18.9
+    motion = slid("restoring_force", shot=Shot(direction=direction, start_m=start), stiffness_n_per_m=k_r)
+    # Kinetic energy goes into friction and the spring: m v²/2 = mu m g s + k_r ((x_0 ± s)² - x_0²)/2.
+    s = brentq(
+        lambda s: (
+            0.152 * mass * G * s
+            + 0.5 * k_r * ((start + direction * s) ** 2 - start**2)
+            - 0.5 * mass * 0.15**2
+        ),
+        0.0,
+        0.05,
+        xtol=1e-15,
+    )
+    assert motion.displacement_m == pytest.approx(s, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "factor"),
+    [
+        ("position_dependent_friction", {"gradient_per_m": 20.0}, lambda x: 1.0 + 20.0 * x),
+        (
+            "periodic_friction",
+            {"amplitude": 0.3, "period_m": 0.0013, "phase_rad": 0.7},
+            lambda x: 1.0 + 0.3 * math.sin(2.0 * math.pi * x / 0.0013 + 0.7),
+        ),
+        (
+            "friction_patch",
+            {"amplitude": 0.4, "position_m": 0.005, "width_m": 0.0006},
+            lambda x: 1.0 + 0.4 * math.exp(-((x - 0.005) ** 2) / (2.0 * 0.0006**2)),
+        ),
+    ],
+)
+@pytest.mark.parametrize("direction", [1, -1])
+def test_friction_along_the_table(
+    name: str, parameters: dict[str, float], factor: object, direction: int
+) -> None:
+    assert callable(factor)
+    start = 0.003 if direction == 1 else 0.008
+    motion = slid(name, shot=Shot(direction=direction, start_m=start), **parameters)
+
+    def surplus(s: float) -> float:
+        work = quad(lambda u: factor(start + direction * u), 0.0, s, epsabs=1e-13, limit=200)[0]
+        return 0.152 * G * work - 0.5 * 0.15**2
+
+    assert motion.displacement_m == pytest.approx(brentq(surplus, 0.0, 0.03, xtol=1e-14), rel=1e-8)
+
+
+def test_hertz_force_at_known_indentation() -> None:
+    motion = struck({"hertz_contact": {"exponent": 1.2}}, replace(STRIKE, velocity_m_s=0.001, stroke_m=3e-5))
+    assert motion.displacement_m == 0.0
+    assert motion.contact_force_n(np.array([9.0]))[0] == pytest.approx(6.5e5 * 3e-5**1.2, rel=1e-12)
+
+
+def test_hunt_crossley_acts_on_departure_too() -> None:
+    motion = struck({"hunt_crossley_damping": {"damping_n_s_per_m2": 6e5}})
+    turn, leave = (next(e.time_s for e in motion.events if e.kind == kind) for kind in ("turn", "separation"))
+    time = np.linspace(turn, leave, 20)[1:-1]
+    d = motion.actuator_m(time) - motion.position_m(time)
+    rate = 0.06 - motion.velocity_m_s(time)
+    np.testing.assert_allclose(motion.contact_force_n(time), 6.5e5 * d + 6e5 * d * rate, rtol=1e-7)
+
+
+def test_droop_follows_its_equation() -> None:
+    c, tau = 2e-5, 0.003
+    motion = struck({"actuator_droop": {"speed_loss_m_per_s_n": c, "time_constant_s": tau}})
+    time = np.linspace(0.001, 0.006, 6)
+    for t in time:
+        memory = quad(
+            lambda s, t=t: math.exp(-(t - s) / tau) * c / tau * motion.contact_force_n(np.array([s]))[0],
+            0.0,
+            t,
+            points=[motion.breakaway_s],
+        )[0]
+        step = 1e-6
+        ends = motion.actuator_m(np.array([t - step, t + step]))
+        assert (ends[1] - ends[0]) / (2.0 * step) == pytest.approx(0.06 - memory, rel=1e-5)
+
+
+def test_droop_without_lag_is_the_limit_of_a_short_one() -> None:
+    at_once = struck({"actuator_droop": {"speed_loss_m_per_s_n": 2e-5, "time_constant_s": 0.0}})
+    short = struck({"actuator_droop": {"speed_loss_m_per_s_n": 2e-5, "time_constant_s": 1e-5}})
+    assert at_once.sliding_distance_m == pytest.approx(short.sliding_distance_m, rel=1e-3)
+
+
+def test_ramp_travels_half_as_far_meanwhile() -> None:
+    motion = struck({"actuator_ramp": {"ramp_time_s": 0.004}})
+    expected = [0.06 * 0.002**2 / 0.008, 0.06 * 0.002, 0.06 * 0.002 + 0.06 * 0.002]
+    np.testing.assert_allclose(motion.actuator_m(np.array([0.002, 0.004, 0.006])), expected, rtol=1e-12)
+
+
+def test_adhesion_takes_its_work_from_the_slide() -> None:
+    # An actuator that halts at separation leaves the whole gap to be pulled open: A l/2 of work.
+    strike = Strike(0.06, 18.9, halts_at_separation=True)
+    with_pull, without = struck({"adhesion": {"force_n": 15.0, "range_m": 3e-4}}, strike), struck({}, strike)
+    lost = 0.5 * 15.0 * 3e-4
+    expected = without.sliding_distance_m - lost / (0.152 * 18.9 * G)
+    assert with_pull.sliding_distance_m == pytest.approx(expected, rel=1e-7)
+    assert with_pull.contact_force_n(np.array([with_pull.separation_s + 1e-6]))[0] == pytest.approx(
+        -15.0, rel=0.01
+    )
+
+
+def test_presliding_breaks_away_at_its_limit() -> None:
+    s0 = 3e6
+    motion = struck({"presliding_compliance": {"stiffness_n_per_m": s0}})
+    moved = motion.position_m(np.array([motion.breakaway_s]))[0]
+    assert moved == pytest.approx(0.2 * 18.9 * G / s0, rel=1e-9)
+
+
+def test_presliding_before_breakaway_is_an_oscillator() -> None:
+    k, b, s0, m, v = 6.5e5, 465.0, 3e6, 18.9, 0.01
+    motion = struck({"presliding_compliance": {"stiffness_n_per_m": s0}}, replace(STRIKE, velocity_m_s=v))
+    # m x'' = k (v t - x) + b (v - x') - s0 x: a particular line plus a damped oscillation from rest.
+    slope = k * v / (k + s0)
+    offset = (b * v - b * slope) / (k + s0)
+    gamma = b / (2.0 * m)
+    omega = math.sqrt((k + s0) / m - gamma**2)
+    time = np.linspace(0.0, 0.004, 30)
+    sine = (-slope - gamma * offset) / omega
+    wave = np.exp(-gamma * time) * (-offset * np.cos(omega * time) + sine * np.sin(omega * time))
+    np.testing.assert_allclose(motion.position_m(time), slope * time + offset + wave, atol=1e-13)
+
+
+def test_mass_error_is_another_mass() -> None:
+    motion = struck({"mass_error": {"relative_error": 0.1}})
+    assert motion.displacement_m == struck({}, replace(STRIKE, mass_kg=18.9 * 1.1)).displacement_m
+
+
+def test_sensor_chain_gain_then_offset_then_saturation() -> None:
+    effects = {
+        "force_saturation": {"limit_n": 200.0},
+        "force_sensor_offset": {"offset_n": 1.5},
+        "force_sensor_gain": {"relative_error": 0.03},
+    }
+    force = struck({}).force_n(TIME)
+    np.testing.assert_allclose(
+        struck(effects).force_n(TIME), np.minimum(force * 1.03 + 1.5, 200.0), atol=1e-9
+    )
+
+
+def test_skew_records_late() -> None:
+    motion = struck({"channel_skew": {"delay_s": 1e-4}})
+    force = struck({}).force_n(TIME - 1e-4)
+    np.testing.assert_allclose(motion.force_n(TIME), force, atol=1e-6)
+    assert struck({"channel_skew": {"delay_s": 1e-4}}).force_n(np.array([5e-5]))[0] == 0.0
+
+
+def test_lag_against_convolution() -> None:
+    tau = 5e-4
+    lagged, motion = struck({"force_sensor_lag": {"time_constant_s": tau}}), struck({})
+    breaks = [event.time_s for event in motion.events]
+    for t in (0.002, 0.012, 0.03):
+        expected = quad(
+            lambda s, t=t: math.exp(-(t - s) / tau) / tau * motion.contact_force_n(np.array([s]))[0],
+            0.0,
+            t,
+            points=[p for p in breaks if 0.0 < p < t],
+            limit=200,
+        )[0]
+        assert lagged.force_n(np.array([t]))[0] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "static", "kinetic"),
+    [
+        ("stiction_ageing", {"increase_per_decade": 0.05}, 1.0 + 0.05 * math.log10(20.0), 1.0),
+        ("friction_drift", {"relative_change": 0.1}, 1.0 + 0.1 * (0.3 - 0.5), 1.0 + 0.1 * (0.3 - 0.5)),
+        ("batch_shift", {"relative_change": (0.06, -0.03)}, 1.06, 1.06),
+        ("direction_asymmetry", {"relative_amplitude": 0.04}, 1.04, 1.04),
+    ],
+)
+def test_between_shots(name: str, parameters: dict[str, object], static: float, kinetic: float) -> None:
+    motion = struck({name: parameters})
+    assert motion.mu_s == pytest.approx(0.2 * static, rel=1e-12)
+    assert motion.mu_k == pytest.approx(0.152 * kinetic, rel=1e-12)
+    plant = replace(PLANT, mu_s=0.2 * static, mu_k=0.152 * kinetic)
+    assert motion.displacement_m == pytest.approx(tap(plant, STRIKE).displacement_m, rel=1e-9)
+
+
+def test_covariates_at_their_ends() -> None:
+    def mu_s(name: str, parameters: dict[str, object], **changed: float) -> float:
+        return struck({name: parameters}, replace(STRIKE, **changed)).mu_s
+
+    ageing = {"increase_per_decade": 0.05}
+    assert mu_s("stiction_ageing", ageing, dwell_s=0.001) == pytest.approx(0.2 * 0.95)
+    assert mu_s("stiction_ageing", ageing, dwell_s=math.nan) == 0.2
+    assert mu_s("batch_shift", {"relative_change": (0.06,)}, batch=0) == 0.2
+    assert mu_s("direction_asymmetry", {"relative_amplitude": 0.04}, direction=-1) == pytest.approx(0.192)
+
+
+def test_loose_mass_shares_the_momentum() -> None:
+    # By the time the part stops the loose mass rings no more: contact and friction share out all momentum.
+    effects = {"loose_mass": {"mass_kg": 2.0, "stiffness_n_per_m": 2e5, "damping_n_s_per_m": 60.0}}
+    motion = tap(
+        Plant(6.5e5, 465.0, 0.02, 0.02, effects=effects), Strike(0.06, 10.0, halts_at_separation=True)
+    )
+    turns = [event.time_s for event in motion.events if event.time_s < motion.separation_s]
+    impulse = 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    for begin, end in itertools.pairwise(sorted({0.0, *turns, motion.separation_s})):
+        time = begin + 0.5 * (end - begin) * (nodes + 1.0)
+        impulse += 0.5 * (end - begin) * float(weights @ motion.contact_force_n(time))
+    friction = 0.02 * 10.0 * G * (motion.stop_s - motion.breakaway_s)
+    assert impulse == pytest.approx(friction, rel=1e-4)
+    solid = tap(Plant(6.5e5, 465.0, 0.02, 0.02), Strike(0.06, 10.0, halts_at_separation=True))
+    assert abs(motion.peak_force_n / solid.peak_force_n - 1.0) > 0.001
+
+
+def test_unknown_effects_and_parameters_are_refused() -> None:
+    with pytest.raises(ValueError, match="unknown effect 'wind'"):
+        build({"wind": {}})
+    with pytest.raises(ValueError, match="viscous_friction has the parameters"):
+        build({"viscous_friction": {"k_v": 1.0}})
