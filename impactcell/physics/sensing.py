@@ -55,7 +55,7 @@ def exponential_moments(theta: float, ratio: float, out: Numbers) -> None:
             out[j] = value
     else:
         value = 0.0
-        for j in range(n + 24, 0, -1):
+        for j in range(n + 14, 0, -1):
             value = (1.0 - value) / (j * relative)
             if j - 1 < n:
                 out[j - 1] = value
