@@ -21,6 +21,8 @@ from impactcell.records import Samples
 WEIGHT, CHANGE, MEAN, COVARIANCE, WIDTH = 0, 1, 2, 6, 22
 OUTLIER_SCALE = 10.0  # an outlier's standard deviation in units of a good measurement's
 CAPACITY = 60
+ROWS = CAPACITY + 2
+WINDOW = 1000.0  # cycles within which a change must be to be reported
 RECENT = 16  # change cycles this recent are each kept
 DROPPED_NATS = 30.0  # a hypothesis this far below the best is given up
 
@@ -190,10 +192,10 @@ def _prune(bank: Samples, count: int, capacity: int, recent: int, cycle: float, 
 
 
 @compiled
-def _odds(bank: Samples, count: int, accepted: float, hazard: float) -> float:
-    """Shiryaev-Roberts log statistic: changed after `accepted` against not, the prior odds taken out."""
+def _odds(bank: Samples, count: int, since: float, hazard: float) -> float:
+    """Shiryaev-Roberts log statistic: changed after `since` against not, the prior odds taken out."""
     split = 0
-    while split < count and bank[split, 1] <= accepted:
+    while split < count and bank[split, 1] <= since:
         split += 1
     if split == 0 or split == count:
         return -np.inf if split == count else np.inf
@@ -236,7 +238,21 @@ def run_cycle(
             count = _spawn(bank, count, cycle, min(hazard * cycles, 0.5), step, 0.0)
     density = _update(bank, count, value, variance, lag, cycle, outliers)
     count = _prune(bank, count, int(capacity), int(recent), cycle + lag, accepted)
-    return count, density, _odds(bank, count, accepted, hazard)
+    # only changes within the window count: over very long spans some tiny change is all but certain
+    since = max(accepted, cycle + lag - WINDOW)
+    return count, density, _odds(bank, count, since, hazard)
+
+
+@compiled
+def run_series(
+    bank: Samples, count: int, design: Samples, readings: Samples, accepted: float
+) -> tuple[int, float]:
+    """Take readings, shape (n, 6), one after another, after that of `seed`; sum log densities."""
+    total = 0.0
+    for reading in readings[1:]:
+        count, density, _ = run_cycle(bank, count, design, reading, accepted)
+        total += density
+    return count, total
 
 
 def seed(value: float, variance: float, slope_std: float, cycle: int, outliers: float) -> Samples:

@@ -34,6 +34,8 @@ class Noise:
         The estimate before, with the declared standard deviation used for it; nan before the first.
     identical : int
         How many values in a row have been the same.
+    guessed : bool
+        No standard deviation was ever declared; the scale was guessed and is learned.
     """
 
     factor: float = 1.0
@@ -42,6 +44,7 @@ class Noise:
     last_value: float = math.nan
     last_std: float = math.nan
     identical: int = 0
+    guessed: bool = False
 
 
 def declared_std(noise: Noise, value: float, std: float) -> tuple[Noise, float]:
@@ -52,7 +55,7 @@ def declared_std(noise: Noise, value: float, std: float) -> tuple[Noise, float]:
     if not math.isnan(noise.usual_std):
         return noise, noise.usual_std
     guess = GUESSED_RELATIVE_STD * abs(value)
-    return replace(noise, usual_std=guess, weight=1.0), guess
+    return replace(noise, usual_std=guess, weight=1.0, guessed=True), guess
 
 
 def learn(noise: Noise, value: float, std: float) -> Noise:
@@ -64,6 +67,12 @@ def learn(noise: Noise, value: float, std: float) -> Noise:
     weight = min(noise.weight + 1.0, MEMORY)
     factor = max(noise.factor + (clipped - noise.factor) / weight, SMALLEST_FACTOR)
     return replace(noise, factor=factor, weight=weight, last_value=value, last_std=std)
+
+
+def variance(noise: Noise, std: float) -> float:
+    """Variance of an estimate that declares `std`; wider while a guessed scale rests on few differences."""
+    doubt = 1.0 + 4.0 / noise.weight if noise.guessed else 1.0
+    return noise.factor * doubt * std**2
 
 
 def count_identical(noise: Noise, value: float) -> Noise:

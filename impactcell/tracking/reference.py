@@ -75,7 +75,7 @@ def restart(reference: Reference) -> Reference:
 
 
 def without_variation(components: Samples, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
-    """Information on the mean rather than on one cycle: (G^-1 + C C')^-1, and the vector that goes with it."""
+    """Information on the mean rather than on one cycle: (G^-1 + C C')^-1, and its vector."""
     image = matrix @ components
     inner = np.eye(components.shape[1]) + components.T @ image
     solved = np.linalg.solve(inner, np.column_stack([image.T, components.T @ vector]))
@@ -115,7 +115,7 @@ def _learn_variation(reference: Reference, slide: profile.Information) -> Refere
     share = reference.weight / (reference.weight + 1.0)
     own = slide.vector - slide.matrix @ reference.mean
     known = basis.T @ slide.matrix @ basis
-    posterior = np.linalg.inv(np.linalg.inv(spread) / 1.0 + known * share)
+    posterior = np.linalg.inv(np.linalg.inv(spread) + known * share)
     score = posterior @ (basis.T @ own) * share
     scatter = reference.scatter + np.outer(score, score) + posterior
     cycles = reference.cycles + 1
@@ -126,7 +126,8 @@ def _learn_variation(reference: Reference, slide: profile.Information) -> Refere
 def _principal(spread: Samples, coefficients: int) -> Samples:
     values, vectors = np.linalg.eigh(spread)
     scaled = vectors[:, ::-1] * np.sqrt(np.maximum(values[::-1], 0.0))
-    return cosines(coefficients) @ scaled
+    components: Samples = cosines(coefficients) @ scaled
+    return components
 
 
 @lru_cache(maxsize=8)
@@ -134,4 +135,5 @@ def cosines(coefficients: int) -> Samples:
     """Lowest cosines along the grid, of unit mean square, shape (j, 6)."""
     place = (np.arange(coefficients) + 0.5) / coefficients
     modes = np.cos(math.pi * np.outer(place, np.arange(MODES)))
-    return modes / np.sqrt((modes**2).mean(axis=0))
+    unit: Samples = modes / np.sqrt((modes**2).mean(axis=0))
+    return unit

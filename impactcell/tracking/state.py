@@ -7,6 +7,8 @@ import numpy as np
 
 from impactcell.records import BatchState, Evidence, FrictionEstimate, Samples, WearState
 from impactcell.tracking.bank import WIDTH
+from impactcell.tracking.commissioning import History
+from impactcell.tracking.honesty import Monitor
 from impactcell.tracking.noise import Noise
 from impactcell.tracking.screening import Clock
 from impactcell.tracking.wear import WearFilter
@@ -39,7 +41,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """The last batch shift: size in mu_s, its first cycle, and whether it was found or announced."""
+    """The last batch shift: index of its first cycle, size in mu_s, and how it was found."""
 
     cycle: int
     size: float
@@ -47,7 +49,6 @@ class Shift:
     found_at: int = 0
     statistic: float = math.nan
     threshold: float = math.nan
-    expected: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +84,8 @@ class TrackerState:
     tested: bool = True
     shift: Shift | None = None
     first: int = 0
+    history: History | None = None
+    monitor: Monitor = field(default_factory=Monitor)
     level_variance: float = 0.0
     slope_variance: float = 0.0
 

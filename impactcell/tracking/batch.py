@@ -1,0 +1,92 @@
+"""Friction over batches: shifts found by the bank where the PLC says nothing, tested where it does."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell.tracking import bank as banks
+from impactcell.tracking import wear
+from impactcell.tracking.screening import Place
+from impactcell.tracking.settings import TrackerSettings
+from impactcell.tracking.state import Reading, Shift, TrackerState
+
+FEWEST_DIFFERENCES = 12.0  # a guessed scale of the noise must rest on so many before a shift is believed
+
+
+def find_shift(
+    settings: TrackerSettings,
+    state: TrackerState,
+    reading: Reading,
+    variance: float,
+    where: Place,
+    announced: float,
+) -> tuple[TrackerState, Shift | None, float]:
+    """Take a reading into the bank; report the shift that it makes certain enough.
+
+    Parameters
+    ----------
+    announced : float
+        1: a batch change came with this cycle, -1: surely none, 0: nobody says.
+
+    Returns
+    -------
+    state : TrackerState
+    shift : Shift or None
+    innovation : float
+        Reading minus the bank's prediction, in standard deviations.
+    """
+    table = np.zeros((banks.ROWS, banks.WIDTH))
+    table[: len(state.bank)] = state.bank
+    design = banks.design(
+        settings.hazard,
+        settings.step_std**2 * variance,
+        state.level_variance,
+        state.slope_variance,
+        settings.outlier_probability,
+    )
+    values = np.array([reading.mu_s, variance, where.passed, where.lag, where.index, announced])
+    before, spread = banks.moments(state.bank)
+    ahead = where.passed - where.lag
+    predicted = before[0] + ahead * before[1]
+    width = spread[0, 0] + 2.0 * ahead * spread[0, 1] + ahead**2 * spread[1, 1] + variance
+    innovation = float((reading.mu_s - predicted) / math.sqrt(width))
+    count, _, statistic = banks.run_cycle(table, len(state.bank), design, values, float(state.accepted))
+    fresh = replace(state, bank=table[:count].copy())
+    if announced > 0.0:
+        # an announced change is no finding, and what came before it has been settled by it
+        return replace(fresh, accepted_before=where.index - 1, accepted=where.index), None, innovation
+    threshold = banks.threshold(settings.false_alarm_cycles)
+    certain = statistic > threshold and state.noise.weight >= FEWEST_DIFFERENCES
+    if announced < 0.0 or where.lag > 0 or not certain:
+        return fresh, None, innovation
+    fresh = replace(fresh, accepted_before=state.accepted, accepted=where.index)
+    cycle, size, std = banks.last_shift(fresh.bank, fresh.accepted_before, fresh.accepted)
+    shift = Shift(cycle, size, std, where.index, statistic, threshold)
+    return replace(fresh, shift=shift), shift, innovation
+
+
+def compare_batch(
+    settings: TrackerSettings, state: TrackerState, variance: float, index: int
+) -> tuple[TrackerState, Shift | None]:
+    """Test whether the PLC's present batch differs from the one before.
+
+    The log Bayes factor of a shift against none, by the density ratio of Savage and Dickey; under no
+    shift its exponential is a martingale, so that a batch is reported in error with probability at
+    most 1 / threshold (Ville 1939). The threshold shares the false alarms out over the batches.
+    """
+    current, previous = state.filter, state.previous_batch
+    if current is None or previous is None or previous not in current.batches:
+        return state, None
+    size, std = wear.contrast(current, current.current, previous)
+    prior = settings.step_std * math.sqrt(variance)
+    statistic = 0.5 * (size / std) ** 2 + math.log(std / prior)
+    length = max(1.0, (state.batch_start - state.first) / max(state.batch_count - 1, 1))
+    threshold = math.log(max(settings.false_alarm_cycles / length, 20.0))
+    shift = Shift(state.batch_start, size, std, index, statistic, threshold)
+    if state.tested:
+        reported = state.shift is not None and state.shift.cycle == state.batch_start
+        return (replace(state, shift=shift) if reported else state), None
+    if statistic <= threshold or state.noise.weight < FEWEST_DIFFERENCES:
+        return state, None
+    return replace(state, shift=shift, tested=True), shift

@@ -1,0 +1,127 @@
+"""Process noise learned from a cell's first cycles: the random walks under which they are most likely.
+
+The likelihood is the bank's own, with batch changes and outliers already averaged over, so that neither
+passes for a random walk. A random walk is adopted only where it is clearly more likely than none: one
+adopted by mistake costs a wear rate most of its precision.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.records import Samples
+from impactcell.tracking import bank as banks
+from impactcell.tracking import wear
+from impactcell.tracking.settings import TrackerSettings
+
+SCHEDULE = (50, 100, 200)  # cycles after which there is a first look, before the end of commissioning
+EARLY = (4, 8, 16, 32, 64)  # cycles after which a guessed scale of the noise is corrected
+LEVEL_WALKS = (0.0, 0.01, 0.03, 0.1, 0.3)  # standard deviations a cycle, of one estimate's
+SLOPE_WALKS = (0.0, 1e-5, 1e-4, 1e-3)
+CLEARLY = 5.0  # nats by which a random walk must be more likely than none
+
+INDEX, VALUE, STD, ANNOUNCED, BATCH = range(5)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class History:
+    """The first cycles, as they were taken in.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (n, 5)
+        Index, value, declared standard deviation, what the bank was told of a batch change (1: one came,
+        -1: surely none, 0: nothing), place of the batch in `batches` (-1 without one).
+    batches : tuple of str
+    """
+
+    rows: Samples = field(default_factory=lambda: np.zeros((0, 5)))
+    batches: tuple[str, ...] = ()
+
+
+def remember(
+    history: History, index: int, value: float, std: float, announced: float, batch: str | None
+) -> History:
+    """Add one cycle."""
+    batches = history.batches
+    if batch is not None and batch not in batches:
+        batches = (*batches, batch)
+    place = -1.0 if batch is None else float(batches.index(batch))
+    rows = np.vstack([history.rows, [index, value, std, announced, place]])
+    return replace(history, rows=rows, batches=batches)
+
+
+def replay(
+    settings: TrackerSettings, history: History, factor: float, level_walk: float, slope_walk: float
+) -> tuple[Samples, float]:
+    """Run the bank over the history; give it back with the log likelihood.
+
+    Parameters
+    ----------
+    factor : float
+        Of the declared variances.
+    level_walk, slope_walk : float
+        Standard deviations a cycle, in standard deviations of one estimate.
+    """
+    rows = history.rows
+    variance = factor * rows[:, STD] ** 2
+    unit = float(np.median(variance))
+    readings = np.zeros((len(rows), 6))
+    readings[:, 0], readings[:, 1], readings[:, 4] = rows[:, VALUE], variance, rows[:, INDEX]
+    readings[1:, 2] = np.diff(rows[:, INDEX])
+    readings[:, 5] = rows[:, ANNOUNCED]
+    table = np.zeros((banks.ROWS, banks.WIDTH))
+    slope_std = settings.slope_std * float(np.sqrt(variance[0]))
+    first = banks.seed(
+        rows[0, VALUE], variance[0], slope_std, int(rows[0, INDEX]), settings.outlier_probability
+    )
+    table[: len(first)] = first
+    design = banks.design(
+        settings.hazard,
+        settings.step_std**2 * unit,
+        level_walk**2 * unit,
+        slope_walk**2 * unit,
+        settings.outlier_probability,
+    )
+    count, likelihood = banks.run_series(table, len(first), design, readings, rows[0, INDEX])
+    return table[:count].copy(), likelihood
+
+
+def most_likely(settings: TrackerSettings, history: History, factor: float) -> tuple[float, float]:
+    """Find the random walks of level and slope, in standard deviations of one estimate a cycle."""
+    start = (settings.level_noise, settings.slope_noise)
+
+    def likelihood(level: float, slope: float) -> float:
+        return replay(settings, history, factor, level, slope)[1]
+
+    none = likelihood(*start)
+    level, best = start[0], none
+    for walk in LEVEL_WALKS:
+        found = likelihood(walk, start[1])
+        if found > max(best, none + CLEARLY):
+            level, best = walk, found
+    slope, base = start[1], best
+    for walk in SLOPE_WALKS:
+        found = likelihood(level, walk)
+        if found > max(best, base + CLEARLY):
+            slope, best = walk, found
+    return level, slope
+
+
+def replay_filter(
+    settings: TrackerSettings, history: History, factor: float, level_walk: float, slope_walk: float
+) -> wear.WearFilter:
+    """Run the filter of known batches over the history."""
+    rows = history.rows[history.rows[:, BATCH] >= 0.0]
+    variance = factor * rows[:, STD] ** 2
+    unit = float(np.median(variance))
+    names = [history.batches[int(place)] for place in rows[:, BATCH]]
+    state = wear.start(rows[0, VALUE], variance[0], settings.slope_std * math.sqrt(variance[0]), names[0])
+    for before, row, own, name in zip(rows[:-1], rows[1:], variance[1:], names[1:], strict=True):
+        passed = int(row[INDEX] - before[INDEX])
+        state = wear.pass_cycles(state, passed, level_walk**2 * unit, slope_walk**2 * unit)
+        if name != state.current:
+            state = wear.change_batch(state, name, settings.step_std**2 * own)
+        state, _ = wear.measure(state, row[VALUE], own, settings.outlier_threshold)
+    return state
