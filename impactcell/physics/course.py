@@ -202,56 +202,61 @@ def follow(
 
 @compiled
 def integrate(
-    row: Samples,
+    rows: Samples,
     program: at.Whole,
-    drive: Samples,
+    drives: Samples,
+    drive_ends: at.Whole,
     horizon: float,
     goal: int,
-    cursor: at.Whole,
+    cursors: at.Whole,
     times: Samples,
     out: Samples,
     event_kinds: at.Whole,
     event_times: Samples,
     figures: Samples,
 ) -> None:
-    """Integrate one tap.
+    """Integrate n taps.
 
     Parameters
     ----------
-    row, program : ndarray
-        See `impactcell.physics.layout`.
-    drive : ndarray, shape (2 n,)
-        Times, then values, of a driving force along +1, linear in between; empty without one.
+    rows : ndarray, shape (n, width)
+        See `impactcell.physics.layout`, as for `program`.
+    drives : ndarray
+        For each tap the times, then the values, of a driving force along +1, linear in between.
+    drive_ends : ndarray, shape (n + 1,)
+        Where each tap's part of `drives` ends; equal to the one before where nothing drives.
     horizon : float
         Longest time to integrate [s].
     goal : int
         TO_REST, for the figures, or TO_LAST_SAMPLE.
-    cursor : ndarray, shape (CURSORS,)
+    cursors : ndarray, shape (n, CURSORS)
         For each channel the index of its first sample and the index after its last; room for events.
+        They are used up.
     times, out : ndarray
         Sample times, sorted within each channel, and where the samples go.
     event_kinds, event_times : ndarray
-        Filled with as many events as there is room for.
-    figures : ndarray, shape (FIGURES,)
+        Filled with as many events of the last tap as there is room for.
+    figures : ndarray, shape (n, FIGURES)
         What came out.
     """
     work = np.empty(WORK)
     mode = np.empty(at.MODES, np.int64)
-    follow(
-        numbers(row),
-        integers(program),
-        numbers(drive),
-        drive.shape[0] // 2,
-        horizon,
-        goal,
-        integers(cursor),
-        numbers(times),
-        numbers(out),
-        integers(event_kinds),
-        numbers(event_times),
-        numbers(figures),
-        numbers(work),
-        integers(mode),
-    )
+    for i in range(rows.shape[0]):
+        follow(
+            numbers(rows[i]),
+            integers(program),
+            numbers(drives[drive_ends[i] :]),
+            (drive_ends[i + 1] - drive_ends[i]) // 2,
+            horizon,
+            goal,
+            integers(cursors[i]),
+            numbers(times),
+            numbers(out),
+            integers(event_kinds),
+            numbers(event_times),
+            numbers(figures[i]),
+            numbers(work),
+            integers(mode),
+        )
     # A last use keeps the workspace alive while bare pointers into it are in use.
-    figures[at.EVENT_COUNT] += 0.0 * (work.shape[0] + mode.shape[0])
+    mode[0] = work.shape[0]

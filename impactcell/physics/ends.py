@@ -6,7 +6,7 @@ import numpy as np
 
 from impactcell.compiled import Integers, Numbers, compiled
 from impactcell.physics import layout as at
-from impactcell.physics.forces import actuator_speed, contact_force, reading
+from impactcell.physics.forces import actuator_speed, body_force, contact_force, reading
 
 
 @compiled
@@ -92,11 +92,32 @@ def after_end(
 
 
 @compiled
+def elastic_rest(
+    t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers
+) -> float:
+    """Position at which elastic stick holds whatever still pulls at the part: where its ringing would end."""
+    z[at.SPEED_OF_PART] = 0.0
+    z[at.U] = memo[at.ANCHOR]
+    for _ in range(20):
+        anchor_force = memo[at.STICK_STIFFNESS] * (z[at.U] - memo[at.ANCHOR])
+        pull = resting_force(t, z, mode, row, program) + body_force(t, z, memo, row, program) - anchor_force
+        stiffness = memo[at.STICK_STIFFNESS]
+        if mode[at.ZONE] == at.TOUCHING:
+            stiffness += row[at.STIFFNESS]
+        z[at.U] += pull / stiffness
+        if abs(pull) < 1e-13 * row[at.MASS] * row[at.GRAVITY]:
+            break
+    return z[at.U]
+
+
+@compiled
 def finish(
     t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers, figures: Numbers
 ) -> None:
     """Turn what was noted on the way into the figures of the tap."""
-    rest = memo[at.ANCHOR] if mode[at.SLIP] == at.ELASTIC else z[at.U]
+    rest = z[at.U]
+    if mode[at.SLIP] == at.ELASTIC:
+        rest = elastic_rest(t, z, mode, memo, row, program)
     figures[at.DISPLACEMENT] = rest
     figures[at.DISTANCE] = rest - figures[at.DISTANCE]
     if mode[at.ZONE] == at.ABSENT:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.compiled import compiled
 from impactcell.errors import PhysicsError
 from impactcell.physics import layout as at
 from impactcell.physics.course import integrate
@@ -17,29 +16,7 @@ from impactcell.records import Samples
 
 LONGEST_S = 600.0
 NONE = np.empty(0)
-
-
-@compiled
-def integrate_all(
-    rows: Samples,
-    laws: at.Whole,
-    drives: Samples,
-    drive_ends: at.Whole,
-    horizon: float,
-    goal: int,
-    cursors: at.Whole,
-    times: Samples,
-    out: Samples,
-    figures: Samples,
-) -> None:
-    """Integrate every tap; row i goes with cursors i."""
-    no_kinds = np.empty(0, np.int64)
-    no_times = np.empty(0)
-    cursor = np.empty(at.CURSORS, np.int64)
-    for i in range(rows.shape[0]):
-        cursor[:] = cursors[i]
-        drive = drives[drive_ends[i] : drive_ends[i + 1]]
-        integrate(rows[i], laws, drive, horizon, goal, cursor, times, out, no_kinds, no_times, figures[i])
+NO_KINDS = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,16 +189,18 @@ class Ensemble:
     def _sampled(self, rows: Samples) -> Samples:
         out = np.empty(self._times.size)
         figures = np.empty((self._count, at.FIGURES))
-        integrate_all(
+        integrate(
             rows,
             self._program.laws,
             self._drives,
             self._drive_ends,
             LONGEST_S,
             at.TO_LAST_SAMPLE,
-            self._cursors,
+            self._cursors.copy(),
             self._times,
             out,
+            NO_KINDS,
+            NONE,
             figures,
         )
         return out
@@ -302,7 +281,7 @@ def figures_of(rows: Samples, laws: at.Whole, horizon_s: float = LONGEST_S) -> F
     table = np.empty((rows.shape[0], at.FIGURES))
     cursors = np.zeros((rows.shape[0], at.CURSORS), dtype=np.int64)
     undriven = np.zeros(rows.shape[0] + 1, dtype=np.int64)
-    integrate_all(rows, laws, NONE, undriven, horizon_s, at.TO_REST, cursors, NONE, NONE, table)
+    integrate(rows, laws, NONE, undriven, horizon_s, at.TO_REST, cursors, NONE, NONE, NO_KINDS, NONE, table)
     return Figures(
         peak_force_n=table[:, at.PEAK_FORCE],
         displacement_m=table[:, at.DISPLACEMENT],

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from impactcell.errors import NoStopError, PhysicsError
+from impactcell.errors import NoStopError
 from impactcell.physics import layout as at
 from impactcell.physics.course import integrate
 from impactcell.physics.motion import Event, EventKind, Motion, Sampled
@@ -16,6 +16,7 @@ LONGEST_S = 600.0
 ROOM = 4096
 KINDS = (EventKind.BREAKAWAY, EventKind.CONTACT, EventKind.SEPARATION, EventKind.STOP, EventKind.HALT)
 NONE = np.empty(0)
+UNDRIVEN = np.zeros(2, dtype=np.int64)
 
 
 def strike(plant: Plant, tap: Strike) -> Motion:
@@ -53,23 +54,23 @@ def _move(plant: Plant, tap: Strike, initial_speed_m_s: float) -> Motion:
     program = assemble(tuple(plant.effects), batches)
     taps = columns([tap])
     taps["initial_speed_m_s"][0] = initial_speed_m_s
-    row = program.rows(parameter_vector(plant, program, batches)[None, :], plant.gravity_m_s2, taps)[0]
-    figures = np.empty(at.FIGURES)
+    rows = program.rows(parameter_vector(plant, program, batches)[None, :], plant.gravity_m_s2, taps)
+    table = np.empty((1, at.FIGURES))
     kinds = np.empty(ROOM, dtype=np.int64)
     times = np.empty(ROOM)
-    cursor = np.zeros(at.CURSORS, dtype=np.int64)
-    cursor[at.ROOM] = ROOM
-    integrate(row, program.laws, NONE, LONGEST_S, at.TO_REST, cursor, NONE, NONE, kinds, times, figures)
+    cursors = np.zeros((1, at.CURSORS), dtype=np.int64)
+    cursors[0, at.ROOM] = ROOM
+    laws = program.laws
+    integrate(rows, laws, NONE, UNDRIVEN, LONGEST_S, at.TO_REST, cursors, NONE, NONE, kinds, times, table)
+    figures = table[0]
     status = figures[at.STATUS]
-    if status == at.NOT_FINITE:
-        raise PhysicsError(f"the motion is not finite with effects {', '.join(plant.effects) or 'none'}")
     if status != at.AT_REST:
         raise NoStopError(
             "the part never came to rest: "
             + (
                 "it was caught and pushed again without end. Command a stroke, or halts_at_separation"
                 if status == at.TOO_MANY_EVENTS or np.isnan(figures[at.HALT_TIME])
-                else f"it was still moving after {LONGEST_S:g} s. Less tilt, or more friction"
+                else f"it was still moving after {LONGEST_S:g} s, or ran away. Less tilt, or more friction"
             )
         )
     count = min(int(figures[at.EVENT_COUNT]), ROOM)
@@ -80,28 +81,29 @@ def _move(plant: Plant, tap: Strike, initial_speed_m_s: float) -> Motion:
         displacement_m=float(figures[at.DISPLACEMENT]),
         stop_s=0.0 if np.isnan(stop) else float(stop),
         distance_after_separation_m=float(figures[at.DISTANCE]),
-        course=partial(_sampled, row, program),
+        course=partial(_sampled, rows, program),
     )
 
 
-def _sampled(row: Samples, program: Program, time_s: Samples) -> Sampled:
+def _sampled(rows: Samples, program: Program, time_s: Samples) -> Sampled:
     """Integrate again, now with samples: it costs less than keeping every step would."""
     n = time_s.size
     order = np.argsort(time_s, kind="stable")
-    cursor = np.array([0, n, 2 * n, 3 * n, n, 2 * n, 3 * n, 4 * n, 0], dtype=np.int64)
+    cursors = np.array([[0, n, 2 * n, 3 * n, n, 2 * n, 3 * n, 4 * n, 0]], dtype=np.int64)
     out = np.empty(4 * n)
     integrate(
-        row,
+        rows,
         program.laws,
         NONE,
+        UNDRIVEN,
         LONGEST_S,
         at.TO_LAST_SAMPLE,
-        cursor,
+        cursors,
         np.tile(time_s[order], 4),
         out,
         np.empty(0, dtype=np.int64),
         NONE,
-        np.empty(at.FIGURES),
+        np.empty((1, at.FIGURES)),
     )
     channels = np.empty((4, n))
     channels[:, order] = out.reshape(4, n)

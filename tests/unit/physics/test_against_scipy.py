@@ -60,7 +60,7 @@ def test_a_tap_is_scipy_s(velocity: float, mass: float, stroke: float) -> None:
     )
     motion = strike(plant, Strike(velocity, mass, stroke))
     force, distance = reference(6.5e5, 465.0, 0.2, 0.152, 85.0, mass, velocity, stroke)
-    # The reference takes its peak from points 20 µs apart, which is 2e-6 of the half oscillation's top at most.
+    # The reference takes its peak from points 20 µs apart: 2e-6 of a half oscillation's top at most.
     assert motion.peak_force_n == pytest.approx(force, rel=2e-6)
     assert motion.peak_force_n >= force * (1.0 - 3e-9)
     assert motion.sliding_distance_m == pytest.approx(distance, rel=1e-8)

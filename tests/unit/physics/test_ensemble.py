@@ -106,7 +106,7 @@ def test_a_derivative_at_the_end_of_a_range_is_one_sided() -> None:
     ensemble = Ensemble(TAPS, ["quadratic_drag"], position_time_s=TIMES)
     theta = np.array([6.5e5, 465.0, 0.2, 0.152, 0.0])
     made = ensemble.sensitivities(theta, ["quadratic_drag.drag_coefficient_n_s2_per_m2"]).position_m[0]
-    far = theta + [0.0, 0.0, 0.0, 0.0, 0.01]
+    far = np.array([6.5e5, 465.0, 0.2, 0.152, 0.01])
     coarse = (ensemble.traces(far).position_m - ensemble.traces(theta).position_m) / 0.01
     np.testing.assert_allclose(made, coarse, rtol=1e-2, atol=1e-9)
 
