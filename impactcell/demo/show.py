@@ -36,6 +36,7 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     ImpactCellError
         The simulator did not start, or no cycle came.
     """
+    sys.stderr.write("setting up; the first time on a machine takes a minute, to compile\n")
     with set_up(scenario, cycles) as stage:
         show = _Show(stage, cycles)
         if as_json or not sys.stdout.isatty():

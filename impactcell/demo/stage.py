@@ -17,6 +17,8 @@ import yaml
 from impactcell.errors import ImpactCellError, SettingsError
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
+from impactcell.service.design import cell_design
+from impactcell.service.rehearsal import rehearse
 from impactcell.settings import Cell, read_cell
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -66,8 +68,10 @@ def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
         played.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
         password = secrets.token_urlsafe(9)
         write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
+        cell = read_cell(CONFIG / "cells" / f"{scenario}.yaml")
+        rehearse(cell_design(cell))
         with _simulator(played) as port:
-            yield Stage(_cell(scenario, directory, port), story(content), password)
+            yield Stage(_placed(cell, directory, port), story(content), password)
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 
@@ -139,8 +143,7 @@ def _simulator(scenario: Path) -> Iterator[int]:
         process.communicate()
 
 
-def _cell(scenario: str, directory: Path, port: int) -> Cell:
-    cell = read_cell(CONFIG / "cells" / f"{scenario}.yaml")
+def _placed(cell: Cell, directory: Path, port: int) -> Cell:
     settings = cell.settings
     changed = settings.model_copy(
         update={

@@ -125,6 +125,7 @@ class RunningCell:
         raise PositioningError(f"{self.cell.name}: this cell has no positioning; add it to {self.cell.path}")
 
     async def _acquire(self) -> None:
+        await self.worker.rehearse()
         async with contextlib.aclosing(self._module.captures(after=self.worker.durable)) as receptions:
             async for reception in receptions:
                 await self._take(reception)

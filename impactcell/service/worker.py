@@ -17,6 +17,7 @@ from impactcell.fieldbus.ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Snapshot
+from impactcell.service.rehearsal import rehearse
 
 T = TypeVar("T")
 
@@ -90,6 +91,10 @@ class Worker:
         """The last cycle that is safely stored."""
         position = None if self._journal is None else self._journal.position()
         return None if position is None else Mark(position.session, position.cycle)
+
+    async def rehearse(self) -> None:
+        """Compile what a cycle needs, so that the first one is not late."""
+        await self._run(lambda: rehearse(self._design))
 
     async def process(
         self, capture: Capture, positioning: PositioningState, announcement: Announcement | None

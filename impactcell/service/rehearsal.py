@@ -1,0 +1,47 @@
+"""A few cycles of the cell's own model before the first real one, so that all is compiled when it comes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell import cell as core
+from impactcell.cell import CellDesign
+from impactcell.physics import Strike, strike
+from impactcell.records import Capture, Channel, PositioningState, uniform_times
+
+CYCLES = 8
+FORCE_HZ, POSITION_HZ = 100_000.0, 10_000.0
+
+
+def rehearse(design: CellDesign) -> None:
+    """Take cycles of the nominal plant through the whole pipeline, and forget them."""
+    hurried = replace(design, signature=replace(design.signature, learned_cycles=2))
+    state = core.initial_state(hurried)
+    for cycle in range(1, CYCLES + 1):
+        state = core.step(hurried, state, _capture(hurried, cycle), PositioningState()).state
+
+
+def _capture(design: CellDesign, cycle: int) -> Capture:
+    tap = Strike(
+        velocity_m_s=0.06,
+        mass_kg=design.mass_kg or 18.9,
+        stroke_m=design.stroke_m or float("inf"),
+        halts_at_separation=design.stroke_m is None,
+    )
+    motion = strike(design.model.plant, tap)
+    random = np.random.default_rng(cycle)
+    force_s = uniform_times(0.0, FORCE_HZ, int(motion.separation_s * 1.2 * FORCE_HZ))
+    position_s = uniform_times(0.0, POSITION_HZ, int((motion.stop_s * 1.1 + 0.005) * POSITION_HZ))
+    force = motion.sample(force_s).force_n + random.normal(0.0, design.force_noise_std_n, len(force_s))
+    position = motion.sample(position_s).position_m + random.normal(
+        0.0, design.position_noise_std_m, len(position_s)
+    )
+    return Capture(
+        cycle=cycle,
+        velocity_m_s=tap.velocity_m_s,
+        mass_kg=tap.mass_kg,
+        force=Channel(force_s, force),
+        position=Channel(position_s, position),
+        stroke_m=tap.stroke_m,
+        time_ns=cycle * 10**9,
+    )
