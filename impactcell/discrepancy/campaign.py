@@ -1,0 +1,319 @@
+"""What goes into the workflow: shots with covariates, replicate groups, checks of units, and the split.
+
+A driven record is cut into blocks longer than its correlation time; a shot, or a block, is the unit of every
+test that follows.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.shots import Index, Shot, Shots
+from impactcell.errors import CampaignError
+from impactcell.records import Capture, Channel, Samples
+
+FEWEST_SHOTS = 6
+HELD_OUT = 0.25
+BLOCKS = 24
+SHORTEST_BLOCK = 40
+GAP_FACTOR = 5.0
+EMPTY = np.empty(0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Material:
+    """A campaign made ready.
+
+    Attributes
+    ----------
+    shots : tuple of Shot
+    batches : tuple of str
+        In order of appearance.
+    covariates : tuple of str
+        Names of the covariates that vary, in the order of `shots.csv`.
+    stated_noise : tuple of float
+        Of force, position and actuator as stated; nan where nothing is.
+    notes : tuple of str
+        What the data lack and what that costs; part of the report.
+    """
+
+    excitation: Excitation
+    gravity_m_s2: float
+    stroke_m: float
+    shots: tuple[Shot, ...]
+    batches: tuple[str, ...]
+    covariates: tuple[str, ...]
+    stated_noise: tuple[float, float, float]
+    notes: tuple[str, ...]
+
+
+def prepare(campaign: Campaign) -> Material:
+    """Make a campaign ready for the workflow.
+
+    Raises
+    ------
+    CampaignError
+        Too few shots for any test, or a unit that is wrong by a large factor.
+    """
+    captures = campaign.shots
+    notes: list[str] = []
+    if campaign.excitation is Excitation.DRIVEN:
+        captures = _blocks(captures)
+    if len(captures) < FEWEST_SHOTS:
+        unit = "blocks" if campaign.excitation is Excitation.DRIVEN else "shots"
+        message = (
+            f"{len(captures)} {unit} are too few: the shot is the unit of every test, and with fewer than "
+            f"{FEWEST_SHOTS} none can be made. Record at least {FEWEST_SHOTS}, better 30"
+        )
+        raise CampaignError(message)
+    batches: list[str] = []
+    for capture in captures:
+        name = capture.batch_id or ""
+        if name not in batches:
+            batches.append(name)
+    groups: dict[tuple[float, ...], int] = {}
+    shots = []
+    for place, capture in enumerate(captures, 1):
+        batch = batches.index(capture.batch_id or "")
+        settings = (
+            round(capture.velocity_m_s, 9) if math.isfinite(capture.velocity_m_s) else -1.0,
+            round(capture.mass_kg, 9) if math.isfinite(capture.mass_kg) else -1.0,
+            float(capture.direction),
+            round(capture.start_m, 9),
+        )
+        key = settings if campaign.excitation is Excitation.TAP else (float(place),)
+        group = groups.setdefault(key, len(groups))
+        shots.append(_shot(capture, place, len(captures), batch, group, campaign.excitation))
+    _say_what_lacks(campaign, shots, notes)
+    _check_units(campaign.excitation, campaign.gravity_m_s2, shots)
+    stated = tuple(_stated(captures, name) for name in ("force", "position", "actuator"))
+    if campaign.excitation is Excitation.DRIVEN:
+        stated = (math.nan, stated[1], math.nan)
+    return Material(
+        campaign.excitation,
+        campaign.gravity_m_s2,
+        campaign.stroke_m,
+        tuple(shots),
+        tuple(batches),
+        _varying(shots),
+        stated,
+        tuple(notes),
+    )
+
+
+def split(material: Material, seed: int) -> tuple[Index, Index]:
+    """Places of the training and of the held-out shots, each in file order.
+
+    A quarter is held out, spread over the settings; of a driven record it is the last third. Held-out shots
+    come first from settings that have replicates, so that no setting is lost to training.
+    """
+    n = len(material.shots)
+    places = np.arange(n)
+    if material.excitation is Excitation.DRIVEN:
+        cut = n - max(n // 3, 1)
+        return places[:cut], places[cut:]
+    rng = np.random.default_rng([seed, 1])
+    order = rng.permutation(n)
+    keys = np.array([_stratum(shot) for shot in material.shots])
+    # Round after round one shot of every stratum: the later rounds go to training last, so that
+    # the held-out shots are those of the first rounds of the fullest strata.
+    rank = np.empty(n, dtype=np.int64)
+    seen: dict[tuple[float, ...], int] = {}
+    for place in order:
+        key = tuple(keys[place])
+        rank[place] = seen.get(key, 0)
+        seen[key] = rank[place] + 1
+    count = np.array([seen[tuple(key)] for key in keys])
+    share = (rank + rng.random(n)) / count
+    wanted = max(round(HELD_OUT * n), 1)
+    held = np.sort(np.lexsort((order, share))[:wanted])
+    return np.setdiff1d(places, held), held
+
+
+def _stratum(shot: Shot) -> tuple[float, float]:
+    velocity = shot.velocity_m_s if math.isfinite(shot.velocity_m_s) else 0.0
+    return (velocity, float(shot.direction))
+
+
+def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, excitation: Excitation) -> Shot:
+    channels = [capture.force, capture.position, capture.actuator]
+    drive = np.empty((2, 0))
+    if excitation is Excitation.DRIVEN and capture.force is not None:
+        drive = np.vstack([capture.force.time_s, capture.force.values])
+        channels[0] = None
+    if excitation is not Excitation.TAP:
+        channels[0] = channels[2] = None
+    covariates: dict[str, float] = {"shot": float(place)}
+    for name, value in (
+        ("velocity", capture.velocity_m_s),
+        ("mass", capture.mass_kg),
+        ("direction", float(capture.direction)),
+        ("batch", float(batch)),
+        ("dwell", math.log10(max(capture.dwell_s, 0.1)) if math.isfinite(capture.dwell_s) else math.nan),
+        ("start", capture.start_m),
+    ):
+        covariates[name] = value
+    covariates |= {name: value for name, value in capture.covariates.items() if isinstance(value, float)}
+    return Shot(
+        number=capture.cycle,
+        place=place,
+        shots=shots,
+        velocity_m_s=capture.velocity_m_s,
+        mass_kg=capture.mass_kg,
+        direction=capture.direction,
+        batch=batch,
+        dwell_s=capture.dwell_s,
+        start_m=capture.start_m,
+        group=group,
+        times=tuple(EMPTY if one is None else one.time_s for one in channels),
+        values=tuple(EMPTY if one is None else one.values for one in channels),
+        drive=drive,
+        covariates=covariates,
+    )
+
+
+def _varying(shots: list[Shot]) -> tuple[str, ...]:
+    names: list[str] = []
+    for name in shots[0].covariates:
+        values = np.array([shot.covariates.get(name, math.nan) for shot in shots])
+        if np.isfinite(values).all() and np.ptp(values) > 1e-12 * np.abs(values).max():
+            names.append(name)
+    return tuple(names)
+
+
+def _stated(captures: tuple[Capture, ...], name: str) -> float:
+    for capture in captures:
+        channel: Channel | None = getattr(capture, name)
+        if channel is not None and channel.noise_std is not None:
+            return channel.noise_std
+    return math.nan
+
+
+def _blocks(captures: tuple[Capture, ...]) -> tuple[Capture, ...]:
+    """Cut long driven records into blocks longer than the correlation time of their velocity."""
+    out: list[Capture] = []
+    per_record = max(BLOCKS // len(captures), 1)
+    for capture in captures:
+        position, force = capture.position, capture.force
+        if position is None or force is None:
+            continue
+        shortest = max(2 * _correlation(position.values), SHORTEST_BLOCK)
+        count = max(min(per_record, len(position.values) // shortest), 1)
+        edges = np.linspace(0, len(position.values), count + 1).astype(int)
+        for first, last in zip(edges[:-1], edges[1:], strict=True):
+            inside = slice(int(first), int(last))
+            times = position.time_s[inside]
+            # One sample of force either side, so that the drive covers the block.
+            low = max(int(np.searchsorted(force.time_s, times[0], "right")) - 1, 0)
+            high = min(int(np.searchsorted(force.time_s, times[-1], "left")) + 1, len(force.time_s))
+            out.append(
+                replace(
+                    capture,
+                    cycle=capture.cycle if count == 1 else len(out) + 1,
+                    position=replace(position, time_s=times - times[0], values=position.values[inside]),
+                    force=replace(
+                        force, time_s=force.time_s[low:high] - times[0], values=force.values[low:high]
+                    ),
+                    start_m=float(position.values[first]),
+                )
+            )
+    return tuple(out)
+
+
+def _correlation(position: Samples) -> int:
+    """Samples after which the velocity's correlation has fallen to 1/e."""
+    velocity = np.diff(position)
+    velocity = velocity - velocity.mean()
+    power = np.abs(np.fft.rfft(velocity, 2 * len(velocity))) ** 2
+    correlation = np.fft.irfft(power)[: len(velocity)]
+    if correlation[0] <= 0.0:
+        return 1
+    below = np.flatnonzero(correlation < correlation[0] / math.e)
+    return int(below[0]) if len(below) else len(velocity)
+
+
+def _say_what_lacks(campaign: Campaign, shots: list[Shot], notes: list[str]) -> None:
+    tap = campaign.excitation is Excitation.TAP
+    if tap and not any(len(shot.times[0]) for shot in shots):
+        notes.append("No force channel: effects of contact and force sensor are seen in the motion only.")
+    if tap and not any(len(shot.times[1]) for shot in shots):
+        notes.append("No position channel: effects on the slide are hardly seen.")
+    if tap and not any(len(shot.times[2]) for shot in shots):
+        notes.append("No actuator channel: droop and ramp of the actuator are hard to tell from damping.")
+    if tap and len({shot.direction for shot in shots}) < 2:
+        notes.append("One direction only: tilt and asymmetry of direction cannot be seen.")
+    if tap and len({round(shot.velocity_m_s, 9) for shot in shots}) < 2:
+        notes.append("One velocity only: terms that depend on speed are hard to tell apart.")
+    if tap and len({round(shot.mass_kg, 9) for shot in shots if math.isfinite(shot.mass_kg)}) < 2:
+        notes.append("One mass only: mass and stiffness, tilt and restoring force lose their contrast.")
+    unknown = [shot.number for shot in shots if not math.isfinite(shot.mass_kg)]
+    if tap and unknown:
+        notes.append(f"The mass of {len(unknown)} shots is not stated and is fitted.")
+    groups = {shot.group for shot in shots}
+    if len(groups) == len(shots) and tap:
+        notes.append(
+            "No replicates: the sensors' noise is only a lower bound of the floor, and gap (b) is null."
+        )
+    for shot in shots:
+        longest = max(shot.times, key=len)
+        steps = np.diff(longest)
+        if len(steps) and steps.max() > GAP_FACTOR * np.median(steps):
+            notes.append(f"Shot {shot.number} has a gap in time; what happened in it is lost.")
+            break
+
+
+def _check_units(excitation: Excitation, gravity: float, shots: list[Shot]) -> None:
+    """Notice a column that is wrong by a large factor.
+
+    The part leaves the actuator at one to two times its velocity; the impulse of the contact makes m v; free of contact friction decelerates
+    at a fraction of g.
+    """
+    if excitation is Excitation.DRIVEN:
+        return
+    speeds, impulses, decelerations = [], [], []
+    for shot in shots:
+        time, position = shot.times[1], shot.values[1]
+        if len(time) < 8:
+            continue
+        step = max(len(time) // 60, 1)
+        speed = np.abs(np.diff(position[::step]) / np.diff(time[::step]))
+        top = float(np.quantile(speed, 0.95))
+        if excitation is Excitation.TAP:
+            speeds.append(top / shot.velocity_m_s)
+            if len(shot.times[0]) > 8 and math.isfinite(shot.mass_kg):
+                impulse = float(np.trapezoid(np.maximum(shot.values[0], 0.0), shot.times[0]))
+                impulses.append(impulse / (shot.mass_kg * shot.velocity_m_s))
+        else:
+            curvature = np.polyfit(time, position, 2)[0]
+            decelerations.append(abs(2.0 * curvature) / gravity)
+    for values, low, high, what, columns in (
+        (
+            speeds,
+            0.05,
+            20.0,
+            "the part's speed over the actuator's velocity",
+            "position_m, time_s or velocity_mm_per_min",
+        ),
+        (impulses, 0.02, 50.0, "the impulse of force_n over mass times velocity", "force_n or mass_kg"),
+        (decelerations, 1e-4, 20.0, "the deceleration over gravity", "position_m or time_s"),
+    ):
+        if not values:
+            continue
+        middle = float(np.median(values))
+        if not low < middle < high:
+            power = round(math.log10(max(middle, 1e-300)) / 3.0) * 3
+            message = (
+                f"{what} is {middle:.3g}, where about 1 is possible: check the unit of {columns} "
+                f"(off by a factor of about 1e{power:+d})"
+            )
+            raise CampaignError(message)
+
+
+def laid_out(material: Material, places: Index, noise_std: tuple[float, float, float]) -> Shots:
+    """Lay out some of the shots for fits."""
+    from impactcell.discrepancy.shots import lay_out
+
+    items = tuple(material.shots[int(place)] for place in places)
+    return lay_out(material.excitation, material.gravity_m_s2, material.stroke_m, items, noise_std)

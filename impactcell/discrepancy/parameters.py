@@ -1,0 +1,166 @@
+"""Which parameters a fit is free in, and the scale on which it moves each of them.
+
+A fit moves coordinates, not the parameters themselves: logarithms of what is positive, mu_s / mu_k instead of
+mu_s, reciprocals of what vanishes at infinity. On these scales the residuals are closer to linear.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.campaign import Excitation
+from impactcell.physics import Parameter
+from impactcell.physics.effects import LIBRARY
+from impactcell.records import Samples
+
+NOMINAL = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
+SMALLEST_RATIO, LARGEST_RATIO = 1.0, 5.0
+DAMPING_SCALE = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """One free number of a fit.
+
+    Attributes
+    ----------
+    effect : str
+        Empty for the nominal plant.
+    parameter : str
+        Name as `result.json` has it.
+    batch : int
+        0, or the batch whose parameter it is.
+    form : str
+        `log`, `linear` (value over scale) or `reciprocal` (scale over value).
+    lower, upper : float
+        Range of the coordinate itself.
+    start : float
+        Value of the coordinate where nothing better is known.
+    """
+
+    effect: str
+    parameter: str
+    batch: int
+    form: str
+    scale: float
+    lower: float
+    upper: float
+    start: float
+
+    def value(self, coordinate: float) -> float:
+        """Parameter at a coordinate."""
+        if self.form == "log":
+            return self.scale * math.exp(coordinate)
+        if self.form == "reciprocal":
+            return self.scale / coordinate if coordinate > 0.0 else math.inf
+        return self.scale * coordinate
+
+    def coordinate(self, value: float) -> float:
+        """Coordinate of a parameter."""
+        if self.form == "log":
+            return math.log(value / self.scale)
+        if self.form == "reciprocal":
+            return self.scale / value
+        return value / self.scale
+
+    def slope(self, coordinate: float) -> float:
+        """Derivative of the parameter with respect to its coordinate."""
+        if self.form == "log":
+            return self.value(coordinate)
+        if self.form == "reciprocal":
+            return -self.scale / coordinate**2 if coordinate > 0.0 else math.inf
+        return self.scale
+
+
+def nominal(excitation: Excitation) -> tuple[Coordinate, ...]:
+    """Free numbers of the nominal plant: those that this excitation can tell anything of."""
+    k = Coordinate("", "stiffness_n_per_m", 0, "log", 1.0, math.log(1e2), math.log(1e11), math.log(6e5))
+    b = Coordinate("", "damping_n_s_per_m", 0, "linear", DAMPING_SCALE, 0.0, 1e6, 4.0)
+    mu_k = Coordinate("", "mu_k", 0, "log", 1.0, math.log(1e-3), math.log(3.0), math.log(0.15))
+    ratio = Coordinate("", "ratio", 0, "log", 1.0, math.log(SMALLEST_RATIO), math.log(LARGEST_RATIO), 0.25)
+    if excitation is Excitation.TAP:
+        return (k, b, mu_k, ratio)
+    return (mu_k,) if excitation is Excitation.FREE_SLIDE else (mu_k, ratio)
+
+
+def of_effect(identifier: str, batches: int) -> tuple[Coordinate, ...]:
+    """Free numbers of an effect."""
+    made: list[Coordinate] = []
+    for parameter in LIBRARY[identifier].parameters:
+        numbers = range(1, batches) if parameter.per_batch else (0,)
+        made += [_coordinate(identifier, parameter, batch) for batch in numbers]
+    return tuple(made)
+
+
+def _coordinate(identifier: str, parameter: Parameter, batch: int) -> Coordinate:
+    typical = parameter.typical
+    if math.isinf(parameter.null):
+        return Coordinate(
+            identifier,
+            parameter.name,
+            batch,
+            "reciprocal",
+            typical,
+            typical / parameter.upper,
+            typical / max(parameter.lower, 1e-3 * typical),
+            1.0,
+        )
+    positive = math.isnan(parameter.null) and parameter.lower > 0.0
+    if positive:
+        return Coordinate(
+            identifier,
+            parameter.name,
+            batch,
+            "log",
+            1.0,
+            math.log(parameter.lower),
+            math.log(parameter.upper),
+            math.log(typical),
+        )
+    start = typical if math.isnan(parameter.null) else parameter.null
+    return Coordinate(
+        identifier,
+        parameter.name,
+        batch,
+        "linear",
+        typical,
+        parameter.lower / typical,
+        parameter.upper / typical,
+        start / typical,
+    )
+
+
+def vector(
+    coordinates: tuple[Coordinate, ...], at: Samples, names: tuple[str, ...], typical: Samples
+) -> Samples:
+    """Parameter vector in the order of the plant's `names` from coordinates.
+
+    `typical` holds what is taken for parameters that are not free.
+    """
+    made = typical.copy()
+    ratio = math.nan
+    for coordinate, where in zip(coordinates, at, strict=True):
+        value = coordinate.value(float(where))
+        if coordinate.parameter == "ratio" and not coordinate.effect:
+            ratio = value
+            continue
+        made[names.index(plant_name(coordinate))] = value
+    if not math.isnan(ratio):
+        made[2] = ratio * made[3]
+    else:
+        made[2] = max(made[2], made[3])
+    return made
+
+
+def plant_name(coordinate: Coordinate) -> str:
+    """Name of a coordinate's parameter among those of `physics`."""
+    if not coordinate.effect:
+        return coordinate.parameter
+    name = f"{coordinate.effect}.{coordinate.parameter}"
+    return f"{name}[{coordinate.batch}]" if coordinate.batch else name
+
+
+def defaults(names: tuple[str, ...]) -> Samples:
+    """Parameter vector for whatever is not free: a stiff contact, friction in the middle of its range."""
+    return np.array([6e5, 0.0, 0.2, 0.15, *([0.0] * (len(names) - 4))])

@@ -1,0 +1,139 @@
+"""One self-contained page: verdict, map, traces, evidence, parameters, held-out gap, what to measure next."""
+
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, select_autoescape
+
+from impactcell.discrepancy import figures
+from impactcell.discrepancy.evidence import ALPHA
+from impactcell.discrepancy.result import where
+from impactcell.discrepancy.workflow import NAMED, NO_GAP, TIED, Findings
+from impactcell.physics.effects import LIBRARY
+
+GUIDE = "impactcell/discrepancy/README.md"
+
+
+def write_report(findings: Findings, source: str, file: Path) -> None:
+    """Write the report; pictures and style are inside the page."""
+    environment = Environment(
+        loader=PackageLoader("impactcell.discrepancy", "templates"),
+        autoescape=select_autoescape(default=True),
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["zip"] = zip
+    page = environment.get_template("report.html.j2").render(**content(findings, source))
+    file.write_text(page, encoding="utf-8")
+
+
+def words(identifier: str) -> str:
+    """Name of an effect as one would say it."""
+    return identifier.replace("_", " ")
+
+
+def verdict_sentence(findings: Findings) -> str:
+    """Verdict in one sentence."""
+    proof = findings.proof
+    before, after = f"{proof.before.whole:.2f}", f"{proof.after.whole:.2f}"
+    if findings.verdict == NO_GAP:
+        return f"The nominal model explains these shots: the held-out gap is {before} noise floors."
+    names = " and ".join(words(effect) for effect in findings.added)
+    if findings.verdict == NAMED:
+        return f"Missing: {names}; with it the held-out gap falls from {before} to {after} noise floors."
+    if findings.verdict == TIED:
+        rivals = sorted({words(one) for tied in findings.search.ties.values() for one in tied})
+        return (
+            f"Missing: {names}, which these shots cannot tell from {' or '.join(rivals)}; "
+            f"the held-out gap falls from {before} to {after} noise floors."
+        )
+    left = findings.unexplained
+    phase = words(left.phase) if left else "some phase"
+    return f"No known effect explains a held-out gap of {before} noise floors, largest in phase {phase}."
+
+
+def content(findings: Findings, source: str) -> dict[str, Any]:
+    """Everything the template shows."""
+    search = findings.search
+    return {
+        "source": source,
+        "verdict": findings.verdict,
+        "sentence": verdict_sentence(findings),
+        "shots": len(findings.material.shots),
+        "training": len(findings.training),
+        "held_out": len(findings.held_out),
+        "excitation": str(findings.material.excitation),
+        "notes": [*findings.material.notes, *findings.floor.notes],
+        "map_before": figures.chart(search.nominal),
+        "map_after": figures.chart(search.final) if search.final is not search.nominal else None,
+        "traces": figures.traces(findings),
+        "factors": figures.factors(findings),
+        "shape": figures.shape(findings),
+        "unexplained": findings.unexplained,
+        "candidates": _candidates(findings),
+        "alternatives": [
+            {
+                "effects": " + ".join(words(one) for one in alternative.effects),
+                "behind": alternative.behind,
+                "std": alternative.behind_std,
+                "chosen": alternative.effects == findings.final.effects,
+            }
+            for alternative in search.alternatives[:15]
+        ],
+        "effects": [
+            {
+                "name": words(effect),
+                "equation": LIBRARY[effect].equation,
+                "reference": LIBRARY[effect].reference,
+                "tied": [words(one) for one in search.ties.get(effect, ())],
+                "p": search.p_values.get(effect, 1.0),
+                "where": where(findings, effect),
+            }
+            for effect in findings.added
+        ],
+        "parameters": [
+            {
+                "effect": words(one.effect) if one.effect else "nominal plant",
+                "name": one.parameter + (f" [batch {one.batch + 1}]" if one.batch else ""),
+                "value": one.value,
+                "low": one.low,
+                "high": one.high,
+            }
+            for one in findings.parameters
+        ],
+        "proof": findings.proof,
+        "floor": findings.floor,
+        "replicates": findings.replicates,
+        "spread": findings.final.spread,
+        "proposals": findings.proposals,
+        "alpha": ALPHA,
+        "seed": findings.seed,
+        "guide": GUIDE,
+        "words": words,
+    }
+
+
+def _candidates(findings: Findings) -> list[dict[str, Any]]:
+    """Evidence for every candidate against the nominal model."""
+    evidence = findings.search.nominal
+    gains = evidence.gains()
+    rows = []
+    for number, effect in enumerate(evidence.candidates.names):
+        rows.append(
+            {
+                "name": words(effect),
+                "statistic": float(evidence.candidate_tests.statistic[number]),
+                "single": float(evidence.candidate_tests.single[number]),
+                "adjusted": float(evidence.candidate_tests.adjusted[number]),
+                "gain": gains[effect],
+                "added": effect in findings.added,
+            }
+        )
+    unseen = [
+        effect
+        for effect in LIBRARY
+        if effect not in evidence.candidates.names and effect not in evidence.fit.effects
+    ]
+    rows.sort(key=lambda row: (row["adjusted"], -row["gain"]))
+    rows += [{"name": words(effect), "unseen": True} for effect in unseen]
+    return rows

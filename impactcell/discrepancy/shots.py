@@ -1,0 +1,125 @@
+"""Shots as the workflow works on them: covariates, samples of all channels in one row, replicate groups."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impactcell.campaign import Excitation
+from impactcell.records import Samples
+
+CHANNELS = ("force", "position", "actuator")
+FORCE, POSITION, ACTUATOR = range(3)
+
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """One shot, or one block of a driven record.
+
+    Attributes
+    ----------
+    number : int
+        As `shots.csv` numbers it.
+    place, shots : int
+        Place in file order, from 1, and how many there are.
+    batch : int
+        Number of the batch in order of appearance.
+    group : int
+        Shots with the same settings share a group: replicates.
+    times : tuple of ndarray
+        Sample times of force, position and actuator; empty where a channel was not recorded.
+    values : tuple of ndarray
+        Samples of the same channels.
+    drive : ndarray, shape (2, n)
+        Times and values of the driving force; shape (2, 0) unless the part is driven.
+    covariates : dict of str to float
+        Everything of `shots.csv` that is a number or was made one.
+    """
+
+    number: int
+    place: int
+    shots: int
+    velocity_m_s: float
+    mass_kg: float
+    direction: int
+    batch: int
+    dwell_s: float
+    start_m: float
+    group: int
+    times: tuple[Samples, Samples, Samples]
+    values: tuple[Samples, Samples, Samples]
+    drive: Samples
+    covariates: dict[str, float]
+
+    @property
+    def size(self) -> int:
+        """Number of samples over all channels."""
+        return sum(len(channel) for channel in self.values)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shots:
+    """A set of shots laid out for fits: samples shot after shot, channel after channel.
+
+    Attributes
+    ----------
+    noise_std : tuple of float
+        Standard deviation of each channel's noise [N, m, m]; nan where a channel was not recorded.
+    values, weights : ndarray, shape (N,)
+        Samples, and one over the noise's standard deviation.
+    channel : ndarray, shape (N,)
+        Which of `CHANNELS` a sample belongs to.
+    bounds : ndarray, shape (n + 1,)
+        Shot i owns samples `bounds[i]` to `bounds[i + 1]`.
+    """
+
+    excitation: Excitation
+    gravity_m_s2: float
+    stroke_m: float
+    items: tuple[Shot, ...]
+    noise_std: tuple[float, float, float]
+    values: Samples
+    weights: Samples
+    channel: Index
+    bounds: Index
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def of(self, shot: int) -> slice:
+        """Samples of one shot."""
+        return slice(int(self.bounds[shot]), int(self.bounds[shot + 1]))
+
+    @property
+    def times(self) -> Samples:
+        """Time of every sample, shape (N,)."""
+        return np.concatenate([np.concatenate(shot.times) for shot in self.items])
+
+    def chosen(self, places: Index) -> "Shots":
+        """Return the same set with only some of its shots, in the order given."""
+        return lay_out(
+            self.excitation,
+            self.gravity_m_s2,
+            self.stroke_m,
+            tuple(self.items[int(place)] for place in places),
+            self.noise_std,
+        )
+
+
+def lay_out(
+    excitation: Excitation,
+    gravity_m_s2: float,
+    stroke_m: float,
+    items: tuple[Shot, ...],
+    noise_std: tuple[float, float, float],
+) -> Shots:
+    """Put the samples of many shots in one row."""
+    values = np.concatenate([np.concatenate(shot.values) for shot in items])
+    channel = np.concatenate(
+        [np.repeat(np.arange(3), [len(samples) for samples in shot.values]) for shot in items]
+    )
+    weights = 1.0 / np.asarray(noise_std)[channel]
+    bounds = np.concatenate([[0], np.cumsum([shot.size for shot in items])]).astype(np.int64)
+    return Shots(excitation, gravity_m_s2, stroke_m, items, noise_std, values, weights, channel, bounds)

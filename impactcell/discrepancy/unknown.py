@@ -1,0 +1,110 @@
+"""A gap that no known effect explains: where it is, what shape it has, and a free-form term that would close it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.discrepancy.evidence import ALPHA, Evidence
+from impactcell.discrepancy.locate import ALL
+from impactcell.discrepancy.phases import BETWEEN_SHOTS
+from impactcell.discrepancy.shots import CHANNELS
+from impactcell.records import Samples
+
+STRONG_SHARE = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """Free-form residual along one phase of one channel, in units of the noise.
+
+    Attributes
+    ----------
+    place : ndarray, shape (k,)
+        Place within the phase, 0 to 1.
+    mean : ndarray, shape (k,)
+    """
+
+    phase: str
+    channel: str
+    place: Samples
+    mean: Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unexplained:
+    """What is left.
+
+    Attributes
+    ----------
+    phase : str
+        Where the gap is largest.
+    depends_on : tuple of str
+        Covariates with which it changes, significantly over the whole map.
+    shape : str
+        In words.
+    shapes : tuple of Shape
+        To be drawn.
+    """
+
+    phase: str
+    depends_on: tuple[str, ...]
+    shape: str
+    shapes: tuple[Shape, ...]
+
+
+def by_phase(evidence: Evidence) -> dict[str, float]:
+    """First-order gain of each row of the map, the largest over its cells; the row of the factors counts too."""
+    chart = evidence.map
+    gain = evidence.map_scores.gain
+    made = {}
+    for row, phase in enumerate(chart.rows):
+        mine = chart.cell // len(chart.columns) == row
+        per_column = [
+            float(gain[mine & (chart.cell % len(chart.columns) == column)].sum())
+            for column in range(len(chart.columns))
+        ]
+        made[phase] = max(per_column)
+    return made
+
+
+def describe(evidence: Evidence) -> Unexplained:
+    """Describe what a fitted model leaves."""
+    chart, tests, made = evidence.map, evidence.map_tests, evidence.map_scores
+    strength = by_phase(evidence)
+    phase = max(strength, key=lambda name: strength[name])
+    row = chart.rows.index(phase)
+    p = np.ones(len(chart.columns))
+    for column in range(len(chart.columns)):
+        cell = row * len(chart.columns) + column
+        if cell < len(tests.adjusted):
+            p[column] = tests.adjusted[cell]
+    depends = tuple(
+        name for column, name in enumerate(chart.columns) if name != ALL and p[column] <= ALPHA * 5.0
+    )
+    shapes = []
+    if phase != BETWEEN_SHOTS:
+        for channel, sensor in enumerate(CHANNELS):
+            mine = (chart.cell == row * len(chart.columns)) & (chart.channel == channel)
+            if mine.any():
+                shapes.append(Shape(phase, sensor, chart.place[mine], made.amplitude[mine]))
+    return Unexplained(
+        phase,
+        depends,
+        _in_words(phase, shapes, made.gain, chart.cell, row * len(chart.columns)),
+        tuple(shapes),
+    )
+
+
+def _in_words(phase: str, shapes: list[Shape], gain: Samples, cell: Samples, whole: int) -> str:
+    if phase == BETWEEN_SHOTS:
+        return "the friction factors change from shot to shot with the covariates named"
+    strongest = max(shapes, key=lambda shape: float(np.abs(shape.mean).max()), default=None)
+    if strongest is None or not float(gain[cell == whole].max(initial=0.0)) > 0.0:
+        return "no mean shape: it changes with the covariates only"
+    mean = strongest.mean
+    signs = np.sign(mean[np.abs(mean) > STRONG_SHARE * np.abs(mean).max()])
+    turns = int(np.sum(signs[1:] != signs[:-1]))
+    kind = {0: "one-sided", 1: "S-shaped", 2: "bowed"}.get(turns, f"oscillating ({turns} changes of sign)")
+    where = float(strongest.place[int(np.argmax(np.abs(mean)))])
+    part = "early" if where < 1 / 3 else "in the middle" if where < 2 / 3 else "late"
+    return f"{kind} in {strongest.channel}, largest {part} in the phase"
