@@ -201,7 +201,7 @@ def follow(
 
 
 @compiled
-def integrate(
+def integrate_all(
     rows: Samples,
     program: at.Whole,
     drives: Samples,
@@ -259,4 +259,40 @@ def integrate(
             integers(mode),
         )
     # A last use keeps the workspace alive while bare pointers into it are in use.
+    mode[0] = work.shape[0]
+
+
+@compiled
+def integrate(
+    row: Samples,
+    program: at.Whole,
+    drive: Samples,
+    horizon: float,
+    goal: int,
+    cursor: at.Whole,
+    times: Samples,
+    out: Samples,
+    event_kinds: at.Whole,
+    event_times: Samples,
+    figures: Samples,
+) -> None:
+    """Integrate one tap; as `integrate_all`, which saves a second compilation."""
+    work = np.empty(WORK)
+    mode = np.empty(at.MODES, np.int64)
+    follow(
+        numbers(row),
+        integers(program),
+        numbers(drive),
+        drive.shape[0] // 2,
+        horizon,
+        goal,
+        integers(cursor),
+        numbers(times),
+        numbers(out),
+        integers(event_kinds),
+        numbers(event_times),
+        numbers(figures),
+        numbers(work),
+        integers(mode),
+    )
     mode[0] = work.shape[0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from impactcell.errors import PhysicsError
 from impactcell.physics import layout as at
-from impactcell.physics.course import integrate
+from impactcell.physics.course import integrate_all
 from impactcell.physics.effects import LIBRARY
 from impactcell.physics.plant import Plant, Strike
 from impactcell.physics.program import assemble, columns, parameter_vector
@@ -189,7 +189,7 @@ class Ensemble:
     def _sampled(self, rows: Samples) -> Samples:
         out = np.empty(self._times.size)
         figures = np.empty((self._count, at.FIGURES))
-        integrate(
+        integrate_all(
             rows,
             self._program.laws,
             self._drives,
@@ -281,7 +281,9 @@ def figures_of(rows: Samples, laws: at.Whole, horizon_s: float = LONGEST_S) -> F
     table = np.empty((rows.shape[0], at.FIGURES))
     cursors = np.zeros((rows.shape[0], at.CURSORS), dtype=np.int64)
     undriven = np.zeros(rows.shape[0] + 1, dtype=np.int64)
-    integrate(rows, laws, NONE, undriven, horizon_s, at.TO_REST, cursors, NONE, NONE, NO_KINDS, NONE, table)
+    integrate_all(
+        rows, laws, NONE, undriven, horizon_s, at.TO_REST, cursors, NONE, NONE, NO_KINDS, NONE, table
+    )
     return Figures(
         peak_force_n=table[:, at.PEAK_FORCE],
         displacement_m=table[:, at.DISPLACEMENT],

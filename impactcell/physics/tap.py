@@ -6,7 +6,7 @@ import numpy as np
 
 from impactcell.errors import NoStopError
 from impactcell.physics import layout as at
-from impactcell.physics.course import integrate
+from impactcell.physics.course import integrate_all
 from impactcell.physics.motion import Event, EventKind, Motion, Sampled
 from impactcell.physics.plant import Plant, Strike
 from impactcell.physics.program import Program, assemble, columns, parameter_vector
@@ -61,7 +61,7 @@ def _move(plant: Plant, tap: Strike, initial_speed_m_s: float) -> Motion:
     cursors = np.zeros((1, at.CURSORS), dtype=np.int64)
     cursors[0, at.ROOM] = ROOM
     laws = program.laws
-    integrate(rows, laws, NONE, UNDRIVEN, LONGEST_S, at.TO_REST, cursors, NONE, NONE, kinds, times, table)
+    integrate_all(rows, laws, NONE, UNDRIVEN, LONGEST_S, at.TO_REST, cursors, NONE, NONE, kinds, times, table)
     figures = table[0]
     status = figures[at.STATUS]
     if status != at.AT_REST:
@@ -91,7 +91,7 @@ def _sampled(rows: Samples, program: Program, time_s: Samples) -> Sampled:
     order = np.argsort(time_s, kind="stable")
     cursors = np.array([[0, n, 2 * n, 3 * n, n, 2 * n, 3 * n, 4 * n, 0]], dtype=np.int64)
     out = np.empty(4 * n)
-    integrate(
+    integrate_all(
         rows,
         program.laws,
         NONE,
