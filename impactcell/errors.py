@@ -31,6 +31,7 @@
 `retry` says whether doing the same again can help. A message names the cell, the thing and the way out.
 """
 
+import math
 from typing import ClassVar
 
 
@@ -85,7 +86,17 @@ class NegativeRootError(PredictionError):
 
 
 class NotConvergedError(PredictionError):
-    """The waveform fit did not reach a minimum."""
+    """The waveform fit did not reach a minimum.
+
+    Attributes
+    ----------
+    gap : float
+        RMS of the residuals over the sensors' noise where the fit came to a halt; nan if it never began.
+    """
+
+    def __init__(self, message: str, gap: float = math.nan) -> None:
+        super().__init__(message)
+        self.gap = gap
 
 
 class PositioningError(ImpactCellError):

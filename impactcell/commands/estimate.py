@@ -58,11 +58,12 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
         rows = [(shot.cycle, _of_free_slide(shot, given.gravity_m_s2)) for shot in given.shots]
     else:
         shots = weighed(given.shots)
-        model = calibrated(_model(given, shots, cell), shots)
+        plant, misfit = _model(given, shots, cell)
+        model = calibrated(plant, shots)
         with progress("estimating", len(shots)) as done:
             rows = []
             for shot in shots:
-                rows.append((shot.cycle, estimate_tap(shot, model)))
+                rows.append((shot.cycle, estimate_tap(shot, model, misfit)))
                 done()
     if output is None:
         _write(rows, sys.stdout)
@@ -112,11 +113,12 @@ def calibrated(model: Model, shots: Sequence[Capture]) -> Model:
     return replace(model, predictors=predictors, stroke_m=stroke)
 
 
-def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> Model:
+def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> tuple[Model, float]:
+    """Give the cell's model, or one fitted to the campaign with what it leaves unexplained."""
     if cell is not None:
         from impactcell.settings import read_cell
 
-        return read_cell(cell).model
+        return read_cell(cell).model, 1.0
     with progress("fitting the plant", 1):
         fitted = fit_plant(shots, campaign.gravity_m_s2)
     plant, prior = fitted.model.plant, fitted.model.prior
@@ -127,7 +129,7 @@ def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> M
         f"mu_k/mu_s {fitted.model.ratio:.4f} ± {prior.ratio_std:.2g}; "
         f"residuals {fitted.gap:.3g} times the noise\n"
     )
-    return fitted.model
+    return fitted.model, fitted.gap
 
 
 def _of_free_slide(shot: Capture, gravity_m_s2: float) -> FrictionEstimate:

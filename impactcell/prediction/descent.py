@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.errors import NotConvergedError, PhysicsError
+from impactcell.errors import PhysicsError
 from impactcell.prediction.posterior import Side
 from impactcell.prediction.response import JUST_STICKING, PARAMETERS, RATIO, Response
 from impactcell.records import Samples
@@ -15,9 +15,13 @@ Indices = NDArray[np.intp]
 
 MOST_STEPS = 25
 SETTLED = 0.02
-"""Length of a step, in posterior standard deviations, below which the fit is at its minimum."""
-WORSE = 0.01
-"""Half a sum of squares may rise by this much in a step: nothing statistically, yet more than rounding."""
+"""Length of a step, in posterior standard deviations, below which the fit is at its minimum. This and
+`NO_GAIN` are for residuals of the size of the noise; where they are larger, so are these."""
+LONGEST_IN_STD = 4.0
+"""Longest step, in standard deviations of the prior: farther away the linear model says nothing."""
+NO_GAIN = 0.005
+"""Change of half a sum of squares that means nothing: a kink that passes a sample makes Gauss-Newton go to
+and fro by less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +56,8 @@ class Minimum:
     jacobian : ndarray, shape (n, 4)
     cost : float
         Half the sum of squares, data and prior.
+    settled : bool
+        False where the steps came to an end before the minimum did.
     """
 
     theta: Samples
@@ -59,6 +65,7 @@ class Minimum:
     residual: Samples
     jacobian: Samples
     cost: float
+    settled: bool = True
 
     @property
     def chi2(self) -> float:
@@ -89,16 +96,12 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
 
     Below the kink (`side` -1) the model is that of immediate breakaway. Above it (`side` +1) the residuals
     are continued linearly along mu_k/mu_s from the kink.
-
-    Raises
-    ------
-    NotConvergedError
-        No minimum after `MOST_STEPS` steps.
     """
     theta = start.copy()
     residual, jacobian = _linear(response, theta, side)
     cost = 0.5 * float(residual @ residual) + known.cost(theta)
     free, prior = known.free, known.weight[known.free] ** 2
+    longest = np.minimum(0.5, LONGEST_IN_STD / np.maximum(known.weight[free], 1e-12))
     damping = 0.0
     for _ in range(MOST_STEPS):
         slope = jacobian[:, free]
@@ -107,23 +110,27 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
         step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
         if not np.isfinite(step).all():
             break
-        if float(step @ curvature @ step) < SETTLED**2 and damping <= 1e-3:
+        noise = max(2.0 * cost / response.size, 1.0)
+        if float(step @ curvature @ step) < SETTLED**2 * noise and damping <= 1e-3:
             return Minimum(theta, side, residual, jacobian, cost)
         moved = theta.copy()
-        moved[free] += np.clip(step, -0.5, 0.5)
+        moved[free] += np.clip(step, -longest, longest)
         try:
             new_residual, new_jacobian = _linear(response, moved, side)
             new_cost = 0.5 * float(new_residual @ new_residual) + known.cost(moved)
         except PhysicsError:
             new_cost = math.inf
-        if new_cost <= cost + WORSE:
+        if new_cost <= cost + NO_GAIN * noise:
+            settled = abs(new_cost - cost) < NO_GAIN * noise and damping <= 1e-2
             theta, residual, jacobian, cost = moved, new_residual, new_jacobian, new_cost
+            if settled:
+                return Minimum(theta, side, residual, jacobian, cost)
             damping = 0.0 if damping < 1e-2 else 0.1 * damping
         else:
             damping = max(10.0 * damping, 1e-2)
             if damping > 1e8:
                 break
-    raise NotConvergedError("the waveform fit did not settle; the capture may not be of this plant")
+    return Minimum(theta, side, residual, jacobian, cost, settled=False)
 
 
 def _linear(response: Response, theta: Samples, side: int) -> tuple[Samples, Samples]:

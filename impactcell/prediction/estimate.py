@@ -2,7 +2,8 @@
 
 import math
 
-from impactcell.errors import PhysicsError, PredictionError
+from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
+from impactcell.prediction.doubt import DOUBTED
 from impactcell.prediction.equations import (
     beyond_calibration,
     by_distance,
@@ -16,12 +17,10 @@ from impactcell.prediction.reading import Reading, Slide, peak_force, slide
 from impactcell.prediction.waveform import Waveform, braking_friction, fit
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
 
-WIDE_GAP = 3.0
-"""Residuals so many times the noise make the waveform's own standard deviation doubtful."""
 NOT_READ = Reading(math.nan, math.nan)
 
 
-def estimate(capture: Capture, model: Model) -> FrictionEstimate:
+def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEstimate:
     """Estimate mu_s and mu_k of one tap by equations (4), (5), (6) and by its waveform.
 
     Published is the waveform's estimate where it converges, else (6), else what there is of (4) and (5).
@@ -31,6 +30,10 @@ def estimate(capture: Capture, model: Model) -> FrictionEstimate:
     ----------
     capture : Capture
     model : Model
+    misfit : float
+        RMS of the model's residuals over many taps, 1 = noise, where it is known. A model that misses those
+        bends mu_s even in a tap that it seems to fit: then mu_s comes from the equations, whose few
+        coefficients bend less.
     """
     peak, force_fault = _peak(capture)
     slid, slide_fault = _slide(capture)
@@ -73,9 +76,14 @@ def estimate(capture: Capture, model: Model) -> FrictionEstimate:
             found = fit(capture, model, slid)
         except PredictionError as fault:
             mu_s = _warned(mu_s, f"no waveform estimate: {fault}")
+            gap = fault.gap if isinstance(fault, NotConvergedError) else math.nan
         else:
-            mu_s, mu_k, gap = _from_waveform(model, capture, found)
-            estimator = Estimator.WAVEFORM
+            mu_s_seen, mu_k, gap = _from_waveform(model, capture, found)
+            if misfit <= DOUBTED or mu_s.quality is Quality.BAD:
+                mu_s, estimator = mu_s_seen, Estimator.WAVEFORM
+            else:
+                missed = f"the model misses these taps: residuals are {misfit:.3g} times the noise"
+                mu_s, mu_k = _warned(mu_s, missed), _warned(mu_k, missed)
     return FrictionEstimate(
         mu_s=mu_s,
         mu_k=mu_k,
@@ -92,7 +100,7 @@ def estimate(capture: Capture, model: Model) -> FrictionEstimate:
 def _from_waveform(model: Model, capture: Capture, found: Waveform) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
     warnings = [beyond_calibration(model, capture, found.mu_s)]
-    if found.gap > WIDE_GAP:
+    if found.misfit > DOUBTED:
         warnings.append(f"residuals are {found.gap:.3g} times the sensors' noise: the model lacks something")
     told = "mu_s through mu_k/mu_s of the model: the part moved at once" if found.immediate > 0.5 else ""
     mu_s = Coefficient(found.mu_s, found.mu_s_std, Quality.GOOD, told)

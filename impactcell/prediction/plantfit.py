@@ -9,10 +9,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
 from impactcell.physics import Plant
+from impactcell.prediction.doubt import (
+    CONTACT_PHASES,
+    DOUBTED,
+    FORCE_PHASES,
+    SLIDE_PHASES,
+    Indices,
+    doubt,
+    phases,
+)
 from impactcell.prediction.model import Model, Prior
 from impactcell.prediction.reading import Slide, checked, peak_force, slide
 from impactcell.prediction.response import DAMPING, MU_K, RATIO, STIFFNESS, Response, parameters, respond
@@ -27,13 +35,13 @@ BY_CONTACT = np.array([0.3, 3e-4, 2e-3])
 """The same where k and b of the contact alone are believed more than the model of the whole tap."""
 MOST_STEPS = 40
 SETTLED = 0.02
+NO_GAIN = 0.05
+"""Change of half a sum of squares over all taps that means nothing."""
 LEAST_RATIO_STD = 1e-3
-DOUBTED = 1.1
-"""Misfit from which the model is not believed in every phase of the tap alike."""
 ROUNDS = 4
-FORCE_PHASES, CONTACT_PHASES, SLIDE_PHASES = 16, 8, 8
-LATER = np.where(np.isin(np.arange(32), [0, 1, 2, 3, 16, 17]), 1.0, 30.0)
-"""How much less the later phases say: mu_s shows in the first quarter of the contact, while all is slow."""
+LATER = np.full(FORCE_PHASES + CONTACT_PHASES + SLIDE_PHASES, 30.0)
+LATER[: FORCE_PHASES // 4] = LATER[FORCE_PHASES : FORCE_PHASES + CONTACT_PHASES // 4] = 1.0
+"""Factor of the standard deviations after the first quarter of the contact, where the model misses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,13 +86,13 @@ def fit_plant(captures: Sequence[Capture], gravity_m_s2: float, name: str = "fit
     frictions = [max(slid.deceleration.value / gravity_m_s2, 1e-3) for _, slid, _ in taps]
     mean = float(np.mean(frictions))
     start = Plant(stiffness, max(damping, 1.0), mean / USUAL_RATIO, mean, gravity_m_s2)
-    responses, thetas, bins = [], [], []
+    responses, thetas, parts = [], [], []
     for (capture, slid, _), mu_k in zip(taps, frictions, strict=True):
         plant = replace(start, mu_k=mu_k, mu_s=mu_k / USUAL_RATIO)
         try:
             responses.append(respond(capture, plant, slid.separation_s))
             thetas.append(parameters(plant))
-            bins.append(_phases(responses[-1], slid))
+            parts.append(phases(responses[-1], slid.separation_s, slid.stop_s))
         except PhysicsError as fault:
             faults.append(f"shot {capture.cycle}: {fault}")
     if not responses:
@@ -95,7 +103,7 @@ def fit_plant(captures: Sequence[Capture], gravity_m_s2: float, name: str = "fit
     if misfit > DOUBTED:
         anchored = found.copy()
         anchored[:, STIFFNESS], anchored[:, DAMPING] = math.log(stiffness), math.log(max(damping, 1.0))
-        found, covariance = _doubting(responses, anchored, bins)
+        found, covariance = _doubting(responses, anchored, parts)
     mu_k = float(np.exp(found[:, MU_K]).mean())
     ratio, stiffness, damping = np.exp(found[0, SHARED]).tolist()
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
@@ -197,48 +205,36 @@ def _joint(
                 new_linear, new_cost = _all_linear(responses, moved)
             except PhysicsError:
                 new_cost = math.inf
-            if new_cost <= cost + 0.01 * len(responses):
+            if new_cost <= cost + NO_GAIN:
                 break
             step = 0.3 * step
             if float(np.abs(step).max()) < 1e-9:
                 raise NotConvergedError("the plant could not be fitted to the campaign")
+        settled = abs(new_cost - cost) < NO_GAIN
         thetas, linear, cost = moved, new_linear, new_cost
+        if settled:
+            return thetas, np.asarray(np.linalg.inv(curvature)), 2.0 * cost
     raise NotConvergedError("the plant could not be fitted to the campaign")
 
 
 def _doubting(
-    responses: Sequence[Response], thetas: Samples, bins: Sequence[NDArray[np.intp]]
+    responses: Sequence[Response], thetas: Samples, parts: Sequence[Indices]
 ) -> tuple[Samples, Samples]:
     """Fit again, with each phase of the tap believed as far as the model describes it there.
 
-    A law that the model lacks shows where it acts. There the residuals of all taps are wide, and count
-    for less, so that what is fitted comes from the phases that the model does describe. k and b stay with
-    the regression of force on indentation, which needs no law of friction.
+    k and b stay with the regression of force on indentation, which needs no law of friction, and mu_s with
+    the first quarter of the contact, where all is slow and laws that depend on speed say little.
     """
     covariance = np.zeros((3, 3))
-    phase, anchor = np.concatenate(bins), thetas[0, SHARED].copy()
-    edges = np.cumsum([len(one) for one in bins])[:-1]
+    anchor = thetas[0, SHARED].copy()
     for _ in range(ROUNDS):
         linear, _ = _all_linear(responses, thetas)
-        squares = np.concatenate([residual for residual, _ in linear]) ** 2
-        mean = np.bincount(phase, squares) / np.maximum(np.bincount(phase), 1)
-        factors = np.split((np.sqrt(np.maximum(mean, 1.0)) * LATER)[phase], edges)
-        doubted = [response.doubted(factor) for response, factor in zip(responses, factors, strict=True)]
+        doubted = [
+            response.doubted(doubt(residual, phase) * LATER[phase])
+            for response, (residual, _), phase in zip(responses, linear, parts, strict=True)
+        ]
         thetas, covariance, _ = _joint(doubted, thetas, anchor, BY_CONTACT)
     return thetas, covariance
-
-
-def _phases(response: Response, slid: Slide) -> NDArray[np.intp]:
-    """Give each block the number of its phase: of contact for force, of contact and slide for position."""
-
-    def along(times: Samples, start: float, end: float, parts: int) -> NDArray[np.intp]:
-        return np.clip(((times - start) / (end - start) * parts).astype(np.intp), 0, parts - 1)
-
-    force, position = response.force_time_s, response.position_time_s
-    first = along(force, 0.0, slid.separation_s, FORCE_PHASES)
-    contact = FORCE_PHASES + along(position, 0.0, slid.separation_s, CONTACT_PHASES)
-    sliding = FORCE_PHASES + CONTACT_PHASES + along(position, slid.separation_s, slid.stop_s, SLIDE_PHASES)
-    return np.concatenate([first, np.where(position < slid.separation_s, contact, sliding)])
 
 
 def _all_linear(

@@ -14,14 +14,14 @@ import numpy as np
 
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.physics import Ensemble, Plant
-from impactcell.prediction.descent import Belief, descend
+from impactcell.prediction.descent import Belief, Minimum, descend
+from impactcell.prediction.doubt import DOUBTED, doubt, phases
 from impactcell.prediction.model import Model
 from impactcell.prediction.posterior import Posterior, mixture
 from impactcell.prediction.reading import Slide, checked, noise_std, refuse_clipped, slide
 from impactcell.prediction.response import (
     DAMPING,
     MU_K,
-    PARAMETERS,
     RATIO,
     STIFFNESS,
     Response,
@@ -36,6 +36,12 @@ FAR_FROM_KINK = 6.0
 """Standard deviations of z beyond which the other side of the kink has no weight."""
 OF_MU_K = np.array([1.0, 0.0, 0.0, 0.0])
 OF_MU_S = np.array([1.0, -1.0, 0.0, 0.0])
+Z = np.array([1.0, -1.0, 0.0, -1.0])
+"""How z, which tells the side of the kink, follows theta."""
+MISSED = 4.0
+"""Misfit of blocks from which on the waveform is not believed at all."""
+ROUNDS = 3
+"""Rounds of doubting the phases that the model misses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +61,8 @@ class Waveform:
     gap : float
         RMS of the residuals of single samples over the sensors' noise; 1 = noise.
     misfit : float
-        The same for blocks; the standard deviations are widened by it where it is above 1.
+        The same for blocks. The standard deviations are widened by it where it is above 1; where it is well
+        above, the phases that the model misses count for less (`impactcell.prediction.doubt`).
     """
 
     mu_s: float
@@ -107,7 +114,7 @@ def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_rati
     CaptureError, ClippedForceError, NoBreakawayError, NoSeparationError, NoStopError
         The capture cannot be used.
     NotConvergedError
-        The fit did not reach a minimum.
+        The fit did not reach a minimum, or the model is not that of this tap.
     """
     force = checked(capture.force, "force")
     refuse_clipped(force)
@@ -119,29 +126,38 @@ def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_rati
         raise CaptureError("the part's mass or the actuator's velocity is not known")
     try:
         response = respond(capture, with_parameters(model.plant, theta), slid.separation_s)
-        return _fit(response, known, theta, capture, model.plant)
+        return _fit(response, known, theta, capture, model.plant, slid)
     except PhysicsError as fault:
         raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
     except np.linalg.LinAlgError as fault:
         raise NotConvergedError(f"the fit is singular: {fault}") from fault
 
 
-def _fit(response: Response, known: Belief, start: Samples, capture: Capture, plant: Plant) -> Waveform:
-    first = 1 if response.kink(start) >= 0.0 else -1
-    found = descend(response, known, start, first)
-    form = np.zeros(PARAMETERS)
-    form[[MU_K, RATIO, DAMPING]] = 1.0, -1.0, -1.0
-    offset = response.kink(found.theta) - float(form @ found.theta)
-    fits = [found]
-    spread = math.sqrt(float(form @ found.as_side(known).covariance @ form))
-    if first * response.kink(found.theta) < FAR_FROM_KINK * spread:
-        fits.append(descend(response, known, found.theta, -first))
-    best = min(fits, key=lambda one: one.cost)
-    misfit = math.sqrt(best.chi2 / max(response.size - len(known.free), 1))
-    sides = tuple(one.as_side(known, max(misfit, 1.0)) for one in fits)
+def _fit(
+    response: Response, known: Belief, start: Samples, capture: Capture, plant: Plant, slid: Slide
+) -> Waveform:
+    offset = response.kink(start) - float(Z @ start)
+    fits = _both_sides(response, known, start)
+    plain = _likelier(fits, known, offset)
+    misfit = math.sqrt(plain.chi2 / max(response.size - len(known.free), 1))
+    widening = max(misfit, 1.0)
+    if misfit > DOUBTED:
+        widening = 1.0
+        phase = phases(response, slid.separation_s, slid.stop_s)
+        later = np.where((phase < 4) | ((phase >= 16) & (phase < 18)), 1.0, 30.0)
+        for _ in range(ROUNDS):
+            best = _likelier(fits, known, offset)
+            residual, _ = response.linear(best.theta, best.side)
+            fits = _both_sides(response.doubted(doubt(residual, phase) * later), known, best.theta)
+    gap = _gap(plant, plain.theta, capture)
+    if misfit > MISSED:
+        raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
+    if not _likelier(fits, known, offset).settled:
+        raise NotConvergedError("the waveform fit did not settle", gap)
+    sides = tuple(one.as_side(known, widening) for one in fits)
     if len(sides) == 1:
         sides = (replace(sides[0], sign=0),)
-    posterior = mixture(sides, form, offset)
+    posterior = mixture(sides, Z, offset)
     slips_at_once = [one.side < 0 for one in fits]
     (mu_s, mu_s_std), (mu_k, mu_k_std) = (_moments(posterior, of) for of in (OF_MU_S, OF_MU_K))
     return Waveform(
@@ -149,12 +165,29 @@ def _fit(response: Response, known: Belief, start: Samples, capture: Capture, pl
         mu_s_std=mu_s_std,
         mu_k=mu_k,
         mu_k_std=mu_k_std,
-        theta=best.theta,
+        theta=_likelier(fits, known, offset).theta,
         posterior=posterior,
         immediate=float(posterior.weights[slips_at_once].sum()),
-        gap=_gap(plant, best.theta, capture),
+        gap=gap,
         misfit=misfit,
     )
+
+
+def _both_sides(response: Response, known: Belief, start: Samples) -> list[Minimum]:
+    """Descend on the side of the start, and on the other where the kink is near."""
+    first = 1 if response.kink(start) >= 0.0 else -1
+    found = descend(response, known, start, first)
+    spread = math.sqrt(float(Z @ found.as_side(known).covariance @ Z))
+    if first * response.kink(found.theta) >= FAR_FROM_KINK * spread:
+        return [found]
+    return [found, descend(response, known, found.theta, -first)]
+
+
+def _likelier(fits: list[Minimum], known: Belief, offset: float) -> Minimum:
+    """Side with the greater probability; the lower minimum may lie beyond its side's end."""
+    misfit = math.sqrt(max(min(2.0 * one.cost / len(one.residual) for one in fits), 1.0))
+    weights = mixture(tuple(one.as_side(known, misfit) for one in fits), Z, offset).weights
+    return fits[int(np.argmax(weights))]
 
 
 def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:

@@ -215,9 +215,9 @@ def table_of_waveform(shots_a_velocity: int) -> list[Table]:
         rows,
         f"{shots_a_velocity} shots a velocity, 18.9 kg, mu_s 0.15-0.25; mu_k/mu_s, k and b drawn from the "
         "priors of the estimator (3, 1, 2 %). Bound: inverse of Fisher information (differences of the "
-        "simulator's plant) plus prior information, for each shot. Last column: with the information averaged "
-        "over the shots of a velocity before it is inverted, which no estimator reaches where shots that show "
-        "mu_s well and shots that do not are mixed.",
+        "simulator's plant) plus prior information, for each shot. Last column: with the information "
+        "averaged over the shots of a velocity before it is inverted, which no estimator reaches where shots "
+        "that show mu_s well and shots that do not are mixed.",
     )
     coverage = Table(
         "Coverage of the waveform's 95 % intervals",
