@@ -122,7 +122,9 @@ def estimate(
 def track(
     series: Annotated[Path, typer.Argument(metavar="SERIES.csv", help="cycle,mu_s,mu_s_std[,batch]")],
     *,
-    batch: Annotated[str, typer.Option(help="known or unknown")] = "known",
+    batch: Annotated[
+        str | None, typer.Option(help="known or unknown; known by default where there is a batch column")
+    ] = None,
     limit: Annotated[float | None, typer.Option(metavar="MU", help="Wear limit of mu_s.")] = None,
     as_json: Annotated[bool, typer.Option("--json")] = False,
     quiet: Quiet = False,

@@ -1,0 +1,240 @@
+"""`impactcell track`: replay a friction series through the tracker and its alarms."""
+
+import csv
+import json
+import math
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from impactcell import alarms
+from impactcell.alarms import AlarmSettings, Effect
+from impactcell.errors import SeriesError
+from impactcell.records import AlarmName, Evidence
+from impactcell.tracking import BatchKnowledge, Reading, Tracked, TrackerSettings, initial_state
+from impactcell.tracking import track as track_cycle
+
+COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
+FEWEST = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Raised:
+    """One activation of an alarm, with its evidence."""
+
+    alarm: AlarmName
+    cycle: int
+    evidence: Evidence
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replayed:
+    """A series after its last cycle."""
+
+    last: Tracked
+    raised: tuple[Raised, ...]
+    used: int
+    notes: tuple[tuple[int, str], ...]
+
+
+def track(
+    series: Path, batch: str | None = None, limit: float | None = None, *, as_json: bool = False
+) -> None:
+    """Replay a series `cycle,mu_s,mu_s_std[,batch]` and print wear, rate and alarms.
+
+    Parameters
+    ----------
+    batch : "known", "unknown" or None
+        Whether the batch column is believed; None believes it where there is one.
+    limit : float or None
+        mu_s at which the surface is worn.
+
+    Raises
+    ------
+    SeriesError
+        A file that cannot be read, with file and line.
+    """
+    readings, has_batch = read_series(series)
+    if batch not in (None, "known", "unknown"):
+        raise SeriesError(f"--batch {batch}: say known or unknown")
+    knowledge = BatchKnowledge(batch) if batch else None
+    if knowledge is BatchKnowledge.KNOWN and not has_batch:
+        raise SeriesError(
+            f"{series}:1: --batch known needs a column `batch`; leave the option out, or add it"
+        )
+    if knowledge is None:
+        knowledge = BatchKnowledge.KNOWN if has_batch else BatchKnowledge.UNKNOWN
+    settings = TrackerSettings(wear_limit=math.inf if limit is None else limit, batch=knowledge)
+    replayed = replay(settings, readings)
+    if replayed.used < FEWEST:
+        why = f"; {replayed.notes[0][1]}" if replayed.notes else ""
+        raise SeriesError(f"{series}: only {replayed.used} of {len(readings)} cycles can be used{why}")
+    text = json.dumps(_as_json(replayed)) if as_json else _as_text(replayed)
+    sys.stdout.write(text + "\n")
+
+
+def replay(settings: TrackerSettings, readings: list[Reading]) -> Replayed:
+    """Track a series and its alarms; a shift is reported as the cycles after it came to see it."""
+    rules = AlarmSettings()
+    state, book = initial_state(), alarms.initial_state(rules)
+    raised: list[Raised] = []
+    notes: list[tuple[int, str]] = []
+    used, open_shift, tracked = 0, -1, None
+    for reading in readings:
+        tracked = track_cycle(settings, state, reading)
+        state = tracked.state
+        used += tracked.used
+        notes.extend((reading.cycle, note) for note in tracked.notes)
+        active = book.alarm(AlarmName.WEAR_LIMIT).active
+        findings = [
+            alarms.wear_limit(rules, tracked.wear, reading.cycle, active=active),
+            alarms.batch_shift(tracked.shift),
+        ]
+        book, moved = alarms.after_cycle(
+            rules, book, findings, reading.cycle, reading.time_ns, announced=tracked.expected
+        )
+        raised.extend(
+            Raised(t.alarm.name, reading.cycle, t.alarm.evidence)
+            for t in moved
+            if Effect.ANNOUNCE in t.effects and t.alarm.name is not AlarmName.BATCH_SHIFT
+        )
+        if tracked.shift is not None:
+            # a second shift while the first still stands is news too
+            open_shift = len(raised)
+            raised.append(Raised(AlarmName.BATCH_SHIFT, reading.cycle, tracked.shift))
+        elif open_shift >= 0:
+            raised[open_shift] = _refined(raised[open_shift], tracked)
+    if tracked is None:
+        raise SeriesError("the series has no cycles")
+    return Replayed(tracked, tuple(raised), used, tuple(notes))
+
+
+def read_series(path: Path) -> tuple[list[Reading], bool]:
+    """Read a series; also tell whether it has a column `batch`.
+
+    Raises
+    ------
+    SeriesError
+        No such file, no header, a column missing or twice, a cell that is no number.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.reader(file))
+    except OSError as error:
+        raise SeriesError(f"{path}: cannot be read: {error.strerror}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise SeriesError(f"{path}: not a CSV file: {error}") from error
+    if not rows:
+        raise SeriesError(f"{path}:1: empty; the first line is to be cycle,mu_s,mu_s_std[,batch]")
+    header = [name.strip() for name in rows[0]]
+    for name in ("cycle", "mu_s"):
+        if name not in header:
+            raise SeriesError(
+                f"{path}:1: no column `{name}`; the first line is to be cycle,mu_s,mu_s_std[,batch]"
+            )
+    for name in COLUMNS:
+        if header.count(name) > 1:
+            raise SeriesError(f"{path}:1: column `{name}` is there {header.count(name)} times; keep one")
+    readings = []
+    for line, row in enumerate(rows[1:], start=2):
+        if not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(header):
+            raise SeriesError(f"{path}:{line}: {len(row)} cells, but the header has {len(header)}")
+        cells = dict(zip(header, (cell.strip() for cell in row), strict=True))
+        readings.append(_reading(path, line, cells))
+    if not readings:
+        raise SeriesError(f"{path}:2: no cycles after the header")
+    return readings, "batch" in header
+
+
+def _reading(path: Path, line: int, cells: dict[str, str]) -> Reading:
+    try:
+        number = float(cells["cycle"])
+        cycle = int(number)
+    except (ValueError, OverflowError):
+        raise SeriesError(f"{path}:{line}: cycle `{cells['cycle']}` is not a whole number") from None
+    if cycle != number or cycle < 0:
+        raise SeriesError(f"{path}:{line}: cycle `{cells['cycle']}` is not a whole number from 0 on")
+    mu_s, std = (_number(path, line, name, cells.get(name, "")) for name in ("mu_s", "mu_s_std"))
+    return Reading(cycle, mu_s, std, batch_id=cells.get("batch") or None)
+
+
+def _number(path: Path, line: int, name: str, cell: str) -> float:
+    """Read a number; an empty cell is a missing one."""
+    if not cell:
+        return math.nan
+    try:
+        return float(cell)
+    except ValueError:
+        raise SeriesError(
+            f"{path}:{line}: {name} `{cell}` is not a number; leave it empty if missing"
+        ) from None
+
+
+def _refined(raised: Raised, tracked: Tracked) -> Raised:
+    """Let what is now believed of the shift replace what was believed when it was found."""
+    batch, evidence = tracked.batch, raised.evidence
+    if not math.isfinite(batch.last_shift):
+        return raised
+    newer = replace(
+        evidence, change_cycle=batch.last_shift_cycle, size=batch.last_shift, size_std=batch.last_shift_std
+    )
+    return replace(raised, evidence=newer)
+
+
+def _as_json(replayed: Replayed) -> dict[str, object]:
+    wear, batch = replayed.last.wear, replayed.last.batch
+    return {
+        "cycles": replayed.used,
+        "slope_per_cycle": wear.rate_per_cycle,
+        "slope_std": wear.rate_std,
+        "level": wear.level,
+        "level_std": wear.level_std,
+        "batch_offset": batch.offset,
+        "batch_offset_std": batch.offset_std,
+        "cycles_to_limit": _finite(wear.cycles_to_limit),
+        "cycles_to_limit_low": _finite(wear.cycles_to_limit_low),
+        "cycles_to_limit_high": _finite(wear.cycles_to_limit_high),
+        "alarms": [
+            {
+                "alarm": r.alarm.value,
+                "cycle": r.cycle,
+                "change_cycle": r.evidence.change_cycle,
+                "size": r.evidence.size,
+                "size_std": r.evidence.size_std,
+                "statistic": r.evidence.statistic,
+                "threshold": r.evidence.threshold,
+                "false_alarm_cycles": _finite(r.evidence.false_alarm_cycles),
+            }
+            for r in replayed.raised
+        ],
+        "notes": [{"cycle": cycle, "note": note} for cycle, note in replayed.notes],
+    }
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity: null says not reached, or no such figure."""
+    return value if math.isfinite(value) else None
+
+
+def _as_text(replayed: Replayed) -> str:
+    wear = replayed.last.wear
+    lines = [
+        f"{replayed.used} cycles used",
+        f"level   {wear.level:.5f} ± {wear.level_std:.5f}",
+        f"wear    {wear.rate_per_cycle * 1e3:+.6f} ± {wear.rate_std * 1e3:.6f} per 1000 cycles",
+    ]
+    if math.isfinite(wear.limit):
+        low, high = wear.cycles_to_limit_low, wear.cycles_to_limit_high
+        lines.append(
+            f"limit   {wear.limit:g} in {wear.cycles_to_limit:.0f} cycles, 95 %: {low:.0f} .. {high:.0f}"
+        )
+    for r in replayed.raised:
+        e = r.evidence
+        lines.append(
+            f"{r.alarm.value} at cycle {r.cycle}: "
+            f"changed at {e.change_cycle}, {e.size:+.5f} ± {e.size_std:.5f}"
+        )
+    lines.extend(f"cycle {cycle}: {note}" for cycle, note in replayed.notes)
+    return "\n".join(lines)
