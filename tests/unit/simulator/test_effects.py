@@ -28,7 +28,7 @@ VOCABULARY = {
 NULL = {
     "hertz_contact": {"exponent": 1.0},
     "force_saturation": {"limit_n": 1e9},
-    "presliding_compliance": {"stiffness_n_per_m": 1e9},
+    "presliding_compliance": {"stiffness_n_per_m": 1e12},
     "batch_shift": {"relative_change": (0.0,)},
     "stribeck_friction": {"friction_increase": 0.0, "stribeck_velocity_m_s": 0.04},
     "adhesion": {"force_n": 0.0, "range_m": 3e-4},
@@ -60,11 +60,11 @@ def test_one_file_an_effect() -> None:
 @pytest.mark.parametrize("name", sorted(VOCABULARY))
 def test_vanishes_at_its_null_value(name: str) -> None:
     null = NULL.get(name) or dict.fromkeys(LIBRARY[name].defaults, 0.0)
-    # The damper's first jolt b v makes elastic stick ring at any stiffness: only without b its limit is rigid.
+    # The damper's first jolt b v makes elastic stick ring at any stiffness: without b the limit is rigid.
     elastic = name == "presliding_compliance"
     plant = replace(PLANT, damping_n_s_per_m=0.0) if elastic else PLANT
     nominal, motion = tap(plant, STRIKE), tap(replace(plant, effects={name: null}), STRIKE)
-    tolerance = 1e-4 if elastic else 1e-9
+    tolerance = 3e-4 if elastic else 1e-9
     assert motion.sliding_distance_m == pytest.approx(nominal.sliding_distance_m, rel=tolerance)
     assert motion.peak_force_n == pytest.approx(nominal.peak_force_n, rel=tolerance)
     np.testing.assert_allclose(motion.position_m(TIME), nominal.position_m(TIME), atol=0.01 * tolerance)
