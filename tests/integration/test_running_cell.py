@@ -41,15 +41,8 @@ async def connected(endpoint: str, password: str) -> Client:
 
 
 async def node(client: Client, cell: str, path: str) -> Node:
-    uri = await client.get_namespace_array()
-    spaces = [i for i, one in enumerate(uri) if "impactcell" in one]
-    for index in spaces:
-        names = ["ImpactCells", cell, *path.split("/")]
-        try:
-            return await client.nodes.objects.get_child([f"{index}:{name}" for name in names])
-        except ua.UaStatusCodeError:
-            continue
-    raise AssertionError(f"no node {path}")
+    index = await client.get_namespace_index("urn:impactcell:cells")
+    return client.get_node(ua.NodeId(f"{cell}/{path}", index))
 
 
 @pytest.mark.timeout(240)
