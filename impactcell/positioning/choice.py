@@ -102,11 +102,11 @@ def weigh(
 def choose(
     remaining: float, table: Samples, velocities: Samples, strokes: Samples, rows: Samples,
     value: CostToGo, aims: Samples, *, tolerance: float, penalty: float, bound: float, part_mass: float,
-    gravity: float,
+    gravity: float, caps: Samples,
 ) -> tuple[Chosen | None, float]:  # fmt: skip
     """Tap of least cost with an overshoot probability within `bound`, and the least probability met.
 
-    The tap is None where none is within the bound.
+    The tap is None where none is within the bound. `caps` is the longest stroke allowed at each velocity.
     """
     coarse, mass = between(COARSE_Z), between(Z)
     which, where, what = shortlist(
@@ -117,7 +117,7 @@ def choose(
     for i, place, first in zip(which, where, what, strict=True):
         if first == math.inf or (best is not None and first > best.cost + 1.0):
             continue
-        for velocity, tried in _neighbours(int(i), float(place), velocities, strokes):
+        for velocity, tried in _neighbours(int(i), float(place), velocities, strokes, caps):
             fine = tried
             for _ in range(2):
                 costs, risks = weigh(
@@ -135,11 +135,14 @@ def choose(
     return best, least
 
 
-def _neighbours(i: int, place: float, velocities: Samples, strokes: Samples) -> list[tuple[float, Samples]]:
+def _neighbours(
+    i: int, place: float, velocities: Samples, strokes: Samples, caps: Samples
+) -> list[tuple[float, Samples]]:
     """Where to look more closely: strokes about `place`, or velocities where there is no stroke to choose."""
     if strokes.size == 1:
-        low, high = velocities[max(i - 1, 0)], velocities[min(i + 1, velocities.size - 1)]
-        return [(float(v), strokes) for v in np.linspace(low, high, 2 * FINE + 1)]
+        above = min(i + 1, velocities.size - 1)
+        high = velocities[above] if caps[above] >= strokes[0] else velocities[i]
+        return [(float(v), strokes) for v in np.linspace(velocities[max(i - 1, 0)], high, 2 * FINE + 1)]
     low = strokes[max(math.ceil(place) - 1, 0)]
     high = strokes[min(math.floor(place) + 1, strokes.size - 1)]
-    return [(float(velocities[i]), np.linspace(low, high, FINE))]
+    return [(float(velocities[i]), np.linspace(low, min(high, caps[i]), FINE))]

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,10 @@ from impactcell.positioning import belief as beliefs
 from impactcell.positioning.belief import Belief
 from impactcell.positioning.choice import choose
 from impactcell.positioning.learning import learn
+from impactcell.positioning.limits import allowed_strokes, largest_force
 from impactcell.positioning.response import displacement_of
 from impactcell.positioning.spread import COARSE_Z, Z, distribution, plants, scenarios, spread_table
+from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.positioning.value import AIMS, CostToGo, cost_to_go
 from impactcell.records import Samples
 
@@ -24,42 +27,6 @@ MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that b
 CAUTION = (1.0, 20.0)  # factors on that multiplier, tried in turn until a tap is within the bound
 SAME_MASS = 0.03
 STALE = np.array([0.02, 0.04, 0.08, 0.03, 2.0])  # change of the belief after which a table is made anew
-
-
-@dataclass(frozen=True, slots=True)
-class Tap:
-    """One tap to command.
-
-    Attributes
-    ----------
-    velocity_m_s : float
-    stroke_m : float
-        Travel from first contact; inf in a cell without a commanded stroke.
-    direction : int
-        +1 or -1.
-    expected_m, lowest_m, highest_m : float
-        Median displacement along the tap, and the band that holds 99.9 % of them.
-    expected_taps : float
-        Taps still needed, this one included.
-    overshoot_probability : float
-        That this tap or one of those to come overshoots.
-    """
-
-    velocity_m_s: float
-    stroke_m: float
-    direction: int = 1
-    expected_m: float = math.nan
-    lowest_m: float = -math.inf
-    highest_m: float = math.inf
-    expected_taps: float = math.nan
-    overshoot_probability: float = math.nan
-
-
-@dataclass(frozen=True, slots=True)
-class Unreachable:
-    """No tap brings the part inside the tolerance within the bound on overshoot."""
-
-    reason: str
 
 
 class _Part(NamedTuple):
@@ -88,6 +55,8 @@ class TapPlanner:
     plant : Plant, optional
         Nominal plant; contact within some 10 % and
         friction within a factor of 1.4 of what the cell turns out to be.
+    max_force_n : float
+        Contact force that no tap may exceed.
     two_sided : bool
         Actuators on both ends: a part that went too far is struck back.
 
@@ -102,6 +71,7 @@ class TapPlanner:
     max_stroke_m: float = 1.5e-3
     overshoot_probability: float = 1e-3
     plant: Plant | None = None
+    max_force_n: float = math.inf
     two_sided: bool = False
     _belief: Belief = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
@@ -109,7 +79,7 @@ class TapPlanner:
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have, and start from the nominal plant."""
-        for name in ("tolerance_m", "max_velocity_m_s", "max_stroke_m"):
+        for name in ("tolerance_m", "max_velocity_m_s", "max_stroke_m", "max_force_n"):
             if not getattr(self, name) > 0.0:
                 raise PositioningError(f"tap planner: {name} must be positive, not {getattr(self, name)}")
         if not 0.0 < self.overshoot_probability < 1.0:
@@ -121,6 +91,7 @@ class TapPlanner:
             plant = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.25, mu_k=0.19)
         viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
         self._gravity = plant.gravity_m_s2
+        _ready()
         self._belief = beliefs.prior(
             plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, float(np.max(viscous))
         )
@@ -189,7 +160,7 @@ class TapPlanner:
         least = 1.0
         for caution in CAUTION:
             part = self._worked_out(mass_kg, caution)
-            if not np.nanmax(part.table[:, :, COARSE_Z.size // 2]) > 0.0:
+            if not _furthest(part.table) > 0.0:
                 return Unreachable(
                     f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
                     f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
@@ -197,7 +168,7 @@ class TapPlanner:
             chosen, met = choose(
                 distance, part.table, self._velocities, self._strokes, rows, part.value, AIMS,
                 tolerance=self.tolerance_m, penalty=self._penalty(caution), bound=self.overshoot_probability,
-                part_mass=mass_kg, gravity=self._gravity,
+                part_mass=mass_kg, gravity=self._gravity, caps=self._caps(mass_kg),
             )  # fmt: skip
             if chosen is not None:
                 break
@@ -266,7 +237,7 @@ class TapPlanner:
                 return part
         table = self._table(self._belief, mass_kg)
         value = CostToGo(1.0, np.ones(1), np.ones(1))
-        if np.nanmax(table[:, :, COARSE_Z.size // 2]) > 0.0:
+        if _furthest(table) > 0.0:
             later = beliefs.foreseen(self._belief)
             less = (np.diag(self._belief.cov) > 1.2 * np.diag(later.cov)).any()
             ahead = self._table(later, mass_kg) if less else table
@@ -277,12 +248,50 @@ class TapPlanner:
         return part
 
     def _table(self, belief: Belief, mass_kg: float) -> Samples:
-        return spread_table(
+        table = spread_table(
             self._velocities, self._strokes, scenarios(belief, COARSE_Z), COARSE_Z, mass_kg, self._gravity
         )
+        table[self._strokes > self._caps(mass_kg)[:, None]] = math.nan
+        return table
+
+    def _stiffest(self) -> Samples:
+        """Plant (k, b, mu_s, mu_k, k_v) that presses hardest, within three standard deviations."""
+        worst = self._belief.mean + 3.0 * np.sqrt(np.diag(self._belief.cov))
+        plant: Samples = plants(worst[None])[0] * np.array([1.0, 1.0, 1.1, 1.1, 1.0])
+        return plant
+
+    def _caps(self, mass_kg: float) -> Samples:
+        if math.isinf(self.max_force_n):
+            return np.full(self._velocities.size, math.inf)
+        return allowed_strokes(self._velocities, self.max_force_n, self._stiffest(), mass_kg, self._gravity)
+
+    def force(self, tap: Tap, mass_kg: float) -> float:
+        """Bound on the contact force of a tap (N), for `impactcell.positioning.limits.released`."""
+        return largest_force(tap.velocity_m_s, tap.stroke_m, self._stiffest(), mass_kg, self._gravity)
 
     def _still_holds(self, part: _Part) -> bool:
         moved = np.abs(self._belief.mean - part.belief.mean)
         now, then = np.sqrt(np.diag(self._belief.cov)), np.sqrt(np.diag(part.belief.cov))
         scatter = self._belief.scatter / part.belief.scatter
         return bool(np.all(moved < STALE) and np.all(np.abs(now - then) < STALE) and 0.9 < scatter < 1.1)
+
+
+def _furthest(table: Samples) -> float:
+    return float(np.nanmax(table[:, :, COARSE_Z.size // 2], initial=0.0))
+
+
+@cache
+def _ready() -> None:
+    """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
+    belief = beliefs.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
+    velocities, strokes = np.array([0.02, 0.05]), np.array([2e-4, 4e-4])
+    table = spread_table(velocities, strokes, scenarios(belief, COARSE_Z), COARSE_Z, 20.0, 9.81)
+    value = cost_to_go(table, COARSE_Z, 50e-6, 100.0)
+    choose(
+        2e-3, table, velocities, strokes, scenarios(belief, Z), value, AIMS, tolerance=50e-6, penalty=100.0,
+        bound=0.1, part_mass=20.0, gravity=9.81, caps=np.full(2, math.inf),
+    )  # fmt: skip
+    plant = plants(belief.mean[None])
+    displacement_of(0.02, 2e-4, plant, np.ones(1), 20.0, 9.81)
+    largest_force(0.02, 2e-4, plant[0], 20.0, 9.81)
+    allowed_strokes(velocities, 100.0, plant[0], 20.0, 9.81)
