@@ -12,6 +12,16 @@ from typing import Any, Final
 import numpy as np
 
 from impactcell.fieldbus.registers import RegisterMap, Words
+from simulator.announcements import Announcements
+from simulator.commands import (
+    MM_PER_MIN,
+    CommandResult,
+    ModuleState,
+    PositioningState,
+    commanded,
+    show_part,
+    show_result,
+)
 from simulator.cycle import Tap
 from simulator.image import Image
 from simulator.plant import NeverAtRestError, Strike, tap
@@ -20,11 +30,11 @@ from simulator.recorder import record
 from simulator.scenario import Scenario
 from simulator.tasks import PartSequence
 
-MM_PER_MIN: Final = 1e-3 / 60.0
-READY, RUNNING, FAULT = 1, 2, 4
-NONE, EXECUTING, DONE, REFUSED_VALUE, REFUSED_STATE, ABORTED, FAILED = range(7)
 NO_SLOT: Final = 0xFFFF
-MOST_STEPS_PER_UPDATE: Final = 8
+COMMAND_REGISTERS: Final = (
+    "command_accepted", "command_cycle", "command_result", "command_sequence", "command_abort"
+)  # fmt: skip
+MOST_STEPS_PER_UPDATE: Final = 4
 
 Truth = Mapping[str, Any]
 
@@ -71,7 +81,7 @@ class Device:
         self._next_s = math.inf if scenario.strikes is None else scenario.strikes.period_s
         self._rested_s = 0.0
         self._busy_until_s = -math.inf
-        self._batch_id = ""
+        self._announcements = Announcements(scenario, self._image)
         self._parts = PartSequence(scenario, 0.0)
         self._image.put("serial_number", scenario.serial_number)
         self._image.put("firmware_version", 0x0100)
@@ -80,21 +90,13 @@ class Device:
     def _reset(self) -> None:
         """Set the registers as a start of the module does."""
         self._tap = None
-        for name in (
-            "acknowledged_cycle",
-            "overwritten_count",
-            "command_accepted",
-            "command_cycle",
-            "command_result",
-        ):
-            self._image.put(name, 0)
-        for name in ("command_sequence", "command_abort"):
+        for name in ("acknowledged_cycle", "overwritten_count", *COMMAND_REGISTERS):
             self._image.put(name, 0)
         self._image.put("newest_slot", NO_SLOT)
-        self._image.put("state", READY)
-        self._image.put("positioning_state", READY if self.scenario.positioning else NONE)
+        self._image.put("state", ModuleState.READY)
+        self._show_ready()
         self._show_part()
-        self._announce()
+        self._announcements.announce(self._made, self.cycle)
 
     @property
     def cycle(self) -> int:
@@ -169,11 +171,12 @@ class Device:
         try:
             motion = tap(met.plant, strike)
         except NeverAtRestError:
-            self._image.put("state", FAULT)
-            self._end_command(sequence, FAILED)
+            self._image.put("state", ModuleState.FAULT)
+            self._image.put("positioning_state", PositioningState.FAULT)
+            show_result(self._image, sequence, CommandResult.FAULT)
             return
         self._tap = Tap(strike, met, motion, self._now_s, sequence)
-        self._image.put("state", RUNNING)
+        self._image.put("state", ModuleState.CYCLE_RUNNING)
 
     def _finish(self, done: Tap) -> None:
         """Put the cycle into the ring, now that the part is at rest."""
@@ -182,18 +185,23 @@ class Device:
         faulty = next((entry.kind for entry in scenario.faulty_captures if entry.cycle == self._made), "")
         samples, rates = record(scenario, done.motion, self._room, done.met.random, faulty)
         time_ns = self._time_ns(done.began_s)
-        header = done.header(time_ns, self._batch_id, mass_stated=scenario.part.mass_stated) | rates
+        header = (
+            done.header(time_ns, self._announcements.batch_id, mass_stated=scenario.part.mass_stated) | rates
+        )
         self._rested_s = self._now_s
-        self._image.put("state", READY)
+        self._image.put("state", ModuleState.READY)
         if scenario.positioning is not None:
             self._parts.moved(done.position_m, self._now_s)
         cycle = self._image.complete(samples, header)
         if scenario.positioning is not None:
             self._image.put("command_cycle", cycle)
-            self._end_command(done.sequence, ABORTED if self._image.get("command_abort") else DONE)
+            aborted = bool(self._image.get("command_abort"))
+            show_result(self._image, done.sequence, CommandResult.ABORTED if aborted else CommandResult.DONE)
+            self._image.put("command_abort", 0)
+            self._show_ready()
         self._tell(done.truth(self._image.session, cycle, time_ns))
         self._show_part()
-        self._announce()
+        self._announcements.announce(self._made, self.cycle)
 
     def _time_ns(self, own_s: float) -> int:
         return self._epoch_ns and self._epoch_ns + round(own_s / self.scenario.acceleration * 1e9)
@@ -224,74 +232,39 @@ class Device:
             raise BlockingIOError
         commanded = self._image.get("command_sequence")
         self._image.write(address, words)
-        self._take_batch()
+        self._announcements.take(self.cycle)
         if self._image.get("command_abort"):
             self._abort()
         if self._image.get("command_sequence") not in (0, commanded):
             self._command(int(self._image.get("command_sequence")))
 
-    def _announce(self) -> None:
-        """Announce the batch that begins within the next two cycles."""
-        known = [
-            entry for entry in self.scenario.batches if entry.announced and entry.from_cycle <= self._made + 2
-        ]
-        if known and known[-1].id != self._image.get("batch_announced"):
-            self._image.put("batch_from_cycle", max(known[-1].from_cycle - self._made, 1) + self.cycle)
-            self._image.put("batch_announced", known[-1].id)
-            self._image.put("batch_sequence", int(self._image.get("batch_sequence")) + 1)
-        self._take_batch()
-
-    def _take_batch(self) -> None:
-        if self._image.get("batch_sequence") and self._image.get("batch_from_cycle") <= self.cycle + 1:
-            self._batch_id = str(self._image.get("batch_announced"))
-
     def _show_part(self) -> None:
-        part = self._parts.part
-        self._image.put("part_position", self._parts.position_m)
-        self._image.put("part_mass", part.mass_kg if self.scenario.part.mass_stated else math.nan)
-        if self._parts.number > int(self._image.get("target_sequence")):
-            self._image.put("target_position", part.target_m)
-            self._image.put("target_sequence", self._parts.number)
+        show_part(self._image, self._parts, mass_stated=self.scenario.part.mass_stated)
         for outcome in self._parts.outcomes():
             self._tell(outcome)
 
+    def _show_ready(self) -> None:
+        positioning = self.scenario.positioning
+        self._image.put("positioning_state", PositioningState.READY if positioning else PositioningState.NONE)
+
     def _command(self, sequence: int) -> None:
         positioning = self.scenario.positioning
-        if positioning is None or self._tap is not None or self._image.get("state") != READY:
-            self._end_command(sequence, REFUSED_STATE)
+        if positioning is None or self._tap is not None or self._image.get("state") != ModuleState.READY:
+            show_result(self._image, sequence, CommandResult.REFUSED_STATE)
             return
         self._image.put("command_cycle", 0)
-        velocity, stroke = (
-            float(self._image.get("command_velocity")),
-            float(self._image.get("command_stroke")),
-        )
-        direction = int(self._image.get("command_direction"))
-        # The registers are single precision: a limit itself must not be refused for its last bit.
-        most_velocity = positioning.most_velocity_mm_per_min * MM_PER_MIN * (1.0 + 1e-6)
-        most_stroke = positioning.most_stroke_m * (1.0 + 1e-6)
-        possible = 0.0 < velocity <= most_velocity and 0.0 < stroke <= most_stroke
-        if not possible or direction not in positioning.directions:
-            self._end_command(sequence, REFUSED_VALUE)
+        strike = commanded(self._image, positioning, self._parts)
+        if strike is None:
+            show_result(self._image, sequence, CommandResult.REFUSED_VALUE)
             return
-        self._image.put("command_accepted", sequence)
-        self._image.put("command_result", EXECUTING)
-        self._image.put("positioning_state", EXECUTING)
-        part = self._parts
-        self._strike(
-            Strike(velocity, part.part.mass_kg, stroke, direction, start_m=part.position_m), sequence
-        )
-
-    def _end_command(self, sequence: int, result: int) -> None:
-        self._image.put("command_accepted", sequence)
-        self._image.put("command_result", result)
-        if self._tap is None:
-            self._image.put("positioning_state", READY if self.scenario.positioning else NONE)
-            self._image.put("command_abort", 0)
+        show_result(self._image, sequence, CommandResult.EXECUTING)
+        self._image.put("positioning_state", PositioningState.EXECUTING)
+        self._strike(strike, sequence)
 
     def _abort(self) -> None:
         """Halt the actuator where it is; what it has set in motion slides on."""
         under_way = self._tap
-        if under_way is None:
+        if under_way is None or self.scenario.positioning is None:
             self._image.put("command_abort", 0)
             return
         elapsed_s = self._now_s - under_way.began_s
@@ -304,7 +277,7 @@ class Device:
     def restart(self) -> int:
         """Lose everything and start anew with the counter at zero; returns the new session."""
         session = self._image.restart()
-        self._image.put("batch_announced", "")
+        self._announcements.restart()
         self._reset()
         return session
 

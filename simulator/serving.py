@@ -65,7 +65,7 @@ async def serve(scenario: Scenario, registers: RegisterMap, truth_file: Path | N
             device = Device(
                 scenario,
                 registers,
-                session=epoch_ns // 1_000_000_000 % (2**32 - 1) + 1,
+                session=epoch_ns // 1_000_000 % (2**32 - 1) + 1,
                 epoch_ns=epoch_ns,
                 now_s=loop.time(),
                 on_truth=tell,

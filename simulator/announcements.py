@@ -1,0 +1,54 @@
+"""What the PLC says of batches through the registers: the scenario's PLC, or one that writes them. Pure."""
+
+from simulator.image import Image
+from simulator.scenario import Batch, Scenario
+
+AHEAD = 2
+"""Cycles before its first one at which the scenario's PLC announces a batch."""
+
+
+class Announcements:
+    """Which batch the PLC believes to be on the table.
+
+    Attributes
+    ----------
+    batch_id : str
+        Empty until something has been announced.
+    """
+
+    def __init__(self, scenario: Scenario, image: Image) -> None:
+        self.batch_id = ""
+        self._batches = [batch for batch in scenario.batches if batch.announced]
+        self._image = image
+        self._last: Batch | None = None
+        self._sequence = 0
+        self._coming: tuple[int, str] | None = None
+
+    def restart(self) -> None:
+        """Say it all again to a module that has forgotten it."""
+        self._last = None
+        self._coming = None
+
+    def announce(self, made: int, cycle: int) -> None:
+        """Announce what begins soon, after `made` strikes of the scenario and `cycle` on the counter."""
+        known = [batch for batch in self._batches if batch.from_cycle <= made + AHEAD]
+        if known and known[-1] is not self._last:
+            self._last = known[-1]
+            self._image.put("batch_from_cycle", max(known[-1].from_cycle - made, 1) + cycle)
+            self._image.put("batch_announced", known[-1].id)
+            self._image.put("batch_sequence", self._shown_sequence() + 1)
+            if "batch_sequence" not in self._image.registers:
+                self._coming = (max(known[-1].from_cycle - made, 1) + cycle, known[-1].id)
+        self.take(cycle)
+
+    def take(self, cycle: int) -> None:
+        """Look whether an announcement has been made, and whether its batch is there."""
+        if self._shown_sequence() != self._sequence:
+            self._sequence = self._shown_sequence()
+            self._coming = (int(self._image.get("batch_from_cycle")), str(self._image.get("batch_announced")))
+        if self._coming is not None and self._coming[0] <= cycle + 1:
+            self.batch_id = self._coming[1]
+            self._coming = None
+
+    def _shown_sequence(self) -> int:
+        return int(self._image.get("batch_sequence"))
