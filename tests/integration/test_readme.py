@@ -1,5 +1,6 @@
 """Every command of the README does what it says, in a copy of the checkout."""
 
+import json
 import os
 import re
 import shutil
@@ -27,9 +28,8 @@ ELSEWHERE = {
 
 def blocks() -> list[str]:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    return [
-        re.sub(r"^ {3}", "", block, flags=re.MULTILINE) for block in re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL)
-    ]
+    found = re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL)
+    return [re.sub(r"^ {3}", "", block, flags=re.MULTILINE) for block in found]
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ignored = shutil.ignore_patterns("node_modules")
             shutil.copytree(source, directory / name, ignore=ignored)
         else:
-            shutil.copy(source, directory / name)
+            shutil.copy2(source, directory / name)  # make looks at the times
     (directory / ".venv").symlink_to(ROOT / ".venv")
     return directory
 
@@ -83,8 +83,6 @@ def test_the_demo_sums_up(checkout: Path) -> None:
         ["make", "demo", "ARGS=--cycles 30 --json"], cwd=checkout, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    import json
-
     summary = json.loads(done.stdout.splitlines()[-1])
     assert summary["cycles"] == 30
     assert summary["missed"] == 0
