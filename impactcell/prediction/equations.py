@@ -1,7 +1,7 @@
 """Equations (4), (5) and (6): mu_s from the peak force, from the sliding distance, and from both.
 
 The forms are the paper's, the coefficients a cell's own (`impactcell.prediction.model.Predictor`), one set
-a mass; between two masses the predicted force is interpolated linearly in mass, the distance in log-log.
+a mass; between two masses coefficients of the force and distances go with powers of the mass.
 """
 
 import math
@@ -25,12 +25,27 @@ class Mix:
     inside: bool
 
     def mean(self, name: str) -> float:
-        """Interpolate a coefficient that is linear in the prediction."""
+        """Interpolate a figure that is not a power of the mass, such as an error or a sensitivity."""
         return sum(share * _deep(predictor, name) for share, predictor in self.parts)
+
+    @property
+    def friction_n(self) -> float:
+        """Coefficient of mu_s in equation (4); between masses it goes with a power of the mass."""
+        return math.exp(sum(share * math.log(one.force.friction_n) for share, one in self.parts))
+
+    @property
+    def velocity_n_s_per_m(self) -> float:
+        """Coefficient of v in equation (4); between masses it goes with a power of the mass."""
+        slopes = [one.force.velocity_n_s_per_m for _, one in self.parts]
+        if min(slopes) <= 0.0:
+            return self.mean("force.velocity_n_s_per_m")
+        return math.exp(
+            sum(share * math.log(slope) for (share, _), slope in zip(self.parts, slopes, strict=True))
+        )
 
     def peak_force(self, mu_s: float, velocity_m_s: float) -> float:
         """Equation (4) forward, N."""
-        return self.mean("force.friction_n") * mu_s + self.mean("force.velocity_n_s_per_m") * velocity_m_s
+        return self.friction_n * mu_s + self.velocity_n_s_per_m * velocity_m_s
 
     def sliding_distance(self, mu_s: float, velocity_m_s: float) -> float:
         """Equation (5) forward, m."""
@@ -105,8 +120,8 @@ def by_force(model: Model, mixed: Mix, velocity_m_s: float, peak: Reading) -> Co
     PredictionError
         The force is smaller than that of a part without friction.
     """
-    slope = mixed.mean("force.friction_n")
-    value = (peak.value - mixed.mean("force.velocity_n_s_per_m") * velocity_m_s) / slope
+    slope = mixed.friction_n
+    value = (peak.value - mixed.velocity_n_s_per_m * velocity_m_s) / slope
     if value <= 0.0:
         raise PredictionError(
             f"peak force {peak.value:.4g} N is below that of a part without friction; check mass and velocity"
@@ -178,7 +193,7 @@ def combined(
     )
     slope = abs(mixed.slope_of_distance(mu_dist.value, velocity_m_s))
     std = math.hypot(
-        weight * peak.std / mixed.mean("force.friction_n"),
+        weight * peak.std / mixed.friction_n,
         weight * mixed.mean("force.rms"),
         (1.0 - weight) * distance_read.std / max(slope, 1e-12),
         (1.0 - weight) * mixed.mean("distance.rms"),
@@ -192,7 +207,7 @@ def force_weight(mixed: Mix, mu_s: float, velocity_m_s: float) -> float:
     low = max(predictor.mu_s_range[0] for _, predictor in mixed.parts)
     high = min(predictor.mu_s_range[1] for _, predictor in mixed.parts)
     inside = min(max(mu_s, low), high)
-    slope_f = mixed.mean("force.friction_n")
+    slope_f = mixed.friction_n
     span_f = slope_f * (high - low)
     span_d = mixed.sliding_distance(low, velocity_m_s) - mixed.sliding_distance(high, velocity_m_s)
     slope_d = abs(mixed.slope_of_distance(inside, velocity_m_s))

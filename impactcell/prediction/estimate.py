@@ -13,7 +13,8 @@ from impactcell.prediction.equations import (
     out_of_range,
 )
 from impactcell.prediction.model import Model
-from impactcell.prediction.reading import Reading, Slide, peak_force, slide
+from impactcell.prediction.reading import Reading, peak_force
+from impactcell.prediction.sliding import Slide, slide
 from impactcell.prediction.waveform import Waveform, braking_friction, fit
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
 

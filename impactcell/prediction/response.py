@@ -20,6 +20,7 @@ from impactcell.prediction.blocks import (
     Blocks,
     blocks,
 )
+from impactcell.prediction.reading import placed
 from impactcell.records import Capture, Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING = range(4)
@@ -164,8 +165,5 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
     force = NOTHING
     if capture.force is not None:
         force = blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
-    if capture.position is None:
-        position = NOTHING
-    else:
-        position = blocks(capture.position, POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
+    position = blocks(placed(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return Response(plant, tap, force, position)

@@ -1,0 +1,120 @@
+"""The free slide as read off a capture: distance from the last loss of contact to rest, and deceleration."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
+from impactcell.prediction.reading import Reading, checked, loss_of_contact, noise_std, placed
+from impactcell.records import Capture, Samples
+
+
+@dataclass(frozen=True, slots=True)
+class Slide:
+    """The free slide as read off a capture.
+
+    Attributes
+    ----------
+    distance : Reading
+        From the last loss of contact to rest, m, positive along the tap.
+    separation_s, stop_s : float
+    deceleration : Reading
+        Mean deceleration of the slide, m/s².
+    """
+
+    distance: Reading
+    separation_s: float
+    stop_s: float
+    deceleration: Reading
+
+
+def slide(capture: Capture) -> Slide:
+    """Read the free slide: where contact was last lost, where the part came to rest, and how it braked.
+
+    Raises
+    ------
+    CaptureError
+        A channel cannot be used.
+    NoBreakawayError, NoSeparationError, NoStopError
+        The part did not move, did not leave the actuator, or had not come to rest when the record ended.
+    """
+    position = placed(capture)
+    sigma = noise_std(position)
+    times = position.time_s
+    moved = capture.direction * (position.values - capture.start_m)
+    tail = max(5, len(moved) // 50)
+    if abs(float(moved[-tail:].mean() - moved[:tail].mean())) < 6.0 * sigma:
+        raise NoBreakawayError(f"the part moved less than {6.0 * sigma:.3g} m")
+    separation = loss_of_contact(checked(capture.force, "force"))
+    separation_s = separation.value
+    if separation_s >= times[-tail]:
+        raise NoSeparationError("contact was lost only when the position record ended")
+    start = _level(times, moved, separation_s, sigma)
+    rest, stop_s, deceleration = _rest(times, moved, separation_s, sigma)
+    speed = max(deceleration.value, 0.0) * (stop_s - separation_s)
+    error = math.hypot(rest.std, start.std, speed * separation.std)
+    return Slide(Reading(rest.value - start.value, error), separation_s, stop_s, deceleration)
+
+
+def _rest(
+    times: Samples, moved: Samples, separation_s: float, sigma: float
+) -> tuple[Reading, float, Reading]:
+    """Level at rest, time of rest, mean deceleration; a parabola through the slide tells when it stopped."""
+    tail = max(5, len(moved) // 50)
+    final = float(np.median(moved[-tail:]))
+    sliding = np.flatnonzero((times > separation_s) & (final - moved > 8.0 * sigma))
+    if len(sliding) < 8:
+        raise NoStopError("the slide is too short for its position samples")
+    last = int(sliding[-1])
+    inside = (times > separation_s) & (times <= times[last])
+    if inside.sum() < 8:
+        raise NoStopError("the slide is too short for its position samples")
+    origin, span = separation_s, float(times[last] - separation_s)
+    u = (times[inside] - origin) / span
+    basis = np.vander(u, 4)
+    coefficients, *_ = np.linalg.lstsq(basis, moved[inside])
+    inverse = np.linalg.inv(basis.T @ basis)
+    speed = np.polyder(coefficients)
+    # The zero of the speed next after the last sample that still moved is the stop.
+    near = [root.real for root in np.roots(speed) if abs(root.imag) < 0.2 and 0.7 < root.real < 1.6]
+    if near:
+        stop = min(near, key=lambda root: abs(root - 1.0))
+    else:  # cut off on the way, or braked otherwise than a cubic says
+        last_speed, braking = float(np.polyval(speed, 1.0)), -float(np.polyval(np.polyder(speed), 1.0))
+        stop = 1.0 + (last_speed / braking if braking > 0.0 else math.inf if last_speed > 0.0 else 0.0)
+    stop_s = origin + span * max(stop, 1.0)
+    if stop_s > times[-1]:
+        left = 1e3 * float(np.polyval(speed, 1.0)) / span
+        raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
+    after = moved[times > stop_s]
+    if len(after) >= 3:
+        rest = Reading(float(after.mean()), sigma / math.sqrt(len(after)))
+    else:
+        rest = Reading(
+            float(np.polyval(coefficients, stop)), sigma * float(np.sqrt(np.ones(4) @ inverse @ np.ones(4)))
+        )
+    parabola, *_ = np.linalg.lstsq(basis[:, 1:], moved[inside])
+    spread = float(np.linalg.inv(basis[:, 1:].T @ basis[:, 1:])[0, 0])
+    return (
+        rest,
+        float(stop_s),
+        Reading(-2.0 * float(parabola[0]) / span**2, 2.0 * sigma * math.sqrt(spread) / span**2),
+    )
+
+
+def _level(times: Samples, values: Samples, at_s: float, sigma: float) -> Reading:
+    """Value of a smooth channel at a time, from a cubic through its neighbourhood."""
+    found = None
+    for half in (2e-3, 4e-3, 8e-3):
+        near = np.abs(times - at_s) <= half
+        if near.sum() >= 8:
+            found = near
+            break
+    if found is None:
+        return Reading(float(np.interp(at_s, times, values)), sigma)
+    scale = float(np.abs(times[found] - at_s).max())
+    basis = np.vander((times[found] - at_s) / scale, 4)
+    coefficients, *_ = np.linalg.lstsq(basis, values[found])
+    inverse = np.linalg.inv(basis.T @ basis)
+    return Reading(float(coefficients[-1]), sigma * math.sqrt(float(inverse[-1, -1])))
