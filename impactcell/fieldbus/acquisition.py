@@ -7,7 +7,7 @@ the link does: that is said in `Module.status` and in the `faults` of a `Recepti
 
 import asyncio
 import logging
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Mapping
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
@@ -20,7 +20,7 @@ from impactcell.fieldbus.decoding import ModuleReport
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.mapped import MappedDevice
 from impactcell.fieldbus.polling import PollSchedule
-from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.registers import RegisterMap, Value
 from impactcell.fieldbus.ring import Mark, distance, next_wanted
 from impactcell.fieldbus.transport import ModbusClient
 from impactcell.records import Capture
@@ -115,6 +115,7 @@ class Module:
         self.registers = registers
         self.report: ModuleReport | None = None
         """What the module said at the last poll; None before the first."""
+        self._polled: Mapping[str, Value] = {}
         self._client = ModbusClient(link)
         self.device = MappedDevice(self._client, registers)
         self._reader = CaptureReader(cell, self.device)
@@ -158,7 +159,8 @@ class Module:
     async def read_report(self) -> ModuleReport:
         """Read the status block now; raises FieldbusError where `captures` would only note it."""
         values = await self.device.values(decoding.REPORT)
-        self.report = decoding.report(self.registers, values)
+        if self.report is None or values is not self._polled:
+            self.report, self._polled = decoding.report(self.registers, values), values
         return self.report
 
     async def acknowledge(self, mark: Mark) -> None:

@@ -15,7 +15,7 @@ from impactcell.fieldbus.transport import ModbusClient
 _TORN_READS: Final = 8
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Block:
     """Neighbouring registers that are read together."""
 
@@ -50,16 +50,33 @@ class MappedDevice:
         self.client = client
         self.registers = registers
         self._plans: dict[tuple[str, ...], tuple[Block, ...]] = {}
+        self._merged: dict[tuple[str, ...], tuple[list[dict[str, Value]], dict[str, Value]]] = {}
+        self._last: dict[Block, tuple[bytes, dict[str, Value]]] = {}
 
-    async def values(self, names: tuple[str, ...]) -> dict[str, Value]:
-        """Read registers and decode them, in SI; those that the map does not have are left out."""
-        found: dict[str, Value] = {}
-        for block in self._blocks(names):
-            words = await self._block(block)
-            for register in block.registers:
-                at = register.address - block.address
-                found[register.name] = register.decode(words[at : at + register.words])
-        return found
+    async def values(self, names: tuple[str, ...]) -> Mapping[str, Value]:
+        """Read registers and decode them, in SI; those that the map does not have are left out.
+
+        What shows the same words as before comes back as the very same mapping.
+        """
+        parts = [self._decoded(block, await self._block(block)) for block in self._blocks(names)]
+        last = self._merged.get(names)
+        if last is None or any(part is not before for part, before in zip(parts, last[0], strict=True)):
+            last = self._merged[names] = (parts, {key: part[key] for part in parts for key in part})
+        return last[1]
+
+    def _decoded(self, block: Block, words: Words) -> dict[str, Value]:
+        """Decode a block; what a poll finds unchanged, which is nearly always, is not decoded again."""
+        raw = words.tobytes()
+        last = self._last.get(block)
+        if last is None or last[0] != raw:
+            found = {
+                register.name: register.decode(
+                    words[register.address - block.address : register.end - block.address]
+                )
+                for register in block.registers
+            }
+            last = self._last[block] = (raw, found)
+        return last[1]
 
     async def words(self, name: str, values: int) -> Words:
         """Read the words of the first `values` values of an array."""

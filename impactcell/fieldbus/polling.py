@@ -6,6 +6,8 @@ FINE_S: Final = 0.003
 """Between polls while a cycle is due."""
 QUIET_S: Final = 0.015
 """Between polls before it is due: what an early cycle may have to wait."""
+REGULAR_S: Final = 0.05
+"""The same, where cycles come so regularly that none is early."""
 IDLE_S: Final = 0.1
 """Between polls once cycles have stopped coming."""
 _GAIN: Final = 0.25
@@ -40,7 +42,8 @@ class PollSchedule:
         margin_s = 3.0 * self._spread_s + FINE_S
         until_due_s = self._period_s - margin_s - age_s
         if until_due_s > 0.0:
-            return max(least_s, min(until_due_s, QUIET_S))
+            regular = 10.0 * margin_s < self._period_s
+            return max(least_s, min(until_due_s, REGULAR_S if regular else QUIET_S))
         if age_s < self._period_s + margin_s:
             return least_s
         overdue_s = age_s - self._period_s

@@ -13,6 +13,7 @@ from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
+from tests.benchmarks._fieldbus_cells import cells
 from tests.benchmarks._fieldbus_faults import MAP, faults_and_outages
 from tests.benchmarks._fieldbus_speed import speed
 from tests.benchmarks.table import Table
@@ -59,6 +60,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [
         speed(10 if quick else 60),
         capture,
+        cells([1, 4] if quick else [1, 4, 8, 16, 24], 4.0 if quick else 20.0),
         faults_and_outages(600 if quick else 10_000, 8 if quick else 64),
     ]
 
