@@ -24,6 +24,7 @@ from impactcell.settings import Cell, read_cell
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 SCENARIOS = ("demo", "new-effect", "positioning")
 USER = "demo"
+HAPPENINGS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
 PREFERRED_PORT = 4840
 
 
@@ -80,27 +81,14 @@ def paced(content: dict, cycles: int | None) -> dict:  # type: ignore[type-arg]
     """Move what happens in a scenario to where a demo of `cycles` cycles has it in view."""
     if cycles is None:
         return content
-    happenings = [
-        entry[key]
-        for section, key in (
-            ("batches", "from_cycle"),
-            ("deviations", "cycle"),
-            ("appearances", "from_cycle"),
-        )
-        for entry in content.get(section, [])
-    ]
-    last = max([1, *happenings])
+    last = max([1, *(entry[key] for section, key in HAPPENINGS for entry in content.get(section, []))])
     scale = min(1.0, 0.9 * cycles / last)
-
-    def moved(entry: dict, key: str) -> dict:  # type: ignore[type-arg]
-        return {**entry, key: max(1, round(entry[key] * scale))}
-
-    return {
-        **content,
-        "batches": [moved(entry, "from_cycle") for entry in content.get("batches", [])],
-        "deviations": [moved(entry, "cycle") for entry in content.get("deviations", [])],
-        "appearances": [moved(entry, "from_cycle") for entry in content.get("appearances", [])],
+    moved = {
+        section: [{**entry, key: max(1, round(entry[key] * scale))} for entry in content[section]]
+        for section, key in HAPPENINGS
+        if section in content
     }
+    return {**content, **moved}
 
 
 def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-arg]

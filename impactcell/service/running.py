@@ -5,6 +5,7 @@ import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from impactcell.alarms import Finding
 from impactcell.cell import Announcement
@@ -17,6 +18,7 @@ from impactcell.scada import ModuleState, Server
 from impactcell.service.design import cell_design, module_link, retention
 from impactcell.service.logs import CellLogger
 from impactcell.service.monitoring import CellHealth
+from impactcell.service.positioning import PositioningTask
 from impactcell.service.worker import Worker
 from impactcell.settings import Cell, read_cell
 
@@ -52,6 +54,12 @@ class RunningCell:
         self.server: Server | None = None
         self._observe = observe
         self._module = Module(cell.name, module_link(cell), cell.register_map, self._link_changed)
+        self._positioning: PositioningTask | None = None
+        if cell.settings.positioning is not None:
+            self._positioning = PositioningTask(
+                cell, cell_design(cell), self._module, self.worker, self._positioning_changed
+            )
+        self._positioning_news = asyncio.Event()
         self._link_news: asyncio.Queue[ModuleStatus] = asyncio.Queue()
         self._last_cycle_s = time.monotonic()
         self._stale = False
@@ -87,6 +95,9 @@ class RunningCell:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self._acquire(), name=f"{self.cell.name} cycles")
                 group.create_task(self._follow_link(), name=f"{self.cell.name} link")
+                if self._positioning is not None:
+                    group.create_task(self._positioning.run(), name=f"{self.cell.name} taps")
+                    group.create_task(self._follow_positioning(), name=f"{self.cell.name} positioning")
                 group.create_task(self._tick(), name=f"{self.cell.name} clock")
         finally:
             await self._module.close()
@@ -111,18 +122,38 @@ class RunningCell:
             self.log.warning("changed, but taken over only by a restart: %s", ", ".join(fixed))
         self.cell = replace(self.cell, settings=fresh.settings, model=fresh.model)
         self._model_seen_ns = fresh.settings.model.stat().st_mtime_ns
-        await self.worker.redesign(cell_design(self.cell))
+        design = cell_design(self.cell)
+        await self.worker.redesign(design)
+        if self._positioning is not None:
+            self._positioning.redesign(design)
         self.log.info("reloaded; model %s", fresh.model.name)
 
     async def set_target(self, target_m: float, audit: AuditEntry) -> None:
-        """Start a positioning task."""
-        del target_m, audit
-        raise PositioningError(f"{self.cell.name}: this cell has no positioning; add it to {self.cell.path}")
+        """Start a positioning task.
+
+        Raises
+        ------
+        PositioningError
+            The cell has no positioning, or refuses the target; nothing has been commanded.
+        """
+        try:
+            await self._positioning_task().begin(target_m)
+        except PositioningError as error:
+            await self.worker.note(replace(audit, result=str(error)))
+            raise
+        await self.worker.note(audit)
 
     async def abort_positioning(self, audit: AuditEntry) -> None:
         """End the positioning task that runs."""
-        del audit
-        raise PositioningError(f"{self.cell.name}: this cell has no positioning; add it to {self.cell.path}")
+        await self._positioning_task().abort(audit.user)
+        await self.worker.note(audit)
+
+    def _positioning_task(self) -> PositioningTask:
+        if self._positioning is None:
+            raise PositioningError(
+                f"{self.cell.name}: this cell has no positioning; add it to {self.cell.path}"
+            )
+        return self._positioning
 
     async def _acquire(self) -> None:
         await self.worker.rehearse()
@@ -132,7 +163,11 @@ class RunningCell:
 
     async def _take(self, reception: Reception) -> None:
         capture = reception.capture
-        processed = await self.worker.process(capture, PositioningState(), self._announcement())
+        task = self._positioning
+        positioning = PositioningState() if task is None else task.state
+        processed = await self.worker.process(capture, positioning, self._announcement())
+        if task is not None:
+            await self.worker.run(partial(task.learn, processed.stepped.snapshot))
         if processed.durable is not None:
             await self._module.acknowledge(processed.durable)
         for note in processed.stepped.notes:
@@ -145,6 +180,22 @@ class RunningCell:
         await self._look_at_journal()
         if self._observe is not None:
             self._observe(self.cell.name, snapshot)
+
+    def _positioning_changed(self) -> None:
+        self._positioning_news.set()
+
+    async def _follow_positioning(self) -> None:
+        """Publish the task between cycles too, and raise or clear its alarm."""
+        while True:
+            await self._positioning_news.wait()
+            self._positioning_news.clear()
+            task = self._positioning_task()
+            if self.server is not None and self.worker.snapshot is not None:
+                snapshot = replace(self.worker.snapshot, positioning=task.state, alarms=self.worker.alarms)
+                self.server.publish(self.cell.name, snapshot)
+            fault = task.fault
+            reason, evidence = fault or ("", Evidence())
+            await self._find(Finding(AlarmName.POSITIONING_FAULT, fault is not None, reason, evidence))
 
     def _announcement(self) -> Announcement | None:
         report = self._module.report

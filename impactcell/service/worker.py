@@ -16,6 +16,7 @@ from impactcell.errors import JournalError
 from impactcell.fieldbus.ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
+from impactcell.positioning import Belief
 from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Snapshot
 from impactcell.service.rehearsal import rehearse
 
@@ -31,10 +32,11 @@ THIN_EVERY = 256
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Durable:
-    """What a restart goes on from: the state, and the last snapshot to show until a cycle comes."""
+    """What a restart goes on from: the state, the last snapshot, what the planner has learned."""
 
     state: CellState
     snapshot: Snapshot | None = None
+    belief: Belief | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +72,7 @@ class Worker:
         restored = self._restore()
         self._state = restored.state
         self._snapshot = restored.snapshot
+        self.belief = restored.belief
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -94,29 +97,33 @@ class Worker:
 
     async def rehearse(self) -> None:
         """Compile what a cycle needs, so that the first one is not late."""
-        await self._run(lambda: rehearse(self._design))
+        await self.run(lambda: rehearse(self._design))
 
     async def process(
         self, capture: Capture, positioning: PositioningState, announcement: Announcement | None
     ) -> Processed:
         """Take one cycle through the pipeline and store it."""
-        return await self._run(lambda: self._process(capture, positioning, announcement))
+        return await self.run(lambda: self._process(capture, positioning, announcement))
 
     async def find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
         """Take what a rule beside the cycles says; the alarms that moved."""
-        return await self._run(lambda: self._find(finding, time_ns))
+        return await self.run(lambda: self._find(finding, time_ns))
 
     async def pass_time(self, time_ns: int) -> tuple[Alarm, ...]:
         """End every shelving whose time is over; the alarms that moved."""
-        return await self._run(lambda: self._pass_time(time_ns))
+        return await self.run(lambda: self._pass_time(time_ns))
 
     async def act(self, name: AlarmName, occurrence: Occurrence, audit: AuditEntry) -> Transition:
         """Apply a person's action on a condition, and write down who did it."""
-        return await self._run(lambda: self._act(name, occurrence, audit))
+        return await self.run(lambda: self._act(name, occurrence, audit))
 
     async def change(self, change: Callable[[CellState], CellState], audit: AuditEntry) -> None:
         """Change the state by a person's command, and write down who did it."""
-        await self._run(lambda: self._change(change, audit))
+        await self.run(lambda: self._change(change, audit))
+
+    async def note(self, audit: AuditEntry) -> None:
+        """Write down what a person did that is not in the state."""
+        await self.run(lambda: self._record((), audit))
 
     async def redesign(self, design: CellDesign) -> None:
         """Go on with other settings or another model, from the next cycle on."""
@@ -124,20 +131,21 @@ class Worker:
         def swap() -> None:
             self._design = design
 
-        await self._run(swap)
+        await self.run(swap)
 
     async def read(self, question: Callable[[Journal], T]) -> T | None:
         """Ask the journal; None without one."""
         journal = self._journal
-        return None if journal is None else await self._run(lambda: question(journal))
+        return None if journal is None else await self.run(lambda: question(journal))
 
     async def close(self) -> None:
         """Finish what has begun, and close the journal."""
         if self._journal is not None:
-            await self._run(self._journal.close)
+            await self.run(self._journal.close)
         self._thread.shutdown()
 
-    async def _run(self, work: Callable[[], T]) -> T:
+    async def run(self, work: Callable[[], T]) -> T:
+        """Do some work in the cell's thread, after all that was asked for before."""
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def _restore(self) -> Durable:
@@ -167,7 +175,7 @@ class Worker:
         return Processed(stepped, self.durable)
 
     def _blob(self) -> bytes:
-        return values.dumps(Durable(self._state, self._snapshot))
+        return values.dumps(Durable(self._state, self._snapshot, self.belief))
 
     def _store(self, entry: Callable[[Journal], None]) -> None:
         """Write `entry` after all that could not be written before: no state may be ahead of its cycles."""

@@ -1,0 +1,224 @@
+"""Positioning tasks of a running cell: targets in, taps out over Modbus, until the part is in place."""
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable
+
+from impactcell.cell import CellDesign
+from impactcell.errors import FieldbusError, PositioningError
+from impactcell.fieldbus.acquisition import Module
+from impactcell.fieldbus.commands import Positioner, TapCommand
+from impactcell.fieldbus.decoding import PositioningReport
+from impactcell.positioning import Belief, Limits, TapPlanner, sequence
+from impactcell.positioning.sequence import Phase, Sequence
+from impactcell.records import Evidence, PositioningState, Quality, Snapshot
+from impactcell.service.worker import Worker
+from impactcell.settings import Cell
+
+log = logging.getLogger(__name__)
+
+WATCH_S = 0.1
+"""Between two looks at the PLC's target register."""
+
+
+class PositioningTask:
+    """Drives `impactcell.positioning.sequence` for one cell.
+
+    Parameters
+    ----------
+    cell : Cell
+        With a `positioning` section.
+    design : CellDesign
+    module : Module
+    worker : Worker
+        Planning runs in its thread; it keeps what the planner has learned.
+    changed : callable
+        Called when what is to be published has changed.
+    """
+
+    def __init__(
+        self, cell: Cell, design: CellDesign, module: Module, worker: Worker, changed: Callable[[], None]
+    ) -> None:
+        settings, actuator = cell.settings.positioning, cell.settings.actuator
+        if settings is None:
+            raise PositioningError(f"{cell.name}: this cell has no positioning; add it to {cell.path}")
+        limits = Limits(
+            velocity_m_s=actuator.max_velocity_mm_per_min / 60e3,
+            stroke_m=actuator.max_stroke_mm * 1e-3,
+            force_n=math.inf if actuator.max_force_n is None else actuator.max_force_n,
+            travel_m=(0.0, settings.travel_mm * 1e-3),
+        )
+        self._cell = sequence.Cell(
+            cell.name, limits, settings.encoder_resolution_um * 1e-6, two_sided=actuator.both_ends
+        )
+        self._planner = TapPlanner(
+            tolerance_m=settings.tolerance_um * 1e-6,
+            max_velocity_m_s=limits.velocity_m_s,
+            max_stroke_m=limits.stroke_m,
+            overshoot_probability=settings.overshoot_probability,
+            plant=design.model.plant,
+            max_force_n=limits.force_n,
+            two_sided=actuator.both_ends,
+        )
+        if worker.belief is not None:
+            self._planner.resume(worker.belief)
+        self._design = design
+        self._mass_kg = design.mass_kg
+        self._module = module
+        self._positioner = Positioner(module)
+        self._worker = worker
+        self._changed = changed
+        self._sequence = Sequence()
+        self._wake = asyncio.Event()
+        self._plc_target: int | None = None
+        self._batch_shift_cycle = 0
+
+    @property
+    def state(self) -> PositioningState:
+        """The task as it is published."""
+        return self._sequence.published()
+
+    @property
+    def fault(self) -> tuple[str, Evidence] | None:
+        """Why the last task stopped, where it was a fault."""
+        if self._sequence.phase is not Phase.FAULTED:
+            return None
+        return self._sequence.reason, self._sequence.evidence or Evidence()
+
+    @property
+    def belief(self) -> Belief:
+        """What the planner has learned."""
+        return self._planner.belief
+
+    async def begin(self, target_m: float) -> None:
+        """Start a task.
+
+        Raises
+        ------
+        PositioningError
+            The target is refused; nothing has been commanded.
+        """
+        report = self._report()
+        mass_kg = report.mass_kg
+        if math.isnan(mass_kg) and self._mass_kg is not None:
+            mass_kg = self._mass_kg
+        before = self._sequence
+        begun = await self._worker.run(
+            lambda: sequence.begin(
+                before,
+                self._cell,
+                self._planner,
+                target_m=target_m,
+                position_m=report.position_m,
+                mass_kg=mass_kg,
+                trained=self._trained,
+            )
+        )
+        if self._sequence is not before:
+            raise PositioningError(f"{self._cell.name}: another task was started meanwhile")
+        self._set(begun)
+        self._wake.set()
+
+    async def abort(self, by: str) -> None:
+        """Stop the task that runs, and the tap that is being executed; nothing happens where none runs."""
+        if not self._sequence.running:
+            return
+        self._set(sequence.aborted(self._sequence, by))
+        try:
+            await self._positioner.abort()
+        except FieldbusError as error:
+            raise PositioningError(
+                f"{self._cell.name}: no further tap is commanded, but the module could not be told: {error}"
+            ) from error
+
+    def redesign(self, design: CellDesign) -> None:
+        """Go on with another model of the cell; what the planner has learned of its contact stays."""
+        self._design = design
+
+    def learn(self, snapshot: Snapshot) -> None:
+        """Take over the friction that the tracker believes in; call it in the worker's thread."""
+        wear, batch, ratio = snapshot.wear, snapshot.batch, self._design.model.ratio
+        if wear.quality is Quality.BAD or not math.isfinite(wear.level + wear.level_std):
+            return
+        offset = batch.offset if math.isfinite(batch.offset) else 0.0
+        offset_std = batch.offset_std if math.isfinite(batch.offset_std) else 0.0
+        mu_s = wear.level + offset
+        std = math.hypot(
+            math.hypot(wear.level_std, offset_std) * ratio, mu_s * self._design.model.prior.ratio_std
+        )
+        shifted = batch.last_shift_cycle not in (0, self._batch_shift_cycle)
+        self._batch_shift_cycle = batch.last_shift_cycle
+        if mu_s > 0.0:
+            self._planner.observe_friction(mu_s * ratio, std, batch_changed=shifted)
+
+    async def run(self) -> None:
+        """Run until cancelled."""
+        while True:
+            try:
+                async with asyncio.timeout(WATCH_S):
+                    await self._wake.wait()
+            except TimeoutError:
+                await self._look_at_plc()
+                continue
+            self._wake.clear()
+            await self._drive()
+
+    async def _look_at_plc(self) -> None:
+        """Start a task where the PLC has raised the sequence of its target."""
+        report = None if self._module.report is None else self._module.report.positioning
+        if report is None or report.target_sequence == self._plc_target:
+            return
+        self._plc_target = report.target_sequence
+        if report.target_sequence == 0:
+            return
+        if self._sequence.running:
+            await self.abort("the PLC, which has a new target")
+        try:
+            await self.begin(report.target_m)
+        except PositioningError as error:
+            log.warning("cell=%s the PLC's target is refused: %s", self._cell.name, error)
+            self._set(Sequence(Phase.FAULTED, reason=str(error), evidence=Evidence()))
+
+    async def _drive(self) -> None:
+        """Command and observe, tap by tap, until the task no longer runs."""
+        while self._sequence.phase is Phase.COMMANDING:
+            tap = self._sequence.tap
+            assert tap is not None  # noqa: S101 - COMMANDING has one
+            waiting = sequence.commanded(self._sequence)
+            self._set(waiting)
+            try:
+                await self._positioner.tap(TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction))
+                await self._module.read_report()
+                position_m = self._report().position_m
+            except (PositioningError, FieldbusError) as error:
+                self._set(sequence.failed(self._sequence, str(error)))
+                return
+            if self._sequence is not waiting:
+                return
+            after = await self._worker.run(
+                lambda: sequence.observed(waiting, self._cell, self._planner, position_m)  # noqa: B023
+            )
+            self._worker.belief = self._planner.belief
+            if self._sequence is waiting:
+                self._set(after)
+
+    @property
+    def _trained(self) -> bool:
+        """Friction is known: from cycles, or from the commissioning that calibrated the model."""
+        snapshot = self._worker.snapshot
+        seen = snapshot is not None and snapshot.wear.quality is not Quality.BAD
+        return seen or bool(self._design.model.predictors)
+
+    def _report(self) -> PositioningReport:
+        report = None if self._module.report is None else self._module.report.positioning
+        if report is None or not self._module.status.connected:
+            raise PositioningError(
+                f"{self._cell.name}: the module does not answer, or has no positioning registers"
+            )
+        return report
+
+    def _set(self, now: Sequence) -> None:
+        if now is not self._sequence:
+            self._sequence = now
+            self._changed()
