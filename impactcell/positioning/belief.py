@@ -91,7 +91,13 @@ def prior(
         Of ln mu_k.
     """
     mean = np.array(
-        [math.log(mu_k), math.log(stiffness), math.log(damping), math.log(max(mu_s / mu_k, 1.0)), viscous]
+        [
+            math.log(mu_k),
+            math.log(stiffness),
+            math.log(max(damping, 1e-3 * math.sqrt(stiffness))),
+            math.log(max(mu_s / mu_k, 1.0)),
+            viscous,
+        ]
     )
     std = np.array([friction_std, 0.12, 0.13, 0.03, 0.5 + 0.15 * viscous])
     return Belief(np.ones(1), mean[None], np.diag(std**2)[None])

@@ -81,13 +81,13 @@ def shortlist(
 
 @compiled
 def weigh(
-    velocity: float, strokes: Samples, rows: Samples, z: Samples, mass: Samples, part_mass: float,
-    gravity: float, remaining: float, tolerance: float, penalty: float,
+    velocity: float, strokes: Samples, rows: Samples, z: Samples, mass: Samples, part: Samples,
+    remaining: float, tolerance: float, penalty: float,
     step: float, cost: Samples, overshoot: Samples,
 ) -> tuple[Samples, Samples]:  # fmt: skip
     """Weigh each stroke at one velocity by the model itself: expected cost and overshoot probability."""
     moved = np.empty((strokes.size, z.size))
-    distribution(velocity, strokes, rows, z, part_mass, gravity, moved)
+    distribution(velocity, strokes, rows, z, part, moved)
     costs, risks = np.empty(strokes.size), np.empty(strokes.size)
     for j in range(strokes.size):
         if math.isnan(moved[j].sum()):
@@ -101,8 +101,8 @@ def weigh(
 
 def choose(
     remaining: float, table: Samples, velocities: Samples, strokes: Samples, rows: Samples,
-    value: CostToGo, aims: Samples, *, tolerance: float, penalty: float, bound: float, part_mass: float,
-    gravity: float, caps: Samples,
+    value: CostToGo, aims: Samples, *, tolerance: float, penalty: float, bound: float, part: Samples,
+    caps: Samples,
 ) -> tuple[Chosen | None, float]:  # fmt: skip
     """Tap of least cost with an overshoot probability within `bound`, and the least probability met.
 
@@ -121,7 +121,7 @@ def choose(
             fine = tried
             for _ in range(2):
                 costs, risks = weigh(
-                    velocity, fine, rows, Z, mass, part_mass, gravity, remaining,
+                    velocity, fine, rows, Z, mass, part, remaining,
                     tolerance, penalty, *value,
                 )  # fmt: skip
                 least = min(least, float(risks.min()))

@@ -1,9 +1,9 @@
 """The tap planner: which velocity and stroke bring the part closer, and when there is none."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,30 +13,17 @@ from impactcell.positioning import belief as beliefs
 from impactcell.positioning.belief import Belief
 from impactcell.positioning.choice import choose
 from impactcell.positioning.learning import learn
-from impactcell.positioning.limits import allowed_strokes, largest_force
+from impactcell.positioning.limits import largest_force
+from impactcell.positioning.outlook import Bounds, Outlook, look_ahead, stiffest
+from impactcell.positioning.profile import Profile, learn_profile
 from impactcell.positioning.response import displacement_of
-from impactcell.positioning.spread import COARSE_Z, Z, distribution, plants, scenarios, spread_table
+from impactcell.positioning.spread import Z, distribution, plants, scenarios
 from impactcell.positioning.tap import Tap, Unreachable
-from impactcell.positioning.value import AIMS, CostToGo, cost_to_go
-from impactcell.records import Samples
+from impactcell.positioning.value import AIMS
+from impactcell.records import Quality, Samples, Signature
 
-SLOWEST_M_S = 0.005
-VELOCITIES = 24
-STROKES = 60
-MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
-CAUTION = (1.0, 20.0)  # factors on that multiplier, tried in turn until a tap is within the bound
-SAME_MASS = 0.03
-STALE = np.array([0.02, 0.04, 0.08, 0.03, 2.0])  # change of the belief after which a table is made anew
-
-
-class _Part(NamedTuple):
-    """What has been worked out for parts of one mass, and the belief it was worked out from."""
-
-    mass_kg: float
-    caution: float
-    belief: Belief
-    table: Samples
-    value: CostToGo
+CAUTION = (1.0, 20.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
+REMEMBERED = 64  # outlooks
 
 
 @dataclass(slots=True)
@@ -52,9 +39,9 @@ class TapPlanner:
         at loss of contact.
     overshoot_probability : float
         Bound for a whole task, learning included.
-    plant : Plant, optional
-        Nominal plant; contact within some 10 % and
-        friction within a factor of 1.4 of what the cell turns out to be.
+    plant : Plant or mapping, optional
+        Nominal plant, or its fields by name; contact within some 10 % and friction within a factor of 1.4
+        of what the cell turns out to be. Of its effects, viscous friction is planned with.
     max_force_n : float
         Contact force that no tap may exceed.
     two_sided : bool
@@ -70,12 +57,14 @@ class TapPlanner:
     max_velocity_m_s: float = 0.1
     max_stroke_m: float = 1.5e-3
     overshoot_probability: float = 1e-3
-    plant: Plant | None = None
+    plant: Plant | Mapping[str, float] | None = None
     max_force_n: float = math.inf
     two_sided: bool = False
     _belief: Belief = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
-    _parts: list[_Part] = field(init=False, repr=False, default_factory=list)
+    _bounds: Bounds = field(init=False, repr=False)
+    _profile: Profile | None = field(init=False, repr=False, default=None)
+    _outlooks: list[Outlook] = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have, and start from the nominal plant."""
@@ -89,8 +78,14 @@ class TapPlanner:
         plant = self.plant
         if plant is None:
             plant = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.25, mu_k=0.19)
+        elif isinstance(plant, Mapping):
+            plant = Plant(**plant)  # type: ignore[arg-type]
         viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
         self._gravity = plant.gravity_m_s2
+        self._bounds = Bounds(
+            self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
+            self.overshoot_probability,
+        )  # fmt: skip
         _ready()
         self._belief = beliefs.prior(
             plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, float(np.max(viscous))
@@ -104,27 +99,6 @@ class TapPlanner:
     def resume(self, belief: Belief) -> None:
         """Go on from a belief kept earlier."""
         self._belief = belief
-
-    @property
-    def _halts_at_separation(self) -> bool:
-        return math.isinf(self.max_stroke_m)
-
-    @property
-    def _velocities(self) -> Samples:
-        count = VELOCITIES * (8 if self._halts_at_separation else 1)
-        return np.geomspace(min(SLOWEST_M_S, 0.5 * self.max_velocity_m_s), self.max_velocity_m_s, count)
-
-    @property
-    def _strokes(self) -> Samples:
-        if self._halts_at_separation:
-            return np.array([math.inf])
-        knee = 0.2 * self.max_stroke_m
-        return np.concatenate(
-            [
-                np.linspace(knee / STROKES, knee, STROKES // 2, endpoint=False),
-                np.linspace(knee, self.max_stroke_m, STROKES // 2),
-            ]
-        )
 
     def next_tap(self, remaining_m: float, mass_kg: float) -> Tap | Unreachable | None:
         """Choose the next tap of a task; None where the part is in place.
@@ -156,19 +130,19 @@ class TapPlanner:
                 "and this cell cannot push it back"
             )
         distance = abs(remaining_m)
-        rows = scenarios(self._belief, Z)
+        rows, part = scenarios(self._belief, Z), self._part(mass_kg)
         least = 1.0
         for caution in CAUTION:
-            part = self._worked_out(mass_kg, caution)
-            if not _furthest(part.table) > 0.0:
+            outlook = self._outlook(part, caution)
+            if not outlook.furthest_m > 0.0:
                 return Unreachable(
                     f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
                     f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
                 )
             chosen, met = choose(
-                distance, part.table, self._velocities, self._strokes, rows, part.value, AIMS,
-                tolerance=self.tolerance_m, penalty=self._penalty(caution), bound=self.overshoot_probability,
-                part_mass=mass_kg, gravity=self._gravity, caps=self._caps(mass_kg),
+                distance, outlook.table, self._bounds.velocities, self._bounds.strokes, rows, outlook.value,
+                AIMS, tolerance=self.tolerance_m, penalty=self._bounds.penalty(caution),
+                bound=self.overshoot_probability, part=part, caps=self._bounds.caps(self._belief, part),
             )  # fmt: skip
             if chosen is not None:
                 break
@@ -181,7 +155,7 @@ class TapPlanner:
             )
         moved = np.empty((1, Z.size))
         stroke = np.array([chosen.stroke_m])
-        distribution(chosen.velocity_m_s, stroke, rows, Z, mass_kg, self._gravity, moved)
+        distribution(chosen.velocity_m_s, stroke, rows, Z, part, moved)
         inside = moved[0, np.abs(Z) <= 3.3]
         return Tap(
             velocity_m_s=chosen.velocity_m_s,
@@ -205,11 +179,11 @@ class TapPlanner:
         if not (math.isfinite(moved_m) and math.isfinite(mass_kg) and mass_kg > 0.0):
             raise PositioningError(f"cannot learn from a displacement of {moved_m} m of {mass_kg} kg")
 
+        part = self._part(mass_kg)
+
         def response(states: Samples) -> Samples:
             factor = np.maximum(1.0 + states[:, 5], 0.05)
-            return displacement_of(
-                tap.velocity_m_s, tap.stroke_m, plants(states[:, :5]), factor, mass_kg, self._gravity
-            )
+            return displacement_of(tap.velocity_m_s, tap.stroke_m, plants(states[:, :5]), factor, part)
 
         self._belief = learn(self._belief, response, moved_m)
 
@@ -225,73 +199,51 @@ class TapPlanner:
             raise PositioningError(f"cannot use a friction of {mu_k} +- {std}")
         self._belief = beliefs.told_friction(self._belief, mu_k, std, batch_changed=batch_changed)
 
-    def _penalty(self, caution: float) -> float:
-        return MULTIPLIER * caution / self.overshoot_probability
+    def observe_signature(self, signature: Signature) -> None:
+        """Take over how friction varies along the slide; a signature of bad quality says nothing.
 
-    def _worked_out(self, mass_kg: float, caution: float) -> _Part:
-        """Table of taps and cost to go for this mass, made anew where the belief has moved on."""
-        for n, part in enumerate(self._parts):
-            near = abs(part.mass_kg / mass_kg - 1.0) < SAME_MASS and part.caution == caution
-            if near and self._still_holds(part):
-                self._parts.append(self._parts.pop(n))
-                return part
-        table = self._table(self._belief, mass_kg)
-        value = CostToGo(1.0, np.ones(1), np.ones(1))
-        if _furthest(table) > 0.0:
-            later = beliefs.foreseen(self._belief)
-            less = (np.diag(self._belief.cov) > 1.2 * np.diag(later.cov)).any()
-            ahead = self._table(later, mass_kg) if less else table
-            value = cost_to_go(ahead, COARSE_Z, self.tolerance_m, self._penalty(caution))
-        part = _Part(mass_kg, caution, self._belief, table, value)
-        self._parts.append(part)
-        del self._parts[:-64]
-        return part
-
-    def _table(self, belief: Belief, mass_kg: float) -> Samples:
-        table = spread_table(
-            self._velocities, self._strokes, scenarios(belief, COARSE_Z), COARSE_Z, mass_kg, self._gravity
-        )
-        table[self._strokes > self._caps(mass_kg)[:, None]] = math.nan
-        return table
-
-    def _stiffest(self) -> Samples:
-        """Plant (k, b, mu_s, mu_k, k_v) that presses hardest, within three standard deviations."""
-        worst = self._belief.mean + 3.0 * np.sqrt(np.diag(self._belief.cov))
-        plant: Samples = plants(worst[None])[0] * np.array([1.0, 1.0, 1.1, 1.1, 1.0])
-        return plant
-
-    def _caps(self, mass_kg: float) -> Samples:
-        if math.isinf(self.max_force_n):
-            return np.full(self._velocities.size, math.inf)
-        return allowed_strokes(self._velocities, self.max_force_n, self._stiffest(), mass_kg, self._gravity)
+        Raises
+        ------
+        PositioningError
+            For a signature whose arrays do not belong together.
+        """
+        if signature.quality is not Quality.BAD:
+            self._profile = learn_profile(
+                self._profile, signature.position_m, signature.friction, signature.friction_std
+            )
 
     def force(self, tap: Tap, mass_kg: float) -> float:
         """Bound on the contact force of a tap (N), for `impactcell.positioning.limits.released`."""
-        return largest_force(tap.velocity_m_s, tap.stroke_m, self._stiffest(), mass_kg, self._gravity)
+        return largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(self._belief), mass_kg, self._gravity)
 
-    def _still_holds(self, part: _Part) -> bool:
-        moved = np.abs(self._belief.mean - part.belief.mean)
-        now, then = np.sqrt(np.diag(self._belief.cov)), np.sqrt(np.diag(part.belief.cov))
-        scatter = self._belief.scatter / part.belief.scatter
-        return bool(np.all(moved < STALE) and np.all(np.abs(now - then) < STALE) and 0.9 < scatter < 1.1)
+    def _part(self, mass_kg: float) -> Samples:
+        return np.concatenate(
+            [[mass_kg, self._gravity], [] if self._profile is None else self._profile.warp()]
+        )
 
-
-def _furthest(table: Samples) -> float:
-    return float(np.nanmax(table[:, :, COARSE_Z.size // 2], initial=0.0))
+    def _outlook(self, part: Samples, caution: float) -> Outlook:
+        """Outlook for this part, made anew where the belief has moved on."""
+        for n, outlook in enumerate(self._outlooks):
+            if outlook.serves(part, caution, self._belief):
+                self._outlooks.append(self._outlooks.pop(n))
+                return outlook
+        outlook = look_ahead(self._bounds, self._belief, part, caution)
+        self._outlooks.append(outlook)
+        del self._outlooks[:-REMEMBERED]
+        return outlook
 
 
 @cache
 def _ready() -> None:
     """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
     belief = beliefs.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
-    velocities, strokes = np.array([0.02, 0.05]), np.array([2e-4, 4e-4])
-    table = spread_table(velocities, strokes, scenarios(belief, COARSE_Z), COARSE_Z, 20.0, 9.81)
-    value = cost_to_go(table, COARSE_Z, 50e-6, 100.0)
+    bounds = Bounds(50e-6, 0.05, 4e-4, 1e3, 0.1)
+    part = np.array([20.0, 9.81])
+    outlook = look_ahead(bounds, belief, part, 1.0)
     choose(
-        2e-3, table, velocities, strokes, scenarios(belief, Z), value, AIMS, tolerance=50e-6, penalty=100.0,
-        bound=0.1, part_mass=20.0, gravity=9.81, caps=np.full(2, math.inf),
+        2e-3, outlook.table, bounds.velocities, bounds.strokes, scenarios(belief, Z), outlook.value, AIMS,
+        tolerance=50e-6, penalty=100.0, bound=0.1, part=part, caps=bounds.caps(belief, part),
     )  # fmt: skip
     plant = plants(belief.mean[None])
-    displacement_of(0.02, 2e-4, plant, np.ones(1), 20.0, 9.81)
+    displacement_of(0.02, 2e-4, plant, np.ones(1), part)
     largest_force(0.02, 2e-4, plant[0], 20.0, 9.81)
-    allowed_strokes(velocities, 100.0, plant[0], 20.0, 9.81)

@@ -24,6 +24,22 @@ MAX_PHASES = 4000
 
 
 @compiled
+def along_profile(distance: float, part: Samples) -> float:
+    """Distance slid where friction varies, for the `distance` slid (m) at its mean.
+
+    `part` as in `displacements`.
+    """
+    last = part.size - 4
+    if last < 1:
+        return distance
+    place = distance / part[2]
+    n = int(place)
+    if n >= last:
+        return float(part[3 + last] + distance - last * part[2])
+    return float(part[3 + n] + (place - n) * (part[4 + n] - part[3 + n]))
+
+
+@compiled
 def slide(speed: float, mass: float, friction: float, viscous: float) -> float:
     """Distance to rest from `speed` (m/s) under `friction` (N) and `viscous` (N s/m) without contact."""
     ratio = viscous * speed / friction
@@ -33,11 +49,14 @@ def slide(speed: float, mass: float, friction: float, viscous: float) -> float:
 
 
 @compiled
-def halted(indentation: float, speed: float, mass: float, k: float, friction: float, viscous: float) -> float:
+def halted(
+    indentation: float, speed: float, k: float, friction: float, viscous: float, part: Samples
+) -> float:
     """Travel to rest of a part in contact with an actuator that has just halted.
 
     `indentation` >= 0 (m) and `speed` > 0 (m/s) at the halt. The damper is off: the part departs.
     """
+    mass = part[0]
     w2 = k / mass
     rest = friction / k
     e = indentation - rest
@@ -45,7 +64,7 @@ def halted(indentation: float, speed: float, mass: float, k: float, friction: fl
         amplitude = math.sqrt(e * e + speed * speed / w2)
         if amplitude <= rest:
             return indentation - rest + amplitude
-        return indentation + 0.5 * (amplitude * amplitude - rest * rest) / rest
+        return indentation + along_profile(0.5 * (amplitude * amplitude - rest * rest) / rest, part)
     z = 0.5 * viscous / mass
     wd = math.sqrt(w2 - z * z)
     c = (z * e - speed) / wd  # e(t) = exp(-z t) (e cos wd t + c sin wd t), e'(0) = -speed
@@ -53,7 +72,7 @@ def halted(indentation: float, speed: float, mass: float, k: float, friction: fl
     turn = math.atan2(speed, -p) / wd
     low, high = 0.0, turn
     if math.exp(-z * turn) * (e * math.cos(wd * turn) + c * math.sin(wd * turn)) >= -rest:
-        return e - math.exp(-z * turn) * (e * math.cos(wd * turn) + c * math.sin(wd * turn))
+        return float(e - math.exp(-z * turn) * (e * math.cos(wd * turn) + c * math.sin(wd * turn)))
     t = 0.5 * turn
     for _ in range(60):
         decay, cosine, sine = math.exp(-z * t), math.cos(wd * t), math.sin(wd * t)
@@ -71,7 +90,7 @@ def halted(indentation: float, speed: float, mass: float, k: float, friction: fl
             break
         t = new
     departure = math.exp(-z * t) * (speed * math.cos(wd * t) + p * math.sin(wd * t))
-    return indentation + slide(max(departure, 0.0), mass, friction, viscous)
+    return indentation + along_profile(slide(max(departure, 0.0), mass, friction, viscous), part)
 
 
 @compiled
@@ -135,9 +154,7 @@ def catch_time(speed: float, v: float, mass: float, friction: float, viscous: fl
 
 
 @compiled
-def displacements(
-    v: float, strokes: Samples, plant: Samples, mass: float, gravity: float, out: Samples
-) -> None:
+def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out: Samples) -> None:
     """Displacement from first contact to rest for each stroke, written to `out` (m).
 
     Parameters
@@ -149,12 +166,15 @@ def displacements(
         halts at the first loss of contact.
     plant : ndarray, shape (5,)
         k, b, mu_s, mu_k and k_v; SI; mu_s >= mu_k > 0.
-    mass, gravity : float
+    part : ndarray, shape (2,) or (3 + n,)
+        Mass and gravity; then, where friction varies along the slide, a step of distance and what is slid
+        instead of 0, 1, 2, ... such steps.
     out : ndarray, shape (n,)
         nan where the course has more than `MAX_PHASES` phases.
     """
     count = strokes.size
     k, b, mu_s, mu_k, viscous = plant
+    mass, gravity = part[0], part[1]
     static, kinetic = mu_s * mass * gravity, mu_k * mass * gravity
     w2 = k / mass
     rest = (kinetic + viscous * v) / k
@@ -223,7 +243,7 @@ def displacements(
                 speed = v - decay * (r * cosine - c * sine)
                 out[j] = strokes[j] - depth
                 if speed > 0.0:
-                    out[j] += halted(depth, speed, mass, k, kinetic, viscous)
+                    out[j] += halted(depth, speed, k, kinetic, viscous, part)
                 j += 1
             if j == count:
                 return
@@ -237,7 +257,7 @@ def displacements(
             else:
                 speed = v - r
                 x = v * t
-                goes = slide(speed, mass, kinetic, viscous)
+                goes = along_profile(slide(speed, mass, kinetic, viscous), part)
                 caught = catch_time(speed, v, mass, kinetic, viscous)
                 while count > j and math.isinf(strokes[count - 1]):
                     count -= 1
@@ -260,9 +280,7 @@ def displacements(
 
 
 @compiled
-def displacement_of(
-    v: float, stroke: float, rows: Samples, factor: Samples, mass: float, gravity: float
-) -> Samples:
+def displacement_of(v: float, stroke: float, rows: Samples, factor: Samples, part: Samples) -> Samples:
     """Displacement (m) by one tap for each plant (k, b, mu_s, mu_k, k_v), friction times `factor`."""
     one, out, moved = np.empty(1), np.empty(1), np.empty(factor.size)
     one[0] = stroke
@@ -270,6 +288,6 @@ def displacement_of(
     for n in range(factor.size):
         plant[:] = rows[n]
         plant[2:4] *= factor[n]
-        displacements(v, one, plant, mass, gravity, out)
+        displacements(v, one, plant, part, out)
         moved[n] = out[0]
     return moved

@@ -52,7 +52,7 @@ def plants(theta: Samples) -> Samples:
 
 @compiled
 def distribution(
-    velocity: float, strokes: Samples, rows: Samples, z: Samples, mass: float, gravity: float,
+    velocity: float, strokes: Samples, rows: Samples, z: Samples, part: Samples,
     out: Samples,
 ) -> None:  # fmt: skip
     """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m.
@@ -65,14 +65,14 @@ def distribution(
     course = np.empty(count)
     square = np.zeros(count)
     for q in range(nodes):
-        displacements(velocity, strokes, rows[q], mass, gravity, course)
+        displacements(velocity, strokes, rows[q], part, course)
         for j in range(count):
             out[j, q] = course[j]
     other = np.empty(count)
     for a in range(across):
         p, n = nodes + a, nodes + across + a
-        displacements(velocity, strokes, rows[p], mass, gravity, course)
-        displacements(velocity, strokes, rows[n], mass, gravity, other)
+        displacements(velocity, strokes, rows[p], part, course)
+        displacements(velocity, strokes, rows[n], part, other)
         for j in range(count):
             step = max(abs(course[j] - out[j, middle]), abs(other[j] - out[j, middle]))
             square[j] += step * step
@@ -114,10 +114,10 @@ def reach(line: Samples, z: Samples, q: int, middle: int, aside: float) -> float
 
 @compiled
 def spread_table(
-    velocities: Samples, strokes: Samples, rows: Samples, z: Samples, mass: float, gravity: float
+    velocities: Samples, strokes: Samples, rows: Samples, z: Samples, part: Samples
 ) -> Samples:  # fmt: skip
     """Displacements (m), shape (velocities, strokes, nodes)."""
     table = np.empty((velocities.size, strokes.size, z.size))
     for i in range(velocities.size):
-        distribution(velocities[i], strokes, rows, z, mass, gravity, table[i])
+        distribution(velocities[i], strokes, rows, z, part, table[i])
     return table
