@@ -136,11 +136,12 @@ def step(
     capture: Capture,
     positioning: PositioningState,
     announcement: Announcement | None = None,
+    faults: tuple[str, ...] = (),
 ) -> Stepped:
-    """Take one cycle through the whole pipeline."""
+    """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
     capture = completed(design, capture)
     state, batch_id, expected = _batch(state, capture, announcement)
-    friction = estimate(capture, design.model)
+    friction = _doubted(estimate(capture, design.model), faults)
     period_s = _period_s(state, capture)
     tracked = track(
         design.tracker,
@@ -244,6 +245,16 @@ def _sign(
         gravity_m_s2=plant.gravity_m_s2,
         period_s=period_s,
     )
+
+
+def _doubted(friction: FrictionEstimate, faults: tuple[str, ...]) -> FrictionEstimate:
+    """Make an estimate from a capture with faults uncertain at best, and say why."""
+    if not faults or friction.mu_s.quality is not Quality.GOOD:
+        return friction
+    reason = "; ".join(faults)
+    mu_s = replace(friction.mu_s, quality=Quality.UNCERTAIN, reason=reason)
+    mu_k = replace(friction.mu_k, quality=max(friction.mu_k.quality, Quality.UNCERTAIN), reason=reason)
+    return replace(friction, mu_s=mu_s, mu_k=mu_k)
 
 
 def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:

@@ -165,7 +165,7 @@ class RunningCell:
         capture = reception.capture
         task = self._positioning
         positioning = PositioningState() if task is None else task.state
-        processed = await self.worker.process(capture, positioning, self._announcement())
+        processed = await self.worker.process(capture, positioning, self._announcement(), reception.faults)
         if task is not None:
             await self.worker.run(partial(task.learn, processed.stepped.snapshot))
         if processed.durable is not None:

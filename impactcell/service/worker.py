@@ -100,10 +100,14 @@ class Worker:
         await self.run(lambda: rehearse(self._design))
 
     async def process(
-        self, capture: Capture, positioning: PositioningState, announcement: Announcement | None
+        self,
+        capture: Capture,
+        positioning: PositioningState,
+        announcement: Announcement | None,
+        faults: tuple[str, ...] = (),
     ) -> Processed:
         """Take one cycle through the pipeline and store it."""
-        return await self.run(lambda: self._process(capture, positioning, announcement))
+        return await self.run(lambda: self._process(capture, positioning, announcement, faults))
 
     async def find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
         """Take what a rule beside the cycles says; the alarms that moved."""
@@ -163,9 +167,13 @@ class Worker:
             return Durable(core.initial_state(self._design))
 
     def _process(
-        self, capture: Capture, positioning: PositioningState, announcement: Announcement | None
+        self,
+        capture: Capture,
+        positioning: PositioningState,
+        announcement: Announcement | None,
+        faults: tuple[str, ...],
     ) -> Processed:
-        stepped = core.step(self._design, self._state, capture, positioning, announcement)
+        stepped = core.step(self._design, self._state, capture, positioning, announcement, faults)
         self._state, self._snapshot = stepped.state, stepped.snapshot
         if self._journal is None:
             return Processed(stepped, Mark(capture.session, capture.cycle))

@@ -1,0 +1,153 @@
+"""What a module can do to a cell: a clear message, a matching quality, and the next good cycle is used."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from impactcell.records import AlarmName, Quality, Snapshot
+from impactcell.service import Service
+from impactcell.settings import read_cells
+from tests.integration.processes import CONFIG, simulator, write_cell
+
+pytestmark = pytest.mark.timeout(240)
+
+
+@dataclass
+class Watched:
+    """A service in this process, with the snapshots of its cells."""
+
+    service: Service
+    snapshots: dict[str, list[Snapshot]] = field(default_factory=dict)
+    news: asyncio.Condition = field(default_factory=asyncio.Condition)
+
+    async def until(self, cell: str, cycles: int, timeout_s: float = 120.0) -> list[Snapshot]:
+        """Wait until a cell has shown so many cycles."""
+        async with asyncio.timeout(timeout_s), self.news:
+            await self.news.wait_for(lambda: len(self.snapshots.get(cell, [])) >= cycles)
+        return self.snapshots[cell]
+
+    async def alarm(self, cell: str, name: AlarmName, *, active: bool, timeout_s: float = 60.0) -> str:
+        """Wait until an alarm is active, or not; its message."""
+        async with asyncio.timeout(timeout_s):
+            while True:
+                alarm = next(a for a in self.service.running[cell].worker.alarms if a.name is name)
+                if alarm.active is active:
+                    return alarm.message
+                async with self.news:
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(self.news.wait(), 0.02)
+
+
+@contextlib.asynccontextmanager
+async def serving(*paths: Path) -> AsyncIterator[Watched]:
+    """Run the service over cell files."""
+    stop = asyncio.Event()
+    tasks: set[asyncio.Task[None]] = set()
+
+    def observe(cell: str, snapshot: Snapshot) -> None:
+        watched.snapshots.setdefault(cell, []).append(snapshot)
+
+        async def tell() -> None:
+            async with watched.news:
+                watched.news.notify_all()
+
+        task = asyncio.create_task(tell())
+        tasks.add(task)
+        task.add_done_callback(tasks.discard)
+
+    watched = Watched(Service(read_cells(paths), observe))
+    started = asyncio.Event()
+    running = asyncio.create_task(watched.service.run(stop, started.set))
+    try:
+        waiter = asyncio.create_task(started.wait())
+        await asyncio.wait({running, waiter}, return_when=asyncio.FIRST_COMPLETED)
+        waiter.cancel()
+        yield watched
+    finally:
+        stop.set()
+        await running
+        if tasks:
+            await asyncio.wait(tasks)
+
+
+KINDS = ["empty", "constant_force", "saturated", "no_separation", "not_a_number", "no_force"]
+
+
+async def test_captures_of_no_use(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    faulty = [{"cycle": 3 + 2 * i, "kind": kind} for i, kind in enumerate(KINDS)]
+    cycles = 3 + 2 * len(KINDS)
+    changes: dict[str, Any] = {
+        "strikes": {"period_s": 0.25, "cycles": cycles},
+        "faulty_captures": faulty,
+        "batches": [{"from_cycle": 1, "id": "A"}],
+        "deviations": [],
+    }
+    async with (
+        simulator(tmp_path, **changes) as module,
+        serving(write_cell(tmp_path, module["port"])) as watched,
+    ):
+        snapshots = await watched.until("press-1", cycles)
+    by_cycle = {snapshot.cycle: snapshot for snapshot in snapshots}
+    assert sorted(by_cycle) == list(range(1, cycles + 1))
+    for entry in faulty:
+        bad, after = by_cycle[entry["cycle"]], by_cycle[entry["cycle"] + 1]
+        assert after.friction.mu_s.quality is Quality.GOOD, (entry, after.friction)
+        assert after.friction.mu_s.value == pytest.approx(0.2, rel=0.1)
+        assert bad.friction.mu_s.quality > Quality.GOOD, (entry, bad.friction)
+        assert bad.friction.mu_s.reason
+    assert not any(record.exc_info for record in caplog.records)
+    text = caplog.text
+    assert "press-1" in text
+    assert "register force (320)" in text
+
+
+async def test_one_sick_cell_leaves_the_other_alone(tmp_path: Path) -> None:
+    strikes = {"period_s": 0.25}
+    async with simulator(tmp_path, strikes=strikes) as module:
+        well = write_cell(tmp_path, module["port"], "well")
+        absent = write_cell(tmp_path, 1, "absent")
+        stranger = write_cell(tmp_path, module["port"], "stranger", module={"device_id": 9})
+        async with serving(well, absent, stranger) as watched:
+            await watched.until("well", 5)
+            assert "127.0.0.1:1" in await watched.alarm("absent", AlarmName.MODULE_CONNECTION, active=True)
+            message = await watched.alarm("stranger", AlarmName.MODULE_CONNECTION, active=True)
+            assert "device_id 9" in message or "device 9" in message
+            await watched.until("well", 8)
+
+
+async def test_another_map_version_is_refused_by_name(tmp_path: Path) -> None:
+    text = (CONFIG / "maps" / "fpga-v1.yaml").read_text()
+    newer = tmp_path / "fpga-v2.yaml"
+    newer.write_text(text.replace("type: u16, expect: 1", "type: u16, expect: 2"))
+    async with simulator(tmp_path, strikes={"period_s": 0.5}) as module:
+        cell = write_cell(tmp_path, module["port"], module={"register_map": str(newer)})
+        async with serving(cell) as watched:
+            message = await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=True)
+    assert "register map_version (16)" in message
+    assert "press-1" in message
+
+
+async def test_a_module_that_goes_and_comes_back(tmp_path: Path) -> None:
+    strikes = {"period_s": 0.25}
+    path = write_cell(tmp_path, 1)
+    async with contextlib.AsyncExitStack() as stack:
+        first = contextlib.AsyncExitStack()
+        module = await first.enter_async_context(simulator(tmp_path, strikes=strikes))
+        path.write_text(path.read_text().replace("port: 1\n", f"port: {module['port']}\n"))
+        watched = await stack.enter_async_context(serving(path))
+        await watched.until("press-1", 3)
+        await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=False)
+        await first.aclose()
+        await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=True)
+        seen = len(watched.snapshots["press-1"])
+        listen = {"port": module["port"]}
+        await stack.enter_async_context(simulator(tmp_path, strikes=strikes, listen=listen))
+        await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=False)
+        await watched.until("press-1", seen + 3)
