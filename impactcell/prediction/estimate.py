@@ -24,7 +24,8 @@ NOT_READ = Reading(math.nan, math.nan)
 def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEstimate:
     """Estimate mu_s and mu_k of one tap by equations (4), (5), (6) and by its waveform.
 
-    Published is the waveform's estimate where it converges, else (6), else what there is of (4) and (5).
+    Published is the waveform's estimate where it converges, else (6), else (4) or (5) alone where only one
+    channel was recorded.
     A capture that cannot be used gives a bad estimate that says why; nothing is raised for it.
 
     Parameters
@@ -69,7 +70,7 @@ def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEst
             mu_combined = _coefficient("; ".join(dict.fromkeys(faults)))
     except PredictionError as fault:
         mu_force = mu_distance = mu_combined = _coefficient(str(fault))
-    mu_s, estimator = _published(mu_combined, mu_force, mu_distance)
+    mu_s, estimator = _published(capture, mu_combined, mu_force, mu_distance)
     mu_k = _mu_k(model, slid, mu_s, capture.mass_kg)
     gap = math.nan
     if not force_fault and slid is not None:
@@ -153,15 +154,19 @@ def _warned(given: Coefficient, *warnings: str) -> Coefficient:
 
 
 def _published(
-    mu_combined: Coefficient, mu_force: Coefficient, mu_distance: Coefficient
+    capture: Capture, mu_combined: Coefficient, mu_force: Coefficient, mu_distance: Coefficient
 ) -> tuple[Coefficient, Estimator]:
-    for given, estimator in (
-        (mu_combined, Estimator.COMBINED),
-        (mu_distance, Estimator.DISTANCE),
-        (mu_force, Estimator.FORCE),
-    ):
-        if given.quality < Quality.BAD:
-            return given, estimator
+    """Choose what is published without a waveform.
+
+    One equation alone is published only where the other's channel was not recorded. Where it was and cannot
+    be used, the capture is not to be trusted.
+    """
+    if mu_combined.quality < Quality.BAD:
+        return mu_combined, Estimator.COMBINED
+    if capture.force is None and mu_distance.quality < Quality.BAD:
+        return _warned(mu_distance, "by sliding distance only: no force was recorded"), Estimator.DISTANCE
+    if capture.position is None and mu_force.quality < Quality.BAD:
+        return _warned(mu_force, "by peak force only: no position was recorded"), Estimator.FORCE
     return mu_combined, Estimator.NONE
 
 

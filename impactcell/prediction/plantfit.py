@@ -22,7 +22,7 @@ from impactcell.prediction.doubt import (
     phases,
 )
 from impactcell.prediction.model import Model, Prior
-from impactcell.prediction.reading import checked, peak_force, placed
+from impactcell.prediction.reading import checked, displacement, peak_force
 from impactcell.prediction.response import DAMPING, MU_K, RATIO, STIFFNESS, Response, parameters, respond
 from impactcell.prediction.sliding import Slide, slide
 from impactcell.prediction.waveform import fit
@@ -122,13 +122,13 @@ def contact_constants(capture: Capture, slid: Slide) -> tuple[float, float]:
     The rate comes from a spline-free derivative of the position: a polynomial over the contact, which is
     smooth enough for a start.
     """
-    force, position = checked(capture.force, "force"), placed(capture)
+    force, position = checked(capture.force, "force"), displacement(capture)
     end = min(slid.separation_s, capture.stroke_m / capture.velocity_m_s)
     inside = (position.time_s > 0.0) & (position.time_s < end)
     if inside.sum() < 12:
         raise PredictionError(f"shot {capture.cycle}: too few position samples within the contact")
     times = position.time_s[inside]
-    moved = capture.direction * (position.values[inside] - capture.start_m)
+    moved = capture.direction * position.values[inside]
     basis = np.polynomial.Chebyshev.fit(times, moved, min(9, len(times) // 4))
     near = (force.time_s >= times[0]) & (force.time_s <= times[-1])
     at = force.time_s[near]
@@ -144,7 +144,7 @@ def weigh(capture: Capture, slid: Slide) -> float:
 
     Between the middle of the contact, when the part slips, and its loss; a is the deceleration of the slide.
     """
-    force, position = checked(capture.force, "force"), placed(capture)
+    force, position = checked(capture.force, "force"), displacement(capture)
     end, start = slid.separation_s, 0.4 * slid.separation_s
     inside = (position.time_s > 0.5 * start) & (position.time_s < end + 0.25 * (slid.stop_s - end))
     moved = capture.direction * position.values[inside]

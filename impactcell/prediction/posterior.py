@@ -14,7 +14,7 @@ from scipy.special import log_ndtr, ndtr
 
 from impactcell.records import Samples
 
-NODES = 100
+NODES = 300
 
 
 @dataclass(frozen=True, slots=True, eq=False)

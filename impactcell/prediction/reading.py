@@ -60,11 +60,11 @@ def checked(channel: Channel | None, name: str) -> Channel:
     return channel
 
 
-def placed(capture: Capture) -> Channel:
-    """Position of a capture on the table, so that it begins at `start_m`.
+def displacement(capture: Capture) -> Channel:
+    """Position of a capture counted from where the part lay, positive along +1.
 
-    Recorders differ in where they count from: the table's zero, or the place at which the part lay. The
-    first samples, taken while the part has hardly moved, tell which.
+    Recorders differ in where they count from: that place, or the table's zero. The first samples, taken
+    while the part has hardly moved, tell which.
 
     Raises
     ------
@@ -73,8 +73,8 @@ def placed(capture: Capture) -> Channel:
     """
     position = checked(capture.position, "position")
     first = float(np.median(position.values[:5]))
-    if abs(first) < abs(first - capture.start_m):
-        return replace(position, values=position.values + capture.start_m)
+    if abs(first - capture.start_m) < abs(first):
+        return replace(position, values=position.values - capture.start_m)
     return position
 
 

@@ -20,7 +20,7 @@ from impactcell.prediction.blocks import (
     Blocks,
     blocks,
 )
-from impactcell.prediction.reading import placed
+from impactcell.prediction.reading import displacement
 from impactcell.records import Capture, Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING = range(4)
@@ -165,5 +165,5 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
     force = NOTHING
     if capture.force is not None:
         force = blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
-    position = blocks(placed(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
+    position = blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return Response(plant, tap, force, position)

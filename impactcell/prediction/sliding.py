@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
-from impactcell.prediction.reading import Reading, checked, loss_of_contact, noise_std, placed
+from impactcell.prediction.reading import Reading, checked, displacement, loss_of_contact, noise_std
 from impactcell.records import Capture, Samples
 
 
@@ -39,10 +39,10 @@ def slide(capture: Capture) -> Slide:
     NoBreakawayError, NoSeparationError, NoStopError
         The part did not move, did not leave the actuator, or had not come to rest when the record ended.
     """
-    position = placed(capture)
+    position = displacement(capture)
     sigma = noise_std(position)
     times = position.time_s
-    moved = capture.direction * (position.values - capture.start_m)
+    moved = capture.direction * position.values
     tail = max(5, len(moved) // 50)
     if abs(float(moved[-tail:].mean() - moved[:tail].mean())) < 6.0 * sigma:
         raise NoBreakawayError(f"the part moved less than {6.0 * sigma:.3g} m")

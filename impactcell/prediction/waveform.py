@@ -18,7 +18,7 @@ from impactcell.prediction.descent import Belief, Minimum, descend
 from impactcell.prediction.doubt import DOUBTED, doubt, phases
 from impactcell.prediction.model import Model
 from impactcell.prediction.posterior import Posterior, mixture
-from impactcell.prediction.reading import checked, noise_std, placed, refuse_clipped
+from impactcell.prediction.reading import checked, displacement, noise_std, refuse_clipped
 from impactcell.prediction.response import (
     DAMPING,
     MU_K,
@@ -200,7 +200,7 @@ def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
 
 def _gap(plant: Plant, theta: Samples, capture: Capture) -> float:
     """RMS of the residuals of every sample over the noise of its sensor."""
-    force, position = checked(capture.force, "force"), placed(capture)
+    force, position = checked(capture.force, "force"), displacement(capture)
     ensemble = Ensemble(
         [commanded(capture)],
         tuple(plant.effects),

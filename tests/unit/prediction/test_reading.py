@@ -15,7 +15,7 @@ from impactcell.errors import (
     PhysicsError,
     PredictionError,
 )
-from impactcell.prediction.reading import checked, loss_of_contact, noise_std, peak_force, placed
+from impactcell.prediction.reading import checked, displacement, loss_of_contact, noise_std, peak_force
 from impactcell.prediction.sliding import slide
 from impactcell.records import Channel
 from tests.taps import Tap
@@ -172,8 +172,8 @@ def test_any_part_of_a_capture_is_read_or_refused_by_name() -> None:
             assert math.isfinite(found.distance.value)
 
 
-def test_positions_counted_from_the_part_are_placed_on_the_table() -> None:
+def test_positions_are_counted_from_where_the_part_lay() -> None:
     tap = Tap(start_m=-0.03)
     for from_table_zero in (True, False):
         capture = tap.capture(from_table_zero=from_table_zero)
-        assert placed(capture).values[0] == pytest.approx(-0.03, abs=1e-5)
+        assert displacement(capture).values[0] == pytest.approx(0.0, abs=1e-5)

@@ -1,0 +1,184 @@
+"""`estimate`: never raises for a capture, says where a value came from and why it may not be believed."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from impactcell.physics import Plant, Strike
+from impactcell.prediction import Model, Prior, calibrate, estimate
+from impactcell.records import Capture, Channel, Estimator, FrictionEstimate, Quality, Summary
+from tests.taps import VISCOUS, Tap
+
+PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects=VISCOUS)
+TAP = Strike(0.1, 18.9, halts_at_separation=True)
+MODEL = Model(
+    "reference",
+    PLANT,
+    Prior(6500.0, 9.3, 0.0228),
+    calibrate(PLANT, TAP, [18.9], np.linspace(0.05, 0.1, 9), np.linspace(0.15, 0.25, 9)),
+)
+GOOD = Tap(0.07).capture(np.random.default_rng(1))
+
+
+def consistent(found: FrictionEstimate) -> None:
+    for one in (found.mu_s, found.mu_k, found.by_force, found.by_distance, found.combined):
+        if one.quality is Quality.BAD:
+            assert one.reason
+        else:
+            assert math.isfinite(one.value)
+            assert math.isfinite(one.std)
+        if one.quality is Quality.UNCERTAIN:
+            assert one.reason
+    assert (found.estimator is Estimator.NONE) == (found.mu_s.quality is Quality.BAD)
+
+
+def test_a_good_capture_is_published_from_its_waveform() -> None:
+    found = estimate(GOOD, MODEL)
+    consistent(found)
+    assert found.estimator is Estimator.WAVEFORM
+    assert found.mu_s.quality is Quality.GOOD
+    assert found.mu_s.value == pytest.approx(0.2, rel=0.05)
+    assert found.mu_k.value == pytest.approx(0.152, rel=1e-3)
+    for one in (found.by_force, found.by_distance, found.combined):
+        assert one.value == pytest.approx(0.2, rel=0.02)
+    assert 0.9 < found.gap < 1.1
+
+
+def force(capture: Capture) -> Channel:
+    assert capture.force is not None
+    return capture.force
+
+
+def position(capture: Capture) -> Channel:
+    assert capture.position is not None
+    return capture.position
+
+
+@pytest.mark.parametrize(
+    ("capture", "reason"),
+    [
+        (replace(GOOD, force=None, position=None), "no force was recorded"),
+        (replace(GOOD, force=Channel(np.empty(0), np.empty(0))), "the force record is empty"),
+        (
+            replace(GOOD, force=replace(force(GOOD), values=np.full(len(force(GOOD).values), 12.0))),
+            "constant at 12",
+        ),
+        (replace(GOOD, force=replace(force(GOOD), values=force(GOOD).values * math.nan)), "are not numbers"),
+        (replace(GOOD, force=replace(force(GOOD), values=np.minimum(force(GOOD).values, 99.0))), "clipped"),
+        (replace(GOOD, force=replace(force(GOOD), full_scale=(0.0, 99.0))), "at full scale"),
+        (replace(GOOD, position=None), "no position was recorded"),
+        (
+            replace(GOOD, position=replace(position(GOOD), values=np.zeros(len(position(GOOD).values)))),
+            "constant",
+        ),
+        (replace(GOOD, mass_kg=math.nan), "mass is not known"),
+        (replace(GOOD, velocity_m_s=math.nan), "velocity is not known"),
+    ],
+)
+def test_a_capture_that_cannot_be_used_says_why(capture: Capture, reason: str) -> None:
+    found = estimate(capture, MODEL)
+    consistent(found)
+    everything = (found.mu_s, found.mu_k, found.by_force, found.by_distance, found.combined)
+    assert any(reason in one.reason for one in everything)
+    assert found.mu_s.quality is not Quality.GOOD
+    assert found.combined.quality is Quality.BAD
+
+
+def test_without_a_position_the_force_still_tells() -> None:
+    found = estimate(replace(GOOD, position=None), MODEL)
+    assert found.estimator is Estimator.FORCE
+    assert found.mu_s.value == pytest.approx(0.2, rel=0.02)
+    assert found.mu_k.quality is Quality.UNCERTAIN
+
+
+def test_the_modules_summary_stands_in_for_channels_that_were_not_recorded() -> None:
+    motion = Tap(0.07).motion()
+    summary = Summary(motion.peak_force_n, motion.sliding_distance_m)
+    found = estimate(replace(GOOD, force=None, position=None, summary=summary), MODEL)
+    consistent(found)
+    assert found.estimator is Estimator.COMBINED
+    assert found.mu_s.quality is Quality.UNCERTAIN
+    assert "summary" in found.mu_s.reason
+    assert found.mu_s.value == pytest.approx(0.2, rel=0.02)
+    nothing = replace(GOOD, force=None, position=None, summary=Summary(math.nan, math.nan))
+    assert estimate(nothing, MODEL).mu_s.quality is Quality.BAD
+
+
+@pytest.mark.parametrize(
+    ("tap", "reason"),
+    [
+        (Tap(0.13), "velocity 7800 mm/min is outside the calibrated 3000-6000 mm/min"),
+        (Tap(0.07, mu_s=0.31), "is outside the calibrated 0.15-0.25"),
+        (Tap(0.07, mass_kg=30.0), "mass 30 kg is outside the calibrated"),
+    ],
+)
+def test_a_shot_outside_the_calibration_is_uncertain(tap: Tap, reason: str) -> None:
+    found = estimate(tap.capture(np.random.default_rng(2)), MODEL)
+    consistent(found)
+    assert found.mu_s.quality is Quality.UNCERTAIN
+    assert reason in found.mu_s.reason
+    assert found.by_force.quality >= Quality.UNCERTAIN
+
+
+def test_another_stroke_makes_the_equations_uncertain_but_not_the_waveform() -> None:
+    found = estimate(Tap(0.07, stroke_m=2e-3).capture(np.random.default_rng(3)), MODEL)
+    assert found.estimator is Estimator.WAVEFORM
+    assert found.mu_s.quality is Quality.GOOD
+    assert found.by_distance.quality is Quality.UNCERTAIN
+    assert "stroke 2 mm" in found.by_distance.reason
+
+
+def test_a_model_without_predictors_still_gives_the_waveform() -> None:
+    found = estimate(GOOD, replace(MODEL, predictors=()))
+    consistent(found)
+    assert found.estimator is Estimator.WAVEFORM
+    assert "impactcell calibrate" in found.combined.reason
+
+
+def test_a_waveform_that_does_not_fit_leaves_the_equations_and_tells_the_gap() -> None:
+    found = estimate(replace(GOOD, mass_kg=18.2), MODEL)
+    consistent(found)
+    assert found.gap > 1.5
+    assert found.mu_s.quality is Quality.UNCERTAIN
+
+
+def test_a_model_known_to_miss_publishes_the_equations() -> None:
+    found = estimate(GOOD, MODEL, misfit=3.0)
+    assert found.estimator is Estimator.COMBINED
+    assert found.mu_s.quality is Quality.UNCERTAIN
+    assert "misses" in found.mu_s.reason
+
+
+damage = st.sampled_from(["cut", "shift", "scale", "spikes", "nan", "repeat", "reverse", "noise"])
+
+
+@settings(max_examples=60, deadline=None)
+@given(which=st.sampled_from(["force", "position"]), kind=damage, seed=st.integers(0, 10**6))
+def test_no_damage_to_a_capture_raises(which: str, kind: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    channel = force(GOOD) if which == "force" else position(GOOD)
+    values, times = channel.values.copy(), channel.time_s
+    first, last = sorted(rng.integers(0, len(values) + 1, 2).tolist())
+    if kind == "cut":
+        values, times = values[first:last], times[first:last]
+    elif kind == "shift":
+        values[first:last] += rng.normal() * np.abs(values).max()
+    elif kind == "scale":
+        values *= rng.normal() * 10.0
+    elif kind == "spikes":
+        values[rng.integers(0, len(values), 3)] *= 1e3
+    elif kind == "nan":
+        values[first:last] = np.nan
+    elif kind == "repeat":
+        values[first:last] = values[min(first, len(values) - 1)]
+    elif kind == "reverse":
+        values = values[::-1].copy()
+    else:
+        values = rng.normal(size=len(values)) * np.abs(values).max()
+    damaged = replace(channel, values=values, time_s=times)
+    capture = replace(GOOD, force=damaged) if which == "force" else replace(GOOD, position=damaged)
+    consistent(estimate(capture, MODEL))

@@ -1,0 +1,89 @@
+"""Mixtures of cut-off Gaussians against Monte Carlo, and blocks against what they are made of."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from impactcell.prediction.blocks import blocks
+from impactcell.prediction.doubt import doubt
+from impactcell.prediction.posterior import Side, mixture
+from impactcell.records import Channel
+
+FORM, OFFSET = np.array([1.0, -1.0]), 0.3
+ABOVE = Side(np.array([0.2, 0.4]), np.array([[1.0, 0.3], [0.3, 0.5]]), 0.0, float(np.log(0.41)), 1)
+BELOW = Side(np.array([-0.5, 0.1]), np.array([[0.6, -0.2], [-0.2, 0.4]]), 0.2, float(np.log(0.2)), -1)
+
+
+@pytest.mark.parametrize("of", [np.array([0.7, 0.9]), np.array([1.0, 0.0]), np.array([1.0, -1.0])])
+def test_moments_and_intervals_are_those_of_samples(of: np.ndarray) -> None:
+    rng = np.random.default_rng(1)
+    kept, masses = [], []
+    for side in (ABOVE, BELOW):
+        drawn = rng.multivariate_normal(side.mean, side.covariance, 400_000)
+        inside = side.sign * (drawn @ FORM + OFFSET) > 0.0
+        kept.append(drawn[inside] @ of)
+        masses.append(np.exp(-side.cost) * np.sqrt(np.linalg.det(side.covariance)) * inside.mean())
+    weights = np.array(masses) / np.sum(masses)
+    posterior = mixture((ABOVE, BELOW), FORM, OFFSET)
+    assert posterior.weights == pytest.approx(weights, abs=3e-3)
+    samples = np.concatenate(
+        [one[: int(150_000 * weight)] for one, weight in zip(kept, weights, strict=True)]
+    )
+    mean, std = posterior.moments(of)
+    assert mean == pytest.approx(samples.mean(), abs=0.01)
+    assert std == pytest.approx(samples.std(), rel=0.01)
+    assert posterior.interval(of) == pytest.approx(np.quantile(samples, [0.025, 0.975]).tolist(), abs=0.05)
+
+
+def test_a_side_far_beyond_its_end_is_squeezed_against_it() -> None:
+    far = Side(np.array([-30.0, 0.0]), np.eye(2), 0.0, 0.0, 1)
+    mean, std = mixture((far,), FORM, 0.0).moments(FORM)
+    assert 0.0 < mean < 0.1
+    assert 0.0 < std < 0.1
+
+
+def test_one_whole_gaussian_is_itself() -> None:
+    whole = Side(ABOVE.mean, ABOVE.covariance, 0.0, ABOVE.log_volume, 0)
+    of = np.array([1.0, 1.0])
+    mean, std = mixture((whole,), FORM, OFFSET).moments(of)
+    assert (mean, std) == pytest.approx((0.6, np.sqrt(2.1)))
+    assert mixture((whole,), FORM, OFFSET).interval(of) == pytest.approx(
+        (0.6 - 1.96 * std, 0.6 + 1.96 * std), abs=0.01
+    )
+
+
+@given(
+    count=st.integers(1, 400),
+    rate=st.sampled_from([1e4, 1e5, 1e6]),
+    fine=st.lists(st.tuples(st.floats(-0.01, 0.05), st.floats(0.0, 0.003)), max_size=4),
+    edge=st.floats(0.0, 0.05),
+)
+def test_blocks_hold_every_sample_once(
+    count: int, rate: float, fine: list[tuple[float, float]], edge: float
+) -> None:
+    rng = np.random.default_rng(count)
+    times = np.cumsum(rng.uniform(0.2, 1.8, count)) / rate
+    channel = Channel(times, rng.normal(size=count), 1.0)
+    made = blocks(channel, 1e-4, 1e-5, [(a, a + width) for a, width in fine], [edge])
+    sizes = np.round(made.std**-2.0).astype(int)
+    assert sizes.sum() == count
+    assert sizes @ made.values == pytest.approx(channel.values.sum(), abs=1e-9)
+    assert sizes @ made.time_s == pytest.approx(times.sum(), rel=1e-12)
+    bounds = np.concatenate([[0], np.cumsum(sizes)])
+    for first, last in pairwise(bounds):
+        assert times[last - 1] - times[first] <= 1e-4 + 1e-12
+        assert (times[first] >= edge) == (times[last - 1] >= edge)
+
+
+def test_doubt_leaves_noise_alone_and_widens_what_is_missed() -> None:
+    rng = np.random.default_rng(2)
+    phase = np.repeat(np.arange(4), 50)
+    residual = rng.normal(size=200)
+    assert (doubt(residual, phase) == 1.0).all()
+    residual[50:100] += 3.0
+    factor = doubt(residual, phase)
+    assert (factor[50:100] > 15.0).all()
+    assert (np.delete(factor, slice(50, 100)) == 1.0).all()
