@@ -11,7 +11,8 @@ from impactcell.tracking.screening import Place
 from impactcell.tracking.settings import TrackerSettings
 from impactcell.tracking.state import Reading, Shift, TrackerState
 
-FEWEST_DIFFERENCES = 12.0  # a guessed scale of the noise must rest on so many before a shift is believed
+FEWEST_DIFFERENCES = 18.0  # the scale of the noise must rest on so many before a shift is believed
+SETTLED = 1.15  # and must not have moved by such a factor since the first cycles were gone over with it
 
 
 def find_shift(
@@ -57,7 +58,7 @@ def find_shift(
         # an announced change is no finding, and what came before it has been settled by it
         return replace(fresh, accepted_before=where.index - 1, accepted=where.index), None, innovation
     threshold = banks.threshold(settings.false_alarm_cycles)
-    certain = statistic > threshold and state.noise.weight >= FEWEST_DIFFERENCES
+    certain = statistic > threshold and _settled(state)
     if announced < 0.0 or where.lag > 0 or not certain:
         return fresh, None, innovation
     fresh = replace(fresh, accepted_before=state.accepted, accepted=where.index)
@@ -87,6 +88,14 @@ def compare_batch(
     if state.tested:
         reported = state.shift is not None and state.shift.cycle == state.batch_start
         return (replace(state, shift=shift) if reported else state), None
-    if statistic <= threshold or state.noise.weight < FEWEST_DIFFERENCES:
+    if statistic <= threshold or not _settled(state):
         return state, None
     return replace(state, shift=shift, tested=True), shift
+
+
+def _settled(state: TrackerState) -> bool:
+    """Whether the scale of the noise is known well enough to tell a shift from noise."""
+    if state.noise.weight < FEWEST_DIFFERENCES:
+        return False
+    moved = state.noise.factor / state.replayed_factor
+    return state.history is None or 1.0 / SETTLED < moved < SETTLED

@@ -1,21 +1,31 @@
 """How noisy the estimates really are: the factor between their own standard deviation and the data's.
 
 The factor comes from differences of successive estimates, which neither wear nor a batch step moves:
-E (z_n - z_{n-1})^2 = kappa^2 (s_n^2 + s_{n-1}^2). Squares are winsorised against outliers and batch steps.
+E (z_n - z_{n-1})^2 = kappa^2 (s_n^2 + s_{n-1}^2). It is the maximum-likelihood one of a contaminated normal,
+by incremental EM; a winsorised one beside it pulls it up quickly where the declared scale is far too small.
 """
 
 import math
 from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.records import Samples
 
 CLIP = 2.5
 # E min(e^2, c^2) of a standard normal e, c = 2.5: what winsorising takes away
 _DENSITY = math.exp(-0.5 * CLIP**2) / math.sqrt(2.0 * math.pi)
 _INSIDE = math.erf(CLIP / math.sqrt(2.0))
 CONSISTENCY = _INSIDE - 2.0 * CLIP * _DENSITY + CLIP**2 * (1.0 - _INSIDE)
+CONTAMINATED = 0.02  # differences with an outlier in them
+WIDE = 50.5  # their variance over that of a good one: (10^2 + 1) / 2
+UNSCALED = 6.0  # differences before a guessed scale is good enough to know an outlier
+ROUGH_BIAS = 1.25  # by which outliers may raise the winsorised factor
 MEMORY = 5000.0  # cycles after which the factor forgets
-DECLARED_WEIGHT = 100.0  # differences that a declared standard deviation counts for
+DECLARED_WEIGHT = 10.0  # differences that a declared standard deviation counts for
 GUESSED_RELATIVE_STD = 0.01  # where no standard deviation was ever declared: of the value itself
-SMALLEST_FACTOR = 1e-3
+CONTRADICTED = 2.0  # a factor beyond this, or below its inverse, says the declared scale is no guide
+SMALLEST_FACTOR = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +38,8 @@ class Noise:
         kappa squared.
     weight : float
         Number of differences it rests on.
+    rough : float
+        The winsorised one.
     usual_std : float
         Declared standard deviation as it usually is; nan before one was declared.
     last_value, last_std : float
@@ -40,6 +52,7 @@ class Noise:
 
     factor: float = 1.0
     weight: float = DECLARED_WEIGHT
+    rough: float = 1.0
     usual_std: float = math.nan
     last_value: float = math.nan
     last_std: float = math.nan
@@ -55,7 +68,7 @@ def declared_std(noise: Noise, value: float, std: float) -> tuple[Noise, float]:
     if not math.isnan(noise.usual_std):
         return noise, noise.usual_std
     guess = GUESSED_RELATIVE_STD * abs(value)
-    return replace(noise, usual_std=guess, weight=1.0, guessed=True), guess
+    return replace(noise, usual_std=guess, weight=0.0, guessed=True), guess
 
 
 def learn(noise: Noise, value: float, std: float) -> Noise:
@@ -63,18 +76,52 @@ def learn(noise: Noise, value: float, std: float) -> Noise:
     if math.isnan(noise.last_value):
         return replace(noise, last_value=value, last_std=std)
     squared = (value - noise.last_value) ** 2 / (std**2 + noise.last_std**2)
-    clipped = min(squared, CLIP**2 * noise.factor) / CONSISTENCY
     weight = min(noise.weight + 1.0, MEMORY)
-    factor = max(noise.factor + (clipped - noise.factor) / weight, SMALLEST_FACTOR)
-    return replace(noise, factor=factor, weight=weight, last_value=value, last_std=std)
+    if noise.guessed and weight <= UNSCALED:
+        # nothing to judge outliers by yet: the plain mean
+        factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
+        return replace(noise, factor=factor, weight=weight, rough=factor, last_value=value, last_std=std)
+    clipped = min(squared, CLIP**2 * noise.rough) / CONSISTENCY
+    rough = max(noise.rough + (clipped - noise.rough) / weight, SMALLEST_FACTOR)
+    own = squared * _share(squared, noise.factor)
+    factor = max(noise.factor + (own - noise.factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
+    return replace(noise, factor=factor, weight=weight, rough=rough, last_value=value, last_std=std)
 
 
 def variance(noise: Noise, std: float) -> float:
     """Variance of an estimate that declares `std`; wider while a guessed scale rests on few differences."""
-    doubt = 1.0 + 4.0 / noise.weight if noise.guessed else 1.0
+    doubt = 1.0 + 4.0 / max(noise.weight, 1.0) if noise.guessed else 1.0
     return noise.factor * doubt * std**2
 
 
 def count_identical(noise: Noise, value: float) -> Noise:
     """Count how many values in a row have been the same."""
     return replace(noise, identical=noise.identical + 1 if value == noise.last_value else 1)
+
+
+def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:
+    """Fit the factor to all of the first values at once, for following it up from a wrong one takes long."""
+    squared = np.diff(values) ** 2 / (stds[1:] ** 2 + stds[:-1] ** 2)
+    factor = _fit(squared, 0.0 if noise.guessed else DECLARED_WEIGHT)
+    if not 1.0 / CONTRADICTED < factor < CONTRADICTED:
+        # what was declared is plainly wrong, and is no longer to weigh against the data
+        factor = _fit(squared, 0.0)
+    return replace(noise, factor=factor, rough=factor)
+
+
+def _fit(squared: Samples, before: float) -> float:
+    """Fit the factor to squared differences by EM, with `before` differences at a factor of one."""
+    # start from the median, which outliers hardly move: that of a squared standard normal is 0.4549
+    factor = max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
+    for _ in range(30):
+        total = sum(float(s) * _share(float(s), factor) for s in squared)
+        factor = max((before + total) / (before + len(squared)), SMALLEST_FACTOR)
+    return factor
+
+
+def _share(squared: float, factor: float) -> float:
+    """How much of a squared difference counts: by the odds that there is an outlier in it."""
+    odds = CONTAMINATED / (1.0 - CONTAMINATED) / math.sqrt(WIDE)
+    odds *= math.exp(min(0.5 * squared / factor * (1.0 - 1.0 / WIDE), 700.0))
+    good = 1.0 / (1.0 + odds)
+    return good + (1.0 - good) / WIDE

@@ -49,10 +49,10 @@ class TrackerSettings:
     wear_limit: float = math.inf
     batch: BatchKnowledge = BatchKnowledge.KNOWN
     false_alarm_cycles: float = 100_000.0
-    hazard: float = 1e-3
-    step_std: float = 2.0
+    hazard: float = 6e-3
+    step_std: float = 5.0
     slope_std: float = 0.1
-    outlier_probability: float = 0.01
+    outlier_probability: float = 0.003
     outlier_threshold: float = 2.5
     commissioning_cycles: int = 500
     level_noise: float = 0.0

@@ -84,6 +84,7 @@ class TrackerState:
     tested: bool = True
     shift: Shift | None = None
     first: int = 0
+    replayed_factor: float = 1.0
     history: History | None = None
     monitor: Monitor = field(default_factory=Monitor)
     level_variance: float = 0.0

@@ -163,18 +163,25 @@ def _learn(
     n = len(history.rows)
     ended = n >= settings.commissioning_cycles
     state = replace(state, history=None if ended else history)
-    guessed = state.noise.guessed
-    if not (ended or n in commissioning.SCHEDULE or (guessed and n in commissioning.EARLY)):
+    if n in commissioning.EARLY:
+        rows = history.rows
+        settled = noises.settle(state.noise, rows[:, commissioning.VALUE], rows[:, commissioning.STD])
+        state = replace(state, noise=settled)
+        unit = settled.factor * settled.usual_std**2
+    moved = max(state.noise.factor / state.replayed_factor, state.replayed_factor / state.noise.factor)
+    rescaled = moved > commissioning.RESCALED
+    if not (ended or n in commissioning.SCHEDULE or (rescaled and n in commissioning.EARLY)):
         return state, notes
     level_walk, slope_walk = settings.level_noise, settings.slope_noise
     if ended or n in commissioning.SCHEDULE:
         level_walk, slope_walk = commissioning.most_likely(settings, history, state.noise.factor)
     level, slope = level_walk**2 * unit, slope_walk**2 * unit
     unchanged = level == state.level_variance and slope == state.slope_variance
-    if unchanged and not guessed:
+    if unchanged and not rescaled:
         return state, notes
     bank, _ = commissioning.replay(settings, history, state.noise.factor, level_walk, slope_walk)
     filtered = state.filter and commissioning.replay_filter(
         settings, history, state.noise.factor, level_walk, slope_walk
     )
-    return replace(state, bank=bank, filter=filtered, level_variance=level, slope_variance=slope), notes
+    fresh = replace(state, bank=bank, filter=filtered, level_variance=level, slope_variance=slope)
+    return replace(fresh, replayed_factor=state.noise.factor), notes
