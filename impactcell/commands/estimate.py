@@ -18,7 +18,7 @@ from impactcell.prediction import Model, calibrate
 from impactcell.prediction import estimate as estimate_tap
 from impactcell.prediction.freeslide import free_slide_friction
 from impactcell.prediction.plantfit import fit_plant, weigh
-from impactcell.prediction.reading import slide
+from impactcell.prediction.sliding import slide
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
 
 COLUMNS = (
