@@ -8,7 +8,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 
 from impactcell.scada import Server
-from impactcell.service import systemd
+from impactcell.service import logs, systemd
 from impactcell.service.actions import CellActions
 from impactcell.service.design import cell_description, server_settings
 from impactcell.service.monitoring import Monitoring
@@ -126,6 +126,7 @@ def run(cells: Sequence[Cell]) -> None:
     KeyboardInterrupt
         Ended by Ctrl-C, after a clean shutdown.
     """
+    logs.configure()
     interrupted = asyncio.run(_until_signalled(Service(cells)))
     if interrupted:
         raise KeyboardInterrupt

@@ -1,0 +1,15 @@
+"""After `kill -9` the service goes on from the last durable cycle, with the state of an uninterrupted run."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.integration.crashes import crash
+
+
+@pytest.mark.timeout(300)
+async def test_ten_kills(tmp_path: Path) -> None:
+    outcome = await crash(tmp_path, kills=10, seed=20261121)
+    assert outcome.cycles == list(range(outcome.cycles[0], outcome.cycles[-1] + 1))
+    assert outcome.same_state
+    assert len(outcome.cycles) > 10
