@@ -110,6 +110,16 @@ class Journal:
         """Name of the cell this journal belongs to."""
         return self._meta("cell")
 
+    @property
+    def model(self) -> str:
+        """Model that the recording cell runs with, as `impactcell.values` writes it; empty before the first."""
+        return self._meta("model")
+
+    def keep_model(self, model: str) -> None:
+        """Keep the model that the cell runs with from now on."""
+        with self._transaction():
+            self._db.execute("INSERT OR REPLACE INTO meta VALUES ('model', ?)", (model,))
+
     def append(
         self, capture: Capture, snapshot: Snapshot, state: bytes, changed: Sequence[Alarm] = ()
     ) -> None:

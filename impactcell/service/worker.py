@@ -73,6 +73,7 @@ class Worker:
         self._state = restored.state
         self._snapshot = restored.snapshot
         self.belief = restored.belief
+        self._keep_model()
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -134,6 +135,7 @@ class Worker:
 
         def swap() -> None:
             self._design = design
+            self._keep_model()
 
         await self.run(swap)
 
@@ -151,6 +153,11 @@ class Worker:
     async def run(self, work: Callable[[], T]) -> T:
         """Do some work in the cell's thread, after all that was asked for before."""
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+
+    def _keep_model(self) -> None:
+        """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
+        model = values.dumps(self._design.model).decode()
+        self._store(lambda journal: journal.keep_model(model))
 
     def _restore(self) -> Durable:
         blob = None if self._journal is None else self._journal.state()

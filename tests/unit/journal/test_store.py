@@ -94,6 +94,15 @@ def test_foreign_files_are_refused_and_left_alone(tmp_path: Path, content: bytes
     assert path.read_bytes() == before
 
 
+def test_the_model_is_kept_beside_the_captures(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", "c") as journal:
+        assert journal.model == ""
+        journal.keep_model("first")
+        journal.keep_model("second")
+    with Journal(tmp_path / "j", None, read_only=True) as journal:
+        assert journal.model == "second"
+
+
 def test_missing_directory_is_named(tmp_path: Path) -> None:
     with pytest.raises(JournalError, match="nowhere"):
         Journal(tmp_path / "nowhere" / "j", "c")
