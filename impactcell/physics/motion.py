@@ -53,46 +53,47 @@ class Motion:
     Attributes
     ----------
     events : tuple of Event
-        In order of time.
+        In order of time; no more than the first 4096.
     peak_force_n : float
         Maximum of the contact force over all contacts, as the force sensor reports it.
     displacement_m : float
         From first contact to rest, positive along the tap.
     stop_s : float
         When the part came to rest for good; 0 if it never moved.
+    first_breakaway_s, last_separation_s, distance_after_separation_m : float
+        nan where there was none; the properties raise instead.
+    course : callable
+        Samples at ascending or any other times.
     """
 
     events: tuple[Event, ...]
     peak_force_n: float
     displacement_m: float
     stop_s: float
+    first_breakaway_s: float
+    last_separation_s: float
     distance_after_separation_m: float
     course: Course
 
     @property
     def breakaway_s(self) -> float:
         """When the part first moved; raises `NoBreakawayError` if it never did."""
-        for event in self.events:
-            if event.kind is EventKind.BREAKAWAY:
-                return event.time_s
-        raise NoBreakawayError(
-            f"static friction held the part throughout; the force reached {self.peak_force_n:.6g} N. "
-            "Tap faster or with a longer stroke"
-        )
+        if math.isnan(self.first_breakaway_s):
+            raise NoBreakawayError(
+                f"static friction held the part throughout; the force reached {self.peak_force_n:.6g} N. "
+                "Tap faster or with a longer stroke"
+            )
+        return self.first_breakaway_s
 
     @property
     def separation_s(self) -> float:
         """When the part last left the actuator; raises `NoSeparationError` if it never did."""
-        last = math.nan
-        for event in self.events:
-            if event.kind is EventKind.SEPARATION:
-                last = event.time_s
-        if math.isnan(last):
+        if math.isnan(self.last_separation_s):
             raise NoSeparationError(
                 "the part came to rest against the actuator and never left it. "
                 "Tap faster or with a longer stroke"
             )
-        return last
+        return self.last_separation_s
 
     @property
     def sliding_distance_m(self) -> float:

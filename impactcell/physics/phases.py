@@ -9,6 +9,9 @@ from impactcell.physics import layout as at
 from impactcell.physics.events import hold_or_slip, next_kink
 from impactcell.physics.forces import actuator_speed, body_force, contact_force, reading
 
+# Stick this stiff gives way by less than a nanometre, and would ring too fast to follow.
+RIGID_N_PER_M = 1e12
+
 
 @compiled
 def first_law(kind: int, missing: float, row: Numbers, program: Integers) -> float:
@@ -23,7 +26,7 @@ def first_law(kind: int, missing: float, row: Numbers, program: Integers) -> flo
 def prepare(t: float, memo: Numbers, row: Numbers, program: Integers) -> None:
     """Read the laws that are plain numbers, once for the whole tap."""
     stick = first_law(at.STICK, np.inf, row, program)
-    memo[at.STICK_STIFFNESS] = stick if math.isfinite(stick) else 0.0
+    memo[at.STICK_STIFFNESS] = stick if stick < RIGID_N_PER_M else 0.0
     memo[at.ADHESION_REACH] = first_law(at.REACH, 0.0, row, program)
     memo[at.LAG_S] = first_law(at.LAG, 0.0, row, program)
     memo[at.DELAY_S] = first_law(at.DELAY, 0.0, row, program)

@@ -68,7 +68,7 @@ def _move(plant: Plant, tap: Strike, initial_speed_m_s: float) -> Motion:
         raise NoStopError(
             "the part never came to rest: "
             + (
-                "it was caught and pushed again without end. Command a stroke, or halts_at_separation"
+                "the actuator pushed it without end. Command a stroke"
                 if status == at.TOO_MANY_EVENTS or np.isnan(figures[at.HALT_TIME])
                 else f"it was still moving after {LONGEST_S:g} s, or ran away. Less tilt, or more friction"
             )
@@ -80,6 +80,8 @@ def _move(plant: Plant, tap: Strike, initial_speed_m_s: float) -> Motion:
         peak_force_n=float(figures[at.PEAK_FORCE]),
         displacement_m=float(figures[at.DISPLACEMENT]),
         stop_s=0.0 if np.isnan(stop) else float(stop),
+        first_breakaway_s=float(figures[at.BREAKAWAY_TIME]),
+        last_separation_s=float(figures[at.SEPARATION_TIME]),
         distance_after_separation_m=float(figures[at.DISTANCE]),
         course=partial(_sampled, rows, program),
     )

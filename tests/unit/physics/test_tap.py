@@ -168,7 +168,7 @@ def test_the_peak_is_the_maximum_of_the_force() -> None:
 
 
 def test_a_push_without_end_is_refused() -> None:
-    with pytest.raises(NoStopError, match="Command a stroke"):
+    with pytest.raises(NoStopError, match="pushed it without end"):
         strike(NOMINAL, Strike(0.05, 18.9))
 
 
@@ -219,3 +219,11 @@ def test_an_impossible_tap_is_refused(tap: dict[str, float], message: str) -> No
 def test_an_impossible_effect_is_refused(effects: dict[str, dict[str, float]], message: str) -> None:
     with pytest.raises(PhysicsError, match=message):
         strike(Plant(K, B, MU_S, MU_K, effects=effects), Strike(0.05, 18.9, 1e-3))
+
+
+def test_a_long_stick_slip_keeps_its_last_events_in_its_figures() -> None:
+    motion = strike(Plant(1.6e6, 20.0, 0.3, 0.2), Strike(0.001, 0.9, 1.5e-2))
+    assert len(motion.events) == 4096
+    assert motion.stop_s > motion.events[-1].time_s
+    assert motion.displacement_m > 1.49e-2
+    assert motion.breakaway_s == motion.events[0].time_s
