@@ -112,7 +112,7 @@ class Journal:
 
     @property
     def model(self) -> str:
-        """Model that the recording cell runs with, as `impactcell.values` writes it; empty before the first."""
+        """Model the recording cell runs with, as `impactcell.values` writes it; empty before the first."""
         return self._meta("model")
 
     def keep_model(self, model: str) -> None:
