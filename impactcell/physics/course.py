@@ -77,7 +77,7 @@ def follow(
     work: Numbers,
     mode: Integers,
 ) -> None:
-    """Integrate one tap; all arrays are bare pointers, `integrate` says what they hold."""
+    """Integrate one tap; all arrays are bare pointers, `integrate_all` says what they hold."""
     n = at.EXTRA + (program[at.LOSS + 1] - program[at.LOSS]) // 2
     z, new, scratch = offset(work, 0), offset(work, at.WIDTH), offset(work, 2 * at.WIDTH)
     K = offset(work, 3 * at.WIDTH)
@@ -195,6 +195,9 @@ def follow(
                 break
             enter_interval(mode[at.INTERVAL] + 1, drive, drives, mode, memo, row, program)
             fresh = True
+    if t >= horizon and mode[at.SLIP] == 0:
+        # Held for good: the actuator has stalled against it, or nothing drives it any more.
+        figures[at.STATUS] = at.AT_REST
     figures[at.STEP_COUNT] = steps
     after_end(t, z, mode, memo, row, program, cursor, times, out)
     finish(t, z, mode, memo, row, program, figures)
@@ -259,40 +262,4 @@ def integrate_all(
             integers(mode),
         )
     # A last use keeps the workspace alive while bare pointers into it are in use.
-    mode[0] = work.shape[0]
-
-
-@compiled
-def integrate(
-    row: Samples,
-    program: at.Whole,
-    drive: Samples,
-    horizon: float,
-    goal: int,
-    cursor: at.Whole,
-    times: Samples,
-    out: Samples,
-    event_kinds: at.Whole,
-    event_times: Samples,
-    figures: Samples,
-) -> None:
-    """Integrate one tap; as `integrate_all`, which saves a second compilation."""
-    work = np.empty(WORK)
-    mode = np.empty(at.MODES, np.int64)
-    follow(
-        numbers(row),
-        integers(program),
-        numbers(drive),
-        drive.shape[0] // 2,
-        horizon,
-        goal,
-        integers(cursor),
-        numbers(times),
-        numbers(out),
-        integers(event_kinds),
-        numbers(event_times),
-        numbers(figures),
-        numbers(work),
-        integers(mode),
-    )
     mode[0] = work.shape[0]

@@ -227,3 +227,10 @@ def test_a_long_stick_slip_keeps_its_last_events_in_its_figures() -> None:
     assert motion.stop_s > motion.events[-1].time_s
     assert motion.displacement_m > 1.49e-2
     assert motion.breakaway_s == motion.events[0].time_s
+
+
+def test_an_actuator_that_stalls_against_the_part_leaves_it_at_rest() -> None:
+    droop = {"speed_loss_m_per_s_n": 8e-5, "time_constant_s": 2e-3}
+    held = strike(Plant(K, B, 0.19, 0.18, effects={"actuator_droop": droop}), Strike(0.004, 28.5, 1e-3))
+    assert held.displacement_m == 0.0
+    assert held.sample([100.0]).force_n[0] == pytest.approx(0.004 / 8e-5, rel=1e-9)
