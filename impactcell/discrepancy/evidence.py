@@ -1,7 +1,7 @@
 """All that is known against a fitted model: the map, the candidates' scores, and whether they suffice."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from impactcell.discrepancy import locate, name
 from impactcell.discrepancy.campaign import Material
 from impactcell.discrepancy.fit import Fit, Problem
 from impactcell.discrepancy.resample import Tests, test
-from impactcell.discrepancy.tangent import Scores, Tangent, linearise, scores
+from impactcell.discrepancy.tangent import Scores, linearise, scores
 from impactcell.records import Samples
 
 ALPHA = 0.01
@@ -24,37 +24,19 @@ saturates may do so in three.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
-    """Evidence against one fit.
-
-    Attributes
-    ----------
-    fit : Fit
-    map, candidates : Directions, Candidates
-    map_tests, candidate_tests : Tests
-    map_scores, candidate_scores : Scores
-    p_value : float
-        That the model lacks nothing, over map and candidates together.
-    gain : float
-        Largest first-order drop of the squared misfit by any single direction.
-    """
+class Scan:
+    """Scores of all candidates against one fit."""
 
     fit: Fit
-    tangent: Tangent
-    map: locate.Directions
-    map_scores: Scores
-    map_tests: Tests
     candidates: name.Candidates
-    candidate_scores: Scores
-    candidate_tests: Tests
-    p_value: float
-    gain: float
+    scores: Scores
+    tests: Tests
 
     def gains(self) -> dict[str, float]:
         """Largest first-order gain of each candidate."""
         made = {}
         for number, effect in enumerate(self.candidates.names):
-            best = name.best_probes(self.candidates, self.candidate_scores, number, 1)
+            best = name.best_probes(self.candidates, self.scores, number, 1)
             made[effect] = best[0][0] if best else 0.0
         return made
 
@@ -62,28 +44,67 @@ class Evidence:
         """Adjusted p-value of a candidate; 1 where it could not be tested."""
         if effect not in self.candidates.names:
             return 1.0
-        return float(self.candidate_tests.adjusted[self.candidates.names.index(effect)])
+        return float(self.tests.adjusted[self.candidates.names.index(effect)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Evidence against one fit.
+
+    Attributes
+    ----------
+    fit : Fit
+    map, map_scores, map_tests
+        Residuals of every phase against every covariate.
+    scan : Scan
+        Candidates.
+    p_value : float
+        That the model lacks nothing, over map and candidates together.
+    """
+
+    fit: Fit
+    map: locate.Directions
+    map_scores: Scores
+    map_tests: Tests
+    scan: Scan
+    p_value: float
+
+
+def at_problem(problem: Problem, fit: Fit) -> Fit:
+    """Return the same model with the residuals of another selection of the same shots' samples."""
+    return replace(fit, residual=problem.residual(fit.effects, fit.at, fit.local))
+
+
+def scan(coarse: Problem, fit: Fit, library: Sequence[str], seed: tuple[int, ...]) -> Scan:
+    """Score every candidate against a fitted model."""
+    here = at_problem(coarse, fit)
+    tangent = linearise(coarse, here)
+    found = name.candidates(coarse, here, tangent, library)
+    made = scores(tangent, found.products)
+    return Scan(fit, found, made, test(tangent, made, found.group, (*seed, 2), found.side))
 
 
 def examine(
-    problem: Problem, fit: Fit, material: Material, library: Sequence[str], seed: tuple[int, ...]
+    problem: Problem,
+    coarse: Problem,
+    fit: Fit,
+    material: Material,
+    library: Sequence[str],
+    seed: tuple[int, ...],
 ) -> Evidence:
-    """Test a fitted model against the map and against every candidate."""
+    """Test a fitted model against the map, and against every candidate on fewer samples."""
     tangent = linearise(problem, fit)
     chart = locate.directions(problem, fit, tangent, material)
     chart_scores = scores(tangent, chart.products)
     chart_tests = test(tangent, chart_scores, chart.cell, (*seed, 1))
-    found = name.candidates(problem, fit, tangent, library)
-    found_scores = scores(tangent, found.products)
-    found_tests = test(tangent, found_scores, found.group, (*seed, 2), found.side)
-    smallest = min(float(chart_tests.adjusted.min(initial=1.0)), float(found_tests.adjusted.min(initial=1.0)))
+    scanned = scan(coarse, fit, library, seed)
+    smallest = min(
+        float(chart_tests.adjusted.min(initial=1.0)), float(scanned.tests.adjusted.min(initial=1.0))
+    )
     p_value = min(2.0 * smallest, 1.0)
     if _overwhelming(chart_scores) > OVERWHELMING:
         p_value = min(p_value, 1e-4)
-    gain = max(float(chart_scores.gain.max(initial=0.0)), float(found_scores.gain.max(initial=0.0)))
-    return Evidence(
-        fit, tangent, chart, chart_scores, chart_tests, found, found_scores, found_tests, p_value, gain
-    )
+    return Evidence(fit, chart, chart_scores, chart_tests, scanned, p_value)
 
 
 def _overwhelming(made: Scores) -> float:

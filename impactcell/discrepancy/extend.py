@@ -8,24 +8,30 @@ wrong names until it gives up.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from impactcell.discrepancy import name
 from impactcell.discrepancy.campaign import Material
-from impactcell.discrepancy.evidence import ALPHA, Evidence, examine
+from impactcell.discrepancy.evidence import ALPHA, Evidence, Scan, examine, scan
 from impactcell.discrepancy.fit import Fit, Problem, fit
 from impactcell.errors import DiscrepancyError
 from impactcell.records import Samples
 
 REFITS = 10
+STEPS = 20
+RACE = 4
+POLISH = 15
+FINALISTS = 2
+MOST_FINALISTS = 6
 STARTS = 3
 SEEDS_OF_PAIRS = 4
 SECONDS = 6
 TIED = 2.2
 SMALLEST_GAIN = 15.0
+MOST = 0.5
+RIVAL = 0.5
 
 Mapper = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
 
@@ -72,43 +78,73 @@ class Search:
     alternatives: tuple[Alternative, ...] = field(default=())
 
 
-def _refit(task: tuple[Problem, tuple[str, ...], list[Samples], Fit]) -> Fit | None:
-    """Fit a set of effects from several starts of its last effect; None if the plant has no answer."""
-    problem, effects, starts, base = task
-    best: Fit | None = None
+def _refit(task: tuple[Problem, tuple[str, ...], list[Samples], Fit, int]) -> Fit | None:
+    """Fit a set of effects; several starts of its last effect run a few steps, the best of them to the end.
+
+    None if the plant has no answer at any start.
+    """
+    problem, effects, starts, base, steps = task
+    ahead: Fit | None = None
     for start in starts:
-        try:
-            made = fit(problem, effects, np.concatenate([base.at, start]), base.local, spread=base.spread)
-        except DiscrepancyError:
-            continue
-        if (
-            best is None
-            or made.log_likelihood(problem.shots).sum() > best.log_likelihood(problem.shots).sum()
-        ):
-            best = made
-    return best
+        few = steps if len(starts) == 1 else RACE
+        made = _try(problem, effects, np.concatenate([base.at, start]), base, few)
+        if made is not None and (ahead is None or _total(problem, made) > _total(problem, ahead)):
+            ahead = made
+    if ahead is None or len(starts) == 1:
+        return ahead
+    return _try(problem, effects, ahead.at, ahead, steps) or ahead
 
 
-def _examine(problem: Problem, material: Material, library: Sequence[str], seed: int, model: Fit) -> Evidence:
-    return examine(problem, model, material, library, (seed, len(model.effects)))
+def _try(problem: Problem, effects: tuple[str, ...], at: Samples, base: Fit, steps: int) -> Fit | None:
+    try:
+        return fit(problem, effects, at, base.local, spread=base.spread, most_steps=steps)
+    except DiscrepancyError:
+        return None
 
 
-def refits(problem: Problem, evidence: Evidence, most: int, mapper: Mapper) -> list[Fit]:
-    """Fit the most promising candidates beside what the model has already."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Setup:
+    """What a search works on: all samples, fewer of them, and what may be named.
+
+    `certain` says that the noise is stated, so that what is left above it is a gap.
+    """
+
+    problem: Problem
+    coarse: Problem
+    material: Material
+    library: tuple[str, ...]
+    seed: int
+    mapper: Mapper
+    certain: bool
+
+    def look(self, model: Fit) -> Evidence:
+        """All evidence against a model."""
+        key = (self.seed, len(model.effects))
+        return examine(self.problem, self.coarse, model, self.material, self.library, key)
+
+    def polished(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Refit on all samples, the likeliest first."""
+        if self.problem is self.coarse:
+            return _ranked(self.problem, fits)
+        tasks = [(self.problem, one.effects, [np.empty(0)], one, POLISH) for one in fits]
+        return _ranked(self.problem, [made for made in self.mapper(_refit, tasks) if made is not None])
+
+
+def _scan(task: tuple[Problem, Fit, tuple[str, ...], tuple[int, ...]]) -> Scan:
+    return scan(*task)
+
+
+def refits(setup: Setup, scanned: Scan, most: int) -> list[Fit]:
+    """Fit the most promising candidates beside what the model has already, the likeliest first."""
     tasks = []
-    gains = evidence.gains()
+    gains = scanned.gains()
     for effect in sorted(gains, key=lambda one: -gains[one])[:most]:
-        if gains[effect] < SMALLEST_GAIN and evidence.p_of(effect) > ALPHA:
+        if gains[effect] < SMALLEST_GAIN and scanned.p_of(effect) > ALPHA:
             continue
-        number = evidence.candidates.names.index(effect)
-        shapes = len(evidence.candidates.probes[int(np.argmax(evidence.candidates.group == number))].at) > 1
-        best = name.best_probes(
-            evidence.candidates, evidence.candidate_scores, number, STARTS if shapes else 1
-        )
-        if best:
-            starts = [start for _, start in best]
-            tasks.append((problem, (*evidence.fit.effects, effect), starts, evidence.fit))
-    return [made for made in mapper(_refit, tasks) if made is not None]
+        starts = name.starts(scanned.candidates, scanned.scores, effect, STARTS)
+        if starts:
+            tasks.append((setup.coarse, (*scanned.fit.effects, effect), starts, scanned.fit, STEPS))
+    return _ranked(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
 
 
 def behind(problem: Problem, best: Fit, other: Fit) -> tuple[float, float]:
@@ -123,41 +159,81 @@ def is_tied(problem: Problem, best: Fit, other: Fit) -> bool:
     return gap <= TIED * std or gap < 2.0
 
 
-def search(
-    problem: Problem,
-    nominal: Fit,
-    material: Material,
-    library: Sequence[str],
-    seed: int,
-    mapper: Mapper,
-) -> Search:
+def search(setup: Setup, nominal: Fit) -> Search:
     """Look for the smallest set of effects that leaves nothing significant."""
-    look = partial(_examine, problem, material, library, seed)
-    first = look(nominal)
+    first = setup.look(nominal)
     if first.p_value > ALPHA:
         return Search(first, first, nominal, (), {}, {})
-    singles = _ranked(problem, refits(problem, first, REFITS, mapper))
-    if not singles:
+    rough = refits(setup, first.scan, REFITS)
+    if not rough:
         return Search(first, first, None, (), {}, {})
-    against = look(singles[0])
+    singles = setup.polished(_finalists(setup, rough))
+    against = setup.look(singles[0])
     if against.p_value > ALPHA:
-        return _accept_single(problem, first, against, singles)
-    sources: list[Evidence] = [against, *mapper(look, singles[1:SEEDS_OF_PAIRS])]
+        return _accept_single(setup.problem, first, against, singles)
+    tasks = [(setup.coarse, one, setup.library, (setup.seed, 1)) for one in rough[1:SEEDS_OF_PAIRS]]
+    sources = [against.scan, *setup.mapper(_scan, tasks)]
     pairs: dict[frozenset[str], Fit] = {}
-    for evidence in sources:
-        for made in refits(problem, evidence, SECONDS, mapper):
+    for source in sources:
+        for made in refits(setup, source, SECONDS):
             key = frozenset(made.effects)
-            if key not in pairs or _total(problem, made) > _total(problem, pairs[key]):
+            if key not in pairs or _total(setup.coarse, made) > _total(setup.coarse, pairs[key]):
                 pairs[key] = made
-    ranked = _ranked(problem, pairs.values())
-    everything = _alternatives(problem, [*ranked, *singles])
-    if not ranked:
-        return Search(first, against, None, (), {}, {}, everything)
-    best = ranked[0]
-    last = look(best)
+    rough_pairs = _ranked(setup.coarse, pairs.values())
+    if not rough_pairs:
+        return Search(first, against, None, (), {}, {}, _alternatives(setup.problem, singles))
+    ranked = setup.polished(_finalists(setup, rough_pairs))
+    everything = _alternatives(setup.problem, [*ranked, *singles])
+    last = setup.look(ranked[0])
     if last.p_value <= ALPHA:
-        return Search(first, last, None, (), {}, {}, everything)
-    return _accept_pair(problem, first, last, best, ranked, singles, sources, everything)
+        return _plausible(setup, first, against, singles[0], rough, everything) or Search(
+            first, last, None, (), {}, {}, everything
+        )
+    return _accept_pair(setup.problem, first, last, ranked, rough, sources, everything)
+
+
+def _plausible(
+    setup: Setup,
+    first: Evidence,
+    against: Evidence,
+    best: Fit,
+    rough: list[Fit],
+    everything: tuple[Alternative, ...],
+) -> Search | None:
+    """Accept the effect that explains most of a gap, if the floor itself is only a lower bound.
+
+    What is left then may be noise that nobody stated. It is also more than what separates the best effect from
+    its rivals may be owed to: whoever is behind by less than that is tied.
+    """
+    if setup.certain:
+        return None
+    size = setup.problem.shots.values.size
+    before = float(first.fit.misfit(setup.problem.shots).sum()) - size
+    after = float(best.misfit(setup.problem.shots).sum()) - size
+    if after > (1.0 - MOST) * before:
+        return None
+    scale = setup.coarse.shots.values.size / size
+    least = float(best.misfit(setup.problem.shots).sum()) * scale
+    effect = best.effects[-1]
+    tied = tuple(
+        one.effects[-1]
+        for one in rough
+        if one.effects != best.effects
+        and float(one.misfit(setup.coarse.shots).sum()) - least <= RIVAL * after * scale
+    )
+    return Search(
+        first, against, best, (effect,), {effect: tied}, {effect: first.scan.p_of(effect)}, everything
+    )
+
+
+def _finalists(setup: Setup, rough: list[Fit]) -> list[Fit]:
+    """Keep the likeliest, and those that fewer samples do not tell from it."""
+    best = rough[0]
+    return [
+        one
+        for place, one in enumerate(rough)
+        if place < FINALISTS or (place < MOST_FINALISTS and is_tied(setup.coarse, best, one))
+    ]
 
 
 def _total(problem: Problem, made: Fit) -> float:
@@ -180,15 +256,15 @@ def _alternatives(problem: Problem, fits: Sequence[Fit]) -> tuple[Alternative, .
 
 def _accept_single(problem: Problem, first: Evidence, against: Evidence, singles: list[Fit]) -> Search:
     best = singles[0]
-    effect = best.effects[0]
-    tied = tuple(other.effects[0] for other in singles[1:] if is_tied(problem, best, other))
+    effect = best.effects[-1]
+    tied = tuple(other.effects[-1] for other in singles[1:] if is_tied(problem, best, other))
     return Search(
         first,
         against,
         best,
         (effect,),
         {effect: tied},
-        {effect: first.p_of(effect)},
+        {effect: first.scan.p_of(effect)},
         _alternatives(problem, singles),
     )
 
@@ -197,22 +273,22 @@ def _accept_pair(
     problem: Problem,
     first: Evidence,
     last: Evidence,
-    best: Fit,
     ranked: list[Fit],
-    singles: list[Fit],
-    sources: list[Evidence],
+    rough: list[Fit],
+    sources: list[Scan],
     everything: tuple[Alternative, ...],
 ) -> Search:
-    order = {one.effects[0]: place for place, one in enumerate(singles)}
-    added = tuple(sorted(best.effects, key=lambda effect: order.get(effect, len(order))))
-    ties: dict[str, tuple[str, ...]] = {effect: () for effect in added}
+    best = ranked[0]
+    order = {one.effects[-1]: place for place, one in enumerate(rough)}
+    new = [effect for effect in best.effects if effect not in first.fit.effects]
+    added = tuple(sorted(new, key=lambda effect: order.get(effect, len(order))))
+    ties: dict[str, tuple[str, ...]] = dict.fromkeys(added, ())
     for other in ranked[1:]:
-        shared = set(other.effects) & set(added)
-        if len(shared) == 1 and is_tied(problem, best, other):
-            replaced = next(effect for effect in added if effect not in shared)
-            instead = next(effect for effect in other.effects if effect not in shared)
+        if len(set(other.effects) & set(added)) == 1 and is_tied(problem, best, other):
+            replaced = next(effect for effect in added if effect not in other.effects)
+            instead = next(effect for effect in other.effects if effect not in best.effects)
             ties[replaced] = (*ties[replaced], instead)
-    p_values = {added[0]: first.p_of(added[0])}
-    with_first = [source for source in sources if source.fit.effects == added[:1]]
-    p_values[added[1]] = with_first[0].p_of(added[1]) if with_first else first.p_of(added[1])
+    p_values = {added[0]: first.scan.p_of(added[0])}
+    beside = [source for source in sources if source.fit.effects[-1:] == added[:1]]
+    p_values[added[1]] = beside[0].p_of(added[1]) if beside else first.scan.p_of(added[1])
     return Search(first, last, best, added, ties, p_values, everything)

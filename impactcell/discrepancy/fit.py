@@ -22,6 +22,7 @@ STEP = 2e-5
 FIRST_SPREAD = 0.03
 SMALLEST_SPREAD = 2e-4
 GIVES_UP = 1e12
+HOPELESS = 3e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,6 +108,8 @@ class Problem:
                 changed[name] = np.where(self.unknown_mass, changed[name] * factor, changed[name])
             elif name == "log_factor":
                 changed[name] = np.clip(changed[name] + np.clip(steps[:, column], -0.7, 0.7), -3.0, 3.0)
+            elif name == "speed_m_s":
+                changed[name] = changed[name] + steps[:, column] * (changed[name] != 0.0)
             else:
                 changed[name] = changed[name] + steps[:, column]
         return replace(local, **changed)
@@ -135,12 +138,16 @@ class Problem:
                 continue
             steps = np.zeros((self.count, len(self.own)))
             size = STEP if name != "speed_m_s" else STEP * max(float(np.abs(local.speed_m_s).max()), 1e-3)
-            steps[:, column] = size
+            # A part that starts at rest stays there until it breaks away: its speed is no free number.
+            steps[:, column] = size if name != "speed_m_s" else size * (local.speed_m_s != 0.0)
             made[column] = (base - self.residual(effects, at, self.moved(local, steps))) / size
         return made
 
-    def first_local(self) -> Local:
-        """Where a fit starts from if nothing is known."""
+    def first_local(self, share: float = 1.0) -> Local:
+        """Where a fit starts from: initial speeds by a parabola through the first `share` of each record.
+
+        With a share of 0 every part starts at rest.
+        """
         n = self.count
         mass = np.array([shot.mass_kg for shot in self.shots.items])
         known = mass[np.isfinite(mass)]
@@ -150,11 +157,10 @@ class Problem:
         if self.shots.excitation is not Excitation.TAP:
             for i, shot in enumerate(self.shots.items):
                 time, position = shot.times[1], shot.values[1]
-                count = min(len(time), max(6, len(time) // 4)) if shot.drive.size else len(time)
-                bend, slope, level = np.polyfit(time[:count], position[:count], 2)
-                del bend
-                speed[i] = slope * shot.direction
-                shift[i] = level
+                count = min(len(time), max(6, round(share * len(time))))
+                _, slope, level = np.polyfit(time[:count], position[:count], 2)
+                speed[i] = slope * shot.direction if share > 0.0 else 0.0
+                shift[i] = level if share > 0.0 else float(position[:count].mean())
         return Local(np.zeros(n), mass, speed, shift)
 
 
@@ -238,22 +244,43 @@ def fit(
         moved = abs(math.log(fresh / spread))
         spread = fresh
         point = replace(point, cost=_cost(point.residual, point.local, spread))
-        calm = calm + 1 if gain < tolerance and moved < 0.01 else 0
-        if calm >= 1:
+        # A model that is far from the floor need not be found to the last digit.
+        excess = max(point.cost - point.residual.size, 0.0)
+        calm = calm + 1 if gain < max(tolerance, HOPELESS * excess) and moved < 0.01 else 0
+        if calm > (gain >= tolerance):
             break
     return Fit(effects, coordinates, point.at, point.local, spread, point.residual)
 
 
 def refit_own(problem: Problem, model: Fit) -> Fit:
     """Keep the shared parameters of `model` and fit only what every shot of `problem` has of its own."""
-    local = problem.first_local()
-    point = _point(problem, model.effects, model.at, local, 1.0)
-    point = _settle(problem, model.effects, point, 1e3, steps=8)
+    point = _begin(problem, model.effects, model.at, 1e3)
     return replace(model, local=point.local, residual=point.residual)
 
 
+def begin(problem: Problem, effects: tuple[str, ...], at: Samples) -> Local:
+    """Fit what every shot has of its own from several starts; the best of them shot by shot."""
+    return _begin(problem, effects, at, FIRST_SPREAD).local
+
+
+def _begin(problem: Problem, effects: tuple[str, ...], at: Samples, spread: float) -> _Point:
+    shares = {
+        Excitation.TAP: (1.0,),
+        Excitation.FREE_SLIDE: (1.0, 0.3),
+        Excitation.DRIVEN: (0.02, 0.05, 0.15, 0.0),
+    }
+    best: _Point | None = None
+    for share in shares[problem.shots.excitation]:
+        point = _point(problem, effects, at, problem.first_local(share), spread)
+        point = _settle(problem, effects, point, spread, steps=8)
+        best = point if best is None else _better_of(problem, best, point, spread)
+    if best is None:
+        raise AssertionError(problem.shots.excitation)
+    return best
+
+
 def _cost(residual: Samples, local: Local, spread: float) -> float:
-    cost = float(residual @ residual) + float(np.sum((local.log_factor / spread) ** 2))
+    cost = float(np.einsum("i,i->", residual, residual)) + float(np.sum((local.log_factor / spread) ** 2))
     return cost if math.isfinite(cost) else math.inf
 
 

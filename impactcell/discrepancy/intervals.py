@@ -51,7 +51,11 @@ def estimates(fit: Fit, tangent: Tangent) -> tuple[Estimate, ...]:
     quantile = float(student.ppf(0.5 + 0.5 * LEVEL, max(shots - len(fit.at), 2)))
     made = []
     for coordinate, at, std in zip(fit.coordinates, fit.at, spread, strict=True):
-        ends = sorted(_bounded(coordinate, float(at + sign * quantile * std)) for sign in (-1.0, 1.0))
+        half = float(quantile * std)
+        ends = sorted(_bounded(coordinate, float(at) + sign * half) for sign in (-1.0, 1.0))
+        if coordinate.form == "angle":
+            middle = coordinate.value(float(at))
+            ends = [middle - coordinate.scale * half, middle + coordinate.scale * half]
         made.append(
             Estimate(
                 coordinate.effect,

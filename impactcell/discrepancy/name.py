@@ -1,5 +1,6 @@
 """Which known effect it is: a score for every effect of the library at every point of its grid."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,11 +8,16 @@ import numpy as np
 
 from impactcell.discrepancy.fit import Fit, Problem
 from impactcell.discrepancy.phases import course_of
-from impactcell.discrepancy.probes import Probe, Range, probes
+from impactcell.discrepancy.probes import SMALL, Probe, Range, probes
 from impactcell.discrepancy.shots import Index
 from impactcell.discrepancy.tangent import Products, Scores, Tangent, products, together
 from impactcell.errors import PhysicsError
+from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
+
+LARGEST = 5.0
+WEAK = 0.3
+"""Strengths in units of an effect's typical one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,10 +96,13 @@ def best_probes(found: Candidates, scored: Scores, candidate: int, most: int) ->
     gain, amplitude = scored.gain[columns], scored.amplitude[columns]
     allowed = (found.side[columns] == 0.0) | (amplitude * found.side[columns] > 0.0)
     gain = np.where(allowed, gain, 0.0)
-    order = np.argsort(-gain, kind="stable")
+    phase = phase_of(found.names[candidate])
+    if phase is not None:
+        scale = LIBRARY[found.names[candidate]].parameters[phase].typical
+        return _best_waves(found, columns, gain, amplitude, (phase, scale), most)
     made: list[tuple[float, Samples]] = []
     taken: list[Samples] = []
-    for place in order:
+    for place in np.argsort(-gain, kind="stable"):
         if gain[place] <= 0.0 or len(made) == most:
             break
         probe = found.probes[int(columns[place])]
@@ -101,6 +110,47 @@ def best_probes(found: Candidates, scored: Scores, candidate: int, most: int) ->
             continue
         taken.append(probe.at)
         made.append((float(gain[place]), started(probe, float(amplitude[place]))))
+    return made
+
+
+def phase_of(identifier: str) -> int | None:
+    """Place of an effect's phase angle among its parameters, if it has one."""
+    for place, parameter in enumerate(LIBRARY[identifier].parameters):
+        if parameter.name.endswith("phase_rad"):
+            return place
+    return None
+
+
+def _best_waves(
+    found: Candidates,
+    columns: Index,
+    gain: Samples,
+    amplitude: Samples,
+    angle: tuple[int, float],
+    most: int,
+) -> list[tuple[float, Samples]]:
+    """Sine and cosine of the same wave make one start with an amplitude and a phase."""
+    phase, scale = angle
+    waves: dict[tuple[float, ...], list[int]] = {}
+    for place, column in enumerate(columns):
+        key = tuple(np.delete(found.probes[int(column)].at, phase))
+        waves.setdefault(key, []).append(place)
+    ranked = sorted(waves.values(), key=lambda pair: -float(gain[pair].sum()))
+    made: list[tuple[float, Samples]] = []
+    taken: list[Samples] = []
+    for pair in ranked:
+        probe = found.probes[int(columns[pair[0]])]
+        if len(made) == most or not gain[pair].sum() > 0.0:
+            break
+        if any(_near(probe, other) for other in taken):
+            continue
+        taken.append(probe.at)
+        angles = [float(found.probes[int(columns[i])].at[phase]) * scale for i in pair]
+        sine = sum(float(amplitude[i]) * math.cos(a) for i, a in zip(pair, angles, strict=True))
+        cosine = sum(float(amplitude[i]) * math.sin(a) for i, a in zip(pair, angles, strict=True))
+        at = started(probe, math.hypot(sine, cosine))
+        at[phase] = math.atan2(cosine, sine) / scale
+        made.append((float(gain[pair].sum()), at))
     return made
 
 
@@ -112,11 +162,30 @@ def _near(probe: Probe, other: Samples) -> bool:
 
 def started(probe: Probe, amplitude: float) -> Samples:
     """Coordinates at which a fit starts, the strength scaled by the score's own estimate."""
-    from impactcell.discrepancy.probes import SMALL
-
     at = probe.at.copy()
-    if len(at) == 1 and probe.side == 0 and at[0] > SMALL * 1.5:
+    if not probe.scaled:
         return at
     base = at[probe.amplitude] - SMALL
-    at[probe.amplitude] = base + float(np.clip(SMALL * amplitude, -5.0, 5.0))
+    at[probe.amplitude] = base + float(np.clip(SMALL * amplitude, -LARGEST, LARGEST))
     return at
+
+
+def starts(found: Candidates, scored: Scores, effect: str, most: int) -> list[Samples]:
+    """Where fits of an effect start: its best probes, as strong as the score says and much weaker.
+
+    A score is a slope; where the gap is wide the effect it promises may lie far beyond what the plant can do.
+    """
+    number = found.names.index(effect)
+    best = [start for _, start in best_probes(found, scored, number, most)]
+    probe = found.probes[int(np.argmax(found.group == number))]
+    made: list[Samples] = []
+    for start in best:
+        made.append(start)
+        if probe.scaled:
+            base = probe.at[probe.amplitude] - SMALL
+            away = start[probe.amplitude] - base
+            if abs(away) > WEAK:
+                weaker = start.copy()
+                weaker[probe.amplitude] = base + math.copysign(WEAK, away)
+                made.append(weaker)
+    return made

@@ -17,6 +17,8 @@ from impactcell.records import Samples
 NOMINAL = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
 SMALLEST_RATIO, LARGEST_RATIO = 1.0, 5.0
 DAMPING_SCALE = 100.0
+SHORTEST = 0.02
+"""Time constants shorter than this share of the typical one act at once and only make the plant stiff."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class Coordinate:
     batch : int
         0, or the batch whose parameter it is.
     form : str
-        `log`, `linear` (value over scale) or `reciprocal` (scale over value).
+        `log`, `linear` (value over scale), `angle` (the same, modulo a turn) or `reciprocal` (scale over value).
     lower, upper : float
         Range of the coordinate itself.
     start : float
@@ -54,6 +56,8 @@ class Coordinate:
             return self.scale * math.exp(coordinate)
         if self.form == "reciprocal":
             return self.scale / coordinate if coordinate > 0.0 else math.inf
+        if self.form == "angle":
+            return math.remainder(self.scale * coordinate, 2.0 * math.pi)
         return self.scale * coordinate
 
     def coordinate(self, value: float) -> float:
@@ -114,11 +118,14 @@ def _coordinate(identifier: str, parameter: Parameter, batch: int) -> Coordinate
             batch,
             "log",
             1.0,
-            math.log(parameter.lower),
+            math.log(max(parameter.lower, SHORTEST * typical) if parameter.unit == "s" else parameter.lower),
             math.log(parameter.upper),
             math.log(typical),
         )
     start = typical if math.isnan(parameter.null) else parameter.null
+    if parameter.name.endswith("phase_rad"):
+        # An angle has no ends; a fit may go round.
+        return Coordinate(identifier, parameter.name, batch, "angle", typical, -1e3, 1e3, start / typical)
     return Coordinate(
         identifier,
         parameter.name,

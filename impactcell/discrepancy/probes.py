@@ -45,11 +45,24 @@ class Range:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Probe:
-    """One point of the grid: coordinates of the effect, and which sign its amplitude may have there."""
+    """One point of the grid.
+
+    Attributes
+    ----------
+    at : ndarray
+        Coordinates of the effect.
+    amplitude : int
+        Which of them is the strength.
+    side : int
+        +1 where only a positive strength makes sense, else 0.
+    scaled : bool
+        The strength is small here, so that a score tells how large it should be.
+    """
 
     at: Samples
     amplitude: int
     side: int
+    scaled: bool
 
 
 def probes(identifier: str, batches: int, gone: Range) -> tuple[Probe, ...]:
@@ -62,16 +75,19 @@ def probes(identifier: str, batches: int, gone: Range) -> tuple[Probe, ...]:
         one = coordinates[strength]
         if one.form == "reciprocal":
             made += [
-                Probe(np.array([value]), 0, 0) for value in RECIPROCALS if one.lower < value <= one.upper
+                Probe(np.array([value]), 0, 0, scaled=False)
+                for value in RECIPROCALS
+                if one.lower < value <= one.upper
             ]
             continue
-        side = 1 if one.lower >= one.start else 0
+        turns = any(coordinates[i].parameter.endswith("phase_rad") for i in shapes)
+        side = 1 if one.lower >= one.start and not turns else 0
         for point in itertools.product(*(_grid(coordinates[i], gone) for i in shapes)):
             at = np.array([c.start for c in coordinates])
             at[strength] = one.start + SMALL
             for i, value in zip(shapes, point, strict=True):
                 at[i] = min(max(value, coordinates[i].lower), coordinates[i].upper)
-            made.append(Probe(at, strength, side))
+            made.append(Probe(at, strength, side, scaled=True))
     return tuple(made)
 
 
@@ -90,7 +106,8 @@ def _grid(one: Coordinate, gone: Range) -> tuple[float, ...]:
         count = np.arange(0.5, CYCLES, CYCLE_STEP)
         return tuple(one.coordinate(gone.span_m / value) for value in count)
     if one.parameter.endswith("_rad"):
-        return tuple(one.coordinate(value) for value in (-math.pi / 2, 0.0, math.pi / 2, math.pi * 0.999))
+        # Sine and cosine; a negative amplitude is a phase turned by half.
+        return (one.coordinate(0.0), one.coordinate(math.pi / 2))
     if one.form == "linear" and one.parameter.endswith("_m"):
         inside = np.linspace(gone.low_m, gone.high_m, 26)[1:-1]
         return tuple(one.coordinate(float(value)) for value in inside)

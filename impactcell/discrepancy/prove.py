@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.fit import Fit, Problem, refit_own
-from impactcell.discrepancy.noise import Replicates
+from impactcell.discrepancy.noise import Floor, Replicates
 from impactcell.discrepancy.phases import PHASES, course_of, phases
 from impactcell.discrepancy.shots import CHANNELS
 from impactcell.records import Samples
@@ -60,18 +60,28 @@ class Proof:
     regions: tuple[tuple[str, str, float, float], ...]
 
 
-def gap(problem: Problem, model: Fit, replicates: Replicates) -> Gap:
-    """Gap of a model whose own numbers of each shot have been fitted."""
-    return _gap(
-        model.misfit(problem.shots),
-        problem.sizes - len(problem.own),
-        model.local.log_factor,
-        replicates.spread,
-    )
+def gap(problem: Problem, model: Fit, floor: Floor, replicates: Replicates) -> Gap:
+    """Gap of a model whose own numbers of each shot have been fitted.
+
+    Only channels whose noise is stated are counted, if there are any: elsewhere the floor is a lower bound.
+    """
+    misfit, free = _counted(problem, model, floor)
+    return _gap(misfit, free, model.local.log_factor, replicates.spread)
+
+
+def _counted(problem: Problem, model: Fit, floor: Floor) -> tuple[Samples, Samples]:
+    """Squared residual and degrees of freedom of every shot, over the channels that count."""
+    stated = np.array([source == "stated" for source in floor.source])
+    counts = stated if stated.any() else ~stated
+    mine = counts[problem.shots.channel]
+    first = problem.shots.bounds[:-1]
+    misfit = np.add.reduceat(np.where(mine, model.residual**2, 0.0), first)
+    free = np.add.reduceat(mine.astype(np.float64), first) - len(problem.own)
+    return misfit, np.maximum(free, 0.0)
 
 
 def _gap(misfit: Samples, free: Samples, log_factor: Samples, spread: float) -> Gap:
-    trace = math.sqrt(float(misfit.sum() / np.maximum(free, 1).sum()))
+    trace = math.sqrt(float(misfit.sum() / max(float(free.sum()), 1.0)))
     factor = math.sqrt(float(np.mean(log_factor**2))) / spread if spread > 0.0 else math.nan
     return Gap(trace, factor)
 
@@ -81,23 +91,23 @@ def prove(
     before: Fit,
     after: Fit,
     held_out: Problem,
+    floor: Floor,
     replicates: Replicates,
     seed: int,
 ) -> tuple[Proof, Fit, Fit]:
     """Open the held-out shots; returns the proof and both models fitted to their factors."""
     old, new = refit_own(held_out, before), refit_own(held_out, after)
-    free = held_out.sizes - len(held_out.own)
-    gap_before, gap_after = gap(held_out, old, replicates), gap(held_out, new, replicates)
+    gap_before, gap_after = (gap(held_out, one, floor, replicates) for one in (old, new))
     closed = low = high = math.nan
     if gap_before.whole > OPEN:
         closed = _closed(gap_before, gap_after)
         rng = np.random.default_rng([seed, 7])
-        misfits = (old.misfit(held_out.shots), new.misfit(held_out.shots))
+        (misfit_before, free), (misfit_after, _) = (_counted(held_out, one, floor) for one in (old, new))
         draws = []
         for _ in range(RESAMPLES):
             pick = rng.integers(0, held_out.count, held_out.count)
-            a = _gap(misfits[0][pick], free[pick], old.local.log_factor[pick], replicates.spread)
-            b = _gap(misfits[1][pick], free[pick], new.local.log_factor[pick], replicates.spread)
+            a = _gap(misfit_before[pick], free[pick], old.local.log_factor[pick], replicates.spread)
+            b = _gap(misfit_after[pick], free[pick], new.local.log_factor[pick], replicates.spread)
             if a.whole > OPEN:
                 draws.append(_closed(a, b))
         if draws:
@@ -105,8 +115,8 @@ def prove(
             low, high = min(low, closed), max(high, closed)
     return (
         Proof(
-            gap(training, before, replicates),
-            gap(training, after, replicates),
+            gap(training, before, floor, replicates),
+            gap(training, after, floor, replicates),
             gap_before,
             gap_after,
             closed,

@@ -116,15 +116,15 @@ def content(findings: Findings, source: str) -> dict[str, Any]:
 def _candidates(findings: Findings) -> list[dict[str, Any]]:
     """Evidence for every candidate against the nominal model."""
     evidence = findings.search.nominal
-    gains = evidence.gains()
+    gains = evidence.scan.gains()
     rows = []
-    for number, effect in enumerate(evidence.candidates.names):
+    for number, effect in enumerate(evidence.scan.candidates.names):
         rows.append(
             {
                 "name": words(effect),
-                "statistic": float(evidence.candidate_tests.statistic[number]),
-                "single": float(evidence.candidate_tests.single[number]),
-                "adjusted": float(evidence.candidate_tests.adjusted[number]),
+                "statistic": float(evidence.scan.tests.statistic[number]),
+                "single": float(evidence.scan.tests.single[number]),
+                "adjusted": float(evidence.scan.tests.adjusted[number]),
                 "gain": gains[effect],
                 "added": effect in findings.added,
             }
@@ -132,7 +132,7 @@ def _candidates(findings: Findings) -> list[dict[str, Any]]:
     unseen = [
         effect
         for effect in LIBRARY
-        if effect not in evidence.candidates.names and effect not in evidence.fit.effects
+        if effect not in evidence.scan.candidates.names and effect not in evidence.fit.effects
     ]
     rows.sort(key=lambda row: (row["adjusted"], -row["gain"]))
     rows += [{"name": words(effect), "unseen": True} for effect in unseen]

@@ -9,12 +9,13 @@ bootstrap; Kline and Santos (2012) for its score form; Westfall and Young (1993)
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f as fisher
 
 from impactcell.discrepancy.shots import Index
 from impactcell.discrepancy.tangent import Scores, Tangent
 from impactcell.records import Samples
 
-DRAWS = 9999
+DRAWS = 1999
 AT_A_TIME = 64
 
 
@@ -76,20 +77,24 @@ def test(
         T = np.where((side != 0.0) & (U * side < 0.0), 0.0, T)
         for column, group in enumerate(groups[part]):
             found[:, group] = np.maximum(found[:, group], T[:, column])
-    return _min_p(found)
+    return _min_p(found, np.bincount(groups, minlength=count), n)
 
 
-def _min_p(found: Samples) -> Tests:
-    """p-values from statistics of shape (draws + 1, groups), the observed ones first."""
+def _min_p(found: Samples, size: Index, shots: int) -> Tests:
+    """p-values from statistics of shape (draws + 1, groups), the observed ones first.
+
+    Groups are made comparable by what a statistic would mean for as many independent directions as the group
+    has and normal scores: that is only a scale, on which the draws say how small the smallest may be. Unlike
+    ranks within each group it does not run out of digits.
+    """
     total = len(found)
     if not found.shape[1]:
         return Tests(np.empty(0), np.empty(0), np.empty(0))
-    # Share of all draws, the observed one among them, that are at least as large.
     ordered = np.sort(found, axis=0)
-    p = np.empty_like(found)
-    for column in range(found.shape[1]):
-        below = np.searchsorted(ordered[:, column], found[:, column], side="left")
-        p[:, column] = (total - below) / total
-    smallest = np.sort(p.min(axis=1))
-    adjusted = np.searchsorted(smallest, p[0], side="right") / total
-    return Tests(found[0], p[0], adjusted)
+    below = [np.searchsorted(ordered[:, g], found[0, g], side="left") for g in range(found.shape[1])]
+    single = (total - np.array(below)) / total
+    ratio = found * (shots - 1) / np.maximum(shots - found, 1e-9)
+    scale = fisher.logsf(ratio, 1, shots - 1) + np.log(np.maximum(size, 1))
+    smallest = np.sort(scale.min(axis=1))
+    adjusted = np.searchsorted(smallest, scale[0] + 1e-9, side="right") / total
+    return Tests(found[0], single, np.maximum(adjusted, single))

@@ -1,6 +1,6 @@
 """Shots as the workflow works on them: covariates, samples of all channels in one row, replicate groups."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,3 +123,24 @@ def lay_out(
     weights = 1.0 / np.asarray(noise_std)[channel]
     bounds = np.concatenate([[0], np.cumsum([shot.size for shot in items])]).astype(np.int64)
     return Shots(excitation, gravity_m_s2, stroke_m, items, noise_std, values, weights, channel, bounds)
+
+
+def thinned(shots: Shots, most: int) -> Shots:
+    """Keep every k-th sample, so that no channel of a shot has more than about `most`.
+
+    Fits and scores cost what they read; a search among many models can do with fewer samples than the
+    comparison of the last few.
+    """
+    longest = max(len(channel) for shot in shots.items for channel in shot.values)
+    step = max(longest // most, 1)
+    if step == 1:
+        return shots
+    items = tuple(
+        replace(
+            shot,
+            times=(shot.times[0][::step], shot.times[1][::step], shot.times[2][::step]),
+            values=(shot.values[0][::step], shot.values[1][::step], shot.values[2][::step]),
+        )
+        for shot in shots.items
+    )
+    return lay_out(shots.excitation, shots.gravity_m_s2, shots.stroke_m, items, shots.noise_std)

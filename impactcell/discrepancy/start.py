@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.fit import Fit, Problem, fit
+from impactcell.discrepancy.fit import Fit, Problem, begin, fit
 from impactcell.discrepancy.shots import FORCE, POSITION, Shot
 from impactcell.errors import DiscrepancyError
 from impactcell.physics import Plant
@@ -50,7 +50,7 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
     failures: list[str] = []
     for start in starts:
         try:
-            made = fit(problem, effects, start, problem.first_local())
+            made = fit(problem, effects, start, begin(problem, effects, start))
         except DiscrepancyError as error:
             failures.append(str(error))
             continue

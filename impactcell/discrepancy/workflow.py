@@ -9,11 +9,11 @@ from impactcell.campaign import Campaign
 from impactcell.discrepancy import noise
 from impactcell.discrepancy.campaign import Material, laid_out, prepare, split
 from impactcell.discrepancy.experiment import Proposal, propose
-from impactcell.discrepancy.extend import Mapper, Search, search
+from impactcell.discrepancy.extend import Mapper, Search, Setup, search
 from impactcell.discrepancy.fit import Fit, Problem
 from impactcell.discrepancy.intervals import Estimate, estimates
 from impactcell.discrepancy.prove import Proof, prove
-from impactcell.discrepancy.shots import Index
+from impactcell.discrepancy.shots import Index, thinned
 from impactcell.discrepancy.start import fit_nominal
 from impactcell.discrepancy.tangent import linearise
 from impactcell.discrepancy.unknown import Unexplained, describe
@@ -21,6 +21,8 @@ from impactcell.physics import Plant
 from impactcell.physics.effects import LIBRARY
 
 NO_GAP, NAMED, TIED, UNKNOWN = "no_gap", "named", "tied", "unknown"
+COARSE = 400
+"""Samples of a channel and shot that a search among many models reads."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,12 +111,13 @@ def investigate(
     say("fitting the nominal model")
     nominal = fit_nominal(problem, plant)
     say("locating the gap and naming effects")
-    found = search(problem, nominal, material, names, seed, each)
+    coarse = Problem(thinned(problem.shots, COARSE), len(material.batches))
+    found = search(Setup(problem, coarse, material, names, seed, each, "stated" in floor.source), nominal)
     final = found.accepted or nominal
     say("proving on held-out shots")
     held_problem = Problem(laid_out(material, held_out, floor.noise_std), len(material.batches))
     proof, replicates, held_nominal, held_final = _prove(
-        material, problem, held_problem, nominal, final, (training, held_out), seed
+        material, floor, (problem, held_problem), nominal, final, (training, held_out), seed
     )
     tangent = linearise(problem, final)
     verdict = _verdict(found)
@@ -151,13 +154,14 @@ def _verdict(found: Search) -> str:
 
 def _prove(
     material: Material,
-    problem: Problem,
-    held_problem: Problem,
+    floor: noise.Floor,
+    problems: tuple[Problem, Problem],
     nominal: Fit,
     final: Fit,
     places: tuple[Index, Index],
     seed: int,
 ) -> tuple[Proof, noise.Replicates, Fit, Fit]:
+    problem, held_problem = problems
     from impactcell.discrepancy.fit import refit_own
 
     held = refit_own(held_problem, final)
@@ -165,7 +169,7 @@ def _prove(
     log_factor[places[0]] = final.local.log_factor
     log_factor[places[1]] = held.local.log_factor
     replicates = noise.replicate_spread(material.shots, log_factor, len(material.batches))
-    proof, old, new = prove(problem, nominal, final, held_problem, replicates, seed)
+    proof, old, new = prove(problem, nominal, final, held_problem, floor, replicates, seed)
     return proof, replicates, old, new
 
 
