@@ -67,6 +67,15 @@ class _Cache(FunctionCache):
         return (*super()._index_key(signature, codegen), self._digest)  # type: ignore[no-untyped-call]
 
 
+def _can_cache(function: Callable[..., Any]) -> bool:
+    """Whether there is a place to keep machine code; a read-only installation without a home has none."""
+    try:
+        FunctionCache(function)  # type: ignore[no-untyped-call]
+    except RuntimeError:
+        return False
+    return True
+
+
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` to machine code on its first call, cached on disk between processes.
 
@@ -74,7 +83,8 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     replay gives the same bits. What it calls of other compiled functions should lie in its own directory.
     """
     dispatcher: Any = njit(error_model="numpy", nogil=True)(function)
-    dispatcher._cache = _Cache(function)  # noqa: SLF001  # what njit(cache=True) does, with the plain cache
+    if _can_cache(function):
+        dispatcher._cache = _Cache(function)  # noqa: SLF001  # what njit(cache=True) does, with the plain cache
     return cast("Callable[P, R]", dispatcher)
 
 
@@ -87,7 +97,7 @@ def address(law: Law) -> int:
     if law not in _POINTERS:
         double = types.float64
         signature = double(double, double, double, double, pointer_to(double))
-        _POINTERS[law] = cfunc(signature, cache=True)(law)
+        _POINTERS[law] = cfunc(signature, cache=_can_cache(law))(law)
     return int(_POINTERS[law].address)
 
 

@@ -32,3 +32,20 @@ def test_an_edited_callee_is_compiled_anew(tmp_path: Path) -> None:
     assert run(tmp_path) == ["2.0", "1"]
     (tmp_path / "callee.py").write_text(CALLEE.format(3.0))
     assert run(tmp_path) == ["3.0", "0"]
+
+
+def test_without_a_place_for_a_cache_it_still_runs(tmp_path: Path) -> None:
+    source = (
+        "from impactcell.compiled import _can_cache, compiled\n\n"
+        "@compiled\ndef twice(x):\n    return 2.0 * x\n\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", source + "print(twice(1.0), _can_cache(twice.py_func))"],
+        cwd=tmp_path,
+        env=dict(os.environ),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    # A function typed in on the command line has no file beside which anything could be kept.
+    assert done.stdout.split() == ["2.0", "False"]
