@@ -16,6 +16,10 @@ Indices = NDArray[np.intp]
 DOUBTED = 1.15
 """Misfit of blocks from which on the model is not believed in every phase alike."""
 FORCE_PHASES, CONTACT_PHASES, SLIDE_PHASES = 16, 8, 8
+LATER = np.full(FORCE_PHASES + CONTACT_PHASES + SLIDE_PHASES, 30.0)
+LATER[: FORCE_PHASES // 4] = LATER[FORCE_PHASES : FORCE_PHASES + CONTACT_PHASES // 4] = 1.0
+"""Factor of the standard deviations of each phase once the model is doubted: mu_s is then left to the first
+quarter of the contact, where all is slow and laws that depend on speed say little."""
 
 
 def phases(response: Response, separation_s: float, stop_s: float) -> Indices:

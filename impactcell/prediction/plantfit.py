@@ -12,15 +12,7 @@ import numpy as np
 
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
 from impactcell.physics import Plant
-from impactcell.prediction.doubt import (
-    CONTACT_PHASES,
-    DOUBTED,
-    FORCE_PHASES,
-    SLIDE_PHASES,
-    Indices,
-    doubt,
-    phases,
-)
+from impactcell.prediction.doubt import DOUBTED, LATER, Indices, doubt, phases
 from impactcell.prediction.model import Model, Prior
 from impactcell.prediction.reading import checked, displacement, peak_force
 from impactcell.prediction.response import DAMPING, MU_K, RATIO, STIFFNESS, Response, parameters, respond
@@ -40,9 +32,6 @@ NO_GAIN = 0.05
 """Change of half a sum of squares over all taps that means nothing."""
 LEAST_RATIO_STD = 1e-3
 ROUNDS = 4
-LATER = np.full(FORCE_PHASES + CONTACT_PHASES + SLIDE_PHASES, 30.0)
-LATER[: FORCE_PHASES // 4] = LATER[FORCE_PHASES : FORCE_PHASES + CONTACT_PHASES // 4] = 1.0
-"""Factor of the standard deviations after the first quarter of the contact, where the model misses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.physics import Ensemble, Plant, Strike, strike
+from impactcell.physics import Ensemble, EventKind, Plant, Strike, strike
 from impactcell.prediction.blocks import (
     FINE_FORCE_BLOCK_S,
     FINE_POSITION_BLOCK_S,
@@ -165,5 +165,15 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
     force = NOTHING
     if capture.force is not None:
         force = blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
+        jumps = [event.time_s for event in motion.events if event.kind is EventKind.CONTACT]
+        force = replace(force, std=force.std * _straddling(force.time_s, jumps))
     position = blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return Response(plant, tap, force, position)
+
+
+def _straddling(times: Samples, jumps: list[float]) -> Samples:
+    """Factor that takes blocks about a jump out of the fit: their means depend on where in them it lies."""
+    factor = np.ones_like(times)
+    for jump in jumps:
+        factor[np.abs(times - jump) < 2.0 * FINE_FORCE_BLOCK_S] = 1e3
+    return factor

@@ -84,10 +84,12 @@ def _rest(
         last_speed, braking = float(np.polyval(speed, 1.0)), -float(np.polyval(np.polyder(speed), 1.0))
         stop = 1.0 + (last_speed / braking if braking > 0.0 else math.inf if last_speed > 0.0 else 0.0)
     stop_s = origin + span * max(stop, 1.0)
-    if stop_s > times[-1]:
+    quiet = (last + len(times)) // 2  # what lies after it is at rest, if anything is
+    if stop_s > times[-1] and not _still(times[quiet:], moved[quiet:], sigma):
         left = 1e3 * float(np.polyval(speed, 1.0)) / span
         raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
-    after = moved[times > stop_s]
+    stop_s = min(stop_s, float(times[-1]))
+    after = moved[times > stop_s] if stop_s < times[-1] else moved[quiet:]
     if len(after) >= 3:
         rest = Reading(float(after.mean()), sigma / math.sqrt(len(after)))
     else:
@@ -101,6 +103,14 @@ def _rest(
         float(stop_s),
         Reading(-2.0 * float(parabola[0]) / span**2, 2.0 * sigma * math.sqrt(spread) / span**2),
     )
+
+
+def _still(times: Samples, moved: Samples, sigma: float) -> bool:
+    """Whether a stretch of positions shows no motion, long enough to tell."""
+    if len(times) < 30:
+        return False
+    slope = float(np.polyfit(times - times.mean(), moved, 1)[0])
+    return abs(slope) < 5.0 * sigma / math.sqrt(float(np.square(times - times.mean()).sum()))
 
 
 def _level(times: Samples, values: Samples, at_s: float, sigma: float) -> Reading:

