@@ -19,6 +19,14 @@ import numpy as np
 
 T = TypeVar("T")
 
+_PLAIN = frozenset({int, str, bool, type(None)})
+
+
+@cache
+def _field_names(kind: type) -> tuple[str, ...] | None:
+    """Names of a dataclass's fields; None for any other class. A state has hundreds of them, each cycle."""
+    return tuple(f.name for f in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else None
+
 
 def dumps(value: object) -> bytes:
     """Write a frozen dataclass as UTF-8 JSON; equal values give equal bytes."""
@@ -40,20 +48,30 @@ def loads(kind: type[T], data: bytes) -> T:
     return restored
 
 
-def to_json(value: object) -> Any:
+def to_json(value: Any) -> Any:
     """Turn a value into mappings, lists, strings and integers."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    kind = type(value)
+    if kind is float:
+        return value.hex()
+    if kind in _PLAIN:
+        return value
+    names = _field_names(kind)
+    if names is not None:
+        return {name: to_json(getattr(value, name)) for name in names}
     if isinstance(value, enum.Enum):
         return value.name
-    if value is None or isinstance(value, bool | int | str):
+    if isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
         return float(value).hex()
     if isinstance(value, np.ndarray):
         raw = np.ascontiguousarray(value)
         raw = raw.astype(raw.dtype.newbyteorder("<"), copy=False)
-        return {"dtype": raw.dtype.str, "shape": list(value.shape), "base64": base64.b64encode(raw.tobytes()).decode()}
+        return {
+            "dtype": raw.dtype.str,
+            "shape": list(value.shape),
+            "base64": base64.b64encode(raw.tobytes()).decode(),
+        }
     if isinstance(value, tuple):
         return [to_json(item) for item in value]
     if isinstance(value, Mapping):

@@ -15,6 +15,7 @@ from typing import Any
 from rich.console import Console
 from rich.live import Live
 
+from impactcell.demo.remedy import Remedy
 from impactcell.demo.stage import USER, Stage, set_up
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
@@ -61,14 +62,18 @@ class _Show:
     service: Service | None = None
     endpoint: str = ""
     missed: int = 0
+    told: list[tuple[int, str]] = field(default_factory=list)
 
     async def run(self, draw: Callable[["_Show", Snapshot], None]) -> bool:
         """Run to the end; True if it was ended by Ctrl-C."""
         stop, done = asyncio.Event(), asyncio.Event()
         news = asyncio.Event()
 
+        remedy = Remedy(self.stage.cell, self._say)
+
         def observe(_: str, snapshot: Snapshot) -> None:
             self._take(snapshot)
+            remedy.take(snapshot)
             news.set()
             draw(self, snapshot)
             if self.cycles is not None and self.seen >= self.cycles:
@@ -83,10 +88,15 @@ class _Show:
         try:
             await self.service.run(stop, self._started)
         finally:
+            await remedy.close()
             watch.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await watch
         return not done.is_set()
+
+    def _say(self, text: str) -> None:
+        if not self.told or self.told[-1][1] != text:
+            self.told.append((self.snapshots[-1].cycle if self.snapshots else 0, text))
 
     def _started(self) -> None:
         assert self.service is not None  # noqa: S101 - it calls us
@@ -120,7 +130,8 @@ class _Show:
     def scene(self) -> Scene:
         """Return what the live view shows now."""
         last = self.snapshots[-1].cycle if self.snapshots else 0
-        told = [text for cycle, text in self.stage.story if cycle <= last]
+        happened = sorted([*self.stage.story, *self.told], key=lambda entry: entry[0])
+        told = [text for cycle, text in happened if cycle <= last]
         who = f"user {USER}, password {self.stage.password}"
         return Scene(
             self.stage.cell.name, f"{self.endpoint} · {who}", told[-1] if told else "", list(self.snapshots)
@@ -155,6 +166,7 @@ class _Show:
             },
             "alarms": self.raised,
             "story": [{"cycle": cycle, "what": text} for cycle, text in self.stage.story],
+            "told": [{"cycle": cycle, "what": text} for cycle, text in self.told],
         }
 
 

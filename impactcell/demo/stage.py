@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
@@ -69,10 +69,9 @@ def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
         played.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
         password = secrets.token_urlsafe(9)
         write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
-        cell = read_cell(CONFIG / "cells" / f"{scenario}.yaml")
-        rehearse(cell_design(cell))
+        rehearse(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
         with _simulator(played) as port:
-            yield Stage(_placed(cell, directory, port), story(content), password)
+            yield Stage(read_cell(_placed(scenario, directory, port)), story(content), password)
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 
@@ -131,24 +130,19 @@ def _simulator(scenario: Path) -> Iterator[int]:
         process.communicate()
 
 
-def _placed(cell: Cell, directory: Path, port: int) -> Cell:
-    settings = cell.settings
-    changed = settings.model_copy(
-        update={
-            "module": settings.module.model_copy(update={"port": port}),
-            "opcua": settings.opcua.model_copy(
-                update={
-                    "endpoint": f"opc.tcp://127.0.0.1:{_free_port()}/impactcell",
-                    "users_file": directory / "users.yaml",
-                    "certificates_dir": directory / "pki",
-                }
-            ),
-            "journal": settings.journal.model_copy(update={"file": directory / "demo.sqlite"})
-            if settings.journal
-            else None,
-        }
-    )
-    return replace(cell, settings=changed)
+def _placed(scenario: str, directory: Path, port: int) -> Path:
+    """Write the scenario's cell file anew: for this module, with all that it writes in `directory`."""
+    source = CONFIG / "cells" / f"{scenario}.yaml"
+    content = yaml.safe_load(source.read_text(encoding="utf-8"))
+    model = directory / "model.yaml"
+    shutil.copy(source.parent / content["model"], model)
+    content["model"] = str(model)
+    content["module"]["port"] = port
+    content["module"]["register_map"] = str((source.parent / content["module"]["register_map"]).resolve())
+    content["opcua"]["endpoint"] = f"opc.tcp://127.0.0.1:{_free_port()}/impactcell"
+    path = directory / "cell.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return path
 
 
 def _free_port() -> int:

@@ -1,0 +1,96 @@
+"""The demo's whole loop: the gap alarm rises, the workflow names the effect, the model goes into service."""
+
+import asyncio
+import json
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from impactcell.records import AlarmName, Snapshot
+from impactcell.settings import Cell
+
+SHOTS = 60
+"""Cycles with the effect that the workflow is given."""
+
+Say = Callable[[str], None]
+
+
+class Remedy:
+    """Watches the gap alarm of a cell; once it has enough cycles since the change, it looks for the cause.
+
+    Parameters
+    ----------
+    cell : Cell
+        With a journal; its model file is replaced when an effect was named.
+    say : callable
+        Told in words what is being done and found.
+    """
+
+    def __init__(self, cell: Cell, say: Say) -> None:
+        self._cell = cell
+        self._say = say
+        self._since: int | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._accepted = False
+
+    def take(self, snapshot: Snapshot) -> None:
+        """Look at a cycle."""
+        gap = next(alarm for alarm in snapshot.alarms if alarm.name is AlarmName.MODEL_GAP)
+        if self._accepted:
+            if not gap.active:
+                self._say("the gap alarm has cleared: the extended model explains the captures")
+            return
+        if gap.active and self._since is None:
+            self._since = gap.evidence.change_cycle
+            self._say(
+                f"the model misses something since cycle {self._since}; collecting {SHOTS} cycles of it"
+            )
+        if self._since is not None and self._task is None and snapshot.cycle >= self._since + SHOTS:
+            self._task = asyncio.create_task(self._find(self._since, snapshot.cycle), name="remedy")
+
+    async def close(self) -> None:
+        """End what is still going on."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    async def _find(self, first: int, last: int) -> None:
+        journal, path = self._cell.settings.journal, self._cell.path
+        assert journal is not None  # noqa: S101 - the demo's cells have one
+        with tempfile.TemporaryDirectory(prefix="impactcell-remedy-") as temporary:
+            shots, found = Path(temporary) / "shots", Path(temporary) / "found"
+            self._say(f"impactcell discrepancy on cycles {first} to {last} ...")
+            between = ["--first-cycle", str(first), "--last-cycle", str(last)]
+            await self._run("export", str(journal.file), "-o", str(shots), *between)
+            await self._run("discrepancy", str(shots), "--cell", str(path), "-o", str(found))
+            result = json.loads((found / "result.json").read_text(encoding="utf-8"))
+            named = ", ".join(effect["effect"] for effect in result["effects"]) or "nothing"
+            held_out = result["gap"]["held_out"]
+            gaps = f"held-out gap {held_out['before']} before, {held_out['after']} after"
+            told = f"{result['verdict']}: {named}; {gaps}"
+            self._say(told)
+            if result["effects"]:
+                await self._run("model", "accept", str(path), str(found / result["model"]))
+                self._accepted = True
+                self._say(f"{told}; the extended model is in service")
+
+    async def _run(self, *arguments: str) -> None:
+        """Run a verb in a process of its own, so that the cell goes on undisturbed."""
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "impactcell",
+            *arguments,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        try:
+            _, errors = await process.communicate()
+        except asyncio.CancelledError:
+            process.terminate()
+            await process.wait()
+            raise
+        if process.returncode:
+            self._say(f"impactcell {arguments[0]} failed: {errors.decode().strip().splitlines()[-1]}")
+            raise asyncio.CancelledError
