@@ -50,7 +50,7 @@ def loads(kind: type[T], data: bytes) -> T:
 
 def to_json(value: Any) -> Any:
     """Turn a value into mappings, lists, strings and integers."""
-    kind = type(value)
+    kind: Any = type(value)
     if kind is float:
         return value.hex()
     if kind in _PLAIN:
