@@ -39,7 +39,7 @@ class Profile:
     information: Samples
 
     def warp(self) -> Samples:
-        """Step, then what is slid instead of 0, 1, 2, ... steps at the mean coefficient; m, shape (1 + n,)."""
+        """Step, then what is slid instead of 0, 1, 2, ... steps at the mean; m, shape (1 + n,)."""
         trust = self.information / (self.information + PRIOR_STD**-2)
         rho = 1.0 + (self.ratio - 1.0) * trust
         grid = np.concatenate([[0.0], self.position_m]) if self.position_m[0] > 0.0 else self.position_m

@@ -123,23 +123,36 @@ def stop_time(e: float, r: float, z: float, w2: float, wd: float, v: float) -> f
 
 
 @compiled
+def fading(u: float) -> float:
+    """Return (1 - exp(-u)) / u - 1, u >= 0, without its cancellation."""
+    if u < 1e-3:
+        return -u * (0.5 - u * (1.0 / 6.0 - u / 24.0))
+    return -math.expm1(-u) / u - 1.0
+
+
+@compiled
+def slowed(speed: float, t: float, tau: float, terminal: float) -> float:
+    """Speed (m/s) after `t` of free slide; tau = m / k_v, terminal = mu_k m g / k_v."""
+    return speed * math.exp(-t / tau) + terminal * math.expm1(-t / tau)
+
+
+@compiled
 def catch_time(speed: float, v: float, mass: float, friction: float, viscous: float) -> float:
     """When the actuator at `v` catches a part that left it at `speed` > v; NEVER if it rests first."""
-    a = friction / mass
-    if viscous * speed < 1e-9 * friction:
-        return 2.0 * (speed - v) / a if speed <= 2.0 * v else NEVER
+    if viscous == 0.0:
+        return 2.0 * (speed - v) * mass / friction if speed <= 2.0 * v else NEVER
     tau = mass / viscous
     terminal = friction / viscous
     rest = tau * math.log1p(speed / terminal)
     if slide(speed, mass, friction, viscous) > v * rest:
         return NEVER
-    low = tau * math.log((speed + terminal) / (v + terminal))
+    low = tau * math.log1p((speed - v) / (v + terminal))
     high = rest
     t = 0.5 * (low + high)
     for _ in range(60):
-        faded = math.exp(-t / tau)
-        value = tau * (speed + terminal) * (1.0 - faded) - (terminal + v) * t
-        slope = (speed + terminal) * faded - terminal - v
+        gone = fading(t / tau)
+        value = t * (speed * (1.0 + gone) + terminal * gone - v)
+        slope = slowed(speed, t, tau, terminal) - v
         if value > 0.0:
             low = t
         else:
@@ -269,11 +282,10 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
                     if j == count:
                         return
                     t += caught
-                    if viscous * speed < 1e-9 * kinetic:
+                    if viscous == 0.0:
                         speed -= kinetic / mass * caught
                     else:
-                        terminal = kinetic / viscous
-                        speed = (speed + terminal) * math.exp(-viscous * caught / mass) - terminal
+                        speed = slowed(speed, caught, mass / viscous, kinetic / viscous)
                     e, r = -rest, v - speed
                 else:
                     d, resting = v * t - (x + goes), True
