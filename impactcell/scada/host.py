@@ -139,6 +139,7 @@ class Host:
         self.monitoring.close()
         for connection in tuple(self._connections):
             connection.fail(ua.StatusCodes.BadServerHalted, "server stops")
+            connection.close()
             await connection.wait_closed()
         if self._listener is not None:
             await self._listener.wait_closed()

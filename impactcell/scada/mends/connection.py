@@ -23,6 +23,7 @@ _log = logging.getLogger(__name__)
 HEADER: Final = struct.Struct("<3scI")
 HELLO_BYTES: Final = 8_192
 QUEUED_CHUNKS: Final = 64
+LINGER_S: Final = 1.0
 UNSENT_BYTES: Final = 16 * 1024 * 1024
 CHUNK_KINDS: Final = (b"F", b"C", b"A")
 SECURE: Final = (b"OPN", b"MSG", b"CLO")
@@ -54,6 +55,7 @@ class Connection(asyncio.Protocol):
         self._timer: asyncio.TimerHandle | None = None
         self._greeted = False
         self._paused = False
+        self._discards = False
         self.channel = Channel(channels)
         self.address = ""
         self.local_address: tuple[str, int] | None = None
@@ -94,6 +96,8 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Cut the stream into frames."""
+        if self._discards:
+            return
         self._buffer += data
         try:
             while len(self._buffer) >= HEADER.size:
@@ -135,8 +139,8 @@ class Connection(asyncio.Protocol):
     async def _serve(self) -> None:
         while (frame := await self._frames.get()) is not None:
             if self._paused and self._frames.qsize() < QUEUED_CHUNKS // 2 and self._transport is not None:
-                self._transport.resume_reading()
                 self._paused = False
+                self._transport.resume_reading()
             try:
                 await self._take(*frame)
             except ChannelError as error:
@@ -197,11 +201,32 @@ class Connection(asyncio.Protocol):
     def fail(self, code: int, reason: str) -> None:
         """Send an Error message and close."""
         if self._transport is not None and not self._transport.is_closing():
-            _log.warning("connection from %s refused: %s", self.address, reason)
+            level = logging.INFO if code == ua.StatusCodes.BadServerHalted else logging.WARNING
+            _log.log(level, "connection from %s closed: %s", self.address, reason)
             message = ua.ErrorMessage(ua.StatusCode(code), ua.StatusCode(code).name)
             body = encode(message)
             self._transport.write(HEADER.pack(b"ERR", b"F", HEADER.size + len(body)) + body)
-        self.close()
+            self._linger(self._transport)
+        self.channel.close()
+        self._frames.put_nowait(None)
+
+    def _linger(self, transport: asyncio.Transport) -> None:
+        # Closing while the peer still sends would reset the connection, and the Error message might be lost:
+        # what comes is thrown away until the peer has closed its end too.
+        if self._discards:
+            return
+        self._discards = True
+        if self._paused:
+            transport.resume_reading()
+        try:
+            transport.write_eof()
+        except OSError:
+            # The peer has gone already.
+            transport.abort()
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = asyncio.get_running_loop().call_later(LINGER_S, transport.abort)
 
     def close(self) -> None:
         """Close once everything is sent; requests that wait are dropped."""

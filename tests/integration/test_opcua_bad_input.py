@@ -1,0 +1,233 @@
+"""Bytes no client should send: answered at once with the standard's status code, and the server goes on."""
+
+import asyncio
+import contextlib
+import random
+import struct
+import time
+
+import pytest
+from asyncua import Client, ua
+from asyncua.ua.ua_binary import struct_to_binary
+
+from impactcell.scada import Limits
+from tests.opcua_server import Site, site
+
+NONE_URI = b"http://opcfoundation.org/UA/SecurityPolicy#None"
+AT_ONCE_S = 1.0
+
+
+def frame(kind: bytes, body: bytes, chunk: bytes = b"F", size: int | None = None) -> bytes:
+    return kind + chunk + struct.pack("<I", size if size is not None else 8 + len(body)) + body
+
+
+def hello(url: bytes = b"opc.tcp://localhost", receive: int = 65536, send: int = 65536) -> bytes:
+    return frame(b"HEL", struct.pack("<IIIIIi", 0, receive, send, 0, 0, len(url)) + url)
+
+
+def open_channel(request_type: int = 0, mode: int = 1, uri: bytes = NONE_URI, sequence: int = 1) -> bytes:
+    request = ua.OpenSecureChannelRequest()
+    request.Parameters.RequestType = ua.SecurityTokenRequestType(request_type)
+    request.Parameters.SecurityMode = ua.MessageSecurityMode(mode)
+    request.Parameters.RequestedLifetime = 60_000
+    security = struct.pack("<i", len(uri)) + uri + struct.pack("<ii", -1, -1)
+    return frame(
+        b"OPN",
+        struct.pack("<I", 0) + security + struct.pack("<II", sequence, sequence) + struct_to_binary(request),
+    )
+
+
+def message(channel: int, token: int, body: bytes, sequence: int = 2, chunk: bytes = b"F") -> bytes:
+    return frame(b"MSG", struct.pack("<IIII", channel, token, sequence, sequence) + body, chunk)
+
+
+class Raw:
+    """A bare TCP connection to the server."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader, self.writer = reader, writer
+
+    async def send(self, data: bytes) -> None:
+        self.writer.write(data)
+        await self.writer.drain()
+
+    async def receive(self) -> tuple[bytes, bytes]:
+        head = await asyncio.wait_for(self.reader.readexactly(8), 5)
+        size = struct.unpack("<I", head[4:])[0]
+        return head[:3], await self.reader.readexactly(size - 8)
+
+    async def error(self) -> int:
+        kind, body = await self.receive()
+        assert kind == b"ERR", (kind, body)
+        assert await asyncio.wait_for(self.reader.read(), 5) == b"", "the connection was not closed"
+        return struct.unpack("<I", body[:4])[0]
+
+    async def channel(self) -> tuple[int, int]:
+        await self.send(hello())
+        assert (await self.receive())[0] == b"ACK"
+        await self.send(open_channel())
+        kind, body = await self.receive()
+        assert kind == b"OPN"
+        # The token is the last structure but the nonce: version, channel, token, created, lifetime, nonce.
+        channel, token = struct.unpack("<II", body[-28:-20]) if body[-4:] != b"\xff" * 4 else (0, 0)
+        channel, token = struct.unpack("<I", body[:4])[0], token
+        return channel, token
+
+
+@contextlib.asynccontextmanager
+async def raw(here: Site):
+    port = int(here.server.endpoint.split(":")[2].split("/")[0])
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    try:
+        yield Raw(reader, writer)
+    finally:
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+
+
+async def alive(here: Site) -> None:
+    client = Client(here.server.endpoint, timeout=5)
+    endpoints = await client.connect_and_get_server_endpoints()
+    assert len(endpoints) == 3
+
+
+codes = ua.StatusCodes
+BEFORE_HELLO = {
+    "no OPC UA at all": (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", codes.BadTcpMessageTypeInvalid),
+    "a message in place of Hello": (open_channel(), codes.BadTcpMessageTypeInvalid),
+    "an unknown message type": (frame(b"XYZ", b"12345678"), codes.BadTcpMessageTypeInvalid),
+    "a chunk type that does not exist": (frame(b"HEL", b"\0" * 24, b"Z"), codes.BadTcpMessageTypeInvalid),
+    "a size smaller than the header": (frame(b"HEL", b"", size=3), codes.BadTcpMessageTypeInvalid),
+    "a size of 4 GiB": (frame(b"HEL", b"", size=2**32 - 1), codes.BadTcpMessageTooLarge),
+    "an empty Hello": (frame(b"HEL", b""), codes.BadDecodingError),
+    "a Hello that ends early": (frame(b"HEL", b"\0" * 10), codes.BadDecodingError),
+    "a URL longer than the message": (
+        frame(b"HEL", struct.pack("<IIIIIi", 0, 65536, 65536, 0, 0, 10_000)),
+        codes.BadDecodingError,
+    ),
+    "a URL of negative length": (
+        frame(b"HEL", struct.pack("<IIIIIi", 0, 65536, 65536, 0, 0, -2)),
+        codes.BadDecodingError,
+    ),
+    "a URL of 5000 characters": (hello(b"x" * 5000), codes.BadTcpEndpointUrlInvalid),
+    "buffers of 100 bytes": (hello(receive=100), codes.BadConnectionRejected),
+}
+AFTER_HELLO = {
+    "a second Hello": (hello(), codes.BadTcpMessageTypeInvalid),
+    "a request without a channel": (message(1, 1, b"\0" * 20), codes.BadSecureChannelClosed),
+    "an unknown policy": (
+        open_channel(uri=b"http://example.org/NoSuchPolicy"),
+        codes.BadSecurityPolicyRejected,
+    ),
+    "a policy without a certificate": (
+        open_channel(uri=b"http://opcfoundation.org/UA/SecurityPolicy#Basic256Sha256", mode=3),
+        codes.BadSecurityChecksFailed,
+    ),
+    "encryption asked for without a policy": (open_channel(mode=3), codes.BadSecurityModeRejected),
+    "renewal of no channel": (open_channel(request_type=1), codes.BadSecureChannelIdInvalid),
+    "a chunk of 100 kB": (frame(b"MSG", b"", size=100_000), codes.BadTcpMessageTooLarge),
+    "noise in an OPN": (frame(b"OPN", b"\xff" * 60), codes.BadSecurityPolicyRejected),
+}
+
+
+async def test_bad_beginnings() -> None:
+    async with site() as here:
+        for name, (data, code) in BEFORE_HELLO.items():
+            async with raw(here) as wire:
+                begin = time.monotonic()
+                await wire.send(data)
+                assert await wire.error() == code, name
+                assert time.monotonic() - begin < AT_ONCE_S, f"{name}: took too long"
+        for name, (data, code) in AFTER_HELLO.items():
+            async with raw(here) as wire:
+                await wire.send(hello())
+                assert (await wire.receive())[0] == b"ACK"
+                await wire.send(data)
+                assert await wire.error() == code, name
+        await alive(here)
+
+
+async def test_bad_requests_on_an_open_channel() -> None:
+    async with site() as here:
+        async with raw(here) as wire:
+            channel, _ = await wire.channel()
+            await wire.send(message(channel + 1, 13, b"\x01\x00\xac\x01" + b"\0" * 40))
+            assert await wire.error() == codes.BadSecurityChecksFailed
+        async with raw(here) as wire:
+            channel, _ = await wire.channel()
+            await wire.send(message(channel, 13, b"\x01\x00\xac\x01" + b"\0" * 3))
+            assert await wire.error() == codes.BadDecodingError, "a request header that ends early"
+        async with raw(here) as wire:
+            channel, _ = await wire.channel()
+            for kind, code in ((9999, codes.BadServiceUnsupported), (631, codes.BadSessionIdInvalid)):
+                header = struct_to_binary(ua.RequestHeader())
+                body = struct.pack("<BBH", 1, 0, kind) + header + b"\0" * 16
+                await wire.send(message(channel, 13, body, sequence=kind - 9997 if kind == 9999 else 3))
+                answer = (await wire.receive())[1]
+                assert struct.unpack("<I", answer[16 + 4 + 8 + 4 : 16 + 4 + 8 + 8])[0] == code, kind
+        async with raw(here) as wire:
+            # Parts of one message without end: the limit of a message is the end.
+            channel, _ = await wire.channel()
+            with contextlib.suppress(ConnectionError):
+                for sequence in range(2, 200):
+                    body = struct.pack("<II", sequence, 2) + b"\0" * 60_000
+                    await wire.send(frame(b"MSG", struct.pack("<II", channel, 13) + body, b"C"))
+            assert await wire.error() == codes.BadTcpMessageTooLarge
+        await alive(here)
+
+
+@pytest.mark.parametrize("seed", range(3))
+async def test_noise(seed: int) -> None:
+    """Random bytes, and random changes of good messages, in every state of a connection."""
+    rng = random.Random(seed)
+    async with site() as here:
+        for _ in range(150):
+            async with raw(here) as wire:
+                with contextlib.suppress(ConnectionError):
+                    if rng.random() < 0.7:
+                        await wire.send(hello())
+                    if rng.random() < 0.7:
+                        await wire.send(open_channel())
+                    kind = rng.choice([428, 422, 461, 467, 631, 527, 673, 787, 826, 751])
+                    good = (
+                        struct.pack("<BBH", 1, 0, kind)
+                        + struct_to_binary(ua.RequestHeader())
+                        + rng.randbytes(60)
+                    )
+                    data = bytearray(message(6, 13, good))
+                    for _ in range(rng.randrange(4)):
+                        data[rng.randrange(8, len(data))] = rng.randrange(256)
+                    await wire.send(bytes(data) if rng.random() < 0.8 else rng.randbytes(rng.randrange(200)))
+                    wire.writer.write_eof()
+                    await asyncio.wait_for(wire.reader.read(), 5)
+        await alive(here)
+
+
+async def test_half_open_connections_are_closed_in_time() -> None:
+    async with site(limits=Limits(hello_s=0.2, activation_s=0.3)) as here:
+        async with raw(here) as wire:
+            assert await wire.error() == codes.BadTimeout, "says nothing"
+        async with raw(here) as wire:
+            await wire.send(hello()[:20])
+            assert await wire.error() == codes.BadTimeout, "stops in the middle of Hello"
+        async with raw(here) as wire:
+            await wire.channel()
+            assert await wire.error() == codes.BadTimeout, "opens a channel and no session"
+        await alive(here)
+
+
+async def test_too_many_connections() -> None:
+    async with site(limits=Limits(connections=5)) as here, contextlib.AsyncExitStack() as stack:
+        held = [await stack.enter_async_context(raw(here)) for _ in range(5)]
+        for wire in held:
+            await wire.send(hello())
+            assert (await wire.receive())[0] == b"ACK"
+        async with raw(here) as wire:
+            assert await wire.error() == codes.BadTcpServerTooBusy
+        held[0].writer.close()
+        await held[0].writer.wait_closed()
+        async with raw(here) as wire:
+            await wire.send(hello())
+            kind, _ = await wire.receive()
+            assert kind in {b"ACK", b"ERR"}
