@@ -60,7 +60,7 @@ class AlarmSettings:
     """
 
     rules: Mapping[AlarmName, RuleSettings] = field(default_factory=lambda: DEFAULT_RULES)
-    wear_on: float = 0.95
+    wear_on: float = 0.98
     wear_off: float = 0.5
     announced_cycles: int = 50
 

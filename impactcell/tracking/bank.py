@@ -22,6 +22,7 @@ WEIGHT, CHANGE, MEAN, COVARIANCE, WIDTH = 0, 1, 2, 6, 22
 OUTLIER_SCALE = 10.0  # an outlier's standard deviation in units of a good measurement's
 CAPACITY = 60
 ROWS = CAPACITY + 2
+CALIBRATION = 0.9
 WINDOW = 1000.0  # cycles within which a change must be to be reported
 RECENT = 16  # change cycles this recent are each kept
 DROPPED_NATS = 30.0  # a hypothesis this far below the best is given up
@@ -290,9 +291,10 @@ def threshold(false_alarm_cycles: float) -> float:
     """Threshold of the log statistic for a mean number of cycles between false alarms.
 
     Without a change the statistic's exponential minus the number of cycles is a martingale (Pollak
-    1985), so that the mean time to cross A is at least A.
+    1985), so that the mean time to cross A is at least A; CALIBRATION takes back what the overshoot
+    and the window give, measured without outliers.
     """
-    return math.log(false_alarm_cycles)
+    return math.log(false_alarm_cycles) - CALIBRATION
 
 
 def last_shift(bank: Samples, after: float, until: float) -> tuple[int, float, float]:

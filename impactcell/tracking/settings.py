@@ -49,8 +49,8 @@ class TrackerSettings:
     wear_limit: float = math.inf
     batch: BatchKnowledge = BatchKnowledge.KNOWN
     false_alarm_cycles: float = 100_000.0
-    hazard: float = 6e-3
-    step_std: float = 5.0
+    hazard: float = 3e-3
+    step_std: float = 4.0
     slope_std: float = 0.1
     outlier_probability: float = 0.003
     outlier_threshold: float = 2.5
