@@ -6,6 +6,7 @@ test that follows.
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def prepare(campaign: Campaign) -> Material:
         shots.append(_shot(capture, place, len(captures), batch, group, campaign.excitation))
     _say_what_lacks(campaign, shots, notes)
     _check_units(campaign.excitation, campaign.gravity_m_s2, shots)
-    stated = tuple(_stated(captures, name) for name in ("force", "position", "actuator"))
+    stated = (_stated(captures, "force"), _stated(captures, "position"), _stated(captures, "actuator"))
     if campaign.excitation is Excitation.DRIVEN:
         stated = (math.nan, stated[1], math.nan)
     return Material(
@@ -145,16 +146,16 @@ def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, exci
         channels[0] = None
     if excitation is not Excitation.TAP:
         channels[0] = channels[2] = None
-    covariates: dict[str, float] = {"shot": float(place)}
-    for name, value in (
-        ("velocity", capture.velocity_m_s),
-        ("mass", capture.mass_kg),
-        ("direction", float(capture.direction)),
-        ("batch", float(batch)),
-        ("dwell", math.log10(max(capture.dwell_s, 0.1)) if math.isfinite(capture.dwell_s) else math.nan),
-        ("start", capture.start_m),
-    ):
-        covariates[name] = value
+    dwell = math.log10(max(capture.dwell_s, 0.1)) if math.isfinite(capture.dwell_s) else math.nan
+    covariates = {
+        "shot": float(place),
+        "velocity": capture.velocity_m_s,
+        "mass": capture.mass_kg,
+        "direction": float(capture.direction),
+        "batch": float(batch),
+        "dwell": dwell,
+        "start": capture.start_m,
+    }
     covariates |= {name: value for name, value in capture.covariates.items() if isinstance(value, float)}
     return Shot(
         number=capture.cycle,
@@ -167,11 +168,16 @@ def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, exci
         dwell_s=capture.dwell_s,
         start_m=capture.start_m,
         group=group,
-        times=tuple(EMPTY if one is None else one.time_s for one in channels),
-        values=tuple(EMPTY if one is None else one.values for one in channels),
+        times=_of_each(channels, "time_s"),
+        values=_of_each(channels, "values"),
         drive=drive,
         covariates=covariates,
     )
+
+
+def _of_each(channels: list[Channel | None], what: str) -> tuple[Samples, Samples, Samples]:
+    force, position, actuator = (EMPTY if one is None else getattr(one, what) for one in channels)
+    return force, position, actuator
 
 
 def _varying(shots: list[Shot]) -> tuple[str, ...]:
@@ -202,7 +208,7 @@ def _blocks(captures: tuple[Capture, ...]) -> tuple[Capture, ...]:
         shortest = max(2 * _correlation(position.values), SHORTEST_BLOCK)
         count = max(min(per_record, len(position.values) // shortest), 1)
         edges = np.linspace(0, len(position.values), count + 1).astype(int)
-        for first, last in zip(edges[:-1], edges[1:], strict=True):
+        for first, last in pairwise(edges):
             inside = slice(int(first), int(last))
             times = position.time_s[inside]
             # One sample of force either side, so that the drive covers the block.
@@ -223,7 +229,7 @@ def _blocks(captures: tuple[Capture, ...]) -> tuple[Capture, ...]:
 
 
 def _correlation(position: Samples) -> int:
-    """Samples after which the velocity's correlation has fallen to 1/e."""
+    """Count the samples after which the velocity's correlation has fallen to 1/e."""
     velocity = np.diff(position)
     velocity = velocity - velocity.mean()
     power = np.abs(np.fft.rfft(velocity, 2 * len(velocity))) ** 2
@@ -267,8 +273,8 @@ def _say_what_lacks(campaign: Campaign, shots: list[Shot], notes: list[str]) -> 
 def _check_units(excitation: Excitation, gravity: float, shots: list[Shot]) -> None:
     """Notice a column that is wrong by a large factor.
 
-    The part leaves the actuator at one to two times its velocity; the impulse of the contact makes m v; free of contact friction decelerates
-    at a fraction of g.
+    The part leaves the actuator at one to two times its velocity, the impulse of the contact makes m v, and
+    free of contact friction decelerates at a fraction of g.
     """
     if excitation is Excitation.DRIVEN:
         return

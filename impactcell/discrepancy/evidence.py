@@ -8,9 +8,8 @@ import numpy as np
 from impactcell.discrepancy import locate, name
 from impactcell.discrepancy.campaign import Material
 from impactcell.discrepancy.fit import Fit, Problem
-from impactcell.discrepancy.resample import Tests, test
+from impactcell.discrepancy.resample import Tests, resampled
 from impactcell.discrepancy.tangent import Scores, linearise, scores
-from impactcell.records import Samples
 
 ALPHA = 0.01
 """Family-wise error of one step: map and candidates each get half of it."""
@@ -41,7 +40,7 @@ class Scan:
         return made
 
     def p_of(self, effect: str) -> float:
-        """Adjusted p-value of a candidate; 1 where it could not be tested."""
+        """Return the adjusted p-value of a candidate; 1 where it could not be tested."""
         if effect not in self.candidates.names:
             return 1.0
         return float(self.tests.adjusted[self.candidates.names.index(effect)])
@@ -81,7 +80,7 @@ def scan(coarse: Problem, fit: Fit, library: Sequence[str], seed: tuple[int, ...
     tangent = linearise(coarse, here)
     found = name.candidates(coarse, here, tangent, library)
     made = scores(tangent, found.products)
-    return Scan(fit, found, made, test(tangent, made, found.group, (*seed, 2), found.side))
+    return Scan(fit, found, made, resampled(tangent, made, found.group, (*seed, 2), found.side))
 
 
 def examine(
@@ -96,7 +95,7 @@ def examine(
     tangent = linearise(problem, fit)
     chart = locate.directions(problem, fit, tangent, material)
     chart_scores = scores(tangent, chart.products)
-    chart_tests = test(tangent, chart_scores, chart.cell, (*seed, 1))
+    chart_tests = resampled(tangent, chart_scores, chart.cell, (*seed, 1))
     scanned = scan(coarse, fit, library, seed)
     smallest = min(
         float(chart_tests.adjusted.min(initial=1.0)), float(scanned.tests.adjusted.min(initial=1.0))
@@ -112,5 +111,5 @@ def _overwhelming(made: Scores) -> float:
     seen = made.information > 0.0
     if not seen.any():
         return 0.0
-    dispersion: Samples = (made.each**2).sum(0)[seen] / made.information[seen]
+    dispersion = (made.each**2).sum(0)[seen] / made.information[seen]
     return float(made.gain.max() / max(float(np.median(dispersion)), 1.0))

@@ -75,7 +75,7 @@ def _cheapest(problem: Problem, best: Fit, other: Fit, effect: str, rival: str) 
 
 
 def _aside(effect: str, rival: str) -> str:
-    """What breaks an exact confound: a measurement outside of the shots."""
+    """Say what breaks an exact confound: a measurement outside of the shots."""
     kinds = {LIBRARY[effect].kind, LIBRARY[rival].kind}
     names = {effect, rival}
     if "mass_error" in names:
@@ -90,7 +90,7 @@ def _aside(effect: str, rival: str) -> str:
 
 
 def _settings(problem: Problem) -> list[tuple[str, Shot]]:
-    """Settings within reach: what was done, and one step beyond it."""
+    """List settings within reach: what was done, and one step beyond it."""
     items = problem.shots.items
     typical = sorted(items, key=lambda shot: (shot.velocity_m_s, shot.place))[len(items) // 2]
     if problem.shots.excitation is not Excitation.TAP:

@@ -1,7 +1,7 @@
 """Which effects join the model: forward with every candidate refitted, one at a time or two, then backward.
 
-A set of effects is accepted when nothing significant is left against the model that has it. Of all sets of the
-smallest size the likeliest is taken; sets that are not significantly less likely, shot by shot, are tied
+A set of effects is accepted when nothing significant is left against the model that has it. Of all sets of
+the smallest size the likeliest is taken; sets that are not significantly less likely, shot by shot, are tied
 with it. When no set suffices nothing is added: forward selection on an effect outside the library would add
 wrong names until it gives up.
 """
@@ -202,8 +202,8 @@ def _plausible(
 ) -> Search | None:
     """Accept the effect that explains most of a gap, if the floor itself is only a lower bound.
 
-    What is left then may be noise that nobody stated. It is also more than what separates the best effect from
-    its rivals may be owed to: whoever is behind by less than that is tied.
+    What is left then may be noise that nobody stated. It also may be what separates the best effect from its
+    rivals: whoever is behind by less than that is tied.
     """
     if setup.certain:
         return None

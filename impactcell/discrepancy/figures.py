@@ -16,7 +16,7 @@ from impactcell.discrepancy.workflow import Findings
 UNITS = ("N", "mm", "mm")
 SCALES = (1.0, 1e3, 1e3)
 INK, BEFORE, AFTER = "#22313f", "#c8553d", "#2a7f8e"
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.family": "sans-serif",
     "font.size": 9,
     "axes.edgecolor": "#8a97a3",

@@ -117,7 +117,7 @@ class Problem:
     def shared_derivatives(
         self, effects: tuple[str, ...], at: Samples, local: Local, base: Samples
     ) -> Samples:
-        """Derivatives of the whitened prediction, shape (p, N)."""
+        """Differentiate the whitened prediction, shape (p, N)."""
         coordinates = self.coordinates(effects)
         made = np.empty((len(coordinates), base.size))
         for column, coordinate in enumerate(coordinates):
@@ -129,8 +129,10 @@ class Problem:
             made[column] = (base - self.residual(effects, moved, local)) / step
         return made
 
-    def own_derivatives(self, effects: tuple[str, ...], at: Samples, local: Local, base: Samples) -> Samples:
-        """Derivatives of the whitened prediction by each shot's own numbers, shape (q, N)."""
+    def own_derivatives(
+        self, effects: tuple[str, ...], at: Samples, local: Local, base: Samples, *, central: bool = False
+    ) -> Samples:
+        """Differentiate the whitened prediction by each shot's own numbers, shape (q, N)."""
         made = np.empty((len(self.own), base.size))
         for column, name in enumerate(self.own):
             if name == "shift_m":
@@ -140,7 +142,11 @@ class Problem:
             size = STEP if name != "speed_m_s" else STEP * max(float(np.abs(local.speed_m_s).max()), 1e-3)
             # A part that starts at rest stays there until it breaks away: its speed is no free number.
             steps[:, column] = size if name != "speed_m_s" else size * (local.speed_m_s != 0.0)
-            made[column] = (base - self.residual(effects, at, self.moved(local, steps))) / size
+            ahead = self.residual(effects, at, self.moved(local, steps))
+            if central:
+                made[column] = (self.residual(effects, at, self.moved(local, -steps)) - ahead) / (2.0 * size)
+            else:
+                made[column] = (base - ahead) / size
         return made
 
     def first_local(self, share: float = 1.0) -> Local:
@@ -299,7 +305,7 @@ class _Blocks:
 def _normal(
     problem: Problem, J: Samples, Jl: Samples, point: _Point, spread: float
 ) -> tuple[Samples, Samples, _Blocks]:
-    """Normal equations of the shared coordinates, each shot's own eliminated."""
+    """Set up the normal equations of the shared coordinates, each shot's own eliminated."""
     n, q, p = problem.count, len(Jl), len(J)
     A = np.empty((n, q, q))
     C = np.empty((n, q, p))
@@ -318,14 +324,15 @@ def _normal(
     gl[:, 0] -= point.local.log_factor / spread**2
     diagonal = np.einsum("iqq->iq", A)
     A[:, np.arange(q), np.arange(q)] += 1e-10 * diagonal + (diagonal == 0.0)
-    inverse = np.linalg.inv(A)
+    inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
     H -= np.einsum("iqa,iqr,irb->ab", C, inverse, C, optimize=True)
     g -= np.einsum("iqa,iqr,ir->a", C, inverse, gl, optimize=True)
     return H, g, _Blocks(inverse, C, gl)
 
 
 def _own_steps(blocks: _Blocks, step: Samples) -> Samples:
-    return np.einsum("iqr,ir->iq", blocks.inverse, blocks.gradient - blocks.cross @ step)
+    steps: Samples = np.einsum("iqr,ir->iq", blocks.inverse, blocks.gradient - blocks.cross @ step)
+    return steps
 
 
 def _correct(

@@ -143,7 +143,7 @@ class Forward:
         return out
 
     def course(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Course:
-        """What the part does at every sample's time, whatever channel the sample belongs to."""
+        """Follow what the part does at every sample's time, whatever channel the sample belongs to."""
         order = _sorted_within(self.shots, self._times)
         times = self._times[order]
         found = np.empty((3, times.size))

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.parameters import NOMINAL, of_effect, plant_name
 from impactcell.discrepancy.phases import course_of
 from impactcell.discrepancy.probes import SMALL, Probe, Range, probes
 from impactcell.discrepancy.shots import Index
 from impactcell.discrepancy.tangent import Products, Scores, Tangent, products, together
 from impactcell.errors import PhysicsError
+from impactcell.physics.effect import Covariates
 from impactcell.physics.effects import LIBRARY
+from impactcell.physics.program import assemble
 from impactcell.records import Samples
 
 LARGEST = 5.0
@@ -59,16 +62,21 @@ def candidates(problem: Problem, fit: Fit, tangent: Tangent, library: Sequence[s
     parts: list[Products] = []
     groups: list[int] = []
     kept: list[Probe] = []
+    unit = products(tangent, np.zeros(problem.shots.values.size), np.ones(problem.count))
     for identifier in library:
         if identifier in fit.effects:
             continue
         grid = probes(identifier, problem.forward.batches, gone)
         found = 0
         for probe in grid:
-            change = direction(problem, fit, identifier, probe)
-            if change is None or not change.any():
-                continue
-            parts.append(products(tangent, change))
+            between = log_factors(problem, identifier, probe)
+            if between is not None:
+                parts.append(unit.modulated(-between / fit.spread))
+            else:
+                change = direction(problem, fit, identifier, probe)
+                if change is None or not change.any():
+                    continue
+                parts.append(products(tangent, change))
             groups.append(len(names))
             kept.append(probe)
             found += 1
@@ -80,14 +88,53 @@ def candidates(problem: Problem, fit: Fit, tangent: Tangent, library: Sequence[s
 
 def direction(problem: Problem, fit: Fit, identifier: str, probe: Probe) -> Samples | None:
     """Change of the whitened prediction when an effect joins at a probe; None where the plant cannot."""
+    effects = (*fit.effects, identifier)
     try:
-        with_effect = problem.residual(
-            (*fit.effects, identifier), np.concatenate([fit.at, probe.at]), fit.local
-        )
+        ahead = problem.residual(effects, np.concatenate([fit.at, probe.at]), fit.local)
+        if probe.scaled and probe.side == 0:
+            # A central difference: what the friction factors can do as well must cancel to the last digits.
+            back = probe.at.copy()
+            back[probe.amplitude] -= 2.0 * SMALL
+            change = 0.5 * (problem.residual(effects, np.concatenate([fit.at, back]), fit.local) - ahead)
+        else:
+            change = fit.residual - ahead
     except PhysicsError:
         return None
-    change = fit.residual - with_effect
     return change if np.isfinite(change).all() else None
+
+
+def log_factors(problem: Problem, identifier: str, probe: Probe) -> Samples | None:
+    """Logarithms of the friction factors by which an effect acts, if that is all it does; shape (n,)."""
+    effect = LIBRARY[identifier]
+    if effect.between is None or effect.laws:
+        return None
+    items = problem.shots.items
+    names = assemble((identifier,), problem.forward.batches).names
+    coordinates = of_effect(identifier, problem.forward.batches)
+    values = {plant_name(one): one.value(float(at)) for one, at in zip(coordinates, probe.at, strict=True)}
+    row = np.array([values[one] for one in names[len(NOMINAL) :]])
+    columns = []
+    place = 0
+    for parameter in effect.parameters:
+        width = problem.forward.batches - 1 if parameter.per_batch else 1
+        own = np.tile(row[place : place + width], (len(items), 1))
+        columns.append(own if parameter.per_batch else own[:, 0])
+        place += width
+    found = effect.between(
+        columns,
+        Covariates(
+            dwell_s=np.array([shot.dwell_s for shot in items]),
+            shot=np.array([float(shot.place) for shot in items]),
+            shots=np.array([float(shot.shots) for shot in items]),
+            batch=np.array([float(shot.batch) for shot in items]),
+            direction=np.array([float(shot.direction) for shot in items]),
+        ),
+    )
+    mu_s, mu_k, mass = (np.broadcast_to(one, len(items)) for one in found)
+    if not (np.allclose(mu_s, mu_k, rtol=1e-12) and np.all(mass == 1.0)):
+        return None
+    made: Samples = np.log(np.maximum(mu_k, 1e-6))
+    return made
 
 
 def best_probes(found: Candidates, scored: Scores, candidate: int, most: int) -> list[tuple[float, Samples]]:

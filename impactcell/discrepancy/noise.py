@@ -57,7 +57,10 @@ def sensors(material: Material) -> Floor:
         stated = material.stated_noise[channel]
         if math.isnan(stated):
             if not estimate > 0.0:
-                message = f"{name}: neither is its noise stated, nor do its samples show any; state it in campaign.yaml"
+                message = (
+                    f"{name}: neither is its noise stated, nor do its samples show any; "
+                    "state it in campaign.yaml"
+                )
                 raise CampaignError(message)
             notes.append(
                 f"The noise of {name} is not stated; {estimate:.3g} was estimated from neighbouring samples, "
@@ -68,7 +71,8 @@ def sensors(material: Material) -> Floor:
             continue
         if estimate > DISAGREES * stated or 0.0 < estimate < stated / DISAGREES**1.5:
             message = (
-                f"{name}: its noise is stated as {stated:.3g}, but neighbouring samples scatter by {estimate:.3g}: "
+                f"{name}: its noise is stated as {stated:.3g}, but neighbouring samples scatter by "
+                f"{estimate:.3g}: "
                 f"check the unit of sensors.{name} in campaign.yaml and of the column in traces"
             )
             raise CampaignError(message)
@@ -78,7 +82,7 @@ def sensors(material: Material) -> Floor:
 
 
 def white_noise(shots: tuple[Shot, ...], channel: int) -> float:
-    """Standard deviation of noise that differs from sample to sample, by a robust third difference."""
+    """Estimate the noise that differs from sample to sample by a robust third difference."""
     found: list[float] = []
     for shot in shots:
         values = shot.values[channel]

@@ -34,7 +34,8 @@ class Coordinate:
     batch : int
         0, or the batch whose parameter it is.
     form : str
-        `log`, `linear` (value over scale), `angle` (the same, modulo a turn) or `reciprocal` (scale over value).
+        `log`, `linear` (value over scale), `angle` (the same, modulo a turn) or `reciprocal` (scale over
+        value).
     lower, upper : float
         Range of the coordinate itself.
     start : float
@@ -69,7 +70,7 @@ class Coordinate:
         return value / self.scale
 
     def slope(self, coordinate: float) -> float:
-        """Derivative of the parameter with respect to its coordinate."""
+        """Differentiate the parameter with respect to its coordinate."""
         if self.form == "log":
             return self.value(coordinate)
         if self.form == "reciprocal":

@@ -1,8 +1,8 @@
 """Where to look for an effect: a grid over the parameters that say nothing while its strength is zero.
 
 A period, a range or a time constant has no derivative at zero strength, so that a score is taken at every
-point of a grid; the best of them is also where the full fit starts. The grid follows from the parameter's unit
-and from what the shots went through, so that a new effect needs no grid of its own.
+point of a grid; the best of them is also where the full fit starts. The grid follows from the parameter's
+unit and from what the shots went through, so that a new effect needs no grid of its own.
 """
 
 import itertools
@@ -14,7 +14,7 @@ import numpy as np
 from impactcell.discrepancy.parameters import Coordinate, of_effect
 from impactcell.records import Samples
 
-SMALL = 0.1
+SMALL = 2e-3
 DECADE = (0.1, 0.316, 1.0, 3.16, 10.0)
 RECIPROCALS = tuple(float(0.08 * 1.42**i) for i in range(16))
 CYCLES = 60

@@ -117,7 +117,7 @@ def _candidates(findings: Findings) -> list[dict[str, Any]]:
     """Evidence for every candidate against the nominal model."""
     evidence = findings.search.nominal
     gains = evidence.scan.gains()
-    rows = []
+    rows: list[dict[str, Any]] = []
     for number, effect in enumerate(evidence.scan.candidates.names):
         rows.append(
             {

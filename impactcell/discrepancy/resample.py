@@ -37,7 +37,7 @@ class Tests:
     adjusted: Samples
 
 
-def test(
+def resampled(
     tangent: Tangent,
     scores: Scores,
     groups: Index,

@@ -18,7 +18,7 @@ SHOWN = 0.05
 
 
 def rounded(value: float) -> float | None:
-    """Number with six significant digits: more would change with the machine's rounding."""
+    """Round to six significant digits: more would change with the machine's rounding."""
     if not math.isfinite(value):
         return None
     return float(f"{value:.{DIGITS}g}")
@@ -93,7 +93,7 @@ def _effect(findings: Findings, effect: str) -> dict[str, Any]:
 
 
 def where(findings: Findings, effect: str) -> dict[str, Any]:
-    """Phase in which the nominal model's residuals showed the effect, and the covariates they changed with."""
+    """Phase in which the nominal model's residuals showed the effect, and what they changed with."""
     evidence = findings.search.nominal
     known = LIBRARY[effect]
     strength = by_phase(evidence)

@@ -89,7 +89,7 @@ class Shots:
         return len(self.items)
 
     def of(self, shot: int) -> slice:
-        """Samples of one shot."""
+        """Select the samples of one shot."""
         return slice(int(self.bounds[shot]), int(self.bounds[shot + 1]))
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from impactcell.discrepancy.fit import Fit, Problem
 from impactcell.records import Samples
 
-UNSEEN = 1e-6
+UNSEEN = 1e-8
 """A direction of which less than this share is left after projection cannot be seen in these data."""
 
 
@@ -78,7 +78,7 @@ class Scores:
 def linearise(problem: Problem, fit: Fit) -> Tangent:
     """Linearise about a fit."""
     bounds = problem.shots.bounds
-    own = problem.own_derivatives(fit.effects, fit.at, fit.local, fit.residual)
+    own = problem.own_derivatives(fit.effects, fit.at, fit.local, fit.residual, central=True)
     prior = np.zeros((len(own), problem.count))
     prior[0] = 1.0 / fit.spread
     basis: list[Samples] = []
@@ -119,11 +119,11 @@ def _project(
 ) -> tuple[Samples, Samples]:
     rows, prior = rows.copy(), prior.copy()
     sizes = np.diff(bounds)
-    for row, below in zip(rows, prior, strict=True):
+    for i in range(len(rows)):
         for b, pb in zip(basis, prior_basis, strict=True):
-            along = _dot(row, b, bounds) + below * pb
-            row -= np.repeat(along, sizes) * b
-            below -= along * pb
+            along = _dot(rows[i], b, bounds) + prior[i] * pb
+            rows[i] -= np.repeat(along, sizes) * b
+            prior[i] -= along * pb
     return rows, prior
 
 

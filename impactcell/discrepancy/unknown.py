@@ -1,4 +1,4 @@
-"""A gap that no known effect explains: where it is, what shape it has, and a free-form term that would close it."""
+"""A gap that no known effect explains: where it is, its shape, and a free-form term that would close it."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy as np
 from impactcell.discrepancy.evidence import ALPHA, Evidence
 from impactcell.discrepancy.locate import ALL
 from impactcell.discrepancy.phases import BETWEEN_SHOTS
-from impactcell.discrepancy.shots import CHANNELS
+from impactcell.discrepancy.shots import CHANNELS, Index
 from impactcell.records import Samples
 
 STRONG_SHARE = 0.25
@@ -53,7 +53,7 @@ class Unexplained:
 
 
 def by_phase(evidence: Evidence) -> dict[str, float]:
-    """First-order gain of each row of the map, the largest over its cells; the row of the factors counts too."""
+    """First-order gain of each row of the map, the largest over its cells."""
     chart = evidence.map
     gain = evidence.map_scores.gain
     made = {}
@@ -95,7 +95,7 @@ def describe(evidence: Evidence) -> Unexplained:
     )
 
 
-def _in_words(phase: str, shapes: list[Shape], gain: Samples, cell: Samples, whole: int) -> str:
+def _in_words(phase: str, shapes: list[Shape], gain: Samples, cell: Index, whole: int) -> str:
     if phase == BETWEEN_SHOTS:
         return "the friction factors change from shot to shot with the covariates named"
     strongest = max(shapes, key=lambda shape: float(np.abs(shape.mean).max()), default=None)

@@ -1,8 +1,7 @@
 """Discrepancy workflow: hidden effects against answers, over campaigns made by the simulator's own plant.
 
-`python -m tests.benchmarks.discrepancy --rows bench-results/discrepancy.jsonl [--per 4] [--kinds single,none]`
-runs the study: a row a campaign, appended as it is done; what is there already is not done again. `tables`
-reads the rows.
+`python -m tests.benchmarks.discrepancy [--rows FILE] [--per 4] [--kinds single,none]` runs the study: a row a
+campaign, appended as it is done; what is there already is not done again. `tables` reads the rows.
 """
 
 import argparse
