@@ -6,17 +6,19 @@ Written apart from `impactcell.physics`, so that a test which compares the two s
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulator.effects import Shot
 from simulator.plant_forces import Contact, Forces, Phase, Plant
-from simulator.plant_integrator import Event, NeverAtRestError, Path, integrate
+from simulator.plant_integrator import Event, NeverAtRestError, Path, Piece, integrate
 
 __all__ = ["Event", "Motion", "NeverAtRestError", "Plant", "Shot", "Strike", "driven", "free_slide", "tap"]
 
 Samples = NDArray[np.float64]
+REFINEMENTS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,36 +115,30 @@ class Motion:
             return math.nan
         return float(self.displacement_m - self._states(np.array([self.separation_s]))[0, 0])
 
-    @property
+    @cached_property
     def peak_force_n(self) -> float:
         """Largest contact force over all contacts; the force itself, not what a sensor shows."""
-        best = 0.0
-        for piece in self._path.pieces:
-            if piece.phase.contact is Contact.TOUCHING:
-                best = max(best, self._peak(piece.start_s, piece.stop_s, piece.phase, piece.states, best))
+        looks = [
+            (force, time, piece)
+            for piece in self._path.pieces
+            if piece.phase.contact is Contact.TOUCHING
+            for time, force in self._looks(piece, piece.start_s, piece.stop_s)
+        ]
+        if not looks:
+            return 0.0
+        best, time, piece = max(looks, key=lambda look: look[0])
+        spacing = (piece.stop_s - piece.start_s) / 8.0
+        for _ in range(REFINEMENTS):
+            # The best of nine looks lies within one spacing of the peak: look closer around it.
+            low, high = max(time - spacing, piece.start_s), min(time + spacing, piece.stop_s)
+            time, best = max(self._looks(piece, low, high), key=lambda look: look[1])
+            spacing /= 4.0
         return best
 
-    def _peak(
-        self, start: float, stop: float, phase: Phase, states: Callable[..., Samples], best: float
-    ) -> float:
-        def force(time: float) -> float:
-            return self._forces.contact(phase, time, states(time).tolist())[0]
-
+    def _looks(self, piece: Piece, start: float, stop: float) -> list[tuple[float, float]]:
         times = np.linspace(start, stop, 9)
-        values = [
-            self._forces.contact(phase, t, z)[0] for t, z in zip(times, states(times).T.tolist(), strict=True)
-        ]
-        top = int(np.argmax(values))
-        if values[top] < 0.9 * best:
-            return values[top]
-        low, high = times[max(top - 1, 0)], times[min(top + 1, 8)]
-        for _ in range(60):
-            inner, outer = low + 0.381966 * (high - low), low + 0.618034 * (high - low)
-            if force(inner) < force(outer):
-                low = inner
-            else:
-                high = outer
-        return max(values[top], force(0.5 * (low + high)))
+        forces = self._forces.contact_along(piece.phase, times, piece.states(times).T)
+        return list(zip(times.tolist(), forces.tolist(), strict=True))
 
     def _states(self, time: Samples) -> Samples:
         """State vectors, shape (n, states); the last state after the end."""
@@ -180,7 +176,7 @@ class Motion:
     def force_n(self, time_s: Samples) -> Samples:
         """Force as its channel shows it without noise, shape (n,)."""
         shown = self._force(time_s - self._forces.delay, sensor=True)
-        return np.array([self._forces.sensed(force) for force in shown.tolist()])
+        return self._forces.sensed_along(shown)
 
     def sensed(self, force: float) -> float:
         """Return what the force channel shows for a steady force."""

@@ -288,6 +288,10 @@ class Forces:
             force = sensed(force)
         return force
 
+    def sensed_along(self, force: Samples) -> Samples:
+        """Return what the force channel shows, sample by sample."""
+        return np.array([self.sensed(value) for value in force.tolist()]) if self._sensed else force
+
     @property
     def delay(self) -> float:
         """By how much force is recorded late."""
