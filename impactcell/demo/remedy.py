@@ -12,6 +12,8 @@ from impactcell.settings import Cell
 
 SHOTS = 60
 """Cycles with the effect that the workflow is given."""
+MARGIN = 5
+"""The estimated cycle of the change may be early by a few; cycles without the effect must not get in."""
 
 Say = Callable[[str], None]
 
@@ -46,8 +48,8 @@ class Remedy:
             self._say(
                 f"the model misses something since cycle {self._since}; collecting {SHOTS} cycles of it"
             )
-        if self._since is not None and self._task is None and snapshot.cycle >= self._since + SHOTS:
-            self._task = asyncio.create_task(self._find(self._since, snapshot.cycle), name="remedy")
+        if self._since is not None and self._task is None and snapshot.cycle >= self._since + MARGIN + SHOTS:
+            self._task = asyncio.create_task(self._find(self._since + MARGIN, snapshot.cycle), name="remedy")
 
     async def close(self) -> None:
         """End what is still going on."""
