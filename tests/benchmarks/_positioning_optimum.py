@@ -164,15 +164,15 @@ def fewest_taps(
     half = Z.size // 2
     furthest = float(np.nanmax(table[:, :, half]))
 
-    def grown(first: float, last: float, step: float) -> Samples:
+    def grown(first: float, last: float, step: float, ratio: float) -> Samples:
         points = [first]
         while points[-1] < last:
-            points.append(points[-1] + max(step, 0.02 * points[-1]))
+            points.append(points[-1] + max(step, ratio * points[-1]))
         return np.array(points)
 
-    grid = grown(1.05 * tolerance_m, remaining_m, 0.3 * tolerance_m)
+    grid = grown(1.05 * tolerance_m, remaining_m, 0.3 * tolerance_m, 0.012)
     grid[-1] = max(remaining_m, grid[-2] * 1.0001)
-    wanted = grown(min(3e-6, 0.3 * tolerance_m), furthest, 0.2 * tolerance_m)
+    wanted = grown(min(3e-6, 0.3 * tolerance_m), furthest, 0.2 * tolerance_m, 0.02)
     kept = best_taps(table, wanted[wanted <= furthest])
     before = (math.nan, math.nan)
     for multiplier in MULTIPLIERS:

@@ -226,6 +226,15 @@ def append(path: Path, outcomes: list[Outcome]) -> None:
         writer.writerows([[getattr(outcome, name) for name in names] for outcome in outcomes])
 
 
-def steady(outcomes: list[Outcome], first: int = 10) -> list[Outcome]:
-    """Tasks after the first ten of each cell."""
-    return [outcome for outcome in outcomes if outcome.number >= first]
+def rows(path: Path) -> list[list[str]]:
+    """Rows of a file without a header; none where there is no file."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+def append_row(path: Path, row: list[float]) -> None:
+    path.parent.mkdir(exist_ok=True)
+    with path.open("a", newline="") as file:
+        csv.writer(file).writerow(row)
