@@ -6,17 +6,25 @@ import numpy as np
 
 from impactcell.compiled import Integers, Numbers, compiled, integers, numbers, offset
 from impactcell.physics import layout as at
-from impactcell.physics.ends import after_end, all_taken, before_contact, finish, last_sample
+from impactcell.physics.ends import after_end, before_contact, finish, last_sample, rests
 from impactcell.physics.events import first_event, margin, next_kink, state_at
-from impactcell.physics.phases import begin, enter_interval, note_breakaway, pass_event, prepare, touch
+from impactcell.physics.phases import (
+    begin,
+    clear,
+    enter_first_interval,
+    enter_interval,
+    note_breakaway,
+    pass_event,
+    prepare,
+    touch,
+)
 from impactcell.physics.runge_kutta import EXTENDED, STAGES, error, interpolant, stages
-from impactcell.physics.sensing import POWERS, find_peak, force_polynomial, lagged, take_samples
+from impactcell.physics.sensing import POWERS, record
 from impactcell.records import Samples
 
 MOST_EVENTS = 20_000
 MOST_STEPS = 20_000_000
 LONGEST_STEP_S = 0.02
-ELASTIC_PERIODS = 3.0
 WORK = (12 + EXTENDED) * at.WIDTH + at.MEMOS + 2 * POWERS
 
 
@@ -88,51 +96,27 @@ def follow(
     found = offset(work, (11 + EXTENDED) * at.WIDTH + at.MEMOS + 2 * POWERS)
     for i in range(WORK):
         work[i] = 0.0
-    for i in range(at.MODES):
-        mode[i] = 0
-    mode[at.STATES] = n
-    for i in range(at.FIGURES):
-        figures[i] = np.nan
-    figures[at.PEAK_FORCE] = -np.inf
-    figures[at.EVENT_COUNT] = 0.0
-    figures[at.STATUS] = at.STILL_MOVING
-    t = 0.0
-    prepare(t if drives < 2 else drive[0], memo, row, program)
+    clear(n, mode, figures)
+    t = 0.0 if drives < 2 else drive[0]
+    prepare(t, memo, row, program)
     if drives > 1:
-        t = drive[0]
-        first = 0
-        while first + 2 < drives and drive[first + 1] - memo[at.DELAY_S] <= t:
-            first += 1
-        enter_interval(first, drive, drives, mode, memo, row, program)
+        enter_first_interval(t, drive, drives, mode, memo, row, program)
     begin(t, z, mode, memo, row, program)
     if (mode[at.SLIP] == 1 or mode[at.SLIP] == -1) and z[at.SPEED_OF_PART] == 0.0:
         note_breakaway(t, figures, cursor, event_kinds, event_times)
     before_contact(t, row, program, z, memo, cursor, times, out)
     last = horizon
     if goal == at.TO_LAST_SAMPLE:
-        last = min(last_sample(memo, cursor, times) + 1e-9, horizon)
+        last = last_sample(memo, cursor, times) + 1e-9
+        if drives < 2:
+            last = min(last, horizon)
     h = memo[at.NATURAL_STEP_S]
     fresh = True
     steps = 0
-    resting_from = np.inf
+    most_events = MOST_EVENTS + 10 * drives
     while t < last:
-        if mode[at.RUNNING] == 0 and drives < 2:
-            if mode[at.SLIP] == 0:
-                figures[at.STATUS] = at.AT_REST
-                break
-            if mode[at.SLIP] == at.ELASTIC:
-                if resting_from == np.inf:
-                    resting_from = t
-                stages(0, 1, t, h, z, mode, memo, row, program, K, scratch)
-                period = 2.0 * np.pi * math.sqrt(row[at.MASS] / memo[at.STICK_STIFFNESS])
-                still = K[at.SPEED_OF_PART] == 0.0 and z[at.SPEED_OF_PART] == 0.0
-                if still or t >= resting_from + ELASTIC_PERIODS * period:
-                    figures[at.STATUS] = at.AT_REST
-                    if still or all_taken(cursor):
-                        break
-            else:
-                resting_from = np.inf
-                figures[at.STATUS] = at.STILL_MOVING
+        if mode[at.RUNNING] == 0 and drives < 2 and rests(t, z, mode, memo, row, program, cursor, figures, K):
+            break
         limit = min(last, memo[at.NEXT_KINK_S])
         if drives > 1:
             limit = min(limit, drive[mode[at.INTERVAL] + 1] - memo[at.DELAY_S])
@@ -144,7 +128,7 @@ def follow(
         err = error(n, step, z, new, K)
         fresh = False
         steps += 1
-        if steps > MOST_STEPS or figures[at.EVENT_COUNT] > MOST_EVENTS:
+        if steps > MOST_STEPS or figures[at.EVENT_COUNT] > most_events:
             figures[at.STATUS] = at.TOO_MANY_EVENTS
             break
         if not math.isfinite(err):
@@ -168,15 +152,22 @@ def follow(
             else:
                 step = 0.0
         if step > 0.0:
-            before = memo[at.LAGGED_FORCE]
-            if memo[at.LAG_S] > 0.0:
-                force_polynomial(t, step, dense, scratch, mode, row, program, powers)
-            find_peak(t, step, dense, scratch, mode, memo, row, program, before, powers, moments, figures)
-            take_samples(
-                t, step, dense, scratch, mode, memo, row, program, before, powers, moments, cursor, times, out
+            record(
+                t,
+                step,
+                dense,
+                scratch,
+                mode,
+                memo,
+                row,
+                program,
+                powers,
+                moments,
+                cursor,
+                times,
+                out,
+                figures,
             )
-            if memo[at.LAG_S] > 0.0:
-                memo[at.LAGGED_FORCE] = lagged(1.0, before, memo[at.LAG_S] / step, powers, moments)
             for i in range(n):
                 z[i] = new[i]
                 K[i] = K[STAGES * at.WIDTH + i]

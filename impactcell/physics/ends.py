@@ -6,7 +6,9 @@ import numpy as np
 
 from impactcell.compiled import Integers, Numbers, compiled
 from impactcell.physics import layout as at
-from impactcell.physics.forces import actuator_speed, body_force, contact_force, reading
+from impactcell.physics.forces import actuator_speed, body_force, contact_force, derivative, reading
+
+ELASTIC_PERIODS = 3.0
 
 
 @compiled
@@ -89,6 +91,40 @@ def after_end(
             value = sign * z[at.U if channel == at.POSITION else at.TRAVEL]
         for i in range(cursor[channel], cursor[at.CHANNELS + channel]):
             out[i] = value
+
+
+@compiled
+def rests(
+    t: float,
+    z: Numbers,
+    mode: Integers,
+    memo: Numbers,
+    row: Numbers,
+    program: Integers,
+    cursor: Integers,
+    figures: Numbers,
+    K: Numbers,
+) -> bool:
+    """Whether a part that nothing drives any more has come to rest and all is known of it.
+
+    In elastic stick without a force it rests. Under a force it would ring for ever: it counts as at rest
+    when it has not broken away for some periods, and is followed on only for samples.
+    """
+    if mode[at.SLIP] == 0:
+        figures[at.STATUS] = at.AT_REST
+        return True
+    if mode[at.SLIP] != at.ELASTIC:
+        memo[at.RESTING_FROM_S] = np.inf
+        figures[at.STATUS] = at.STILL_MOVING
+        return False
+    memo[at.RESTING_FROM_S] = min(memo[at.RESTING_FROM_S], t)
+    derivative(t, z, mode, memo, row, program, K, 0)
+    still = K[at.SPEED_OF_PART] == 0.0 and z[at.SPEED_OF_PART] == 0.0
+    period = 2.0 * np.pi * math.sqrt(row[at.MASS] / memo[at.STICK_STIFFNESS])
+    if still or t >= memo[at.RESTING_FROM_S] + ELASTIC_PERIODS * period:
+        figures[at.STATUS] = at.AT_REST
+        return still or all_taken(cursor)
+    return False
 
 
 @compiled

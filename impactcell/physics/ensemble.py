@@ -1,6 +1,5 @@
 """Many taps at once: arrays of parameters in, samples and figures out, without objects for each tap."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,9 +8,8 @@ import numpy as np
 from impactcell.errors import PhysicsError
 from impactcell.physics import layout as at
 from impactcell.physics.course import integrate_all
-from impactcell.physics.effects import LIBRARY
 from impactcell.physics.plant import Plant, Strike
-from impactcell.physics.program import assemble, columns, parameter_vector
+from impactcell.physics.program import assemble, columns, parameter_range, parameter_vector
 from impactcell.records import Samples
 
 LONGEST_S = 600.0
@@ -295,15 +293,3 @@ def figures_of(rows: Samples, laws: at.Whole, horizon_s: float = LONGEST_S) -> F
         stop_s=table[:, at.STOP_TIME],
         at_rest=table[:, at.STATUS] == at.AT_REST,
     )
-
-
-def parameter_range(name: str) -> tuple[float, float, float]:
-    """Lower and upper end of a parameter's range, and its typical magnitude, by its name in `names`."""
-    if "." not in name:
-        typical = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.2, "mu_k": 0.15}[name]
-        return 0.0, math.inf, typical
-    identifier, rest = name.split(".", 1)
-    for parameter in LIBRARY[identifier].parameters:
-        if parameter.name == rest.partition("[")[0]:
-            return parameter.lower, parameter.upper, parameter.typical
-    raise PhysicsError(f"no parameter is called {name}")

@@ -70,7 +70,8 @@ NATURAL_STEP_S: Final = 7
 DRIVE: Final = 8  # driving force at DRIVE_TIME, and its slope
 DRIVE_SLOPE: Final = 9
 DRIVE_TIME: Final = 10
-MEMOS: Final = 11
+RESTING_FROM_S: Final = 11  # when elastic stick began to ring, inf while it does not
+MEMOS: Final = 12
 
 # state: u along the tap from the start, its speed, travel of the actuator, states of the effects
 U: Final = 0

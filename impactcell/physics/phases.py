@@ -23,6 +23,19 @@ def first_law(kind: int, missing: float, row: Numbers, program: Integers) -> flo
 
 
 @compiled
+def clear(states: int, mode: Integers, figures: Numbers) -> None:
+    """Forget the tap before."""
+    for i in range(at.MODES):
+        mode[i] = 0
+    mode[at.STATES] = states
+    for i in range(at.FIGURES):
+        figures[i] = np.nan
+    figures[at.PEAK_FORCE] = -np.inf
+    figures[at.EVENT_COUNT] = 0.0
+    figures[at.STATUS] = at.STILL_MOVING
+
+
+@compiled
 def prepare(t: float, memo: Numbers, row: Numbers, program: Integers) -> None:
     """Read the laws that are plain numbers, once for the whole tap."""
     stick = first_law(at.STICK, np.inf, row, program)
@@ -31,6 +44,7 @@ def prepare(t: float, memo: Numbers, row: Numbers, program: Integers) -> None:
     memo[at.LAG_S] = first_law(at.LAG, 0.0, row, program)
     memo[at.DELAY_S] = first_law(at.DELAY, 0.0, row, program)
     memo[at.NEXT_KINK_S] = next_kink(t, row, program)
+    memo[at.RESTING_FROM_S] = np.inf
     memo[at.NATURAL_STEP_S] = 0.2 * math.sqrt(row[at.MASS] / row[at.STIFFNESS])
 
 
@@ -82,6 +96,17 @@ def enter_interval(
     memo[at.DRIVE_TIME] = drive[i] - memo[at.DELAY_S]
     memo[at.DRIVE] = first + memo[at.LAG_S] * slope
     memo[at.DRIVE_SLOPE] = slope
+
+
+@compiled
+def enter_first_interval(
+    t: float, drive: Numbers, drives: int, mode: Integers, memo: Numbers, row: Numbers, program: Integers
+) -> None:
+    """Take up the driving force where it acts at time t, its delay undone."""
+    first = 0
+    while first + 2 < drives and drive[first + 1] - memo[at.DELAY_S] <= t:
+        first += 1
+    enter_interval(first, drive, drives, mode, memo, row, program)
 
 
 @compiled

@@ -188,3 +188,15 @@ def columns(taps: Sequence[Strike]) -> dict[str, Samples]:
     }
     made["initial_speed_m_s"] = np.full(len(taps), np.nan)
     return made
+
+
+def parameter_range(name: str) -> tuple[float, float, float]:
+    """Lower and upper end of a parameter's range, and its typical magnitude, by its name in `names`."""
+    if "." not in name:
+        typical = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.2, "mu_k": 0.15}[name]
+        return 0.0, math.inf, typical
+    identifier, rest = name.split(".", 1)
+    for parameter in LIBRARY[identifier].parameters:
+        if parameter.name == rest.partition("[")[0]:
+            return parameter.lower, parameter.upper, parameter.typical
+    raise PhysicsError(f"no parameter is called {name}")

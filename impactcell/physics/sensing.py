@@ -220,3 +220,30 @@ def take_samples(
         out[i] = sign * evaluate((times[i] - t) / h, dense, at.SPEED_OF_PART)
         i += 1
     cursor[at.PART_VELOCITY] = i
+
+
+@compiled
+def record(
+    t: float,
+    h: float,
+    dense: Numbers,
+    z: Numbers,
+    mode: Integers,
+    memo: Numbers,
+    row: Numbers,
+    program: Integers,
+    powers: Numbers,
+    moments: Numbers,
+    cursor: Integers,
+    times: Numbers,
+    out: Numbers,
+    figures: Numbers,
+) -> None:
+    """Take the peak force and the samples of an accepted step, and carry the sensor's lag over it."""
+    before = memo[at.LAGGED_FORCE]
+    if memo[at.LAG_S] > 0.0:
+        force_polynomial(t, h, dense, z, mode, row, program, powers)
+    find_peak(t, h, dense, z, mode, memo, row, program, before, powers, moments, figures)
+    take_samples(t, h, dense, z, mode, memo, row, program, before, powers, moments, cursor, times, out)
+    if memo[at.LAG_S] > 0.0:
+        memo[at.LAGGED_FORCE] = lagged(1.0, before, memo[at.LAG_S] / h, powers, moments)
