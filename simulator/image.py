@@ -46,7 +46,7 @@ class Image:
         """Put a cycle into the ring, counting the one that has to leave for it; returns its number."""
         counter = int(self.get("cycle_counter"))
         ring = np.atleast_1d(self.get("ring_cycle"))
-        leaving = int(ring[(counter % LAST_CYCLE + 1) % len(ring)])
+        leaving = int(ring[self._image.next_slot])
         acknowledged = int(self.get("acknowledged_cycle"))
         if leaving and (counter - leaving) % LAST_CYCLE < (counter - acknowledged) % LAST_CYCLE:
             self._overwritten += 1

@@ -8,9 +8,9 @@ the link does: that is said in `Module.status` and in the `faults` of a `Recepti
 import asyncio
 import logging
 from collections.abc import AsyncGenerator, Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceError
 from impactcell.fieldbus import decoding
@@ -20,69 +20,17 @@ from impactcell.fieldbus.decoding import ModuleReport
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.mapped import MappedDevice
 from impactcell.fieldbus.polling import PollSchedule
+from impactcell.fieldbus.reception import ModuleStatus, Reception
 from impactcell.fieldbus.registers import RegisterMap, Value
 from impactcell.fieldbus.ring import Mark, distance, next_wanted
 from impactcell.fieldbus.transport import ModbusClient
-from impactcell.records import Capture
+
+__all__ = ["Module", "ModuleStatus", "Reception"]
 
 log = logging.getLogger(__name__)
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reception:
-    """One cycle as received.
-
-    Attributes
-    ----------
-    capture : Capture
-        In SI; without channels where they could not be read.
-    mark : Mark
-        Session and cycle: what to acknowledge once it is durable, and where to go on after a restart.
-    missed : int
-        Cycles right before it that the ring no longer had.
-    restarted : bool
-        Whether the module was started anew since the last one.
-    faults : tuple of str
-        What is wrong with it; each names cell, cycle and register.
-    """
-
-    capture: Capture
-    mark: Mark
-    missed: int = 0
-    restarted: bool = False
-    faults: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class ModuleStatus:
-    """State of the link and what has come over it since the start of the service.
-
-    Attributes
-    ----------
-    connected : bool
-        Whether the right module answers.
-    reason : str
-        Why it does not.
-    round_trip_s : float
-        Of the last request; nan before the first.
-    received, missed, unreadable : int
-        Cycles received (unreadable ones among them), gone from the ring before they could be read, and
-        received without content.
-    discarded : int
-        Readings thrown away because the capture changed meanwhile or its CRC did not fit.
-    restarts, reconnects : int
-        Starts of the module seen; connections made after the first.
-    """
-
-    connected: bool = False
-    reason: str = "not connected yet"
-    round_trip_s: float = float("nan")
-    received: int = 0
-    missed: int = 0
-    unreadable: int = 0
-    discarded: int = 0
-    restarts: int = 0
-    reconnects: int = 0
+_NOT_THIS_DEVICE: Final = (1, 2, 3, 10, 11)
+"""Exceptions that say that there are no such registers, or nobody with this device id behind a gateway."""
 
 
 class Module:
@@ -150,7 +98,7 @@ class Module:
         """Close the connection."""
         self._ready.clear()
         await self._client.close()
-        self._say(connected=False, reason="closed")
+        self._say(connected=False, reason=f"{self.cell}: connection closed", level=logging.INFO)
 
     async def wait_connected(self) -> None:
         """Wait until the right module answers; `captures` must be running meanwhile."""
@@ -230,6 +178,8 @@ class Module:
         try:
             values = await self.device.values(pinned)
         except ModbusExceptionError as error:
+            if error.code not in _NOT_THIS_DEVICE:
+                raise
             raise WrongDeviceError(
                 f"{self.cell}: {error}; this is not a module of map {self.registers.name}, "
                 f"or device_id {self.link.device_id} is wrong"
@@ -270,7 +220,7 @@ class Module:
         reason = str(error) if str(error).startswith(self.cell) else f"{self.cell}: {error}"
         self._say(connected=False, reason=reason)
 
-    def _say(self, *, connected: bool, reason: str) -> None:
+    def _say(self, *, connected: bool, reason: str, level: int = logging.WARNING) -> None:
         before = self._status
         self._status = replace(before, connected=connected, reason=reason)
         if (before.connected, before.reason) == (connected, reason):
@@ -278,7 +228,7 @@ class Module:
         if connected:
             log.info("%s: connected to %s", self.cell, self.link)
         else:
-            log.warning("%s", reason)
+            log.log(level, "%s", reason)
         if self._on_change is not None:
             self._on_change(self.status)
 

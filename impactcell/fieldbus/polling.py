@@ -3,7 +3,9 @@
 from typing import Final
 
 FINE_S: Final = 0.003
-"""Between polls while a cycle is due."""
+"""Between polls while a cycle is due to the millisecond."""
+COARSE_S: Final = 0.008
+"""The same, where it is not known so well."""
 QUIET_S: Final = 0.015
 """Between polls before it is due: what an early cycle may have to wait."""
 REGULAR_S: Final = 0.05
@@ -35,7 +37,8 @@ class PollSchedule:
 
     def delay_s(self, now_s: float, round_trip_s: float) -> float:
         """Return the wait before the next poll; at least three round trips, so that a slow line has rest."""
-        least_s = max(FINE_S, 3.0 * round_trip_s if round_trip_s == round_trip_s else 0.0)
+        fine_s = min(max(FINE_S, self._spread_s), COARSE_S)
+        least_s = max(fine_s, 3.0 * round_trip_s if round_trip_s == round_trip_s else 0.0)
         if self._last_s is None or self._period_s is None:
             return max(least_s, QUIET_S)
         age_s = now_s - self._last_s

@@ -79,4 +79,6 @@ def next_wanted(
     age = held[min(skip, len(held) - 1)]
     slot = ages[age]
     missed = 0 if last is None else max(0, behind - age - 1)
+    if restarted and missed > PERIOD // 2:
+        missed = 0  # no module makes so many cycles between two polls: its counter was set
     return Want(Mark(session, ring[slot]), slot, missed, restarted)

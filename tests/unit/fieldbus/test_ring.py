@@ -90,6 +90,13 @@ def test_a_counter_that_goes_back_is_a_restart_even_in_the_same_session() -> Non
     assert (want.mark, want.restarted) == (Mark(1, 1), True)
 
 
+def test_a_counter_that_was_set_close_to_its_wrap_misses_nothing() -> None:
+    newest = PERIOD - 1
+    want = next_wanted(Mark(1, 5), 1, newest, ring_of(newest, newest))
+    assert want is not None
+    assert (want.mark.cycle, want.missed, want.restarted) == (newest, 0, True)
+
+
 def test_a_cycle_beyond_the_counter_is_not_taken_yet() -> None:
     ring = ring_of(21, 1)
     want = next_wanted(Mark(1, 19), 1, 20, ring)
