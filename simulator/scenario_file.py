@@ -18,6 +18,9 @@ class ScenarioModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
+MOST_VALUES = 100_000
+"""A file of nested aliases can describe more than memory holds; no honest one comes near this."""
+
 M = TypeVar("M", bound=ScenarioModel)
 
 
@@ -68,6 +71,23 @@ def read_yaml(file: Path) -> tuple[Any, dict[KeyPath, tuple[int, int]]]:
     except UnicodeDecodeError:
         message = f"{file}: is not UTF-8 text"
         raise SettingsError(message) from None
+    try:
+        return _parsed(file, text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = "" if mark is None else f"{mark.line + 1}:{mark.column + 1}:"
+        message = f"{file}:{where} is not YAML: {getattr(error, 'problem', None) or error}"
+        raise SettingsError(message) from None
+    except RecursionError:
+        message = f"{file}: is nested too deeply"
+        raise SettingsError(message) from None
+    except ValueError as error:
+        # A scalar whose explicit tag it does not fit, such as `!!int x`.
+        message = f"{file}: is not YAML: {error}"
+        raise SettingsError(message) from None
+
+
+def _parsed(file: Path, text: str) -> tuple[Any, dict[KeyPath, tuple[int, int]]]:
     places: dict[KeyPath, tuple[int, int]] = {}
     loader = _Loader(text)
     try:
@@ -79,14 +99,6 @@ def read_yaml(file: Path) -> tuple[Any, dict[KeyPath, tuple[int, int]]]:
         if twice:
             raise SettingsError("\n".join(f"{file}:{line}:{column}: {text}" for line, column, text in twice))
         return loader.construct_document(node), places
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = "" if mark is None else f"{mark.line + 1}:{mark.column + 1}:"
-        message = f"{file}:{where} is not YAML: {getattr(error, 'problem', None) or error}"
-        raise SettingsError(message) from None
-    except RecursionError:
-        message = f"{file}: is nested too deeply"
-        raise SettingsError(message) from None
     finally:
         loader.dispose()
 
@@ -94,8 +106,9 @@ def read_yaml(file: Path) -> tuple[Any, dict[KeyPath, tuple[int, int]]]:
 def _place(
     node: yaml.Node, path: KeyPath, places: dict[KeyPath, tuple[int, int]]
 ) -> list[tuple[int, int, str]]:
-    if path in places:
-        return []
+    if len(places) > MOST_VALUES:
+        message = f"has more than {MOST_VALUES} values"
+        raise ValueError(message)
     places[path] = (node.start_mark.line + 1, node.start_mark.column + 1)
     faults = []
     if isinstance(node, yaml.MappingNode):
@@ -117,7 +130,7 @@ def _place(
 def _told(file: Path, places: dict[KeyPath, tuple[int, int]], fault: Any) -> str:
     path: KeyPath = fault["loc"]
     known = path
-    while known not in places:
+    while known and known not in places:
         known = known[:-1]
     line, column = places[known]
     name = ".".join(str(part) for part in path) or "scenario"

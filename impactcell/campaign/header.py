@@ -35,6 +35,9 @@ def read_header(file: Path, faults: Faults) -> Header | None:
         line = None if mark is None else mark.line + 1
         faults.add(file, line, f"is not YAML: {getattr(error, 'problem', None) or error}")
         return None
+    except RecursionError:
+        faults.add(file, None, "is nested too deeply")
+        return None
     noted = len(faults)
     reader = _Reader(file, faults)
     top = reader.mapping(

@@ -112,6 +112,7 @@ def test_start_position_and_covariates_are_kept(tmp_path: Path) -> None:
         ("format: 1\nexcitation: tap\nsensors:\n  force: {noise_std_n: 0}\n", 4, "positive number"),
         ("format: 1\nexcitation: tap\nformat: 1\n", 3, "appears twice"),
         ("format: [1\n", 2, "is not YAML"),
+        ("[" * 5000, None, "is nested too deeply"),
         ("- 1\n", 1, "block of `key: value`"),
         ("", None, "block of `key: value`"),
     ],

@@ -1,5 +1,6 @@
 """Scenario files, and the simulator as a process of its own."""
 
+import itertools
 import json
 import os
 import signal
@@ -9,6 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from impactcell.errors import SettingsError
 from simulator.__main__ import main
@@ -56,6 +59,40 @@ def test_faults_of_a_scenario(tmp_path: Path, text: str, place: str, message: st
         read_scenario(file)
     assert str(caught.value).startswith(f"{file}:{place}:")
     assert message in str(caught.value)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    text=st.one_of(
+        st.text(max_size=60),
+        st.text(alphabet="format: 1{}[]&*!<>|\n\t-ae.", max_size=60).map(lambda text: GOOD + text),
+    )
+)
+def test_any_scenario_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    file = tmp_path_factory.mktemp("fuzz") / "s.yaml"
+    file.write_text(text, encoding="utf-8", errors="ignore")
+    try:
+        read_scenario(file)
+    except SettingsError as error:
+        message = str(error)
+    else:
+        return
+    assert str(file) in message
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a: !!int x\n", "[" * 5000, "a: &a [*a]\n", "1: 2\n", "? [1]\n: 2\n", "a: &a [1,1,1,1,1,1,1,1,1]\n"],
+)
+def test_odd_yaml_is_refused(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "s.yaml"
+    if "1,1" in text:
+        text += "".join(
+            f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in itertools.pairwise("abcdefghi")
+        )
+    file.write_text(text)
+    with pytest.raises(SettingsError, match=r"s\.yaml:"):
+        read_scenario(file)
 
 
 def test_all_faults_of_a_scenario_at_once(tmp_path: Path) -> None:
