@@ -126,7 +126,18 @@ class Motion:
         ]
         if not looks:
             return 0.0
-        best, time, piece = max(looks, key=lambda look: look[0])
+        _, _, best = max(looks, key=lambda look: look[0])
+        # The peak may lie a little beyond the end of the piece with the best look: its neighbours count too.
+        return max(
+            self._refined(piece)
+            for piece in self._path.pieces
+            if piece.phase.contact is Contact.TOUCHING
+            and piece.start_s <= best.stop_s
+            and piece.stop_s >= best.start_s
+        )
+
+    def _refined(self, piece: Piece) -> float:
+        time, best = max(self._looks(piece, piece.start_s, piece.stop_s), key=lambda look: look[1])
         spacing = (piece.stop_s - piece.start_s) / 8.0
         for _ in range(REFINEMENTS):
             # The best of nine looks lies within one spacing of the peak: look closer around it.
