@@ -118,7 +118,8 @@ class _Show:
         while True:
             news.clear()
             try:
-                async with asyncio.timeout(PATIENCE_S):
+                # Without an end, silence is part of the show: a positioning cell waits for its next part.
+                async with asyncio.timeout(None if self.cycles is None else PATIENCE_S):
                     await news.wait()
             except TimeoutError:
                 stop.set()

@@ -1,79 +1,17 @@
 """What a module can do to a cell: a clear message, a matching quality, and the next good cycle is used."""
 
-import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from impactcell.records import AlarmName, Quality, Snapshot
-from impactcell.service import Service
-from impactcell.settings import read_cells
+from impactcell.records import AlarmName, Quality
 from tests.integration.processes import CONFIG, simulator, write_cell
+from tests.integration.watched import serving
 
 pytestmark = pytest.mark.timeout(240)
-
-
-@dataclass
-class Watched:
-    """A service in this process, with the snapshots of its cells."""
-
-    service: Service
-    snapshots: dict[str, list[Snapshot]] = field(default_factory=dict)
-    news: asyncio.Condition = field(default_factory=asyncio.Condition)
-
-    async def until(self, cell: str, cycles: int, timeout_s: float = 120.0) -> list[Snapshot]:
-        """Wait until a cell has shown so many cycles."""
-        async with asyncio.timeout(timeout_s), self.news:
-            await self.news.wait_for(lambda: len(self.snapshots.get(cell, [])) >= cycles)
-        return self.snapshots[cell]
-
-    async def alarm(self, cell: str, name: AlarmName, *, active: bool, timeout_s: float = 60.0) -> str:
-        """Wait until an alarm is active, or not; its message."""
-        async with asyncio.timeout(timeout_s):
-            while True:
-                alarm = next(a for a in self.service.running[cell].worker.alarms if a.name is name)
-                if alarm.active is active:
-                    return alarm.message
-                async with self.news:
-                    with contextlib.suppress(TimeoutError):
-                        await asyncio.wait_for(self.news.wait(), 0.02)
-
-
-@contextlib.asynccontextmanager
-async def serving(*paths: Path) -> AsyncIterator[Watched]:
-    """Run the service over cell files."""
-    stop = asyncio.Event()
-    tasks: set[asyncio.Task[None]] = set()
-
-    def observe(cell: str, snapshot: Snapshot) -> None:
-        watched.snapshots.setdefault(cell, []).append(snapshot)
-
-        async def tell() -> None:
-            async with watched.news:
-                watched.news.notify_all()
-
-        task = asyncio.create_task(tell())
-        tasks.add(task)
-        task.add_done_callback(tasks.discard)
-
-    watched = Watched(Service(read_cells(paths), observe))
-    started = asyncio.Event()
-    running = asyncio.create_task(watched.service.run(stop, started.set))
-    try:
-        waiter = asyncio.create_task(started.wait())
-        await asyncio.wait({running, waiter}, return_when=asyncio.FIRST_COMPLETED)
-        waiter.cancel()
-        yield watched
-    finally:
-        stop.set()
-        await running
-        if tasks:
-            await asyncio.wait(tasks)
 
 
 KINDS = ["empty", "constant_force", "saturated", "no_separation", "not_a_number", "no_force"]
