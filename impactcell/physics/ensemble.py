@@ -116,7 +116,7 @@ class Ensemble:
             begin = total
             for i in range(len(taps)):
                 times = NONE if given is None else np.asarray(given[i], dtype=np.float64)
-                if times.size and not (np.diff(times) >= 0.0).all():
+                if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
                     raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
                 pieces.append(times)
                 self._cursors[i, channel] = total

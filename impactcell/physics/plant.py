@@ -85,5 +85,7 @@ class Strike:
                 raise PhysicsError(f"tap: {name} must be positive, not {getattr(self, name)}")
         if not self.stroke_m > 0.0:
             raise PhysicsError(f"tap: stroke_m must be positive, not {self.stroke_m}")
+        if not math.isfinite(self.start_m):
+            raise PhysicsError(f"tap: start_m must be a number, not {self.start_m}")
         if self.direction not in {1, -1}:
             raise PhysicsError(f"tap: direction must be 1 or -1, not {self.direction}")

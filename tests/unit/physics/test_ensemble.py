@@ -161,7 +161,7 @@ def test_bad_questions_are_refused() -> None:
     with pytest.raises(PhysicsError, match="must ascend"):
         Ensemble(TAPS[:1], force_time_s=[np.array([1.0, 0.5])])
     with pytest.raises(PhysicsError, match="must ascend"):
-        Ensemble(TAPS[:1], force_time_s=[np.array([0.0, np.nan])])
+        Ensemble(TAPS[:1], force_time_s=[np.array([np.nan])])
     with pytest.raises(PhysicsError, match="named twice"):
         Ensemble(TAPS, ["surface_tilt", "surface_tilt"])
     with pytest.raises(PhysicsError, match="made without surface_tilt"):

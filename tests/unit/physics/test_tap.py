@@ -199,6 +199,7 @@ def test_an_impossible_plant_is_refused(plant: dict[str, float], message: str) -
         ({"mass_kg": math.nan}, "mass_kg must be positive"),
         ({"stroke_m": -1.0}, "stroke_m must be positive"),
         ({"direction": 0}, "direction must be 1 or -1"),
+        ({"start_m": math.nan}, "start_m must be a number"),
     ],
 )
 def test_an_impossible_tap_is_refused(tap: dict[str, float], message: str) -> None:
