@@ -42,7 +42,7 @@ def shortlist(
         bound = what[kept - 1]
         for j in range(strokes):
             centre = table[i, j, middle]
-            if math.isnan(centre) or centre <= 0.0:
+            if centre <= 0.0 or math.isnan(table[i, j].sum()):
                 continue
             if centre <= remaining + 2.0 * tolerance:
                 c, _ = expect(
@@ -54,7 +54,7 @@ def shortlist(
             if j + 1 < strokes:
                 following = table[i, j + 1, middle]
                 low, high = min(centre, following), max(centre, following)
-                if math.isnan(following) or low <= 0.0 or low == high:
+                if math.isnan(table[i, j + 1].sum()) or low <= 0.0 or low == high:
                     continue
                 if low > remaining or high < remaining - 3.0 * tolerance:
                     continue

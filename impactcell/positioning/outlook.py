@@ -99,6 +99,8 @@ def look_ahead(bounds: Bounds, belief: Belief, part: Samples, caution: float) ->
         later = foreseen(belief)
         will_learn = (np.diag(belief.cov) > 1.2 * np.diag(later.cov)).any()
         ahead = _table(bounds, later, part) if will_learn else table
+        if math.isinf(bounds.max_stroke_m):
+            ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
         value = cost_to_go(ahead, COARSE_Z, bounds.tolerance_m, bounds.penalty(caution))
     return Outlook(part, caution, belief, table, value)
 

@@ -23,6 +23,7 @@ from impactcell.positioning.value import AIMS
 from impactcell.records import Quality, Samples, Signature
 
 CAUTION = (1.0, 20.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
+BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
 REMEMBERED = 64  # outlooks
 
 
@@ -153,17 +154,17 @@ class TapPlanner:
                 f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
                 f"(the safest with {least:.2g})"
             )
-        moved = np.empty((1, Z.size))
+        moved = np.empty((1, BAND_Z.size))
         stroke = np.array([chosen.stroke_m])
-        distribution(chosen.velocity_m_s, stroke, rows, Z, part, moved)
-        inside = moved[0, np.abs(Z) <= 3.3]
+        band = scenarios(self._belief, BAND_Z)
+        distribution(chosen.velocity_m_s, stroke, band, BAND_Z, part, moved)
         return Tap(
             velocity_m_s=chosen.velocity_m_s,
             stroke_m=chosen.stroke_m,
             direction=1 if remaining_m > 0.0 else -1,
-            expected_m=float(moved[0, Z.size // 2]),
-            lowest_m=float(inside.min()),
-            highest_m=float(inside.max()),
+            expected_m=float(moved[0, BAND_Z.size // 2]),
+            lowest_m=float(moved.min()),
+            highest_m=float(moved.max()),
             expected_taps=chosen.cost,
             overshoot_probability=chosen.overshoot,
         )

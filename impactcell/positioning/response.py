@@ -114,7 +114,7 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
         Mass and gravity; then, where friction varies along the slide, a step of distance and what is slid
         instead of 0, 1, 2, ... such steps.
     out : ndarray, shape (n,)
-        nan where the course has more than `MAX_PHASES` phases.
+        nan where contact is never lost and the stroke is infinite, or after `MAX_PHASES` rests.
     """
     count = strokes.size
     k, b, mu_s, mu_k, viscous = plant
@@ -178,6 +178,11 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
                             break
                         s = new
                     separates = s
+                else:  # the swing only fades from here: contact is never lost
+                    while count > j and math.isinf(strokes[count - 1]):
+                        count -= 1
+                    if j == count:
+                        return
             step = min(ends, stops, separates)
             f = (r + z * e) / wd
             while j < count and strokes[j] <= v * (t + step):

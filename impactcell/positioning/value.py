@@ -132,7 +132,7 @@ def taps_by_displacement(table: Samples, targets: Samples, z: Samples) -> Sample
     for i in range(table.shape[0]):
         for j in range(table.shape[1] - 1):
             a, b = table[i, j, middle], table[i, j + 1, middle]
-            if not (a <= 0.0 or b <= 0.0 or math.isnan(a) or math.isnan(b)) and a != b:
+            if a > 0.0 and b > 0.0 and a != b and not math.isnan(table[i, j].sum() + table[i, j + 1].sum()):
                 n = np.searchsorted(targets, min(a, b))
                 while n < targets.size and targets[n] <= max(a, b):
                     part = (targets[n] - a) / (b - a)

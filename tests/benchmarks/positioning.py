@@ -148,7 +148,8 @@ def beside_rivals(kinds: dict[str, Sequence[Outcome]], cells: int) -> Table:
         ["mass", "planner", "taps for each part delivered", "overshot", "95 % interval"],
         table,
         "fixed: the same planner kept to the nominal plant; proportional: 0.7 of what remains, by the "
-        f"nominal plant, strikes above 1.5 mm and pushes below. {cells} cells of 100 tasks; at most 100 taps a task.",
+        f"nominal plant, strikes above 1.5 mm and pushes below. {cells} cells of 100 tasks; "
+        "at most 100 taps a task.",
     )
 
 

@@ -25,7 +25,8 @@ def drawn(count: int, seed: int) -> np.ndarray:
     return np.column_stack(
         [
             spread(4e5, 1.1e6), spread(100.0, 900.0), mu_s, mu_s * rng.uniform(0.6, 1.0, count),
-            rng.choice([0.0, 0.5, 10.0, 85.0], count), spread(3.0, 60.0), spread(0.004, 0.15), spread(1e-5, 3e-3),
+            rng.choice([0.0, 0.5, 10.0, 85.0], count), spread(3.0, 60.0), spread(0.004, 0.15),
+            spread(1e-5, 3e-3),
         ]
     )  # fmt: skip
 

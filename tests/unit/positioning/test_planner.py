@@ -1,0 +1,190 @@
+"""The planner in closed loop with the simulator's plant, and what it refuses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from impactcell.errors import PositioningError
+from impactcell.physics import Plant
+from impactcell.positioning import Tap, TapPlanner, Unreachable
+from simulator.plant_nominal import nominal_taps
+
+NOMINAL = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.2, mu_k=0.152)
+
+
+def deliver(
+    planner: TapPlanner, plant: Plant, mass: float, remaining: float, rng: np.random.Generator, most: int = 40
+) -> tuple[list[Tap], float, Tap | Unreachable | None]:
+    """Taps made, what remains, and the planner's last word."""
+    taps: list[Tap] = []
+    while len(taps) < most:
+        answer = planner.next_tap(remaining, mass)
+        if not isinstance(answer, Tap):
+            return taps, remaining, answer
+        factor = 1.0 + 0.03 * rng.standard_normal()
+        halts = math.isinf(answer.stroke_m)
+        moved = nominal_taps(
+            plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s * factor, plant.mu_k * factor, mass,
+            answer.velocity_m_s, answer.stroke_m, halts_at_separation=halts,
+        ).displacement_m[0]  # fmt: skip
+        planner.observe(answer, float(moved), mass)
+        remaining -= answer.direction * float(moved)
+        taps.append(answer)
+    return taps, remaining, None
+
+
+@pytest.mark.parametrize("tolerance_m", [10e-6, 50e-6])
+def test_cells_off_by_a_tenth_end_inside_and_never_beyond(tolerance_m: float) -> None:
+    rng = np.random.default_rng(11)
+    counts = []
+    for stiffness, damping, mu_s in ((0.9, 1.1, 0.13), (1.1, 0.9, 0.29)):
+        plant = Plant(6.5e5 * stiffness, 465.0 * damping, mu_s, 0.76 * mu_s)
+        planner = TapPlanner(tolerance_m=tolerance_m, plant=NOMINAL)
+        for _ in range(20):
+            mass, distance = math.exp(rng.uniform(math.log(5.0), math.log(40.0))), rng.uniform(2e-3, 40e-3)
+            taps, remaining, last = deliver(planner, plant, mass, distance, rng)
+            assert last is None
+            assert abs(remaining) <= tolerance_m
+            counts.append(len(taps))
+        belief = planner.belief
+        std = np.sqrt(np.diag(belief.cov))
+        truth = np.log([plant.mu_k, plant.stiffness_n_per_m, plant.damping_n_s_per_m])
+        assert (np.abs(belief.mean[:3] - truth) < 4.0 * std[:3]).all()
+        assert std[1] < 0.05  # stiffness is learned to better than half of what it was off
+        assert belief.scatter == pytest.approx(0.03, rel=0.3)
+    assert np.mean(counts) < 5.0
+
+
+def test_in_place_is_not_unreachable() -> None:
+    planner = TapPlanner(tolerance_m=50e-6)
+    assert planner.next_tap(0.0, 10.0) is None
+    assert planner.next_tap(50e-6, 10.0) is None
+    assert planner.next_tap(-49e-6, 10.0) is None
+    assert isinstance(planner.next_tap(51e-6, 10.0), Tap | Unreachable)
+
+
+def test_one_sided_never_pushes_back() -> None:
+    answer = TapPlanner(tolerance_m=50e-6).next_tap(-0.2e-3, 10.0)
+    assert isinstance(answer, Unreachable)
+    assert "beyond its target" in answer.reason
+
+
+def test_two_sided_recovers_from_overshoot() -> None:
+    planner = TapPlanner(tolerance_m=50e-6, plant=NOMINAL, two_sided=True)
+    rng = np.random.default_rng(5)
+    plant = Plant(7e5, 430.0, 0.22, 0.76 * 0.22)
+    for mass in (6.0, 18.0, 35.0):
+        taps, remaining, last = deliver(planner, plant, mass, -4e-3, rng)
+        assert last is None
+        assert all(tap.direction == -1 for tap in taps)
+        assert abs(remaining) <= 50e-6
+
+
+def test_limits_hold() -> None:
+    planner = TapPlanner(tolerance_m=50e-6, max_velocity_m_s=0.04, max_stroke_m=0.8e-3, max_force_n=160.0)
+    rng = np.random.default_rng(6)
+    for mass in (6.0, 15.0, 30.0):
+        for remaining in rng.uniform(0.1e-3, 30e-3, 12):
+            tap = planner.next_tap(float(remaining), mass)
+            if isinstance(tap, Unreachable):
+                continue
+            assert isinstance(tap, Tap)
+            assert 0.0 < tap.velocity_m_s <= 0.04
+            assert 0.0 < tap.stroke_m <= 0.8e-3 * (1.0 + 1e-12)
+            assert planner.force(tap, mass) <= 160.0 * (1.0 + 1e-9)
+            assert tap.lowest_m <= tap.expected_m <= tap.highest_m
+            assert tap.overshoot_probability <= 1e-3
+
+
+def test_a_part_too_heavy_to_move_is_unreachable() -> None:
+    planner = TapPlanner(max_velocity_m_s=0.01, max_stroke_m=0.05e-3)
+    answer = planner.next_tap(5e-3, 60.0)
+    assert isinstance(answer, Unreachable)
+    assert "moves a part of 60.0 kg" in answer.reason
+
+
+def test_a_remainder_below_what_can_be_controlled_is_unreachable() -> None:
+    # a cell without a stroke: the smallest true strike of 40 kg at friction 0.3 is some 0.9 mm
+    planner = TapPlanner(
+        tolerance_m=10e-6, max_stroke_m=math.inf, plant=Plant(6.5e5, 465.0, 0.3, 0.228), max_velocity_m_s=0.1
+    )
+    planner.observe_friction(0.228, 0.002)
+    answer = planner.next_tap(0.2e-3, 40.0)
+    assert isinstance(answer, Unreachable)
+    assert "overshoots" in answer.reason
+
+
+def test_a_cell_without_a_stroke_strikes_by_velocity() -> None:
+    plant = Plant(6.5e5, 465.0, 0.15, 0.76 * 0.15)
+    planner = TapPlanner(tolerance_m=0.3e-3, max_stroke_m=math.inf, plant=plant)
+    taps, remaining, last = deliver(planner, plant, 8.0, 15e-3, np.random.default_rng(2))
+    assert last is None
+    assert abs(remaining) <= 0.3e-3
+    assert all(math.isinf(tap.stroke_m) for tap in taps)
+
+
+def test_the_bound_on_overshoot_is_kept_by_the_true_distribution() -> None:
+    # one part, contact and friction known: the share of 20 000 outcomes beyond the tolerance
+    planner = TapPlanner(tolerance_m=10e-6, plant=NOMINAL, overshoot_probability=0.02)
+    belief = planner.belief
+    planner.resume(type(belief)(np.ones(1), belief.mean[None], np.diag(np.full(5, 1e-10))[None]))
+    rng = np.random.default_rng(3)
+    factor = 1.0 + 0.03 * rng.standard_normal(20_000)
+    for mass, remaining in ((7.0, 1.3e-3), (15.0, 6e-3), (30.0, 3.3e-3)):
+        tap = planner.next_tap(remaining, mass)
+        assert isinstance(tap, Tap)
+        moved = nominal_taps(
+            6.5e5, 465.0, 0.2 * factor, 0.152 * factor, mass, tap.velocity_m_s, tap.stroke_m
+        ).displacement_m
+        assert (moved > remaining + 10e-6).mean() <= 0.02
+        outside = (moved < tap.lowest_m) | (moved > tap.highest_m)
+        assert outside.mean() < 0.004
+        assert np.median(moved) == pytest.approx(tap.expected_m, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("remaining", "mass", "message"),
+    [(math.nan, 10.0, "remaining"), (1e-3, math.nan, "mass"), (1e-3, 0.0, "mass"), (1e-3, -3.0, "mass")],
+)
+def test_refuses_what_is_not_a_number(remaining: float, mass: float, message: str) -> None:
+    with pytest.raises(PositioningError, match=message):
+        TapPlanner().next_tap(remaining, mass)
+
+
+def test_refuses_a_planner_no_cell_can_have() -> None:
+    for options in ({"tolerance_m": 0.0}, {"max_velocity_m_s": -1.0}, {"overshoot_probability": 1.5}):
+        with pytest.raises(PositioningError, match=next(iter(options))):
+            TapPlanner(**options)
+    with pytest.raises(PositioningError, match="displacement"):
+        TapPlanner().observe(Tap(0.05, 1e-3), math.nan, 10.0)
+    with pytest.raises(PositioningError, match="friction"):
+        TapPlanner().observe_friction(-0.1, 0.01)
+
+
+def test_same_history_same_taps() -> None:
+    plant = Plant(6.0e5, 500.0, 0.17, 0.76 * 0.17)
+    runs = []
+    for _ in range(2):
+        planner = TapPlanner(tolerance_m=50e-6, plant=NOMINAL)
+        runs.append(deliver(planner, plant, 12.0, 22e-3, np.random.default_rng(8))[0])
+    assert runs[0] == runs[1]
+
+
+def test_friction_along_the_stroke_is_planned_with() -> None:
+    from impactcell.records import Quality, Signature
+
+    planner = TapPlanner(tolerance_m=50e-6, plant=NOMINAL)
+    planner.observe_friction(0.152, 0.001)
+    before = planner.next_tap(10e-3, 10.0)
+    assert isinstance(before, Tap)
+    position = np.linspace(0.0, 20e-3, 81)
+    friction = 0.152 * (1.0 - 0.3 * np.tanh((position - 10e-3) / 2e-3))  # rough first, smooth beyond 10 mm
+    planner.observe_signature(
+        Signature(position, friction, np.full(81, 2e-4), math.nan, math.nan, math.nan, Quality.GOOD)
+    )
+    after = planner.next_tap(10e-3, 10.0)
+    assert isinstance(after, Tap)
+    same = planner.next_tap(10e-3, 10.0)
+    assert same == after
+    assert (after.velocity_m_s, after.stroke_m) != (before.velocity_m_s, before.stroke_m)
