@@ -22,12 +22,13 @@ from impactcell.records import Samples
 REFITS = 10
 STEPS = 20
 RACE = 4
+AHEAD = 4
 POLISH = 15
 FINALISTS = 2
 MOST_FINALISTS = 6
-STARTS = 3
+STARTS = 2
 SEEDS_OF_PAIRS = 4
-SECONDS = 6
+SECONDS = 5
 TIED = 2.2
 SMALLEST_GAIN = 15.0
 MOST = 0.5
@@ -79,20 +80,17 @@ class Search:
 
 
 def _refit(task: tuple[Problem, tuple[str, ...], list[Samples], Fit, int]) -> Fit | None:
-    """Fit a set of effects; several starts of its last effect run a few steps, the best of them to the end.
+    """Fit a set of effects from several starts of its last effect, and keep the best.
 
     None if the plant has no answer at any start.
     """
     problem, effects, starts, base, steps = task
-    ahead: Fit | None = None
+    best: Fit | None = None
     for start in starts:
-        few = steps if len(starts) == 1 else RACE
-        made = _try(problem, effects, np.concatenate([base.at, start]), base, few)
-        if made is not None and (ahead is None or _total(problem, made) > _total(problem, ahead)):
-            ahead = made
-    if ahead is None or len(starts) == 1:
-        return ahead
-    return _try(problem, effects, ahead.at, ahead, steps) or ahead
+        made = _try(problem, effects, np.concatenate([base.at, start]), base, steps)
+        if made is not None and (best is None or _total(problem, made) > _total(problem, best)):
+            best = made
+    return best
 
 
 def _try(problem: Problem, effects: tuple[str, ...], at: Samples, base: Fit, steps: int) -> Fit | None:
@@ -143,8 +141,13 @@ def refits(setup: Setup, scanned: Scan, most: int) -> list[Fit]:
             continue
         starts = name.starts(scanned.candidates, scanned.scores, effect, STARTS)
         if starts:
-            tasks.append((setup.coarse, (*scanned.fit.effects, effect), starts, scanned.fit, STEPS))
-    return _ranked(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
+            tasks.append((setup.coarse, (*scanned.fit.effects, effect), starts, scanned.fit, RACE))
+    raced = _ranked(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
+    # A few steps tell who cannot win; the others run to the end.
+    none = [np.empty(0)]
+    ahead = [(setup.coarse, one.effects, none, one, STEPS) for one in raced[:AHEAD]]
+    finished = [made for made in setup.mapper(_refit, ahead) if made is not None]
+    return _ranked(setup.coarse, [*finished, *raced[AHEAD:]])
 
 
 def behind(problem: Problem, best: Fit, other: Fit) -> tuple[float, float]:

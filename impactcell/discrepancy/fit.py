@@ -23,6 +23,7 @@ FIRST_SPREAD = 0.03
 SMALLEST_SPREAD = 2e-4
 GIVES_UP = 1e12
 HOPELESS = 3e-5
+THOROUGH = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -260,7 +261,7 @@ def fit(
 
 def refit_own(problem: Problem, model: Fit) -> Fit:
     """Keep the shared parameters of `model` and fit only what every shot of `problem` has of its own."""
-    point = _begin(problem, model.effects, model.at, 1e3)
+    point = _begin(problem, model.effects, model.at, 1e3, (0.0, -model.spread, model.spread))
     return replace(model, local=point.local, residual=point.residual)
 
 
@@ -269,7 +270,13 @@ def begin(problem: Problem, effects: tuple[str, ...], at: Samples) -> Local:
     return _begin(problem, effects, at, FIRST_SPREAD).local
 
 
-def _begin(problem: Problem, effects: tuple[str, ...], at: Samples, spread: float) -> _Point:
+def _begin(
+    problem: Problem,
+    effects: tuple[str, ...],
+    at: Samples,
+    spread: float,
+    factors: tuple[float, ...] = (0.0,),
+) -> _Point:
     shares = {
         Excitation.TAP: (1.0,),
         Excitation.FREE_SLIDE: (1.0, 0.3),
@@ -277,9 +284,11 @@ def _begin(problem: Problem, effects: tuple[str, ...], at: Samples, spread: floa
     }
     best: _Point | None = None
     for share in shares[problem.shots.excitation]:
-        point = _point(problem, effects, at, problem.first_local(share), spread)
-        point = _settle(problem, effects, point, spread, steps=8)
-        best = point if best is None else _better_of(problem, best, point, spread)
+        first = problem.first_local(share)
+        for factor in factors:
+            start = replace(first, log_factor=first.log_factor + factor)
+            point = _settle(problem, effects, _point(problem, effects, at, start, spread), spread, THOROUGH)
+            best = point if best is None else _better_of(problem, best, point, spread)
     if best is None:
         raise AssertionError(problem.shots.excitation)
     return best
@@ -374,8 +383,14 @@ def _settle(
         Jl = problem.own_derivatives(effects, point.at, point.local, point.residual)
         none = np.empty((0, point.residual.size))
         _, _, blocks = _normal(problem, none, Jl, point, spread)
-        moved = problem.moved(point.local, _own_steps(blocks, np.empty(0)))
-        new = _better_of(problem, point, _point(problem, effects, point.at, moved, spread), spread)
+        steps_of = _own_steps(blocks, np.empty(0))
+        new = point
+        for scale in (1.0, 0.3, 0.1):
+            # Shorter steps for the shots that the whole step did not help; a step once taken is the best so far.
+            moved = problem.moved(point.local, scale * steps_of)
+            new = _better_of(problem, new, _point(problem, effects, point.at, moved, spread), spread)
+            if steps < THOROUGH:
+                break
         if point.cost - new.cost < 1e-3:
             return new
         point = new

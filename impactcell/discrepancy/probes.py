@@ -17,8 +17,8 @@ from impactcell.records import Samples
 SMALL = 2e-3
 DECADE = (0.1, 0.316, 1.0, 3.16, 10.0)
 RECIPROCALS = tuple(float(0.08 * 1.42**i) for i in range(16))
-CYCLES = 60
-CYCLE_STEP = 0.4
+CYCLES = 40
+CYCLE_STEP = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +109,10 @@ def _grid(one: Coordinate, gone: Range) -> tuple[float, ...]:
         # Sine and cosine; a negative amplitude is a phase turned by half.
         return (one.coordinate(0.0), one.coordinate(math.pi / 2))
     if one.form == "linear" and one.parameter.endswith("_m"):
-        inside = np.linspace(gone.low_m, gone.high_m, 26)[1:-1]
+        inside = np.linspace(gone.low_m, gone.high_m, 20)[1:-1]
         return tuple(one.coordinate(float(value)) for value in inside)
     if one.parameter.startswith("width"):
-        return tuple(one.coordinate(gone.span_m * share) for share in (0.02, 0.05, 0.12))
+        return tuple(one.coordinate(gone.span_m * share) for share in (0.025, 0.08))
     if one.parameter.endswith("_m"):
         return tuple(one.coordinate(gone.span_m * share) for share in (0.005, 0.015, 0.05, 0.15, 0.5))
     if one.parameter.endswith("_m_s"):
