@@ -42,6 +42,7 @@ async def strike(device: ScriptedDevice, seed: int) -> None:
             velocity=0.05,
             mass=18.9,
             stroke=0.0015,
+            direction=1,
             force_rate=1e6,
             position_rate=1e5,
             cycle_time=time.time_ns(),

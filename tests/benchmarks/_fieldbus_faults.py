@@ -85,7 +85,9 @@ def make(device: ScriptedDevice, cycles: int = 1) -> None:
     for _ in range(cycles):
         draw = np.random.default_rng(int(device.get("cycle_counter")) + 1)
         samples = {"force": draw.normal(0, 50, SAMPLES), "position": draw.normal(0, 1e-3, SAMPLES // 4)}
-        device.complete(samples, velocity=0.05, mass=18.9, stroke=0.0015, force_rate=1e6, position_rate=1e5)
+        device.complete(
+            samples, velocity=0.05, mass=18.9, stroke=0.0015, direction=1, force_rate=1e6, position_rate=1e5
+        )
 
 
 async def outage(registers: RegisterMap, seed: int) -> tuple[float, bool, bool]:

@@ -33,7 +33,13 @@ async def _captures(number: int) -> tuple[float, float]:
     ):
         for _ in range(number):
             device.complete(
-                samples, velocity=0.05, mass=18.9, stroke=0.0015, force_rate=1e6, position_rate=1e5
+                samples,
+                velocity=0.05,
+                mass=18.9,
+                stroke=0.0015,
+                direction=1,
+                force_rate=1e6,
+                position_rate=1e5,
             )
             requests, cpu = server.requests, time.process_time()
             await anext(receptions)

@@ -66,7 +66,7 @@ async def running(
     statuses: list[ModuleStatus] | None = None,
     **link: Any,
 ) -> AsyncIterator[tuple[ModbusServer, Module, AsyncIterator[Reception]]]:
-    link = {"window": 16, "timeout_s": 0.2} | link
+    link = {"window": 16, "timeout_s": 10.0} | link
     async with (
         ModbusServer(device) as server,
         Module("cell-1", ModuleLink(port=server.port, **link), fpga, statuses and statuses.append) as module,
@@ -307,7 +307,7 @@ async def test_the_wrong_module_is_named_and_the_right_one_taken_when_it_comes(
     statuses: list[ModuleStatus] = [ModuleStatus()]
     async with running(fpga, device, statuses=statuses) as (server, module, receptions):
         waiting = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
-        while told not in module.status.reason:  # noqa: ASYNC110
+        while told not in module.status.reason:
             await asyncio.sleep(0)
         assert module.status.reason.startswith(f"cell-1: 127.0.0.1:{server.port} device 1: ")
         assert not module.status.connected
@@ -321,7 +321,7 @@ async def test_a_wrong_device_id_is_named(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga)
     async with running(fpga, device, device_id=7) as (_, module, receptions):
         waiting = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
-        while "device_id 7 is wrong" not in module.status.reason:  # noqa: ASYNC110
+        while "device_id 7 is wrong" not in module.status.reason:
             await asyncio.sleep(0)
         assert "gateway target device failed to respond" in module.status.reason
         waiting.cancel()
@@ -334,7 +334,7 @@ async def test_a_module_that_is_not_there_at_the_start_is_taken_when_it_comes(fp
     async with running(fpga, device) as (server, module, receptions):
         await server.close()
         waiting = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
-        while "no connection" not in module.status.reason:  # noqa: ASYNC110
+        while "no connection" not in module.status.reason:
             await asyncio.sleep(0)
         await server.start()
         assert_whole(await waiting)
@@ -361,8 +361,8 @@ async def test_every_fault_ends_with_every_cycle_whole_and_in_order(
 ) -> None:
     device = ScriptedDevice(fpga)
     make(device, 10)
-    async with running(fpga, device, timeout_s=0.05) as (server, module, receptions):
-        server.faults.inject(Fault(kind, probability=0.05, seconds=0.06, remaining=10))
+    async with running(fpga, device, timeout_s=0.2) as (server, module, receptions):
+        server.faults.inject(Fault(kind, probability=0.05, seconds=0.3, remaining=5))
         received = await take(receptions, 10)
         assert [r.capture.cycle for r in received] == list(range(1, 11))
         for reception in received:

@@ -50,12 +50,12 @@ class PositioningDevice(ScriptedDevice):
 
 @asynccontextmanager
 async def ready(
-    fpga: RegisterMap, device: ScriptedDevice, patience_s: float = 5.0
+    fpga: RegisterMap, device: ScriptedDevice, patience_s: float = 20.0
 ) -> AsyncIterator[tuple[ModbusServer, Module, Positioner]]:
     """A module whose captures are being taken, as the service does."""
     async with (
         ModbusServer(device) as server,
-        Module("cell-1", ModuleLink(port=server.port, timeout_s=0.1), fpga) as module,
+        Module("cell-1", ModuleLink(port=server.port, timeout_s=5.0), fpga) as module,
     ):
 
         async def follow() -> None:
@@ -152,7 +152,7 @@ async def test_an_abort_ends_what_is_being_executed(fpga: RegisterMap) -> None:
 async def test_a_tap_without_an_end_is_given_up(fpga: RegisterMap) -> None:
     device = PositioningDevice(fpga)
     device.result = 1
-    async with ready(fpga, device, patience_s=0.1) as (_, _, positioner):
+    async with ready(fpga, device, patience_s=1.0) as (_, _, positioner):
         with pytest.raises(PositioningError, match="may have been struck"):
             await positioner.tap(COMMAND)
 

@@ -156,7 +156,7 @@ async def test_a_busy_device_is_asked_again() -> None:
 async def test_a_device_that_stays_busy_is_an_error_by_name() -> None:
     device = Image()
     device.busy = 10**9
-    async with ModbusServer(device) as server, linked(server, timeout_s=0.1) as client:
+    async with ModbusServer(device) as server, linked(server, timeout_s=0.5) as client:
         with pytest.raises(ModbusExceptionError, match="server device busy"):
             await client.read(0, 10)
         assert client.connected
@@ -167,7 +167,7 @@ async def test_a_disconnect_fails_everything_at_once() -> None:
     async with ModbusServer(Image()) as server, linked(server, 2) as client:
         server.faults.inject(Fault(FaultKind.DROP))
         reads = [asyncio.ensure_future(client.read(i, 300)) for i in range(3)]
-        while server.requests < 2:  # noqa: ASYNC110
+        while server.requests < 2:
             await asyncio.sleep(0)
         server.drop_clients()
         for result in await asyncio.gather(*reads, return_exceptions=True):
@@ -183,9 +183,9 @@ async def test_a_disconnect_fails_everything_at_once() -> None:
 
 @pytest.mark.parametrize("kind", [FaultKind.DROP, FaultKind.HALF_OPEN, FaultKind.TRUNCATED])
 async def test_silence_closes_the_link_and_the_next_connection_works(kind: FaultKind) -> None:
-    async with ModbusServer(Image()) as server, linked(server, timeout_s=0.05) as client:
+    async with ModbusServer(Image()) as server, linked(server, timeout_s=0.25) as client:
         server.faults.inject(Fault(kind, remaining=1))
-        with pytest.raises(LinkError, match=r"no answer to 10 holding registers from 0 within 0\.05 s"):
+        with pytest.raises(LinkError, match=r"no answer to 10 holding registers from 0 within 0\.25 s"):
             await client.read(0, 10)
         assert not client.connected
         await client.connect()
@@ -212,7 +212,7 @@ async def test_a_reply_that_is_not_ours_closes_the_link(kind: FaultKind, told: s
 @pytest.mark.parametrize("seed", range(8))
 async def test_a_reply_of_the_wrong_length_is_never_used(seed: int) -> None:
     faults = FaultInjector(seed)
-    async with ModbusServer(Image(), faults=faults) as server, linked(server, timeout_s=0.05) as client:
+    async with ModbusServer(Image(), faults=faults) as server, linked(server, timeout_s=0.25) as client:
         faults.inject(Fault(FaultKind.WRONG_LENGTH, remaining=1))
         with pytest.raises((ProtocolError, LinkError)):
             await client.read(0, 10)
@@ -228,14 +228,15 @@ async def test_legal_but_odd_framing_and_order_are_understood(kind: FaultKind) -
 
 async def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request() -> None:
     """As a gateway does it: the late reply comes on the next connection, with the old transaction id."""
-    async with ModbusServer(Image()) as server, linked(server, timeout_s=0.05) as client:
-        server.faults.inject(Fault(FaultKind.LATE_REPLY, remaining=1, seconds=0.07))
-        with pytest.raises(LinkError):
-            await client.read(1000, 10)
-        await client.connect()
-        server.faults.inject(Fault(FaultKind.DELAY, remaining=1, seconds=0.04))
-        with pytest.raises(ProtocolError, match="which is not open"):
-            await client.read(0, 10)
+    async with ModbusServer(Image()) as server:
+        server.faults.inject(Fault(FaultKind.LATE_REPLY, remaining=1, seconds=0.5))
+        async with linked(server, timeout_s=0.1) as impatient:
+            with pytest.raises(LinkError):
+                await impatient.read(1000, 10)
+        async with linked(server) as next_one:
+            server.faults.inject(Fault(FaultKind.DELAY, remaining=1, seconds=SILENT_S))
+            with pytest.raises(ProtocolError, match="which is not open"):
+                await next_one.read(0, 10)
 
 
 async def test_every_attempt_has_a_fresh_transaction_id() -> None:
@@ -275,7 +276,7 @@ async def test_a_cancelled_read_leaves_the_link_usable() -> None:
     async with ModbusServer(Image()) as server, linked(server, 2) as client:
         server.faults.inject(Fault(FaultKind.DELAY, seconds=0.02))
         read = asyncio.ensure_future(client.read(0, 10_000))
-        while not server.requests:  # noqa: ASYNC110
+        while not server.requests:
             await asyncio.sleep(0)
         read.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -296,11 +297,11 @@ async def test_no_fault_gets_a_wrong_value_through(window: int) -> None:
     faults = FaultInjector(seed=window)
     accepted = 0
     async with ModbusServer(Image(), faults=faults) as server:
-        client = ModbusClient(ModuleLink(port=server.port, window=window, timeout_s=0.02))
+        client = ModbusClient(ModuleLink(port=server.port, window=window, timeout_s=0.1))
         for kind in FaultKind:
-            faults.inject(Fault(kind, probability=0.02, seconds=0.03))
+            faults.inject(Fault(kind, probability=0.02, seconds=0.15))
         draw = np.random.default_rng(window)
-        for _ in range(150):
+        for _ in range(80):
             address, count = int(draw.integers(0, 60_000)), int(draw.integers(1, 500))
             try:
                 await client.connect()
@@ -310,5 +311,5 @@ async def test_no_fault_gets_a_wrong_value_through(window: int) -> None:
             accepted += 1
             assert np.array_equal(words, np.arange(address, address + count))
         await client.close()
-    assert accepted > 20
-    assert sum(faults.happened.values()) > 50
+    assert accepted > 10
+    assert sum(faults.happened.values()) > 30
