@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from impactcell.errors import CampaignError, ImpactCellError, MapError, SettingsError
+from simulator.plant_integrator import NeverAtRestError
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+MOST_PORT = 65_535
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -19,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (SettingsError, CampaignError, MapError) as error:
         print(error, file=sys.stderr)  # noqa: T201
         return BAD_INPUT
-    except ImpactCellError as error:
+    except (ImpactCellError, NeverAtRestError) as error:
         print(error, file=sys.stderr)  # noqa: T201
         return 1
     except KeyboardInterrupt:
@@ -36,15 +38,24 @@ def _parser() -> argparse.ArgumentParser:
     campaign.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     campaign.add_argument("--hide", action="append", default=[], metavar="EFFECT", help="repeatable")
     campaign.add_argument("--seed", type=int, help="in place of the scenario's")
+    campaign.add_argument("-q", "--quiet", action="store_true", help="say nothing")
+    campaign.add_argument("-v", "--verbose", action="store_true", help="say what is hidden")
     campaign.set_defaults(run=_campaign)
     serve = verbs.add_parser("serve", help="serve a scenario over Modbus TCP until SIGTERM")
     serve.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
-    serve.add_argument("--port", type=int, help="in place of the scenario's; 0 lets the system choose")
+    serve.add_argument("--port", type=_port, help="in place of the scenario's; 0 lets the system choose")
     serve.add_argument(
         "--truth", type=Path, metavar="FILE", help="write what really happened, a JSON line a cycle"
     )
     serve.set_defaults(run=_serve)
     return parser
+
+
+def _port(text: str) -> int:
+    port = int(text)
+    if not 0 <= port <= MOST_PORT:
+        raise ValueError(text)
+    return port
 
 
 def _serve(options: argparse.Namespace) -> int:
@@ -76,7 +87,10 @@ def _campaign(options: argparse.Namespace) -> int:
     except ValidationError as error:
         message = "; ".join(fault["msg"].removeprefix("Value error, ") for fault in error.errors())
         raise SettingsError(message) from None
-    write(scenario, options.output)
+    truth = write(scenario, options.output)
+    if not options.quiet:
+        hidden = f", hidden: {', '.join(scenario.hide) or 'nothing'}" if options.verbose else ""
+        print(f"{options.output} (truth: {truth}){hidden}")  # noqa: T201
     return 0
 
 

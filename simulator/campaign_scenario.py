@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from simulator.effects import LIBRARY, UNLISTED
+from simulator.effects import LIBRARY, UNLISTED, check
 from simulator.scenario_file import ScenarioModel
 
 Positive = Annotated[float, Field(gt=0)]
@@ -110,7 +110,7 @@ class CampaignScenario(ScenarioModel):
     @classmethod
     def _known_effects(cls, value: list[str]) -> list[str]:
         for identifier in value:
-            _known(identifier)
+            _defaults(identifier)
         if len(set(value)) < len(value):
             message = "an effect is hidden once at most"
             raise ValueError(message)
@@ -120,11 +120,7 @@ class CampaignScenario(ScenarioModel):
     @classmethod
     def _known_strengths(cls, value: dict[str, dict[str, Strength]]) -> dict[str, dict[str, Strength]]:
         for identifier, parameters in value.items():
-            kind = _known(identifier)
-            for name in parameters:
-                if name not in kind:
-                    message = f"{identifier} has no parameter {name!r}; it has {', '.join(kind)}"
-                    raise ValueError(message)
+            check(identifier, {**_defaults(identifier), **parameters})
         return value
 
     @model_validator(mode="after")
@@ -150,13 +146,13 @@ class CampaignScenario(ScenarioModel):
         """Effects that act, with the parameters they act with."""
         effects: dict[str, Mapping[str, Strength | tuple[float, ...]]] = {}
         for identifier in self.hide:
-            parameters: dict[str, Strength | tuple[float, ...]] = dict(_known(identifier))
+            parameters: dict[str, Strength | tuple[float, ...]] = _defaults(identifier)
             parameters.update(self.strengths.get(identifier, {}))
             effects[identifier] = parameters
         return effects
 
 
-def _known(identifier: str) -> dict[str, Strength | tuple[float, ...]]:
+def _defaults(identifier: str) -> dict[str, Strength | tuple[float, ...]]:
     kind = LIBRARY.get(identifier) or UNLISTED.get(identifier)
     if kind is None:
         message = f"unknown effect {identifier!r}; known: {', '.join([*LIBRARY, *UNLISTED])}"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from simulator.effects import LIBRARY, UNLISTED
+from simulator.effects import check
 from simulator.fault_schedule import ScheduledFault
 from simulator.scenario_file import ScenarioModel, load
 
@@ -19,13 +19,7 @@ Effects = dict[str, dict[str, float | list[float]]]
 
 def _known(effects: Effects) -> Effects:
     for identifier, parameters in effects.items():
-        kind = LIBRARY.get(identifier) or UNLISTED.get(identifier)
-        if kind is None:
-            message = f"unknown effect {identifier!r}; known: {', '.join([*LIBRARY, *UNLISTED])}"
-            raise ValueError(message)
-        if set(parameters) != set(kind.defaults):
-            message = f"{identifier} has the parameters {', '.join(kind.defaults)}"
-            raise ValueError(message)
+        check(identifier, parameters)
     return effects
 
 

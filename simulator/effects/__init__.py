@@ -12,7 +12,7 @@ from types import MappingProxyType
 from simulator.effects import unlisted
 from simulator.effects.law import Effect, Parameter, Shot
 
-__all__ = ["LIBRARY", "UNLISTED", "Effect", "Parameter", "Shot", "build"]
+__all__ = ["LIBRARY", "UNLISTED", "Effect", "Parameter", "Shot", "build", "check"]
 
 
 def _discover(package: str, path: Sequence[str]) -> Mapping[str, type[Effect]]:
@@ -31,25 +31,42 @@ UNLISTED = _discover(unlisted.__name__, unlisted.__path__)
 LIBRARY = _discover(__name__, __path__)
 
 
-def build(effects: Mapping[str, Mapping[str, Parameter]]) -> tuple[Effect, ...]:
-    """Effects with their parameters, in the order given.
+def check(identifier: str, parameters: Mapping[str, Parameter]) -> type[Effect]:
+    """Return the law of an effect with these parameters.
 
     Raises
     ------
     ValueError
-        An identifier or parameter that is not known, or a parameter that is missing.
+        An identifier or parameter that is not known, a parameter that is missing, or a value that the law
+        cannot have.
     """
-    built = []
-    for identifier, parameters in effects.items():
-        kind = LIBRARY.get(identifier) or UNLISTED.get(identifier)
-        if kind is None:
-            message = f"unknown effect {identifier!r}; known: {', '.join([*LIBRARY, *UNLISTED])}"
+    kind = LIBRARY.get(identifier) or UNLISTED.get(identifier)
+    if kind is None:
+        message = f"unknown effect {identifier!r}; known: {', '.join([*LIBRARY, *UNLISTED])}"
+        raise ValueError(message)
+    for name in parameters:
+        if name not in kind.defaults:
+            message = f"{identifier} has no parameter {name!r}; it has {', '.join(kind.defaults)}"
             raise ValueError(message)
-        if set(parameters) != set(kind.defaults):
-            wanted = ", ".join(kind.defaults)
-            message = (
-                f"effect {identifier} has the parameters {wanted}; got {', '.join(parameters) or 'none'}"
+    for name, default in kind.defaults.items():
+        if name not in parameters:
+            message = f"{identifier} needs its parameter {name}"
+            raise ValueError(message)
+        value = parameters[name]
+        if isinstance(value, int | float) == isinstance(default, Sequence):
+            wanted = (
+                "a list with one number a batch after the first"
+                if isinstance(default, Sequence)
+                else "one number"
             )
+            message = f"{identifier}: {name} has to be {wanted}"
             raise ValueError(message)
-        built.append(kind(**parameters))
-    return tuple(built)
+        if name in kind.positive and not (isinstance(value, int | float) and value > 0.0):
+            message = f"{identifier}: {name} has to be above 0"
+            raise ValueError(message)
+    return kind
+
+
+def build(effects: Mapping[str, Mapping[str, Parameter]]) -> tuple[Effect, ...]:
+    """Effects with their parameters, in the order given; ValueError as `check`."""
+    return tuple(check(identifier, parameters)(**parameters) for identifier, parameters in effects.items())

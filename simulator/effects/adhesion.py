@@ -8,6 +8,7 @@ class Adhesion(Effect):
 
     identifier = "adhesion"
     defaults = {"force_n": 15.0, "range_m": 3.0e-4}
+    positive = ("range_m",)
 
     def __init__(self, force_n: float, range_m: float) -> None:
         self._force = force_n

@@ -11,8 +11,8 @@ class BatchShift(Effect):
     identifier = "batch_shift"
     defaults = {"relative_change": (0.06,)}
 
-    def __init__(self, relative_change: Sequence[float] | float) -> None:
-        self._changes = (relative_change,) if isinstance(relative_change, float) else tuple(relative_change)
+    def __init__(self, relative_change: Sequence[float]) -> None:
+        self._changes = tuple(relative_change)
 
     def shot_factor(self, shot: Shot) -> float:
         if shot.batch == 0 or not self._changes:

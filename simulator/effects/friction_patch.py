@@ -10,6 +10,7 @@ class FrictionPatch(Effect):
 
     identifier = "friction_patch"
     defaults = {"amplitude": 0.25, "position_m": 0.002, "width_m": 0.0005}
+    positive = ("width_m",)
 
     def __init__(self, amplitude: float, position_m: float, width_m: float) -> None:
         self._amplitude = amplitude

@@ -8,6 +8,7 @@ class HertzContact(Effect):
 
     identifier = "hertz_contact"
     defaults = {"exponent": 1.03}
+    positive = ("exponent",)
 
     def __init__(self, exponent: float) -> None:
         self._n = exponent

@@ -50,6 +50,8 @@ class Effect:
         One entry for each state of its own, with its integration tolerance; empty for a law without memory.
     ongoing : bool
         True where something moves on although the part is at rest.
+    positive : tuple of str
+        Parameters that have to be above 0 for the law to mean anything.
     sensor_stage : int
         Place in the measuring chain: gain before offset before saturation.
     """
@@ -58,6 +60,7 @@ class Effect:
     defaults: ClassVar[Mapping[str, Parameter]]
     absolute_tolerance: tuple[float, ...] = ()
     ongoing: bool = False
+    positive: ClassVar[tuple[str, ...]] = ()
     sensor_stage: ClassVar[int] = 0
 
     def mass(self, mass_kg: float) -> float:

@@ -10,6 +10,7 @@ class PeriodicFriction(Effect):
 
     identifier = "periodic_friction"
     defaults = {"amplitude": 0.12, "period_m": 0.0013, "phase_rad": 0.7}
+    positive = ("period_m",)
 
     def __init__(self, amplitude: float, period_m: float, phase_rad: float) -> None:
         self._amplitude = amplitude

@@ -10,6 +10,7 @@ class StribeckFriction(Effect):
 
     identifier = "stribeck_friction"
     defaults = {"friction_increase": 0.03, "stribeck_velocity_m_s": 0.04}
+    positive = ("stribeck_velocity_m_s",)
 
     def __init__(self, friction_increase: float, stribeck_velocity_m_s: float) -> None:
         self._increase = friction_increase

@@ -10,6 +10,7 @@ class GapSuction(Effect):
 
     identifier = "gap_suction"
     defaults = {"force_n": 25.0, "range_m": 2.0e-3}
+    positive = ("range_m",)
 
     def __init__(self, force_n: float, range_m: float) -> None:
         self._force = force_n

@@ -10,6 +10,7 @@ class LateFriction(Effect):
 
     identifier = "late_friction"
     defaults = {"amplitude": 0.35, "start_s": 0.035, "time_constant_s": 0.010}
+    positive = ("time_constant_s",)
 
     def __init__(self, amplitude: float, start_s: float, time_constant_s: float) -> None:
         self._amplitude = amplitude

@@ -10,6 +10,7 @@ class LooseMass(Effect):
 
     identifier = "loose_mass"
     defaults = {"mass_kg": 1.0, "stiffness_n_per_m": 2.0e5, "damping_n_s_per_m": 60.0}
+    positive = ("mass_kg",)
     ongoing = True
 
     def __init__(self, mass_kg: float, stiffness_n_per_m: float, damping_n_s_per_m: float) -> None:

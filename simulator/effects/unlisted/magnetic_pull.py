@@ -8,6 +8,7 @@ class MagneticPull(Effect):
 
     identifier = "magnetic_pull"
     defaults = {"force_n": 8.0, "position_m": 0.006, "width_m": 0.0015}
+    positive = ("width_m",)
 
     def __init__(self, force_n: float, position_m: float, width_m: float) -> None:
         self._force = force_n

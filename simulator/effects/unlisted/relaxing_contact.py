@@ -10,6 +10,7 @@ class RelaxingContact(Effect):
 
     identifier = "relaxing_contact"
     defaults = {"stiffness_n_per_m": 2.0e5, "time_constant_s": 0.004}
+    positive = ("time_constant_s",)
 
     def __init__(self, stiffness_n_per_m: float, time_constant_s: float) -> None:
         self._stiffness = stiffness_n_per_m

@@ -192,6 +192,21 @@ def test_faults_are_told_with_file_line_and_key(
     assert not (tmp_path / "c").exists()
 
 
+def test_a_part_that_never_stops_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = on_disk(tmp_path, directions=[1], strengths={"surface_tilt": {"tilt_rad": -0.5}})
+    assert main(["campaign", str(file), "-o", str(tmp_path / "c"), "--hide", "surface_tilt"]) == 1
+    assert "still slides" in capsys.readouterr().err
+    assert not (tmp_path / "c").exists()
+
+
+def test_quiet_and_verbose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(on_disk(tmp_path, shots=1))
+    assert main(["campaign", file, "-o", str(tmp_path / "a"), "-q"]) == 0
+    assert capsys.readouterr().out == ""
+    assert main(["campaign", file, "-o", str(tmp_path / "b"), "-v"]) == 0
+    assert "hidden: nothing" in capsys.readouterr().out
+
+
 def test_unknown_effect_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = on_disk(tmp_path)
     assert main(["campaign", str(file), "-o", str(tmp_path / "c"), "--hide", "wind"]) == 2

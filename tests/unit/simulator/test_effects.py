@@ -270,5 +270,13 @@ def test_loose_mass_shares_the_momentum() -> None:
 def test_unknown_effects_and_parameters_are_refused() -> None:
     with pytest.raises(ValueError, match="unknown effect 'wind'"):
         build({"wind": {}})
-    with pytest.raises(ValueError, match="viscous_friction has the parameters"):
+    with pytest.raises(ValueError, match="viscous_friction has no parameter 'k_v'"):
         build({"viscous_friction": {"k_v": 1.0}})
+    with pytest.raises(ValueError, match="needs its parameter range_m"):
+        build({"adhesion": {"force_n": 1.0}})
+    with pytest.raises(ValueError, match="period_m has to be above 0"):
+        build({"periodic_friction": {"amplitude": 0.1, "period_m": 0.0, "phase_rad": 0.0}})
+    with pytest.raises(ValueError, match="one number a batch"):
+        build({"batch_shift": {"relative_change": 0.1}})
+    with pytest.raises(ValueError, match="has to be one number"):
+        build({"surface_tilt": {"tilt_rad": [0.1]}})

@@ -46,7 +46,7 @@ def test_the_scenarios_that_come_with_it(name: str) -> None:
         (
             GOOD + "plant: {effects: {surface_tilt: {a: 1.0}}}\n",
             "4:18",
-            "surface_tilt has the parameters tilt_rad",
+            "surface_tilt has no parameter 'a'",
         ),
         (GOOD + "batches: [{from_cycle: 2, id: A}]\n", "1:1", "the first begins with cycle 1"),
         (GOOD + "deviations: [{cycle: 1, kind: dent, size: 1.0}]\n", "4:31", "deviations.0.kind: "),
