@@ -159,3 +159,24 @@ def test_requests_stay_in_the_register_space(address: int, count: int) -> None:
         read_request(Function.READ_HOLDING, address, count)
     with pytest.raises(ValueError, match="cannot write"):
         write_request(address, np.zeros(count, dtype=WIRE))
+
+
+def test_the_reasons_for_framing_of_our_own_still_hold() -> None:
+    """When this fails, pymodbus has mended its framer, and ours may be given up."""
+    framer = FramerSocket(DecodePDU(is_server=False))
+    good = bytes.fromhex("000100000005010302002a")
+    foreign = bytes.fromhex("000100050005010302002a")
+    assert framer.handleFrame(foreign + good, 0, 0) == (0, None)  # stuck for ever: nothing is ever consumed
+    endless = struct.pack(">HHHB", 1, 0, 60_000, 1) + bytes(300)
+    assert framer.handleFrame(endless, 0, 0) == (0, None)  # waits for 60 000 bytes that no PDU can have
+    eight = bytes.fromhex("000100000002018302")
+    assert framer.decode(eight)[0] == 9
+    _, short = framer.handleFrame(good, 1, 1)  # one register, whatever had been asked for
+    assert short is not None
+    assert short.registers == [42]
+    for stream in (foreign, endless, eight):
+        with pytest.raises(ProtocolError):
+            [
+                check_reply(read_request(Function.READ_HOLDING, 0, 1), each[2])
+                for each in FrameReader().feed(stream)
+            ]
