@@ -20,8 +20,9 @@ from impactcell.records import Samples
 
 WEIGHT, CHANGE, MEAN, COVARIANCE, WIDTH = 0, 1, 2, 6, 22
 OUTLIER_SCALE = 10.0  # an outlier's standard deviation in units of a good measurement's
-CAPACITY = 60
-ROWS = CAPACITY + 2
+CAPACITY = 76
+ROWS = CAPACITY + 3
+SMALL_STEP, LARGE_STEP = 0.4, 1.6  # of the prior's standard deviation, equally likely
 CALIBRATION = 0.9
 WINDOW = 1000.0  # cycles within which a change must be to be reported
 RECENT = 16  # change cycles this recent are each kept
@@ -85,37 +86,40 @@ def _merge(bank: Samples, first: int, last: int, into: Samples) -> None:
 
 
 @compiled
-def _spawn(
-    bank: Samples, count: int, cycle: float, hazard: float, step_variance: float, level_variance: float
-) -> int:
-    """Add the hypothesis that a batch change came just before `cycle`; with `hazard` 1 it is the only one.
+def _spawn(bank: Samples, count: int, cycle: float, hazard: float, step_variance: float) -> int:
+    """Add the hypotheses that a batch change came just before `cycle`; with `hazard` 1 there are no others.
 
-    `level_variance` widens total alone, which makes the first hypothesis of a bank that has none.
+    One for a small and one for a large step: their mixture has a higher peak and wider tails than a normal.
     """
     fresh = np.empty(22)
     _merge(bank, 0, count, fresh)
+    if hazard < 1.0:
+        for i in range(count):
+            bank[i, 0] += math.log1p(-hazard)
+        fresh[0] += math.log(hazard)
+    else:
+        count = 0
     # the new shift is independent of all before: total and offset both move by it
-    fresh[6] += step_variance + level_variance
-    fresh[8] += step_variance
-    fresh[14] += step_variance
-    fresh[16] += step_variance
+    fresh[0] += math.log(0.5)
+    fresh[1] = cycle
     fresh[5] = 0.0
     for a in range(4):
         fresh[9 + 4 * a] = 0.0
         fresh[18 + a] = 0.0
-    for a in (0, 2):
-        fresh[9 + 4 * a] = step_variance
-        fresh[18 + a] = step_variance
-    fresh[21] = step_variance
-    fresh[1] = cycle
-    if hazard >= 1.0:
-        bank[0] = fresh
-        return 1
-    for i in range(count):
-        bank[i, 0] += math.log1p(-hazard)
-    fresh[0] += math.log(hazard)
-    bank[count] = fresh
-    return count + 1
+    for scale in (SMALL_STEP, LARGE_STEP):
+        variance = scale**2 * step_variance
+        bank[count] = fresh
+        row = bank[count]
+        row[6] += variance
+        row[8] += variance
+        row[14] += variance
+        row[16] += variance
+        for a in (0, 2):
+            row[9 + 4 * a] = variance
+            row[18 + a] = variance
+        row[21] = variance
+        count += 1
+    return count
 
 
 @compiled
@@ -234,9 +238,9 @@ def run_cycle(
     if cycles > 0.0:
         _predict(bank, count, cycles, level_q, slope_q)
         if announced > 0.0:
-            count = _spawn(bank, count, cycle, 1.0, step, 0.0)
+            count = _spawn(bank, count, cycle, 1.0, step)
         elif announced == 0.0:
-            count = _spawn(bank, count, cycle, min(hazard * cycles, 0.5), step, 0.0)
+            count = _spawn(bank, count, cycle, min(hazard * cycles, 0.5), step)
     density = _update(bank, count, value, variance, lag, cycle, outliers)
     count = _prune(bank, count, int(capacity), int(recent), cycle + lag, accepted)
     # only changes within the window count: over very long spans some tiny change is all but certain

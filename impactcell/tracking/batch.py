@@ -12,7 +12,8 @@ from impactcell.tracking.settings import TrackerSettings
 from impactcell.tracking.state import Reading, Shift, TrackerState
 
 FEWEST_DIFFERENCES = 18.0  # the scale of the noise must rest on so many before a shift is believed
-SETTLED = 1.15  # and must not have moved by such a factor since the first cycles were gone over with it
+LEARNING_DIFFERENCES = 100.0  # before so many,
+SETTLED = 1.15  # it must not have moved by such a factor since the first cycles were gone over with it
 
 
 def find_shift(
@@ -98,4 +99,5 @@ def _settled(state: TrackerState) -> bool:
     if state.noise.weight < FEWEST_DIFFERENCES:
         return False
     moved = state.noise.factor / state.replayed_factor
-    return state.history is None or 1.0 / SETTLED < moved < SETTLED
+    early = state.history is not None and state.noise.weight < LEARNING_DIFFERENCES
+    return not early or 1.0 / SETTLED < moved < SETTLED

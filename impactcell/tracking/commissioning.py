@@ -16,7 +16,15 @@ from impactcell.tracking import wear
 from impactcell.tracking.settings import TrackerSettings
 
 SCHEDULE = (50, 100, 200)  # cycles after which there is a first look, before the end of commissioning
-EARLY = (4, 8, 12, *range(16, 200, 4))  # cycles after which a wrong scale of the noise is corrected
+EARLY = (
+    4,
+    8,
+    12,
+    *range(16, 200, 4),
+    250,
+    300,
+    400,
+)  # cycles after which a wrong scale of the noise is corrected
 RESCALED = 1.07  # factor by which it must have moved
 LEVEL_WALKS = (0.0, 0.01, 0.03, 0.1, 0.3)  # standard deviations a cycle, of one estimate's
 SLOPE_WALKS = (0.0, 1e-5, 1e-4, 1e-3)

@@ -25,6 +25,7 @@ MEMORY = 5000.0  # cycles after which the factor forgets
 DECLARED_WEIGHT = 10.0  # differences that a declared standard deviation counts for
 GUESSED_RELATIVE_STD = 0.01  # where no standard deviation was ever declared: of the value itself
 CONTRADICTED = 2.0  # a factor beyond this, or below its inverse, says the declared scale is no guide
+SMALLEST_GUESS = 1e-6
 SMALLEST_FACTOR = 1e-6
 
 
@@ -67,7 +68,7 @@ def declared_std(noise: Noise, value: float, std: float) -> tuple[Noise, float]:
         return replace(noise, usual_std=usual), std
     if not math.isnan(noise.usual_std):
         return noise, noise.usual_std
-    guess = GUESSED_RELATIVE_STD * abs(value)
+    guess = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
     return replace(noise, usual_std=guess, weight=0.0, guessed=True), guess
 
 
