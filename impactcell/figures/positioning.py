@@ -1,0 +1,88 @@
+"""Remaining distance against tap number, by mass: the planner in closed loop with a cell that is not nominal.
+
+The cell's stiffness is 10 % above, its damping 10 % below what the planner was told; each tap's friction
+scatters by 3 %. One planner serves all masses in turn and learns from every tap; its first five tasks are
+drawn apart. The plant is `impactcell.physics`, tap by tap.
+"""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from impactcell.figures.friction import COLOURS, GREY, STYLE
+from impactcell.physics import Plant, Strike, strike
+from impactcell.positioning import Tap, TapPlanner
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MASSES_KG = (8.0, 16.0, 32.0)
+NOMINAL = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.2, mu_k=0.152)
+STIFFNESS, DAMPING, MU_S, RATIO = 7.15e5, 418.5, 0.22, 0.76
+SCATTER = 0.03
+TOLERANCE_M = 10e-6
+TASKS = 25  # of each mass
+LEARNING = 5
+MOST_TAPS = 60
+FLOOR_M = 0.3e-6  # below this a remainder is drawn here, for the logarithmic axis
+SEED = 7
+
+
+def draw(directory: Path) -> list[Path]:
+    """Write the figure as PNG and SVG."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    courses = _courses()
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 2.9))
+        axes: list[Axes] = list(figure.subplots(1, len(MASSES_KG), sharey=True))
+        for axis, mass, colour in zip(axes, MASSES_KG, COLOURS, strict=True):
+            _panel(axis, courses[mass], mass, colour)
+        axes[0].set_ylabel("remaining distance / mm")
+        axes[0].legend(loc="lower left", fontsize=7)
+        files = [directory / f"positioning.{suffix}" for suffix in ("png", "svg")]
+        for file in files:
+            figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else {"Software": None})
+    return files
+
+
+def _courses() -> dict[float, list[list[float]]]:
+    """Remaining distances (m) from task start to end, for each task of each mass, in the order made."""
+    rng = np.random.default_rng(SEED)
+    planner = TapPlanner(tolerance_m=TOLERANCE_M, plant=NOMINAL)
+    courses: dict[float, list[list[float]]] = {mass: [] for mass in MASSES_KG}
+    for _ in range(TASKS):
+        for mass in MASSES_KG:
+            course = [float(rng.uniform(2e-3, 40e-3))]
+            while len(course) <= MOST_TAPS:
+                tap = planner.next_tap(course[-1], mass)
+                if not isinstance(tap, Tap):
+                    break
+                mu_s = MU_S * (1.0 + SCATTER * rng.standard_normal())
+                plant = Plant(STIFFNESS, DAMPING, mu_s, RATIO * mu_s)
+                moved = strike(plant, Strike(tap.velocity_m_s, mass, tap.stroke_m)).displacement_m
+                planner.observe(tap, moved, mass)
+                course.append(course[-1] - moved)
+            courses[mass].append(course)
+    return courses
+
+
+def _panel(axis: "Axes", courses: list[list[float]], mass: float, colour: str) -> None:
+    for n, course in enumerate(courses):
+        learning = n < LEARNING
+        shown = [max(abs(remaining), FLOOR_M) * 1e3 for remaining in course]
+        axis.semilogy(
+            range(len(course)), shown, color=GREY if learning else colour, linewidth=0.8,
+            alpha=0.9 if learning else 0.5, linestyle="--" if learning else "-", marker=".", markersize=3,
+            label={0: "first five tasks", LEARNING: "later tasks"}.get(n),
+        )  # fmt: skip
+    axis.axhspan(FLOOR_M * 0.7e3, TOLERANCE_M * 1e3, color="#dddddd", zorder=0)
+    axis.set_ylim(FLOOR_M * 0.7e3, 60.0)
+    mean = math.fsum(len(course) - 1 for course in courses[LEARNING:]) / (len(courses) - LEARNING)
+    axis.set_title(f"{mass:g} kg: {mean:.1f} taps on average")
+    axis.set_xlabel("tap")
+    axis.set_xticks(range(0, max(map(len, courses)), 1 if max(map(len, courses)) < 9 else 2))
+    axis.text(0.98, 0.08, "inside ±10 µm", transform=axis.transAxes, ha="right", fontsize=7, color=GREY)
