@@ -192,6 +192,10 @@ class Journal:
         with self._errors():
             thin(self._db, keep, now_ns)
 
+    def count(self) -> int:
+        """Return how many cycles the journal holds."""
+        return int(self._db.execute("SELECT count(*) FROM cycles").fetchone()[0])
+
     def audit(self) -> tuple[AuditEntry, ...]:
         """Return every action of a person, oldest first."""
         rows = self._db.execute("SELECT time_ns, user, action, arguments, result FROM audit ORDER BY id")
