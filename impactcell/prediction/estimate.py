@@ -124,16 +124,23 @@ def _peak(capture: Capture) -> tuple[Reading, str]:
 
 
 def _slide(capture: Capture) -> tuple[Slide | None, str]:
-    if capture.position is None and capture.summary is not None:
-        return None, "from the module's summary: no position was recorded"
+    if capture.summary is not None and (lacking := _lacking(capture)):
+        return None, f"from the module's summary: {lacking}"
     try:
         return slide(capture), ""
     except (PredictionError, PhysicsError) as fault:
         return None, str(fault)
 
 
+def _lacking(capture: Capture) -> str:
+    """Say which channel was not recorded, of the two that show a slide."""
+    if capture.position is None:
+        return "no position was recorded"
+    return "no force was recorded" if capture.force is None else ""
+
+
 def _reported_distance(capture: Capture) -> Reading:
-    if capture.position is None and capture.summary is not None:
+    if capture.summary is not None and _lacking(capture):
         reported = capture.summary.sliding_distance_m
         if math.isfinite(reported) and reported > 0.0:
             return Reading(reported, 0.01 * reported)

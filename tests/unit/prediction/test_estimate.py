@@ -104,6 +104,9 @@ def test_the_modules_summary_stands_in_for_channels_that_were_not_recorded() -> 
     assert found.mu_s.quality is Quality.UNCERTAIN
     assert "summary" in found.mu_s.reason
     assert found.mu_s.value == pytest.approx(0.2, rel=0.02)
+    without_force = estimate(replace(GOOD, force=None, summary=summary), MODEL)
+    assert without_force.estimator is Estimator.COMBINED
+    assert "no force was recorded" in without_force.mu_s.reason
     nothing = replace(GOOD, force=None, position=None, summary=Summary(math.nan, math.nan))
     assert estimate(nothing, MODEL).mu_s.quality is Quality.BAD
 
