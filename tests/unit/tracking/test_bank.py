@@ -1,0 +1,151 @@
+"""The compiled bank against exhaustive enumeration, filterpy and its own limits."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from filterpy.kalman import KalmanFilter
+from scipy.stats import multivariate_normal
+
+from impactcell.tracking import bank
+
+
+def run(values, design, announced=None, variance=1.0, slope_std=0.1, accepted=0.0):
+    table = np.zeros((bank.ROWS, bank.WIDTH))
+    first = bank.seed(values[0], variance, slope_std, 0, design[6])
+    table[: len(first)] = first
+    count, densities, statistics = len(first), [], []
+    for t, value in enumerate(values[1:], start=1):
+        told = 0.0 if announced is None else announced[t]
+        reading = np.array([value, variance, 1.0, 0.0, t, told])
+        count, density, statistic = bank.run_cycle(table, count, design, reading, accepted)
+        densities.append(density)
+        statistics.append(statistic)
+    return table[:count], np.array(densities), np.array(statistics)
+
+
+def exact_posterior(values, hazard, step_std, slope_std):
+    """Every set of change cycles and scales of step, each a linear Gaussian model solved in one piece."""
+    n = len(values)
+    weights, means, lasts = [], [], []
+    for changes in itertools.product([0.0, bank.SMALL_STEP, bank.LARGE_STEP], repeat=n - 1):
+        at = [t for t, c in enumerate(changes, start=1) if c]
+        # unknowns: level at cycle 0 (known from the first value), slope, one shift a change
+        design = np.zeros((n, 2 + len(at)))
+        design[:, 0], design[:, 1] = 1.0, np.arange(n)
+        for k, t in enumerate(at):
+            design[t:, 2 + k] = 1.0
+        prior = np.diag([1.0, slope_std**2, *[(step_std * changes[t - 1]) ** 2 for t in at]])
+        later = design[1:]
+        residual = values[1:] - values[0]
+        cov = later @ prior @ later.T + np.eye(n - 1)
+        weight = multivariate_normal.logpdf(residual, np.zeros(n - 1), cov)
+        weight += len(at) * math.log(hazard / 2.0) + (n - 1 - len(at)) * math.log1p(-hazard)
+        gain = prior @ later.T @ np.linalg.inv(cov)
+        weights.append(weight)
+        means.append((gain @ residual)[1])
+        lasts.append(at[-1] if at else 0)
+    w = np.exp(np.array(weights) - max(weights))
+    w /= w.sum()
+    last = np.bincount(lasts, weights=w, minlength=n)
+    total = max(weights) + math.log(np.exp(np.array(weights) - max(weights)).sum())
+    return last, float(w @ means), total
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.5, 4.0])
+def test_last_change_and_slope_against_enumeration(shift):
+    rng = np.random.default_rng(3)
+    values = 0.03 * np.arange(8) + rng.normal(size=8)
+    values[4:] += shift
+    hazard, step_std, slope_std = 0.02, 3.0, 0.1
+    design = bank.design(hazard, step_std**2, 0.0, 0.0, 1e-12)
+    table, densities, _ = run(values, design, slope_std=slope_std)
+    last, slope, total = exact_posterior(values, hazard, step_std, slope_std)
+    ours = np.zeros(8)
+    for row in table:
+        ours[int(row[bank.CHANGE])] += math.exp(row[bank.WEIGHT])
+    # histories before the last change are merged by moments: near, not equal
+    assert ours == pytest.approx(last, abs=0.01)
+    assert bank.moments(table)[0][1] == pytest.approx(slope, abs=4e-3)
+    assert densities.sum() == pytest.approx(total, abs=0.05)
+
+
+def test_one_hypothesis_is_filterpys_kalman_filter():
+    rng = np.random.default_rng(1)
+    values = 0.2 + 0.002 * rng.normal(size=300) + 1e-5 * np.arange(300)
+    variance, level_q, slope_q = 4e-6, 1e-9, 1e-13
+    design = bank.design(1e-3, 1e-4, level_q, slope_q, 0.0)
+    table = np.zeros((bank.ROWS, bank.WIDTH))
+    table[0] = bank.seed(values[0], variance, 1e-4, 0, 0.01)[0]
+    table[0, bank.WEIGHT] = 0.0
+    oracle = KalmanFilter(2, 1)
+    oracle.x = np.array([[values[0]], [0.0]])
+    oracle.P = np.diag([variance, 1e-8])
+    oracle.F = np.array([[1.0, 1.0], [0.0, 1.0]])
+    oracle.H = np.array([[1.0, 0.0]])
+    oracle.Q = np.array([[level_q + slope_q / 3.0, slope_q / 2.0], [slope_q / 2.0, slope_q]])
+    oracle.R *= variance
+    for t, value in enumerate(values[1:], start=1):
+        reading = np.array([value, variance, 1.0, 0.0, t, -1.0])
+        count, density, _ = bank.run_cycle(table, 1, design, reading, 0.0)
+        oracle.predict()
+        oracle.update(value)
+        assert count == 1
+        assert density == pytest.approx(oracle.log_likelihood, abs=1e-6)
+    mean, covariance = bank.moments(table[:1])
+    assert mean[:2] == pytest.approx(oracle.x[:, 0], rel=1e-9)
+    assert covariance[:2, :2] == pytest.approx(oracle.P, rel=1e-9)
+
+
+def test_a_late_reading_gives_the_same_state_as_in_time():
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=60)
+    design = bank.design(1e-3, 16.0, 0.0, 0.0, 1e-12)
+
+    def take(order):
+        table = np.zeros((bank.ROWS, bank.WIDTH))
+        table[0] = bank.seed(values[0], 1.0, 0.1, 0, 0.01)[0]
+        count, newest = 1, 0
+        for t in order:
+            passed, lag = max(t - newest, 0), max(newest - t, 0)
+            reading = np.array([values[t], 1.0, passed, lag, t, -1.0])
+            count, _, _ = bank.run_cycle(table, count, design, reading, 0.0)
+            newest = max(newest, t)
+        return bank.moments(table[:count])
+
+    in_time = take(range(1, 60))
+    shuffled = take([*range(1, 20), 25, 20, 22, 21, 24, 23, *range(26, 60)])
+    assert shuffled[0] == pytest.approx(in_time[0], abs=1e-9)
+    assert shuffled[1] == pytest.approx(in_time[1], rel=1e-7, abs=1e-12)
+
+
+def test_an_announced_change_leaves_one_history_and_knows_its_size():
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=400)
+    values[200:] += 2.0
+    told = np.where(np.arange(400) == 200, 1.0, -1.0)
+    table, _, _ = run(values, bank.design(1e-3, 16.0, 0.0, 0.0, 0.003), announced=told)
+    assert {int(row[bank.CHANGE]) for row in table} == {200}
+    cycle, size, std = bank.last_shift(table, 199, 200)
+    assert cycle == 200
+    # two lines of 200 points with a common slope, known level and slope to within their data
+    assert std == pytest.approx(0.2, rel=0.1)
+    assert abs(size - 2.0) < 3.0 * std
+
+
+def test_the_bank_stays_small_and_normalised_over_a_long_run():
+    rng = np.random.default_rng(5)
+    values = rng.normal(size=3000)
+    values[::97] += 12.0
+    table, _, statistics = run(values, bank.design(3e-3, 16.0, 0.0, 0.0, 0.003))
+    assert len(table) <= bank.CAPACITY
+    assert np.exp(table[:, bank.WEIGHT]).sum() == pytest.approx(1.0, abs=1e-9)
+    assert np.all(np.diff(table[:, bank.CHANGE]) >= 0)
+    assert np.isfinite(table).all()
+    # outliers alone, however regular, are no batch change
+    assert statistics[20:].max() < bank.threshold(1e5)
+
+
+def test_a_threshold_for_each_rate():
+    assert bank.threshold(1e6) - bank.threshold(1e5) == pytest.approx(math.log(10.0))
