@@ -36,6 +36,13 @@ def test_a_model_comes_back_as_it_was_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_parameter_of_one_value_a_batch_is_a_list(tmp_path: Path) -> None:
+    effects = {"batch_shift": {"relative_change": (0.02, -0.01)}}
+    model = replace(MODEL, plant=replace(MODEL.plant, effects=effects), intervals={})
+    write_model(model, tmp_path / "model.yaml")
+    assert read_model(tmp_path / "model.yaml") == model
+
+
 def test_an_actuator_that_halts_at_separation_has_no_stroke(tmp_path: Path) -> None:
     path = tmp_path / "model.yaml"
     write_model(replace(MODEL, stroke_m=math.inf), path)

@@ -149,6 +149,38 @@ def test_a_waveform_that_does_not_fit_leaves_the_equations_and_tells_the_gap() -
     assert found.mu_s.quality is Quality.UNCERTAIN
 
 
+def test_a_part_that_never_moves_and_a_negative_root_are_bad_and_named() -> None:
+    rng = np.random.default_rng(4)
+    times = np.arange(1, 600) * 1e-4
+    held = Channel(times, np.minimum(2e3 * times, 20.0) + rng.normal(0.0, 0.4, len(times)), 0.4)
+    still = Channel(times, rng.normal(0.0, 1.5e-6, len(times)), 1.5e-6)
+    found = estimate(replace(GOOD, force=held, position=still), MODEL)
+    consistent(found)
+    assert found.mu_s.quality is Quality.BAD
+    assert "moved less than" in found.mu_s.reason
+    short = replace(GOOD, position=replace(position(GOOD), values=0.3 * position(GOOD).values))
+    found = estimate(short, MODEL)
+    consistent(found)
+    assert found.mu_s.quality is Quality.BAD
+    assert "shortest for which equation (5) has a root" in found.by_distance.reason
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"quadratic_drag": {"drag_coefficient_n_s2_per_m2": 40.0}},
+        {"force_sensor_lag": {"time_constant_s": 3e-4}, "surface_tilt": {"tilt_rad": 0.004}},
+        {"batch_shift": {"relative_change": [0.1]}, "hertz_contact": {"exponent": 1.1}},
+    ],
+)
+def test_a_model_with_effects_fits_taps_that_have_them(effects: dict[str, dict[str, float]]) -> None:
+    model = replace(MODEL, plant=replace(PLANT, effects={**VISCOUS, **effects}), predictors=())
+    found = estimate(Tap(0.06, effects={**VISCOUS, **effects}).capture(np.random.default_rng(5)), model)
+    assert found.estimator is Estimator.WAVEFORM
+    assert 0.9 < found.gap < 1.1
+    assert found.mu_k.value == pytest.approx(0.152, rel=2e-3)
+
+
 def test_a_model_known_to_miss_publishes_the_equations() -> None:
     found = estimate(GOOD, MODEL, misfit=3.0)
     assert found.estimator is Estimator.COMBINED
