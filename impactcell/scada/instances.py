@@ -10,6 +10,8 @@ from typing import Any
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
+from impactcell.scada.standard import DESCRIPTIONS
+
 AGGREGATES = frozenset(
     ua.NodeId(i)
     for i in (
@@ -50,8 +52,9 @@ def supertypes(space: AddressSpace, node: ua.NodeId) -> Iterator[ua.NodeId]:
 
 
 def link(space: AddressSpace, source: ua.NodeId, reference: ua.NodeId, target: ua.NodeId) -> None:
-    """Add a reference in both directions, once."""
-    for one, other, forward in ((source, target, True), (target, source, False)):
+    """Add a reference in both directions, once; a type is not told of its instances."""
+    directions = ((source, target, True), (target, source, False))
+    for one, other, forward in directions[: 1 if reference == HAS_TYPE_DEFINITION else 2]:
         data = space[one]
         if any(r.NodeId == other and r.ReferenceTypeId == reference for r in data.references):
             continue
@@ -138,8 +141,16 @@ def _fill(
             copy.attributes[attribute] = AttributeValue(held.value)
         space[node] = copy
         set_attribute(space, node, ua.AttributeIds.NodeId, node, ua.VariantType.NodeId)
+        _describe(space, node, name)
         types = targets(original, HAS_TYPE_DEFINITION)
         for kind in types:
             link(space, node, HAS_TYPE_DEFINITION, kind)
         link(space, parent, reference, node)
         _fill(space, node, _declarations(space, [declaration, *types]), wanted, f"{path}/")
+
+
+def _describe(space: AddressSpace, node: ua.NodeId, name: str) -> None:
+    held = read(space, node, ua.AttributeIds.Description)
+    if (held is None or not held.Text) and name in DESCRIPTIONS:
+        text = ua.LocalizedText(DESCRIPTIONS[name])
+        set_attribute(space, node, ua.AttributeIds.Description, text, ua.VariantType.LocalizedText)

@@ -97,6 +97,7 @@ class Listener:
 
 async def connected(site: dict[str, str]) -> Client:
     client = Client(site["endpoint"], timeout=30)
+    client.session_timeout = 10_000
     client.application_uri = CLIENT_URI
     client.set_user(site.get("user", "observer"))
     client.set_password(site["password"])

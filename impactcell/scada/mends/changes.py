@@ -93,7 +93,8 @@ def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, wanted: 
     """
     if wanted is None or isinstance(wanted, ua.ExtensionObject):
         return ChangeFilter(ua.DataChangeTrigger.StatusValue, 0.0)
-    if not isinstance(wanted, ua.DataChangeFilter):
+    # asyncua exports a subclass of what it decodes, so the exported name would let nothing through.
+    if not isinstance(wanted, ua.uaprotocol_auto.DataChangeFilter):
         raise FaultError(ua.StatusCodes.BadFilterNotAllowed)
     if wanted.DeadbandType == ua.DeadbandType.None_:
         return ChangeFilter(wanted.Trigger, 0.0)

@@ -1,0 +1,283 @@
+"""What a client sees of a cell: names, units, status, time, changes, restarts; against the table of the interface."""
+
+import asyncio
+import math
+import time
+from pathlib import Path
+
+import pytest
+from asyncua import Client, ua
+
+from impactcell.records import AlarmName, Quality
+from impactcell.scada import ModuleState
+from tests.opcua_server import CELL, START_NS, Site, site
+
+codes = ua.StatusCodes
+
+# As `docs` of the interface gives it: folder, variable, type, unit.
+ONE, N, UM, MM_MIN, MM, MS = "C62", "NEW", "4H", "H81", "MMT", "C26"
+INTERFACE = {
+    "Friction": {
+        **dict.fromkeys(
+            (
+                "StaticFriction",
+                "StaticFrictionStdDev",
+                "StaticFrictionByForce",
+                "StaticFrictionByDistance",
+                "KineticFriction",
+            ),
+            ("Double", ONE),
+        ),
+        "PeakForce": ("Double", N),
+        "SlidingDistance": ("Double", UM),
+        "ActuationVelocity": ("Double", MM_MIN),
+        "CycleNumber": ("UInt32", None),
+    },
+    "Wear": dict.fromkeys(
+        (
+            "Level",
+            "LevelStdDev",
+            "Limit",
+            "RatePer1000Cycles",
+            "CyclesToLimit",
+            "CyclesToLimitLow",
+            "CyclesToLimitHigh",
+        ),
+        ("Double", ONE),
+    ),
+    "Batch": {
+        "BatchId": ("String", None),
+        **dict.fromkeys(("Offset", "OffsetStdDev", "LastShift"), ("Double", ONE)),
+        "LastShiftCycle": ("UInt32", None),
+    },
+    "Signature": {
+        "Position": ("Double", MM),
+        "Friction": ("Double", ONE),
+        "TSquared": ("Double", ONE),
+        "Spe": ("Double", ONE),
+    },
+    "Positioning": {
+        "Target": ("Double", MM),
+        "Remaining": ("Double", MM),
+        "NextVelocity": ("Double", MM_MIN),
+        "NextStroke": ("Double", MM),
+    },
+    "Module": {
+        "Connected": ("Boolean", None),
+        "CyclesReceived": ("UInt32", None),
+        "CyclesMissed": ("UInt32", None),
+        "RoundTripTime": ("Double", MS),
+    },
+    "Model": {"Name": ("String", None), "Gap": ("Double", ONE)},
+}
+
+
+def unit_id(code: str) -> int:
+    """UNECE code as OPC UA numbers it (Part 8, 5.6.4.3)."""
+    return int.from_bytes(code.encode(), "big")
+
+
+class Changes:
+    def __init__(self) -> None:
+        self.queue: asyncio.Queue[ua.DataValue] = asyncio.Queue()
+
+    def datachange_notification(self, node: object, value: object, data: object) -> None:
+        self.queue.put_nowait(data.monitored_item.Value)
+
+    async def next(self) -> ua.DataValue:
+        return await asyncio.wait_for(self.queue.get(), 10)
+
+
+async def test_the_interface_is_there_with_units_and_descriptions() -> None:
+    async with site() as here, await here.client() as client:
+        for folder, variables in INTERFACE.items():
+            children = await (await here.node(client, folder)).get_children()
+            found = {(await child.read_browse_name()).Name: child for child in children}
+            assert set(found) == set(variables), folder
+            for name, (kind, unit) in variables.items():
+                node = found[name]
+                assert (await node.read_data_type()).Identifier == ua.VariantType[kind].value, name
+                definition = (await node.read_type_definition()).Identifier
+                assert definition == (ua.ObjectIds.AnalogUnitRangeType if unit else 63), name
+                assert (await node.read_description()).Text, name
+                if unit:
+                    units = await (await node.get_child("0:EngineeringUnits")).read_value()
+                    assert units.UnitId == unit_id(unit), name
+                    assert units.NamespaceUri == "http://www.opcfoundation.org/UA/units/un/cefact"
+                    eu_range = await (await node.get_child("0:EURange")).read_value()
+                    assert eu_range.Low < eu_range.High
+        names = {
+            (await c.read_browse_name()).Name for c in await (await here.node(client, "")).get_children()
+        }
+        assert names >= {alarm.value for alarm in AlarmName}
+        assert names >= {"StartBatch", "ResetWear", "SetTarget", "AbortPositioning", "Identification"}
+        await _every_node_is_described(client, await here.node(client, ""))
+
+
+async def _every_node_is_described(client: Client, root) -> None:
+    queue = [root]
+    while queue:
+        node = queue.pop()
+        assert (await node.read_description()).Text, node
+        queue += await node.get_children()
+
+
+async def test_identification_and_machines_folder() -> None:
+    async with site() as here, await here.client() as client:
+        machinery = await client.get_namespace_index("http://opcfoundation.org/UA/Machinery/")
+        machines = client.get_node(ua.NodeId(1001, machinery))
+        cell = await here.node(client, "")
+        assert cell in await machines.get_children()
+        expected = {
+            "Manufacturer": ua.LocalizedText("Example Works"),
+            "SerialNumber": f"SN-{CELL}",
+            "ProductInstanceUri": f"urn:example:{CELL}",
+            "Model": ua.LocalizedText("IC-1"),
+            "Location": "Hall 3",
+        }
+        identification = await here.node(client, "Identification")
+        found = {
+            (await child.read_browse_name()).Name: await child.read_value()
+            for child in await identification.get_children()
+        }
+        assert found == expected
+
+
+async def _read(here: Site, client: Client, path: str) -> ua.DataValue:
+    return await (await here.node(client, path)).read_data_value(raise_on_bad_status=False)
+
+
+async def test_status_value_and_time() -> None:
+    async with site() as here, await here.client() as client:
+        first = await _read(here, client, "Friction/StaticFriction")
+        assert first.StatusCode.value == codes.BadWaitingForInitialData
+        snapshot = here.publish(0.2)
+        good = await _read(here, client, "Friction/StaticFriction")
+        assert good.StatusCode.is_good()
+        assert good.Value.Value == 0.2
+        assert good.SourceTimestamp.timestamp() == pytest.approx(snapshot.time_ns / 1e9, abs=2e-6)
+        velocity = await _read(here, client, "Friction/ActuationVelocity")
+        assert velocity.Value.Value == pytest.approx(0.05 * 60_000), "m/s as mm/min"
+        distance = await _read(here, client, "Friction/SlidingDistance")
+        assert distance.Value.Value == pytest.approx(4e-4 * 1e6), "m as µm"
+        missing = await _read(here, client, "Friction/StaticFrictionByDistance")
+        assert missing.StatusCode.value == codes.BadWaitingForInitialData, "never had a value"
+        here.publish(0.21, quality=Quality.UNCERTAIN)
+        doubtful = await _read(here, client, "Friction/StaticFriction")
+        assert doubtful.StatusCode.value == codes.Uncertain
+        assert doubtful.Value.Value == 0.21
+        here.publish(math.nan, quality=Quality.BAD)
+        bad = await _read(here, client, "Friction/StaticFriction")
+        assert bad.StatusCode.value == codes.Bad
+        assert bad.Value.Value == 0.21, "the last value is kept"
+        here.publish(0.22)
+        here.server.mark_stale(CELL, time.time_ns())
+        assert (await _read(here, client, "Wear/Level")).StatusCode.value == (
+            codes.UncertainNoCommunicationLastUsableValue
+        )
+        here.server.mark_bad(CELL, time.time_ns())
+        lost = await _read(here, client, "Friction/StaticFriction")
+        assert (lost.StatusCode.value, lost.Value.Value) == (codes.BadNoCommunication, 0.22)
+        here.server.module(CELL, ModuleState(False, 5, 1, math.nan), time.time_ns())
+        assert (await _read(here, client, "Module/Connected")).Value.Value is False
+        assert (await _read(here, client, "Module/RoundTripTime")).StatusCode.is_bad()
+        here.server.module(CELL, ModuleState(True, 5, 1, 0.002), time.time_ns())
+        assert (await _read(here, client, "Module/RoundTripTime")).Value.Value == pytest.approx(2.0)
+        here.publish(0.22)
+        assert (await _read(here, client, "Friction/StaticFriction")).StatusCode.is_good()
+
+
+async def test_only_changes_are_told() -> None:
+    async with site() as here, await here.client() as client:
+        here.publish(0.2)
+        changes = Changes()
+        subscription = await client.create_subscription(20, changes)
+        await subscription.subscribe_data_change(
+            await here.node(client, "Friction/StaticFriction"), queuesize=50
+        )
+        assert (await changes.next()).Value.Value == 0.2
+        for mu in (0.2, 0.2, 0.2, 0.25):
+            here.publish(mu)
+        changed = await changes.next()
+        assert changed.Value.Value == 0.25
+        assert changes.queue.empty()
+
+
+async def test_deadband_is_measured_from_what_was_reported() -> None:
+    """A drift in steps smaller than the deadband is reported each time it has added up to it."""
+    async with site() as here, await here.client() as client:
+        here.publish(0.2)
+        changes = Changes()
+        subscription = await client.create_subscription(20, changes)
+        node = await here.node(client, "Friction/StaticFriction")
+        await subscription.deadband_monitor(node, 0.0105, queuesize=50)
+        assert (await changes.next()).Value.Value == 0.2
+        for step in range(1, 24):
+            here.publish(0.2 + 0.001 * step)
+        assert (await changes.next()).Value.Value == pytest.approx(0.211)
+        assert (await changes.next()).Value.Value == pytest.approx(0.222)
+        assert changes.queue.empty()
+        percent = Changes()
+        other = await client.create_subscription(20, percent)
+        # 5 % of the EURange of 0 to 1.
+        await other.deadband_monitor(node, 5.0, deadbandtype=2, queuesize=50)
+        first = (await percent.next()).Value.Value
+        here.publish(first + 0.04)
+        here.publish(first + 0.06)
+        assert (await percent.next()).Value.Value == pytest.approx(first + 0.06)
+
+
+async def test_a_full_queue_says_so() -> None:
+    async with site() as here, await here.client() as client:
+        here.publish(0.2)
+        changes = Changes()
+        subscription = await client.create_subscription(200, changes)
+        await subscription.subscribe_data_change(
+            await here.node(client, "Friction/StaticFriction"), queuesize=3
+        )
+        await changes.next()
+        for mu in (0.3, 0.31, 0.32, 0.33, 0.34):
+            here.publish(mu)
+        told = [await changes.next() for _ in range(3)]
+        assert [value.Value.Value for value in told] == [0.32, 0.33, 0.34]
+        assert told[0].StatusCode.value & 0x480 == 0x480
+        assert told[1].StatusCode.value == 0
+
+
+async def test_node_ids_stay_over_restarts_and_new_cells(tmp_path: Path) -> None:
+    async def ids(cells: tuple[str, ...]) -> dict[str, str]:
+        async with site(cells=cells, directory=tmp_path) as here, await here.client() as client:
+            found: dict[str, str] = {}
+            queue = [(await here.node(client, ""), "")]
+            while queue:
+                node, path = queue.pop()
+                found[path] = node.nodeid.to_string()
+                queue += [
+                    (c, f"{path}/{(await c.read_browse_name()).Name}") for c in await node.get_children()
+                ]
+            return found
+
+    before = await ids((CELL,))
+    assert len(before) > 400
+    assert await ids(("another", CELL)) == before
+
+
+async def test_conditions_stay_over_a_restart(tmp_path: Path) -> None:
+    async with site(directory=tmp_path) as here:
+        stored = here.raise_alarm()
+        async with await here.client("operator") as client:
+            known = await (await here.node(client, "WearLimit/EventId")).read_value()
+    async with site(directory=tmp_path) as here:
+        here.actions.alarms[CELL, AlarmName.WEAR_LIMIT] = stored
+        here.server.alarm(CELL, stored)
+        async with await here.client("operator") as client:
+            assert await (await here.node(client, "WearLimit/ActiveState/Id")).read_value() is True
+            assert await (await here.node(client, "WearLimit/Retain")).read_value() is True
+            condition = await here.node(client, "WearLimit")
+            method = await here.node(client, "WearLimit/Acknowledge")
+            # The EventId a client noted before the restart still stands for the alarm.
+            await condition.call_method(method, known, ua.LocalizedText("seen"))
+            assert await (await here.node(client, "WearLimit/AckedState/Id")).read_value() is True
+            size = await (await here.node(client, "WearLimit/Size")).read_value()
+            assert size == stored.evidence.size
+    assert START_NS > 0
