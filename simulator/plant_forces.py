@@ -184,7 +184,6 @@ class Forces:
             for pull in self._pull:
                 force -= pull(-d)
             return force, free if phase.halted else free - self.compliance * force
-        d = max(d, 0.0)
         spring = self.stiffness * d
         for law in self._spring:
             spring = law(d, self.stiffness, spring)
@@ -199,7 +198,9 @@ class Forces:
             force += further(d, rate, t)
         for state_law, first, last in self._state_contact_force:
             force += state_law(d, z[first:last])
-        force = max(force, 0.0)
+        # Never negative; but a step that crosses the loss of contact has to find the law it came with.
+        if d >= 0.0:
+            force = max(force, 0.0)
         return force, free - compliance * force
 
     def contact_along(self, phase: Phase, time: Samples, states: Samples) -> Samples:

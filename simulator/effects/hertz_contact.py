@@ -1,5 +1,7 @@
 """Non-linear contact: k d^n."""
 
+import math
+
 from simulator.effects.law import Effect
 
 
@@ -14,4 +16,5 @@ class HertzContact(Effect):
         self._n = exponent
 
     def spring_force(self, d: float, stiffness: float, force: float) -> float:  # noqa: ARG002
-        return stiffness * float(d**self._n)
+        # Odd beyond d = 0, where only a step that looks for the loss of contact gets to.
+        return math.copysign(stiffness * abs(d) ** self._n, d)
