@@ -25,6 +25,7 @@ WALK = np.array([1.5e-3, 3e-4, 6e-4, 3e-4, 0.02])
 NARROW = {FRICTION: 0.05, STIFFNESS: 0.04}  # standard deviations that one Gaussian is trusted with
 NEGLIGIBLE = 1e-4  # weight of a component that is dropped
 ITERATIONS = 4
+CLIPPED = 3.5  # standard deviations of a tap's factor, beyond which more does not count as scatter
 CROOKED = 0.1  # of the first regression's remainder that stays, whatever the later ones leave over
 
 Response = Callable[[Samples], Samples]
@@ -115,7 +116,7 @@ def step(
         Normalised innovation.
     told, square : float
         How much the tap says of its own friction factor, 0 to 1, and the square of that factor's
-        deviation, both weighted.
+        deviation.
     """
     before = np.append(mean, 0.0)
     prior = np.zeros((6, 6))
@@ -124,6 +125,7 @@ def step(
     noise = POSITION_NOISE_M**2 + (MODEL_ERROR * moved_m) ** 2
     point, after = before.copy(), prior
     weight, surprise, likelihood, crooked = 1.0, 0.0, -math.inf, 0.0
+    gain, variance, innovation = np.zeros(6), 1.0, 0.0
     for iteration in range(ITERATIONS):
         root = np.linalg.cholesky(after + 1e-12 * np.diag(np.diag(prior)))
         values = response(point + POINTS @ root.T)
@@ -149,8 +151,10 @@ def step(
         after = 0.5 * (after + after.T)
         if settled and iteration > 0:
             break
-    told = 1.0 - float(after[5, 5]) / sigma**2
-    return point[:5], after[:5, :5], likelihood, surprise, told, float(point[5]) ** 2
+    told = float(gain[5]) ** 2 * variance / sigma**2
+    # Of the factor's variance it says factor² / told; an outlier counts as one of 3.5 standard deviations.
+    square = min(float(gain[5] * innovation) ** 2, CLIPPED**2 * told * sigma**2)
+    return point[:5], after[:5, :5], likelihood, surprise, told, square
 
 
 def _spread_evenly(count: int, seed: int) -> Samples:
