@@ -93,18 +93,28 @@ def table_of_equations(shots: int) -> Table:
     )
 
 
+def averaged_bound(seen: list[tuple[float, np.ndarray]], groups: int) -> np.ndarray:
+    """Mean over groups of like mu_k of the inverse of the group's mean information, prior included."""
+    ordered = np.array([mine for _, mine in sorted(seen, key=lambda pair: pair[0])])
+    inverses = [
+        len(group) * np.linalg.inv(group.mean(axis=0) + PRIOR_INFORMATION)
+        for group in np.array_split(ordered, groups)
+    ]
+    return np.sum(inverses, axis=0) / len(ordered)
+
+
 def table_of_waveform(shots_a_velocity: int) -> list[Table]:
     rng = np.random.default_rng(3)
     model = Model("reference", PLANT, PRIOR)
     squares: dict[str, list[list[float]]] = {name: [] for name in OF}
     bounds: dict[str, list[list[float]]] = {name: [] for name in OF}
-    loose: dict[str, list[float]] = {name: [] for name in OF}
+    loose: dict[str, list[list[float]]] = {name: [] for name in OF}
     inside: dict[str, list[bool]] = {name: [] for name in OF}
     ready: dict[str, list[bool]] = {name: [] for name in OF}
     for velocity in VELOCITIES_MM_PER_MIN:
         errors: dict[str, list[float]] = {name: [] for name in OF}
         own: dict[str, list[float]] = {name: [] for name in OF}
-        mean_information = np.zeros((4, 4))
+        seen: list[tuple[float, np.ndarray]] = []
         for _ in range(shots_a_velocity):
             truth = Truth(
                 velocity / 6e4,
@@ -115,7 +125,7 @@ def table_of_waveform(shots_a_velocity: int) -> list[Table]:
             )
             found = fit(shot(truth, rng), model)
             mine = information(truth)
-            mean_information += mine / shots_a_velocity
+            seen.append((truth.mu_k, mine))
             covariance = np.linalg.inv(mine + PRIOR_INFORMATION)
             intervals = dict(zip(("mu_s", "mu_k"), found.interval(), strict=True))
             for name, of in OF.items():
@@ -124,20 +134,20 @@ def table_of_waveform(shots_a_velocity: int) -> list[Table]:
                 own[name].append(float(of @ covariance @ of))
                 inside[name].append(intervals[name][0] <= true <= intervals[name][1])
                 ready[name].append(abs(value - true) <= 1.96 * getattr(found, name + "_std"))
-        mean_covariance = np.linalg.inv(mean_information + PRIOR_INFORMATION)
+        averaged = [averaged_bound(seen, groups) for groups in (max(shots_a_velocity // 10, 1), 1)]
         for name, of in OF.items():
             squares[name].append(errors[name])
             bounds[name].append(own[name])
-            loose[name].append(float(of @ mean_covariance @ of))
+            loose[name].append([float(of @ covariance @ of) for covariance in averaged])
         print(f"  waveform at {velocity} mm/min", file=sys.stderr, flush=True)
     rows = []
     for name in OF:
         error, bound = np.array(squares[name]), np.array(bounds[name])
-        for velocity, e, own_bound, mean_bound in zip(
+        for velocity, e, own_bound, looser in zip(
             [*map(str, VELOCITIES_MM_PER_MIN), "all"],
             [*error, error.ravel()],
             [*bound, bound.ravel()],
-            [*loose[name], float(np.mean(loose[name]))],
+            [*loose[name], np.mean(loose[name], axis=0).tolist()],
             strict=True,
         ):
             ratio = math.sqrt(e.mean() / own_bound.mean())
@@ -146,19 +156,20 @@ def table_of_waveform(shots_a_velocity: int) -> list[Table]:
                 (
                     f"{name}, {velocity} mm/min", "1.2", f"{ratio:.3f}", f"± {half:.3f}",
                     f"{100 * math.sqrt(e.mean()):.3g} %", f"{100 * math.sqrt(own_bound.mean()):.3g} %",
-                    f"{math.sqrt(e.mean() / mean_bound):.2f}",
+                    *(f"{math.sqrt(e.mean() / other):.2f}" for other in looser),
                 )
             )  # fmt: skip
     count = shots_a_velocity * len(VELOCITIES_MM_PER_MIN)
     against_bound = Table(
         "Waveform estimate against the Bayesian Cramér-Rao bound",
-        ("what", "bar", "RMSE / bound", "interval", "RMSE", "bound", "RMSE / van Trees bound"),
+        ("what", "bar", "RMSE / bound", "interval", "RMSE", "bound", "RMSE / (b)", "RMSE / (c)"),
         rows,
         f"{shots_a_velocity} shots a velocity, 18.9 kg, mu_s 0.15-0.25; mu_k/mu_s, k and b drawn from the "
         "priors of the estimator (3, 1, 2 %). Bound: inverse of the Fisher information (differences of the "
-        "simulator's plant) plus prior information, for each shot. Last column: with the information "
-        "averaged over the shots of a velocity before it is inverted, which no estimator reaches where shots "
-        "that show mu_s well and shots that do not are mixed.",
+        "simulator's plant) plus prior information, of each shot, then averaged: not a strict bound, ratios "
+        "a little below 1 occur. (b) averages the information over shots of like mu_k before inverting, (c) "
+        "over all shots of a velocity (van Trees): strict, but loose where shots that show mu_s well and "
+        "shots that do not are mixed.",
     )
     coverage = Table(
         "Coverage of the waveform's 95 % intervals",
