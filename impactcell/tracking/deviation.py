@@ -102,7 +102,7 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
         reference, *without_variation(C[:, COMPONENTS:], G, y), C[:, :COMPONENTS]
     )
     found = {
-        "t_squared": _hotelling(t_squared, reference.cycles),
+        "t_squared": _hotelling(t_squared, int(reference.counted)),
         "spe": float(chdtrc(freedom, spe / spe_scale)) if freedom > 0 else 1.0,
     }
     grid = shapes(float(grid_m[-1]), len(grid_m))
@@ -186,18 +186,20 @@ def _bumps(
 def _ripples(
     ripples: Samples, u: Samples, P: Samples, limit: float, scale: float
 ) -> tuple[float, float, float]:
-    image = P @ ripples
-    pairs = ripples.shape[1] // 2
-    best, count = (0.0, 0.0, math.inf), 0
-    for k in range(pairs):
-        two = slice(2 * k, 2 * k + 2)
-        known = ripples[:, two].T @ image[:, two]
-        if np.linalg.eigvalsh(known)[0] < limit:
-            continue
-        count += 1
-        seen = u @ ripples[:, two]
-        amplitude = np.linalg.solve(known, seen)
-        r = float(seen @ amplitude) / scale
-        if r > best[0]:
-            best = (r, float(np.hypot(*amplitude)), math.sqrt(scale * 2.0 / float(np.trace(known))))
-    return min(1.0, count * math.exp(-0.5 * best[0])), best[1], best[2]
+    cosine, sine = ripples[:, ::2], ripples[:, 1::2]
+    image_c, image_s = P @ cosine, P @ sine
+    cc = np.einsum("ij,ij->j", cosine, image_c)
+    cs = np.einsum("ij,ij->j", cosine, image_s)
+    ss = np.einsum("ij,ij->j", sine, image_s)
+    # two by two: least eigenvalue, and the amplitudes that solve it
+    determinant = cc * ss - cs**2
+    visible = (cc + ss) / 2.0 - np.sqrt(((cc - ss) / 2.0) ** 2 + cs**2) >= limit
+    if not visible.any():
+        return 1.0, 0.0, math.inf
+    uc, us = u @ cosine, u @ sine
+    safe = np.where(visible, determinant, 1.0)
+    a, b = (ss * uc - cs * us) / safe, (cc * us - cs * uc) / safe
+    score = np.where(visible, (uc * a + us * b) / scale, 0.0)
+    best = int(np.argmax(score))
+    p_value = min(1.0, int(visible.sum()) * math.exp(-0.5 * float(score[best])))
+    return p_value, float(np.hypot(a[best], b[best])), math.sqrt(2.0 * scale / float(cc[best] + ss[best]))

@@ -24,6 +24,7 @@ MODES = 6  # cosines in which cycles are allowed to vary
 MEMORY = 300.0  # cycles the mean remembers
 FIRST_SPREAD = 0.05  # of the friction itself: how much cycles vary before anything is known
 FIRST_WEIGHT = 0.5  # cycles that guess counts for
+FORGETS = (8, 24)  # cycles after which learning begins again from what is known by then
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +41,8 @@ class Reference:
     strength : float
         Smoothing of the mean.
     cycles : int
+        Cycles seen.
+    counted : float
         Cycles that Lambda rests on.
     scatter : ndarray, shape (6, 6)
         Summed second moments of a.
@@ -56,6 +59,7 @@ class Reference:
     mean: Samples = field(default_factory=lambda: np.zeros(0))
     strength: float = 0.0
     cycles: int = 0
+    counted: float = FIRST_WEIGHT
     scatter: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
     components: Samples = field(default_factory=lambda: np.zeros((0, MODES)))
     spe_sum: float = 0.0
@@ -110,7 +114,7 @@ def _first(reference: Reference, slide: profile.Information, penalty: Samples) -
 def _learn_variation(reference: Reference, slide: profile.Information) -> Reference:
     """One step of incremental EM on this cycle's deviation from the mean of those before it."""
     basis = cosines(len(reference.mean))
-    spread = reference.scatter / (reference.cycles + FIRST_WEIGHT)
+    spread = reference.scatter / reference.counted
     # the deviation also holds the error of the mean, 1 / weight of a cycle's variance
     share = reference.weight / (reference.weight + 1.0)
     own = slide.vector - slide.matrix @ reference.mean
@@ -119,8 +123,13 @@ def _learn_variation(reference: Reference, slide: profile.Information) -> Refere
     score = posterior @ (basis.T @ own) * share
     scatter = reference.scatter + np.outer(score, score) + posterior
     cycles = reference.cycles + 1
-    components = _principal(scatter / (cycles + FIRST_WEIGHT), len(reference.mean))
-    return replace(reference, scatter=(scatter + scatter.T) / 2.0, cycles=cycles, components=components)
+    counted = reference.counted + 1.0
+    if cycles in FORGETS:
+        # what was learned against a first, rough mean is kept as no more than a guess
+        scatter, counted = scatter / counted * FIRST_WEIGHT, FIRST_WEIGHT
+    components = _principal(scatter / counted, len(reference.mean))
+    scatter = (scatter + scatter.T) / 2.0
+    return replace(reference, scatter=scatter, cycles=cycles, counted=counted, components=components)
 
 
 def _principal(spread: Samples, coefficients: int) -> Samples:
