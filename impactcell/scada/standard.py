@@ -1,4 +1,4 @@
-"""Descriptions of nodes that come from the standard's own types, which carry none in asyncua's address space."""
+"""Descriptions of nodes that come from the standard's own types; asyncua's address space has none."""
 
 from collections.abc import Mapping
 from typing import Final

@@ -28,7 +28,7 @@ def moved(value: Any, step: float) -> Any:
         changes = {
             name: moved(getattr(value, name), step)
             for name in value.__dataclass_fields__
-            if name not in ("limit",) and not isinstance(getattr(value, name), (str, int, bool, tuple))
+            if name != "limit" and not isinstance(getattr(value, name), (str, int, bool, tuple))
         }
         return replace(value, **changes)
     return value

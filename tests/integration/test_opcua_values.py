@@ -1,4 +1,4 @@
-"""What a client sees of a cell: names, units, status, time, changes, restarts; against the table of the interface."""
+"""What a client sees of a cell, against the table of the interface: names, units, status, time, restarts."""
 
 import asyncio
 import math
