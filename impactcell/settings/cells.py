@@ -61,12 +61,11 @@ def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
     data, _ = yamlfile.load(path)
     if not isinstance(data, dict):
         raise SettingsError(f"{path}:1:1: a register map is a mapping of format, name and registers")
-    if word_order is not None:
-        data = {**data, "word_order": word_order}
     try:
-        return RegisterMap.from_mapping(data)
+        layout = RegisterMap.from_mapping(data)
     except MapError as error:
         raise SettingsError("\n".join(f"{path}: {fault}" for fault in str(error).splitlines())) from error
+    return layout if word_order is None else layout.with_word_order(word_order)
 
 
 def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
