@@ -20,10 +20,10 @@ from impactcell.errors import DiscrepancyError
 from impactcell.records import Samples
 
 REFITS = 10
-STEPS = 20
+STEPS = 25
 RACE = 4
 AHEAD = 4
-POLISH = 15
+POLISH = 40
 FINALISTS = 2
 MOST_FINALISTS = 6
 STARTS = 2

@@ -24,6 +24,11 @@ SMALLEST_SPREAD = 2e-4
 GIVES_UP = 1e12
 HOPELESS = 3e-5
 THOROUGH = 8
+WHOLE = 10
+PROMISE = 2.0
+RESCUES = 2
+FAR = 4.0
+NOT_IT = 25.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -218,6 +223,66 @@ def fit(
         raise DiscrepancyError(
             f"the plant with {', '.join(effects) or 'no effect'} has no answer at the start"
         )
+    limits = (lower, upper)
+    point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
+    if most_steps >= WHOLE:
+        for _ in range(RESCUES):
+            if not _stuck(problem, effects, point, spread):
+                break
+            before = point.cost
+            point = _rescued(problem, effects, point, spread, limits)
+            point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
+            if point.cost > before - 1.0:
+                break
+    return Fit(effects, coordinates, point.at, point.local, spread, point.residual)
+
+
+def _rescued(
+    problem: Problem, effects: tuple[str, ...], point: _Point, spread: float, limits: tuple[Samples, Samples]
+) -> _Point:
+    """Start the stuck shots again, at shared parameters to which only the other shots are fitted.
+
+    A few shots whose events come in another order hold up the fit of all: every step that helps the others
+    makes them worse.
+    """
+    again = _begin(problem, effects, point.at, spread, (0.0, -spread, spread))
+    point = _better_of(problem, point, again, spread)
+    misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
+    good = np.flatnonzero(misfit <= FAR * float(np.median(misfit)))
+    if len(good) == problem.count or len(good) < 0.6 * problem.count:
+        return point
+    part = Problem(problem.shots.chosen(good), problem.forward.batches)
+    local = Local(
+        *(getattr(point.local, name)[good] for name in ("log_factor", "mass_kg", "speed_m_s", "shift_m"))
+    )
+    start = _point(part, effects, point.at, local, spread)
+    found, _ = _descend(part, effects, start, spread, limits, (WHOLE, 1.0))
+    other = _begin(problem, effects, found.at, spread, (0.0, -spread, spread))
+    return other if other.cost < point.cost else point
+
+
+def _stuck(problem: Problem, effects: tuple[str, ...], point: _Point, spread: float) -> bool:
+    """Whether some shot's own numbers are not at their optimum: the cost would still fall to first order."""
+    misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
+    if float(np.median(misfit)) > NOT_IT:
+        return False
+    Jl = problem.own_derivatives(effects, point.at, point.local, point.residual)
+    _, _, blocks = _normal(problem, np.empty((0, point.residual.size)), Jl, point, spread)
+    promise = np.einsum("iq,iqr,ir->i", blocks.gradient, blocks.inverse, blocks.gradient)
+    return bool((promise > PROMISE).any())
+
+
+def _descend(
+    problem: Problem,
+    effects: tuple[str, ...],
+    point: _Point,
+    spread: float,
+    limits: tuple[Samples, Samples],
+    budget: tuple[int, float],
+) -> tuple[_Point, float]:
+    """Damped Gauss-Newton steps until the cost no longer falls."""
+    lower, upper = limits
+    most_steps, tolerance = budget
     damping = 1e-3
     calm = 0
     for _ in range(most_steps):
@@ -227,7 +292,7 @@ def fit(
         taken = False
         for _attempt in range(8):
             free = ~(((point.at <= lower) & (g < 0.0)) | ((point.at >= upper) & (g > 0.0)))
-            step = np.zeros_like(at)
+            step = np.zeros_like(point.at)
             scaled = H[np.ix_(free, free)].copy()
             scale = np.maximum(np.diag(scaled), 1e-12 * max(float(np.diag(H).max()), 1e-300))
             scaled[np.diag_indices_from(scaled)] += damping * scale
@@ -256,7 +321,7 @@ def fit(
         calm = calm + 1 if gain < max(tolerance, HOPELESS * excess) and moved < 0.01 else 0
         if calm > (gain >= tolerance):
             break
-    return Fit(effects, coordinates, point.at, point.local, spread, point.residual)
+    return point, spread
 
 
 def refit_own(problem: Problem, model: Fit) -> Fit:
@@ -386,7 +451,7 @@ def _settle(
         steps_of = _own_steps(blocks, np.empty(0))
         new = point
         for scale in (1.0, 0.3, 0.1):
-            # Shorter steps for the shots that the whole step did not help; a step once taken is the best so far.
+            # Shorter steps for the shots that the whole step did not help; the best so far is kept.
             moved = problem.moved(point.local, scale * steps_of)
             new = _better_of(problem, new, _point(problem, effects, point.at, moved, spread), spread)
             if steps < THOROUGH:

@@ -13,6 +13,8 @@ from impactcell.physics import Plant
 from impactcell.records import Samples
 
 RATIOS = (1.15, 1.5)
+DRIVEN_RATIOS = (1.05, 1.25, 1.5)
+DRIVEN_FRICTION = (0.05, 0.5, 6)
 STIFFNESSES = (5e4, 2e5, 6e5, 2e6, 8e6)
 
 
@@ -30,7 +32,7 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
     if shots.excitation is Excitation.FREE_SLIDE:
         starts.append(np.array([math.log(mu)]))
     elif shots.excitation is Excitation.DRIVEN:
-        starts += [np.array([math.log(guess), math.log(1.2)]) for guess in (0.05, 0.15, 0.4)]
+        starts += _driven(problem)
     else:
         found = _contact(shots.items)
         pairs = [found] if found is not None else [(k, 0.7e-3 * k) for k in STIFFNESSES]
@@ -59,6 +61,25 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
     if best is None:
         raise DiscrepancyError(f"the nominal model cannot be fitted: {failures[0]}")
     return best
+
+
+def _driven(problem: Problem) -> list[Samples]:
+    """Best of a grid of friction and ratio by how many blocks they explain.
+
+    A block in which stick ends at the wrong moment is far off whatever else is right, so that a sum of
+    squares says nothing yet; the logarithm of each block's misfit does.
+    """
+    grid = [
+        np.array([math.log(mu), math.log(ratio)])
+        for mu in np.geomspace(*DRIVEN_FRICTION)
+        for ratio in DRIVEN_RATIOS
+    ]
+    ranked: list[tuple[float, int]] = []
+    for place, at in enumerate(grid):
+        residual = problem.residual((), at, begin(problem, (), at))
+        misfit = np.add.reduceat(residual**2, problem.shots.bounds[:-1]) / problem.sizes
+        ranked.append((float(np.log1p(misfit).sum()), place))
+    return [grid[place] for _, place in sorted(ranked)[:1]]
 
 
 def _given(problem: Problem, plant: Plant) -> Samples:

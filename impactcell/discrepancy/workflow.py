@@ -1,11 +1,11 @@
 """The whole workflow, one step a line: fit, locate, name, extend, prove, next experiment."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.campaign import Campaign
+from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy import noise
 from impactcell.discrepancy.campaign import Material, laid_out, prepare, split
 from impactcell.discrepancy.experiment import Proposal, propose
@@ -21,6 +21,7 @@ from impactcell.physics import Plant
 from impactcell.physics.effects import LIBRARY
 
 NO_GAP, NAMED, TIED, UNKNOWN = "no_gap", "named", "tied", "unknown"
+LOST = 30.0
 COARSE = 400
 """Samples of a channel and shot that a search among many models reads."""
 
@@ -110,6 +111,17 @@ def investigate(
     problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
     say("fitting the nominal model")
     nominal = fit_nominal(problem, plant)
+    if campaign.excitation is Excitation.DRIVEN:
+        kept = _followed(problem, nominal)
+        if len(kept) < len(training):
+            note = (
+                f"{len(training) - len(kept)} of {len(training)} training blocks were left out: in them "
+                "stick ends at a moment that the nominal model does not find."
+            )
+            material = replace(material, notes=(*material.notes, note))
+            training = training[kept]
+            problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
+            nominal = fit_nominal(problem, plant)
     say("locating the gap and naming effects")
     coarse = Problem(thinned(problem.shots, COARSE), len(material.batches))
     found = search(Setup(problem, coarse, material, names, seed, each, "stated" in floor.source), nominal)
@@ -142,6 +154,13 @@ def investigate(
         proposals=propose(problem, final, _rivals(found)),
         seed=seed,
     )
+
+
+def _followed(problem: Problem, nominal: Fit) -> Index:
+    """Blocks that the model follows at all; one that sticks at the wrong time is far off everywhere."""
+    misfit = nominal.misfit(problem.shots) / problem.sizes
+    limit = LOST * float(np.median(misfit))
+    return np.flatnonzero(misfit <= max(limit, 4.0))
 
 
 def _verdict(found: Search) -> str:

@@ -228,6 +228,8 @@ def study(file: Path, per: int, kinds: set[str], workers: int) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     done = {row["key"] for row in rows(file)}
     todo = [job for job in jobs(per) if job.key not in done and (not kinds or job.kind in kinds)]
+    # In an order that leaves every kind with its share whenever the study is interrupted.
+    todo = [todo[i] for i in np.random.default_rng(1).permutation(len(todo))]
     print(f"{len(done)} done, {len(todo)} to do", file=sys.stderr, flush=True)
     with file.open("a", encoding="utf-8") as out, ProcessPoolExecutor(workers) as pool:
         for future in as_completed([pool.submit(run, job) for job in todo]):
