@@ -11,7 +11,7 @@ import enum
 import json
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
@@ -72,7 +72,7 @@ def to_json(value: Any) -> Any:
             "shape": list(value.shape),
             "base64": base64.b64encode(raw.tobytes()).decode(),
         }
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return [to_json(item) for item in value]
     if isinstance(value, Mapping):
         return {str(key): to_json(item) for key, item in value.items()}
@@ -84,6 +84,8 @@ def from_json(kind: Any, data: Any) -> Any:
     origin = typing.get_origin(kind)
     if origin in (typing.Union, types.UnionType):
         return _from_union(kind, data)
+    if origin is Sequence:
+        return tuple(from_json(typing.get_args(kind)[0], item) for item in data)
     if origin is tuple:
         inner = typing.get_args(kind)
         if len(inner) == 2 and inner[1] is Ellipsis:
@@ -118,8 +120,15 @@ def _from_union(kind: Any, data: Any) -> Any:
     members = typing.get_args(kind)
     if data is None and type(None) in members:
         return None
-    (member,) = (m for m in members if m is not type(None))
+    sequences = tuple(m for m in members if _is_sequence(m))
+    scalars = tuple(m for m in members if m is not type(None) and m not in sequences)
+    (member,) = sequences if sequences and isinstance(data, list) else scalars
     return from_json(member, data)
+
+
+def _is_sequence(kind: Any) -> bool:
+    origin = typing.get_origin(kind)
+    return isinstance(origin, type) and issubclass(origin, Sequence)
 
 
 @cache

@@ -68,6 +68,10 @@ def discrepancy(
 
         given = read_cell(cell)
         plant, name = given.model.plant, given.model.name
+    elif journal is not None:
+        recording = _recording_model(journal)
+        if recording is not None:
+            plant, name = recording.plant, recording.name
     source, data = _read(campaign, journal, plant)
     with _steps() as say, _mapper(scheduler) as mapper:
         findings = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=say)
@@ -97,6 +101,20 @@ def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> t
         except CampaignError as error:
             raise CampaignError(f"{journal}: {error}") from error
     return str(journal.name), recorded.campaign
+
+
+def _recording_model(journal: Path) -> Model | None:
+    """Model that the recording cell ran with; None in a journal that has none yet."""
+    from impactcell import values
+    from impactcell.journal.store import Journal
+
+    with Journal(journal, None, read_only=True) as store:
+        try:
+            return values.loads(Model, store.model.encode()) if store.model else None
+        except ValueError as error:
+            raise CampaignError(
+                f"{journal}: its model is of another version ({error}); name the model with --cell"
+            ) from error
 
 
 @contextmanager

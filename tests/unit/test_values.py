@@ -9,6 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from impactcell import values
+from impactcell.physics import Plant
+from impactcell.prediction import Model, Prior
 from impactcell.records import Alarm, AlarmName, Samples, Shelving
 
 
@@ -59,3 +61,15 @@ def test_another_version_is_refused():
         values.loads(Inner, b"[]")
     with pytest.raises(TypeError):
         values.dumps({1, 2})
+
+
+def test_a_model_with_one_and_with_many_numbers_comes_back() -> None:
+    plant = Plant(
+        6.5e5,
+        465.0,
+        0.2,
+        0.152,
+        effects={"surface_tilt": {"tilt_rad": 0.1}, "batch_shift": {"relative_change": (0.1, -0.2)}},
+    )
+    model = Model("m", plant, Prior(1.0, 2.0, 3.0), intervals={"surface_tilt": {"tilt_rad": (0.0, 0.2)}})
+    assert values.loads(Model, values.dumps(model)) == model
