@@ -91,7 +91,13 @@ class Condition:
         self._last_severity = 0
         input_path = _INPUTS.get(name)
         self._input = cell.path(input_path) if input_path else ua.NodeId()
+        cell.compute(f"{name.value}/ShelvingState/UnshelveTime", self._unshelve_time)
         self._show(self.alarm)
+
+    def _unshelve_time(self) -> ua.DataValue:
+        now = datetime.now(UTC)
+        variant = ua.Variant(unshelve_ms(self.alarm), ua.VariantType.Double)
+        return ua.DataValue(variant, GOOD if self.alarm.enabled else _DISABLED, now, now)
 
     def update(self, alarm: Alarm) -> Event | None:
         """Take a new state; the event that tells it, None where nothing has changed."""

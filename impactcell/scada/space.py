@@ -1,5 +1,6 @@
 """The address space: types and units from the NodeSet2 files, one object per cell made from them."""
 
+from collections.abc import Callable
 from dataclasses import fields
 from importlib.resources import as_file, files
 from typing import Any, Final
@@ -105,6 +106,11 @@ class CellSpace:
     def path(self, path: str) -> ua.NodeId:
         """NodeId of a node of the cell by its path, as `Wear/Level`."""
         return ua.NodeId(f"{self.description.name}/{path}", self._cells)
+
+    def compute(self, path: str, value: Callable[[], ua.DataValue]) -> None:
+        """Let a variable be computed whenever it is read."""
+        held = self._space[self.path(path)].attributes[ua.AttributeIds.Value]
+        held.value_callback = lambda _node, _attribute: value()
 
     def alarm_type(self, alarm: AlarmName) -> ua.NodeId:
         """Event type of a condition."""

@@ -37,7 +37,11 @@ def cut(body: bytes) -> tuple[int, int, float]:
     at += 9
     count = struct.unpack_from("<i", body, at)[0]
     mask, kind = struct.unpack_from("<BB", body, at + 8)
-    at += 9 + 1 + {11: 8, 7: 4}[kind]
+    at += 10
+    if kind & 0x80:
+        at += 4 + 8 * struct.unpack_from("<i", body, at)[0]
+    else:
+        at += {11: 8, 7: 4, 1: 1}[kind]
     at += 4 if mask & 2 else 0
     at += 8 if mask & 4 else 0
     assert mask & 8, "no server timestamp"

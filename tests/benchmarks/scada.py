@@ -176,9 +176,9 @@ def tables(quick: bool = False) -> list[Table]:
     """Measure everything."""
     rows = asyncio.run(_rows(quick))
     note = (
-        "Delay: from the server timestamp of a value to the arrival of its notification in another process, by "
-        "the clock of one machine. One client: simulator, service and client are three processes, cycles with "
-        "full captures at 2 a second. Fifty clients: Basic256Sha256, signed and encrypted, in two processes. "
-        "Interval: bootstrap over notifications; beside it how late a bare timer was in the client meanwhile."
+        "Delay: from the server timestamp of a value to the arrival of its notification in another process, "
+        "by the clock of one machine. One client: simulator, service and client are three processes, cycles "
+        "with full captures at 2 a second. Fifty clients: Basic256Sha256, signed and encrypted, in two "
+        "processes. Interval: bootstrap over notifications; beside it how late a bare timer was meanwhile."
     )
     return [Table("OPC UA", COLUMNS, rows, note)]
