@@ -20,7 +20,7 @@ from tests.benchmarks.table import Table
 CELLS = 100
 RIVAL_CELLS = 20
 OPTIMUM_CELLS = 20
-OPTIMUM_EVERY = 7  # of the tasks of those cells, every so-manieth
+OPTIMUM_EVERY = 10  # of the tasks of those cells, every so-manieth
 CLASSES = ((5.0, 12.0), (12.0, 20.0), (20.0, 40.0))
 LEARNING = 10
 
