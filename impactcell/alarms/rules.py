@@ -33,7 +33,7 @@ class RuleSettings:
 
 DEFAULT_RULES: Mapping[AlarmName, RuleSettings] = MappingProxyType(
     {
-        AlarmName.WEAR_LIMIT: RuleSettings(severity=700, off_delay=20),
+        AlarmName.WEAR_LIMIT: RuleSettings(severity=700, on_delay=5, off_delay=20),
         # a shift is one cycle's finding: the alarm stands for a while and then clears by itself
         AlarmName.BATCH_SHIFT: RuleSettings(severity=500, off_delay=50),
         AlarmName.DEVIANT_CYCLE: RuleSettings(severity=400, off_delay=1),

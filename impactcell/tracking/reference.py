@@ -98,9 +98,18 @@ def learn(reference: Reference, slide: profile.Information, penalty: Samples) ->
     strength = reference.strength
     if reference.weight in (0.0, 4.0, 16.0, 64.0):
         _, _, strength = profile.smooth(matrix, vector, penalty)
-    mean = cho_solve(cho_factor(matrix + strength * penalty), vector)
+    mean = _solved(matrix + strength * penalty, vector)
     weight = min(reference.weight + 1.0, MEMORY)
     return replace(reference, weight=weight, matrix=matrix, vector=vector, mean=mean, strength=strength)
+
+
+def _solved(matrix: Samples, vector: Samples) -> Samples:
+    """Solve for the mean; where next to nothing is known of a place, by the smallest solution."""
+    try:
+        found: Samples = cho_solve(cho_factor(matrix), vector)
+    except np.linalg.LinAlgError:
+        found = np.linalg.lstsq(matrix, vector, rcond=1e-14)[0]
+    return found
 
 
 def _first(reference: Reference, slide: profile.Information, penalty: Samples) -> Reference:

@@ -11,6 +11,7 @@ from impactcell.tracking.publishing import nothing_yet, outcome
 from impactcell.tracking.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.state import Reading, Shift, Tracked, TrackerState
 
+FIRST_CYCLES = 12  # no unannounced batch change is looked for before
 RESTLESS = 4.0  # a batch id that lasts fewer cycles than this on average says nothing about batches
 
 
@@ -93,7 +94,9 @@ def _announce(
     if where.lag > 0:
         return state, -1.0 if believed else 0.0
     if said is None or said == state.batch_id:
-        return state, 1.0 if reading.expected_change else -1.0 if believed else 0.0
+        # an odd first value must not pass for a batch of one cycle
+        sure = believed or where.index < state.first + FIRST_CYCLES
+        return state, 1.0 if reading.expected_change else -1.0 if sure else 0.0
     fresh = replace(
         state,
         batch_id=said,

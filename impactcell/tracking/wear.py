@@ -8,7 +8,7 @@ Measurement of cycle n in batch i, and what passes between cycles::
 The first batch is the reference, its offset zero. Every later batch has an offset of its own in the
 state, so that a batch that comes back is recognised and the size of a shift has its exact variance.
 Outliers are clipped after Huber (1964): beyond c standard deviations R is inflated until the innovation
-moves the state as one of c standard deviations would.
+moves the state as one of c standard deviations would; beyond 2 c its influence falls off again.
 """
 
 import math
@@ -112,6 +112,8 @@ def measure(
     innovation = value - float(design @ state.mean)
     ratio = abs(innovation) / math.sqrt(own + variance) / threshold
     if ratio > 1.0:
+        # beyond twice the threshold it is no measurement of this quantity: it counts less the farther it is
+        ratio *= max(1.0, 0.5 * ratio)
         # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
         variance = (own + variance) * ratio - own
     mean, covariance = update(

@@ -52,11 +52,14 @@ def test_equals_least_squares_with_batches_that_come_back():
 
 def test_an_outlier_is_clipped():
     state = run(np.zeros(50), ["A"] * 50, slope_std=0.01)
-    odd, error = wear.measure(state, 100.0, 1.0, 2.5)
-    edge, _ = wear.measure(state, 2.5 * math.sqrt(1.0 + state.covariance[0, 0]), 1.0, 2.5)
+    std = math.sqrt(1.0 + state.covariance[0, 0])
+    edge, _ = wear.measure(state, 2.5 * std, 1.0, 2.5)
+    odd, error = wear.measure(state, 4.5 * std, 1.0, 2.5)
     assert odd.mean == pytest.approx(edge.mean, rel=1e-9)
     assert odd.covariance[0, 0] > edge.covariance[0, 0]
-    assert error.value == pytest.approx(100.0, abs=1e-6)
+    assert error.value == pytest.approx(4.5 * std, abs=1e-6)
+    far, _ = wear.measure(state, 100.0, 1.0, 2.5)
+    assert abs(far.mean[0]) < 0.2 * abs(edge.mean[0])
 
 
 def test_old_batches_are_forgotten_and_all_stays_finite():
@@ -85,9 +88,7 @@ def test_a_late_measurement_at_its_own_place():
 
 
 def test_cycles_to_limit_and_its_interval():
-    published = belief.wear_state(
-        0.2, 1e-5, (1e-8, 0.0, 1e-14), (0.0, 0.0), 0.21, Quality.GOOD, ""
-    )
+    published = belief.wear_state(0.2, 1e-5, (1e-8, 0.0, 1e-14), (0.0, 0.0), 0.21, Quality.GOOD, "")
     assert published.cycles_to_limit == pytest.approx(1000.0)
     for cycles, share in (
         (published.cycles_to_limit_low, 0.025),

@@ -1,0 +1,85 @@
+"""Tracking and alarms: wear, batches, deviant cycles, the in-cycle filter and the cost of a cycle."""
+
+import statistics
+import sys
+import time
+
+import numpy as np
+
+from impactcell import alarms
+from impactcell.alarms import AlarmSettings
+from impactcell.records import AlarmName
+from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, gap, initial_state, signature, track
+from tests.benchmarks import _inside, _signatures, _slides, _steps
+from tests.benchmarks.table import Table
+
+
+def tables(*, quick: bool = False) -> list[Table]:
+    made: list[Table] = []
+    for make in (
+        cost_table,
+        _signatures.speed_table,
+        _signatures.error_table,
+        _signatures.power_table,
+        _inside.known_table,
+        _inside.unknown_table,
+        _steps.table,
+    ):
+        print(f"  {make.__module__}.{make.__name__} ...", file=sys.stderr, flush=True)
+        found = make(quick=quick)
+        made.extend(found if isinstance(found, list) else [found])
+    return made
+
+
+def cost_table(*, quick: bool) -> Table:
+    """Time of one cycle through tracker, signature, model gap and alarms, at 10 kHz."""
+    rng = np.random.default_rng(3)
+    captures = [_slides.slide(lambda x: 0.2 + 0.0 * x, 0.09, 1e4, 0.42e-6, k)[0] for k in range(20)]
+    n = 400 if quick else 1500
+    rows = []
+    for knowledge in BatchKnowledge:
+        config, rules, shape = (
+            TrackerSettings(batch=knowledge),
+            AlarmSettings(),
+            signature.SignatureSettings(),
+        )
+        state, book = initial_state(), alarms.initial_state(rules)
+        signed, gaps = signature.initial_state(shape), gap.GapState()
+        took: dict[str, list[float]] = {"tracker": [], "signature": [], "gap and alarms": []}
+        for i in range(n):
+            reading = Reading(i, 0.2 + 0.002 * rng.normal(), 0.002, (i + 1) * 10**9, "A")
+            t0 = time.thread_time()
+            tracked = track(config, state, reading)
+            t1 = time.thread_time()
+            seen = signature.update(shape, signed, captures[i % 20])
+            t2 = time.thread_time()
+            followed = gap.follow(gaps, 1.0 + 0.02 * rng.normal(), i, 1e5, 1.0)
+            active = book.alarm(AlarmName.WEAR_LIMIT).active
+            findings = [
+                alarms.wear_limit(rules, tracked.wear, i, active=active),
+                alarms.batch_shift(tracked.shift),
+                alarms.deviant_cycle(seen.deviation, seen.signature.deviates_at_m, judged=seen.judged),
+                alarms.Finding(AlarmName.MODEL_GAP, followed.exceeds, "", followed.evidence),
+            ]
+            book, _ = alarms.after_cycle(rules, book, findings, i, reading.time_ns)
+            t3 = time.thread_time()
+            state, signed, gaps = tracked.state, seen.state, followed.state
+            for name, spent in zip(took, (t1 - t0, t2 - t1, t3 - t2), strict=True):
+                took[name].append(1e3 * spent)
+        whole = [sum(each) for each in zip(*took.values(), strict=True)][n // 4 :]
+        parts = ", ".join(f"{name} {statistics.median(t[n // 4 :]):.2f}" for name, t in took.items())
+        p99 = float(np.percentile(whole, 99))
+        rows.append(
+            [
+                f"batch {knowledge.value}: ms a cycle",
+                "< 1",
+                f"{statistics.median(whole):.2f}",
+                f"p99 {p99:.2f}; {parts}",
+            ]
+        )
+    return Table(
+        "Cost of a cycle",
+        ["what", "bar", "median", ""],
+        rows,
+        f"{n} cycles, the first quarter left out; processor time.",
+    )

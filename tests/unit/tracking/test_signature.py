@@ -1,0 +1,179 @@
+"""Friction along the stroke against slides integrated apart from the product; deviance and replay."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from impactcell import values
+from impactcell.records import Channel, Quality
+from impactcell.tracking import gap, profile, signature
+from tests.benchmarks._slides import slide
+
+SETTINGS = signature.SignatureSettings()
+GRID = SETTINGS.grid_m
+NOISE = 0.42e-6
+
+
+def textured(cycle, bump=0.0):
+    rng = np.random.default_rng([1, cycle])
+    a, b = 0.01 * rng.normal(), 0.005 * rng.normal()
+
+    def friction(x):
+        near = bump * np.exp(-0.5 * ((x - 1e-3) / 0.25e-3) ** 2)
+        return 0.2 * (1.0 + a + b * (x / 1e-3 - 1.0) + 0.03 * np.sin(2.0 * np.pi * x / 1.3e-3) + near)
+
+    return friction
+
+
+@pytest.fixture(scope="module")
+def learned():
+    state = signature.initial_state(SETTINGS)
+    outcomes = []
+    for cycle in range(90):
+        capture, _ = slide(textured(cycle), 0.09 + 0.001 * (cycle % 3), 1e4, NOISE, cycle)
+        outcomes.append(signature.update(SETTINGS, state, capture))
+        state = outcomes[-1].state
+    return state, outcomes
+
+
+@pytest.mark.parametrize(("rate", "bound"), [(1e3, 0.0045), (1e5, 0.0012)])
+def test_friction_against_an_independent_slide(rate, bound):
+    def friction(x):
+        return 0.2 * (1.0 + 0.1 * np.exp(-0.5 * ((x - 1e-3) / 0.4e-3) ** 2))
+
+    capture, distance = slide(friction, 0.09, rate, NOISE, 3)
+    found = signature.update(SETTINGS, signature.initial_state(SETTINGS), capture).signature
+    use = np.abs(GRID / distance - 0.5) < 0.4
+    error = found.friction[use] - friction(GRID[use])
+    assert math.sqrt((error**2).mean()) < bound
+    assert ((error / found.friction_std[use]) ** 2).mean() < 3.0
+    assert np.isnan(found.friction[distance + 1e-4 < GRID]).all()
+
+
+def test_viscous_friction_of_the_model_is_taken_out():
+    from scipy.integrate import solve_ivp
+
+    def stopped(_, y):
+        return y[1]
+
+    stopped.terminal = True
+    path = solve_ivp(
+        lambda _, y: [y[1], -9.81 * 0.2 - 4.5 * y[1]],
+        (0, 1),
+        [0, 0.09],
+        events=stopped,
+        rtol=1e-10,
+        dense_output=True,
+    )
+    t = np.arange(0.0, path.t[-1], 1e-5)
+    capture, _ = slide(textured(0), 0.09, 1e4, NOISE, 0)
+    noisy = path.sol(t)[0] + NOISE * np.random.default_rng(0).normal(size=len(t))
+    capture = replace(capture, position=Channel(t, noisy, NOISE))
+    with_model = signature.update(SETTINGS, signature.initial_state(SETTINGS), capture, viscous_per_mass=4.5)
+    inner = slice(2, 13)
+    assert with_model.signature.friction[inner] == pytest.approx(0.2, abs=0.002)
+    without = signature.update(SETTINGS, signature.initial_state(SETTINGS), capture)
+    assert without.signature.friction[2] - without.signature.friction[12] > 0.01
+
+
+def test_normal_cycles_are_not_deviant_and_a_bump_is_with_its_place(learned):
+    state, outcomes = learned
+    assert not any(o.deviation for o in outcomes)
+    assert [o.judged for o in outcomes].index(True) == 51
+    capture, _ = slide(textured(500, bump=0.1), 0.09, 1e4, NOISE, 500)
+    odd = signature.update(SETTINGS, state, capture)
+    assert odd.deviation is not None
+    assert odd.deviation.statistic > odd.deviation.threshold == 5.0
+    assert odd.signature.deviates_at_m == pytest.approx(1e-3, abs=0.3e-3)
+    # a deviant cycle is not learned from
+    assert values.dumps(odd.state.reference) == values.dumps(state.reference)
+
+
+def test_t_squared_is_about_its_three_degrees_of_freedom(learned):
+    _, outcomes = learned
+    scores = [o.signature.t_squared for o in outcomes if o.judged]
+    assert 0.8 < np.mean(scores) < 6.0
+
+
+def test_another_material_is_learned_before_it_is_judged(learned):
+    state, _ = learned
+    capture, _ = slide(textured(1), 0.09, 1e4, NOISE, 1)
+    first = signature.update(SETTINGS, replace(state, batch_id="A"), capture, batch_id="B")
+    assert not first.judged
+    assert "being learned, 5 more cycles" in first.signature.reason
+    after = first.state
+    for cycle in range(2, 8):
+        after = signature.update(
+            SETTINGS, after, slide(textured(cycle), 0.09, 1e4, NOISE, cycle)[0], batch_id="B"
+        ).state
+    assert signature.update(SETTINGS, after, capture, batch_id="B").judged
+
+
+@pytest.mark.parametrize(
+    ("position", "why"),
+    [
+        (None, "no position channel"),
+        (Channel(np.arange(5.0), np.arange(5.0)), "5 usable samples"),
+        (Channel(np.arange(100) * 1e-4, np.full(100, 0.1), NOISE), "did not slide"),
+        (Channel(np.arange(100) * 1e-4, np.full(100, 0.1)), "constant"),
+        (Channel(np.arange(100) * 1e-4, np.full(100, math.nan), NOISE), "0 usable samples"),
+    ],
+)
+def test_a_capture_without_a_slide_says_why(learned, position, why):
+    state, _ = learned
+    capture, _ = slide(textured(1), 0.09, 1e4, NOISE, 1)
+    done = signature.update(SETTINGS, state, replace(capture, position=position))
+    assert why in done.signature.reason
+    assert done.signature.quality is Quality.BAD
+    assert not done.judged
+    assert values.dumps(done.state) == values.dumps(state)
+
+
+def test_a_restored_state_replays_to_the_same_bits(learned):
+    state, _ = learned
+    capture, _ = slide(textured(7), 0.09, 1e4, NOISE, 7)
+    restored = values.loads(signature.SignatureState, values.dumps(state))
+    ours, theirs = (signature.update(SETTINGS, s, capture) for s in (state, restored))
+    assert values.dumps(ours.state) == values.dumps(theirs.state)
+    assert ours.signature.friction.tobytes() == theirs.signature.friction.tobytes()
+
+
+def test_splines_reproduce_a_straight_line():
+    capture, distance = slide(lambda x: 0.2 + 5.0 * x, 0.09, 1e5, 1e-9, 2)
+    found = signature.update(SETTINGS, signature.initial_state(SETTINGS), capture).signature
+    use = np.abs(GRID / distance - 0.5) < 0.4
+    assert found.friction[use] == pytest.approx(0.2 + 5.0 * GRID[use], abs=2e-4)
+    assert profile.roughness(5) @ np.arange(5.0) == pytest.approx(0.0)
+
+
+def test_a_model_gap_is_found_at_the_designed_rate():
+    rng = np.random.default_rng(0)
+    state, alarms = gap.GapState(), 0
+    for cycle in range(20_000):
+        done = gap.follow(state, float(np.exp(0.05 * rng.normal())), cycle, 1000.0, 1.0)
+        state = done.state
+        if done.exceeds:
+            alarms += 1
+            state = replace(state, excess=0.0)
+    assert 8 <= alarms <= 34
+    found = []
+    for cycle in range(100):
+        done = gap.follow(state, float(1.2 * np.exp(0.05 * rng.normal())), 20_000 + cycle, 1e5, 1.0)
+        state = done.state
+        found.append(done.exceeds)
+    assert found.index(True) < 12
+    assert done.evidence.size == pytest.approx(0.2, abs=0.15)
+    back = [gap.follow(state, 1.0, 30_000, 1e5, 1.0)]
+    while back[-1].exceeds:
+        back.append(gap.follow(back[-1].state, 1.0, 30_000 + len(back), 1e5, 1.0))
+    assert len(back) < 20
+
+
+def test_a_gap_that_is_no_number_is_left_out():
+    for bad in (math.nan, math.inf, -1.0, 0.0):
+        done = gap.follow(gap.GapState(), bad, 1, 1e5, 1.0)
+        assert done.exceeds is None
+        assert done.reason
+        assert done.state == gap.GapState()
