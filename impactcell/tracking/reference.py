@@ -106,10 +106,9 @@ def learn(reference: Reference, slide: profile.Information, penalty: Samples) ->
 def _solved(matrix: Samples, vector: Samples) -> Samples:
     """Solve for the mean; where next to nothing is known of a place, by the smallest solution."""
     try:
-        found: Samples = cho_solve(cho_factor(matrix), vector)
+        return np.asarray(cho_solve(cho_factor(matrix), vector), dtype=np.float64)
     except np.linalg.LinAlgError:
-        found = np.linalg.lstsq(matrix, vector, rcond=1e-14)[0]
-    return found
+        return np.asarray(np.linalg.lstsq(matrix, vector, rcond=1e-14)[0], dtype=np.float64)
 
 
 def _first(reference: Reference, slide: profile.Information, penalty: Samples) -> Reference:

@@ -145,7 +145,7 @@ def power_table(*, quick: bool) -> Table:
     columns = ["what", "bar", "oracle at 0.99", "95 %", "oracle at 0.5", "oracle at 0.9"]
     note = (
         f"Reference of {learned} cycles; in brackets the amplitude at which the oracle has that power. "
-        "Not knowing shape and place costs a search over all of them, which shows most where the oracle itself is unsure."
+        "Not knowing shape and place costs a search over all of them, most where the oracle itself is unsure."
     )
     return Table("Deviant cycle at 1e-5 false alarms", columns, rows, note)
 

@@ -103,7 +103,7 @@ def test_an_announced_batch_keeps_the_batch_alarm_silent():
 
 
 def test_shelving_ends_with_time_as_the_cycles_bring_it():
-    settings = AlarmSettings()
+    settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state = alarms.initial_state(settings)
     shelve = Occurrence(Event.SHELVE_TIMED, 0, 0, user="ann", shelve_ns=5 * SECOND)
     state, done = alarms.act(state, WEAR, shelve)
@@ -117,7 +117,7 @@ def test_shelving_ends_with_time_as_the_cycles_bring_it():
 
 
 def test_a_condition_beside_the_cycles():
-    settings = AlarmSettings()
+    settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state = alarms.initial_state(settings)
     lost = Finding(AlarmName.MODULE_CONNECTION, holds=True, message="connection refused")
     state, done = alarms.find(settings, state, lost, 0, 5)
@@ -129,7 +129,7 @@ def test_a_condition_beside_the_cycles():
 
 
 def test_a_disabled_condition_is_not_evaluated_and_comes_back():
-    settings = AlarmSettings()
+    settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state = alarms.initial_state(settings)
     state, _ = run(settings, state, WEAR, [True])
     state, _ = alarms.act(state, WEAR, Occurrence(Event.DISABLE))
@@ -141,7 +141,7 @@ def test_a_disabled_condition_is_not_evaluated_and_comes_back():
 
 
 def test_the_state_is_restored_bit_for_bit():
-    settings = AlarmSettings()
+    settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state, _ = run(settings, alarms.initial_state(settings), WEAR, [True, True, False])
     state, _ = alarms.act(state, WEAR, Occurrence(Event.SHELVE_ONE_SHOT, comment="ä"))
     data = values.dumps(state)
