@@ -63,7 +63,7 @@ class Listener:
         index = await client.get_namespace_index("urn:impactcell:cells")
         parameters = ua.CreateSubscriptionParameters()
         parameters.RequestedPublishingInterval = self.interval_ms
-        parameters.RequestedLifetimeCount, parameters.RequestedMaxKeepAliveCount = 600, 20
+        parameters.RequestedLifetimeCount, parameters.RequestedMaxKeepAliveCount = 60, 20
         parameters.PublishingEnabled = True
         request = ua.CreateSubscriptionRequest()
         request.Parameters = parameters

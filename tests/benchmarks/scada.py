@@ -147,6 +147,7 @@ async def memory(batches: int) -> tuple[str, str, str, str]:
             ]:
                 pass
             after.append(state["rss"] / 2**20)
+            sys.stderr.write(f"after {100 * len(after)} lost clients: {after[-1]:.1f} MB\n")
     warm = after[0]
     return (
         f"memory over {100 * batches} connect / subscribe / drop",
