@@ -119,7 +119,7 @@ def power_table(*, quick: bool) -> Table:
         cells = []
         for oracle in (0.5, 0.9, 0.99):
             amplitude = (norm.isf(alpha) + norm.ppf(oracle)) / unit
-            runs = 60 if quick else 300
+            runs = 60 if quick else 200
             hits = 0
             for k in range(runs):
                 rng = np.random.default_rng([9, k])
