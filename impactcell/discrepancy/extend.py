@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from impactcell.campaign import Excitation
 from impactcell.discrepancy import name
 from impactcell.discrepancy.campaign import Material
 from impactcell.discrepancy.evidence import ALPHA, Evidence, Scan, examine, scan
@@ -32,6 +33,7 @@ SECONDS = 5
 TIED = 2.2
 SMALLEST_GAIN = 15.0
 MOST = 0.5
+LARGE = 1.1
 RIVAL = 0.5
 
 Mapper = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
@@ -120,6 +122,14 @@ class Setup:
         key = (self.seed, len(model.effects))
         return examine(self.problem, self.coarse, model, self.material, self.library, key)
 
+    def suffices(self, evidence: Evidence) -> bool:
+        """Whether nothing significant is left, and nothing large either where the noise is stated."""
+        each = evidence.fit.misfit(self.problem.shots) / self.problem.sizes
+        # A driven block in which stick ends at the wrong moment is far off whatever the model.
+        driven = self.problem.shots.excitation is Excitation.DRIVEN
+        misfit = float(np.median(each) if driven else np.average(each, weights=self.problem.sizes))
+        return evidence.p_value > ALPHA and not (self.certain and misfit > LARGE**2)
+
     def polished(self, fits: Sequence[Fit]) -> list[Fit]:
         """Refit on all samples, the likeliest first."""
         if self.problem is self.coarse:
@@ -165,14 +175,14 @@ def is_tied(problem: Problem, best: Fit, other: Fit) -> bool:
 def search(setup: Setup, nominal: Fit) -> Search:
     """Look for the smallest set of effects that leaves nothing significant."""
     first = setup.look(nominal)
-    if first.p_value > ALPHA:
+    if setup.suffices(first):
         return Search(first, first, nominal, (), {}, {})
     rough = refits(setup, first.scan, REFITS)
     if not rough:
         return Search(first, first, None, (), {}, {})
     singles = setup.polished(_finalists(setup, rough))
     against = setup.look(singles[0])
-    if against.p_value > ALPHA:
+    if setup.suffices(against):
         return _accept_single(setup.problem, first, against, singles)
     tasks = [(setup.coarse, one, setup.library, (setup.seed, 1)) for one in rough[1:SEEDS_OF_PAIRS]]
     sources = [against.scan, *setup.mapper(_scan, tasks)]
@@ -188,7 +198,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     ranked = setup.polished(_finalists(setup, rough_pairs))
     everything = _alternatives(setup.problem, [*ranked, *singles])
     last = setup.look(ranked[0])
-    if last.p_value <= ALPHA:
+    if not setup.suffices(last):
         return _plausible(setup, first, against, singles[0], rough, everything) or Search(
             first, last, None, (), {}, {}, everything
         )

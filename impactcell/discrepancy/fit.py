@@ -224,17 +224,30 @@ def fit(
             f"the plant with {', '.join(effects) or 'no effect'} has no answer at the start"
         )
     limits = (lower, upper)
+    point = _recentred(coordinates, point, spread)
     point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
     if most_steps >= WHOLE:
         for _ in range(RESCUES):
             if not _stuck(problem, effects, point, spread):
                 break
             before = point.cost
-            point = _rescued(problem, effects, point, spread, limits)
+            point = _recentred(coordinates, _rescued(problem, effects, point, spread, limits), spread)
             point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
             if point.cost > before - 1.0:
                 break
     return Fit(effects, coordinates, point.at, point.local, spread, point.residual)
+
+
+def _recentred(coordinates: tuple[Coordinate, ...], point: _Point, spread: float) -> _Point:
+    """Move what all friction factors have in common into mu_k, which leaves every trace as it is."""
+    place = next(i for i, one in enumerate(coordinates) if one.parameter == "mu_k" and not one.effect)
+    common = float(np.median(point.local.log_factor))
+    moved = min(max(float(point.at[place]) + common, coordinates[place].lower), coordinates[place].upper)
+    common = moved - float(point.at[place])
+    at = point.at.copy()
+    at[place] = moved
+    local = replace(point.local, log_factor=point.local.log_factor - common)
+    return _Point(at, local, point.residual, _cost(point.residual, local, spread))
 
 
 def _rescued(
@@ -330,9 +343,9 @@ def refit_own(problem: Problem, model: Fit) -> Fit:
     return replace(model, local=point.local, residual=point.residual)
 
 
-def begin(problem: Problem, effects: tuple[str, ...], at: Samples) -> Local:
+def begin(problem: Problem, effects: tuple[str, ...], at: Samples, steps: int = THOROUGH) -> Local:
     """Fit what every shot has of its own from several starts; the best of them shot by shot."""
-    return _begin(problem, effects, at, FIRST_SPREAD).local
+    return _begin(problem, effects, at, FIRST_SPREAD, steps=steps).local
 
 
 def _begin(
@@ -341,6 +354,7 @@ def _begin(
     at: Samples,
     spread: float,
     factors: tuple[float, ...] = (0.0,),
+    steps: int = THOROUGH,
 ) -> _Point:
     shares = {
         Excitation.TAP: (1.0,),
@@ -352,7 +366,7 @@ def _begin(
         first = problem.first_local(share)
         for factor in factors:
             start = replace(first, log_factor=first.log_factor + factor)
-            point = _settle(problem, effects, _point(problem, effects, at, start, spread), spread, THOROUGH)
+            point = _settle(problem, effects, _point(problem, effects, at, start, spread), spread, steps)
             best = point if best is None else _better_of(problem, best, point, spread)
     if best is None:
         raise AssertionError(problem.shots.excitation)

@@ -1,0 +1,144 @@
+"""The discrepancy workflow from campaign to verdict, on effects hidden by the simulator's own plant."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell import campaign as campaigns
+from impactcell.campaign import Campaign
+from impactcell.commands.discrepancy import discrepancy
+from impactcell.discrepancy.noise import replicate_spread
+from impactcell.discrepancy.result import result, text_of
+from impactcell.discrepancy.workflow import Findings, investigate
+from impactcell.errors import CampaignError
+from impactcell.modelfile import read_model
+from impactcell.records import Channel
+from tests.benchmarks import discrepancy as study
+
+STRENGTH = 1.0
+
+
+def make(*hidden: str, seed: int = 3, shots: int = 36) -> Campaign:
+    study_rate, study.RATE_HZ = study.RATE_HZ, 2000.0
+    try:
+        return study.campaign(study.Job("single", hidden, seed, STRENGTH, shots=shots))
+    finally:
+        study.RATE_HZ = study_rate
+
+
+def answer(found: Findings) -> tuple[str, set[str]]:
+    tied = {one for rivals in found.search.ties.values() for one in rivals}
+    return found.verdict, {*found.added, *tied}
+
+
+def test_nothing_is_named_where_nothing_is_hidden() -> None:
+    found = investigate(make())
+    assert found.verdict == "no_gap"
+    assert found.proof.before.trace == pytest.approx(1.0, abs=0.03)
+    assert np.log(found.parameters[0].value) == pytest.approx(
+        np.log(study.scenario(study.Job("single", (), 3)).plant.stiffness_n_per_m), rel=1e-4
+    )
+
+
+@pytest.mark.parametrize("effect", ["viscous_friction", "channel_skew", "friction_drift"])
+def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
+    found = investigate(make(effect))
+    assert effect in answer(found)[1]
+    assert found.added[0] == effect
+    (truth,) = study.strengths(effect, STRENGTH).values()
+    (estimate,) = [one for one in found.parameters if one.effect == effect]
+    half = 0.5 * (estimate.high - estimate.low)
+    assert abs(estimate.value - truth) < 3.0 * half
+    assert found.proof.after.trace < 1.05
+
+
+def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
+    found = investigate(make("mass_error"))
+    assert found.verdict == "tied"
+    assert answer(found)[1] == {"mass_error", "force_sensor_gain"}
+    assert "weigh the part" in found.proposals[0].setting
+
+
+def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
+    found = investigate(make("actuator_vibration"))
+    outcome = result(found)
+    assert outcome["verdict"] == "unknown"
+    assert outcome["effects"] == []
+    assert outcome["unexplained"]["phase"] in {"preload", "loading", "unloading"}
+
+
+def test_files_are_whole_and_the_same_to_the_byte(tmp_path: Path) -> None:
+    given = make("viscous_friction", shots=24)
+    campaigns.write(given, tmp_path / "campaign")
+    for name in ("one", "two"):
+        discrepancy(tmp_path / "campaign", tmp_path / name, seed=5)
+    texts = [(tmp_path / name / "result.json").read_bytes() for name in ("one", "two")]
+    assert texts[0] == texts[1]
+    outcome = json.loads(texts[0])
+    assert outcome["effects"][0]["effect"] == "viscous_friction"
+    assert sorted(path.name for path in (tmp_path / "one").iterdir()) == [
+        "model.extended.yaml",
+        "report.html",
+        "result.json",
+    ]
+    assert "viscous_friction" in read_model(tmp_path / "one" / "model.extended.yaml").plant.effects
+    page = (tmp_path / "one" / "report.html").read_text()
+    assert "viscous friction" in page
+    assert "src=" not in page
+
+
+def test_an_interrupt_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    campaigns.write(make(shots=12), tmp_path / "campaign")
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("impactcell.commands.discrepancy.write_report", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        discrepancy(tmp_path / "campaign", tmp_path / "out")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["campaign"]
+
+
+def test_one_shot_is_too_few() -> None:
+    given = make(shots=12)
+    with pytest.raises(CampaignError, match="1 shots are too few"):
+        investigate(replace(given, shots=given.shots[:1]))
+
+
+@pytest.mark.parametrize("channel", ["force", "position"])
+def test_a_unit_wrong_by_a_thousand_is_noticed(channel: str) -> None:
+    given = make(shots=12)
+
+    def scaled(one: Channel | None) -> Channel | None:
+        return None if one is None else replace(one, values=one.values * 1000.0)
+
+    wrong = [replace(shot, **{channel: scaled(getattr(shot, channel))}) for shot in given.shots]
+    with pytest.raises(CampaignError, match=f"{channel}_"):
+        investigate(replace(given, shots=tuple(wrong)))
+
+
+def test_missing_channels_and_replicates_are_said() -> None:
+    given = make(shots=24)
+    jittered = [
+        replace(shot, actuator=None, force=None, velocity_m_s=shot.velocity_m_s * (1.0 + 1e-6 * i))
+        for i, shot in enumerate(given.shots)
+    ]
+    found = investigate(replace(given, shots=tuple(jittered)))
+    text = text_of(result(found))
+    assert "No force channel" in text
+    assert "No replicates" in text
+    assert result(found)["gap"]["parts"]["train"]["before"]["friction_factors"] is None
+
+
+def test_replicate_spread_is_that_of_the_scatter() -> None:
+    found = investigate(make(shots=60))
+    rng = np.random.default_rng(2)
+    drift = np.linspace(-0.05, 0.05, 60)
+    spreads = [
+        replicate_spread(found.material.shots, drift + 0.01 * rng.standard_normal(60), 2).spread
+        for _ in range(200)
+    ]
+    assert np.sqrt(np.mean(np.square(spreads))) == pytest.approx(0.01, rel=0.05)
