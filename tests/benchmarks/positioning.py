@@ -122,7 +122,7 @@ def ratios(kinds: dict[str, Sequence[Outcome]], cells: int, every: int) -> Table
         ["what", "bar", "measured", "95 % interval"],
         table,
         f"Optimum by dynamic programming that knows plant, friction and scatter, with the same bound on "
-        f"overshoot; {len(chosen)} of the tasks. Its grid leaves it about 1 % above the true optimum.",
+        f"overshoot; {len(chosen)} of the tasks. It is solved on a grid and no sharper than about 1 %.",
     )
 
 
