@@ -1,5 +1,6 @@
 """Which conditions should be active after a cycle, and why: hysteresis, delays in cycles, re-alarm."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -118,6 +119,8 @@ def deviant_cycle(deviation: Evidence | None, at_m: float, *, judged: bool) -> F
     if deviation is None:
         return Finding(AlarmName.DEVIANT_CYCLE, holds=False)
     message = f"friction {deviation.size:+.4f} ± {deviation.size_std:.4f} off at {at_m * 1e3:.2f} mm"
+    if not math.isfinite(deviation.size_std + at_m):
+        message = "the stroke as a whole is unlike the others; no single place stands out"
     return Finding(AlarmName.DEVIANT_CYCLE, holds=True, message=message, evidence=deviation)
 
 

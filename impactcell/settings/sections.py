@@ -160,7 +160,7 @@ class Alarms(Section):
 
     wear_limit: Positive
     """mu_s at which the surface counts as worn."""
-    wear_probability_on: Probability = 0.95
+    wear_probability_on: Probability = 0.98
     """The wear alarm comes when P(level > limit) passes this ..."""
     wear_probability_off: Probability = 0.5
     """... and goes when it falls below this."""
