@@ -81,7 +81,7 @@ def response(figure: "Figure") -> None:
     for mu, colour in zip(FRICTIONS, COLOURS, strict=True):
         motion = strike(plant(mu), tap(4000))
         seen = motion.sample(times)
-        top.plot(1e3 * times, seen.force_n, color=colour, label=f"µs = {mu:.2f}")
+        top.plot(1e3 * times, seen.force_n, color=colour, label=rf"$\mu_s$ = {mu:.2f}")
         middle.plot(1e3 * times, 1e3 * seen.velocity_m_s, color=colour)
         bottom.plot(1e3 * times, 1e3 * seen.position_m, color=colour)
         bottom.plot([1e3 * motion.stop_s], [1e3 * motion.displacement_m], "o", color=colour, markersize=4)
@@ -123,7 +123,9 @@ def force_and_distance(figure: "Figure") -> None:
         right.plot(
             velocities, [1e3 * one.sliding_distance_m for one in motions], "o", color=colour, markersize=3.2
         )
-        left.plot(curve, [paper.peak_force(mu, v / 6e4) for v in curve], color=colour, label=f"µs = {mu:.2f}")
+        left.plot(
+            curve, [paper.peak_force(mu, v / 6e4) for v in curve], color=colour, label=rf"$\mu_s$ = {mu:.2f}"
+        )
         right.plot(curve, [1e3 * paper.sliding_distance(mu, v / 6e4) for v in curve], color=colour)
     left.plot([], [], "o", color=GREY, markersize=3.2, label="model (1)-(3)")
     left.plot([], [], color=GREY, label="(4), (5) as printed")
@@ -157,7 +159,7 @@ def errors(figure: "Figure") -> None:
         "reported in the paper for (6), v > 3000: 3.6 %", (6000, 3.6), ha="right", va="bottom", color=GREY
     )
     left.set_ylim(0, 4.4)
-    left.set_ylabel("mean error of µs / %")
+    left.set_ylabel(r"mean error of $\mu_s$ / %")
     left.legend(loc="lower left")
     mixed = Mix(MASS_KG, ((1.0, printed()),), inside=True)
     frictions = np.linspace(0.15, 0.25, 101)
@@ -166,7 +168,7 @@ def errors(figure: "Figure") -> None:
     right.plot(frictions, 1.0 - weights, color=COLOURS[2], label="sliding distance")
     right.set_ylim(0, 1)
     right.set_ylabel("weight in (6)")
-    right.set_xlabel("µs")
+    right.set_xlabel(r"$\mu_s$")
     right.legend(loc="lower left")
     left.set_xlabel("velocity / (mm/min)")
 
