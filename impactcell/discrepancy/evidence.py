@@ -7,7 +7,8 @@ import numpy as np
 
 from impactcell.discrepancy import locate, name
 from impactcell.discrepancy.campaign import Material
-from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.fit import Fit
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.resample import Tests, resampled
 from impactcell.discrepancy.tangent import Scores, linearise, scores
 

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.stats import norm
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.fit import Fit
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import Shot, lay_out
 from impactcell.errors import PhysicsError
 from impactcell.physics import Kind

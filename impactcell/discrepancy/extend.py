@@ -16,7 +16,9 @@ from impactcell.campaign import Excitation
 from impactcell.discrepancy import name
 from impactcell.discrepancy.campaign import Material
 from impactcell.discrepancy.evidence import ALPHA, Evidence, Scan, examine, scan
-from impactcell.discrepancy.fit import Fit, Problem, fit
+from impactcell.discrepancy.fit import Fit, fit
+from impactcell.discrepancy.problem import Problem
+from impactcell.discrepancy.ties import Alternative, alternatives, by_likelihood, is_tied, total
 from impactcell.errors import DiscrepancyError
 from impactcell.records import Samples
 
@@ -30,28 +32,12 @@ MOST_FINALISTS = 6
 STARTS = 2
 SEEDS_OF_PAIRS = 4
 SECONDS = 5
-TIED = 2.2
 SMALLEST_GAIN = 15.0
 MOST = 0.5
 LARGE = 1.1
 RIVAL = 0.5
 
 Mapper = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Alternative:
-    """A set of effects that was fitted, and how much less likely it is than the best of its size."""
-
-    fit: Fit
-    log_likelihood: float
-    behind: float
-    behind_std: float
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Its effects."""
-        return self.fit.effects
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +76,7 @@ def _refit(task: tuple[Problem, tuple[str, ...], list[Samples], Fit, int]) -> Fi
     best: Fit | None = None
     for start in starts:
         made = _try(problem, effects, np.concatenate([base.at, start]), base, steps)
-        if made is not None and (best is None or _total(problem, made) > _total(problem, best)):
+        if made is not None and (best is None or total(problem, made) > total(problem, best)):
             best = made
     return best
 
@@ -133,9 +119,9 @@ class Setup:
     def polished(self, fits: Sequence[Fit]) -> list[Fit]:
         """Refit on all samples, the likeliest first."""
         if self.problem is self.coarse:
-            return _ranked(self.problem, fits)
+            return by_likelihood(self.problem, fits)
         tasks = [(self.problem, one.effects, [np.empty(0)], one, POLISH) for one in fits]
-        return _ranked(self.problem, [made for made in self.mapper(_refit, tasks) if made is not None])
+        return by_likelihood(self.problem, [made for made in self.mapper(_refit, tasks) if made is not None])
 
 
 def _scan(task: tuple[Problem, Fit, tuple[str, ...], tuple[int, ...]]) -> Scan:
@@ -152,24 +138,12 @@ def refits(setup: Setup, scanned: Scan, most: int) -> list[Fit]:
         starts = name.starts(scanned.candidates, scanned.scores, effect, STARTS)
         if starts:
             tasks.append((setup.coarse, (*scanned.fit.effects, effect), starts, scanned.fit, RACE))
-    raced = _ranked(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
+    raced = by_likelihood(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
     # A few steps tell who cannot win; the others run to the end.
     none = [np.empty(0)]
     ahead = [(setup.coarse, one.effects, none, one, STEPS) for one in raced[:AHEAD]]
     finished = [made for made in setup.mapper(_refit, ahead) if made is not None]
-    return _ranked(setup.coarse, [*finished, *raced[AHEAD:]])
-
-
-def behind(problem: Problem, best: Fit, other: Fit) -> tuple[float, float]:
-    """By how much `other` is less likely than `best`, and the standard deviation of that over shots."""
-    difference = best.log_likelihood(problem.shots) - other.log_likelihood(problem.shots)
-    return float(difference.sum()), float(difference.std() * np.sqrt(len(difference)))
-
-
-def is_tied(problem: Problem, best: Fit, other: Fit) -> bool:
-    """Whether the shots do not tell two models apart (Vuong's test, the shot as the unit)."""
-    gap, std = behind(problem, best, other)
-    return gap <= TIED * std or gap < 2.0
+    return by_likelihood(setup.coarse, [*finished, *raced[AHEAD:]])
 
 
 def search(setup: Setup, nominal: Fit) -> Search:
@@ -190,13 +164,13 @@ def search(setup: Setup, nominal: Fit) -> Search:
     for source in sources:
         for made in refits(setup, source, SECONDS):
             key = frozenset(made.effects)
-            if key not in pairs or _total(setup.coarse, made) > _total(setup.coarse, pairs[key]):
+            if key not in pairs or total(setup.coarse, made) > total(setup.coarse, pairs[key]):
                 pairs[key] = made
-    rough_pairs = _ranked(setup.coarse, pairs.values())
+    rough_pairs = by_likelihood(setup.coarse, pairs.values())
     if not rough_pairs:
-        return Search(first, against, None, (), {}, {}, _alternatives(setup.problem, singles))
+        return Search(first, against, None, (), {}, {}, alternatives(setup.problem, singles))
     ranked = setup.polished(_finalists(setup, rough_pairs))
-    everything = _alternatives(setup.problem, [*ranked, *singles])
+    everything = alternatives(setup.problem, [*ranked, *singles])
     last = setup.look(ranked[0])
     if not setup.suffices(last):
         return _plausible(setup, first, against, singles[0], rough, everything) or Search(
@@ -249,24 +223,6 @@ def _finalists(setup: Setup, rough: list[Fit]) -> list[Fit]:
     ]
 
 
-def _total(problem: Problem, made: Fit) -> float:
-    return float(made.log_likelihood(problem.shots).sum())
-
-
-def _ranked(problem: Problem, fits: Iterable[Fit]) -> list[Fit]:
-    return sorted(fits, key=lambda made: (-_total(problem, made), made.effects))
-
-
-def _alternatives(problem: Problem, fits: Sequence[Fit]) -> tuple[Alternative, ...]:
-    made = []
-    best = max(fits, key=lambda one: _total(problem, one)) if fits else None
-    for one in fits:
-        if best is not None:
-            gap, std = behind(problem, best, one)
-            made.append(Alternative(one, _total(problem, one), gap, std))
-    return tuple(sorted(made, key=lambda one: -one.log_likelihood))
-
-
 def _accept_single(problem: Problem, first: Evidence, against: Evidence, singles: list[Fit]) -> Search:
     best = singles[0]
     effect = best.effects[-1]
@@ -278,7 +234,7 @@ def _accept_single(problem: Problem, first: Evidence, against: Evidence, singles
         (effect,),
         {effect: tied},
         {effect: first.scan.p_of(effect)},
-        _alternatives(problem, singles),
+        alternatives(problem, singles),
     )
 
 

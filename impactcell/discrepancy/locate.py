@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.campaign import Material
-from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.phases import BETWEEN_SHOTS, PHASES, course_of, phases, place_within
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import CHANNELS, Index
 from impactcell.discrepancy.tangent import Products, Tangent, products, together
 from impactcell.records import Samples

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.parameters import NOMINAL, of_effect, plant_name
 from impactcell.discrepancy.phases import course_of
 from impactcell.discrepancy.probes import SMALL, Probe, Range, probes
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import Index
 from impactcell.discrepancy.tangent import Products, Scores, Tangent, products, together
 from impactcell.errors import PhysicsError

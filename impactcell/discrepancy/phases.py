@@ -3,8 +3,9 @@
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.forward import Course
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import Index
 from impactcell.records import Samples
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.fit import Fit, Problem, refit_own
+from impactcell.discrepancy.fit import Fit, refit_own
 from impactcell.discrepancy.noise import Floor, Replicates
 from impactcell.discrepancy.phases import PHASES, course_of, phases
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import CHANNELS
 from impactcell.records import Samples
 

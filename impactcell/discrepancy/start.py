@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.fit import Fit, Problem, begin, fit
+from impactcell.discrepancy.fit import Fit, begin, fit
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import FORCE, POSITION, Shot
 from impactcell.errors import DiscrepancyError
 from impactcell.physics import Plant

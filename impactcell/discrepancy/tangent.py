@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.fit import Fit
+from impactcell.discrepancy.problem import Problem
 from impactcell.records import Samples
 
 UNSEEN = 1e-8

@@ -10,8 +10,9 @@ from impactcell.discrepancy import noise
 from impactcell.discrepancy.campaign import Material, laid_out, prepare, split
 from impactcell.discrepancy.experiment import Proposal, propose
 from impactcell.discrepancy.extend import Mapper, Search, Setup, search
-from impactcell.discrepancy.fit import Fit, Problem
+from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.intervals import Estimate, estimates
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.prove import Proof, prove
 from impactcell.discrepancy.shots import Index, thinned
 from impactcell.discrepancy.start import fit_nominal

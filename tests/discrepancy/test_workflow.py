@@ -16,7 +16,7 @@ from impactcell.discrepancy.workflow import Findings, investigate
 from impactcell.errors import CampaignError
 from impactcell.modelfile import read_model
 from impactcell.records import Channel
-from tests.benchmarks import discrepancy as study
+from tests.discrepancy import study
 
 STRENGTH = 1.0
 
