@@ -35,6 +35,8 @@ SECONDS = 5
 SMALLEST_GAIN = 15.0
 MOST = 0.5
 LARGE = 1.1
+MATERIAL = 30.0
+"""Log-likelihood that a second effect has to add; an effect that is worth less has no visible gap."""
 RIVAL = 0.5
 
 Mapper = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
@@ -110,11 +112,19 @@ class Setup:
 
     def suffices(self, evidence: Evidence) -> bool:
         """Whether nothing significant is left, and nothing large either where the noise is stated."""
-        each = evidence.fit.misfit(self.problem.shots) / self.problem.sizes
+        return evidence.p_value > ALPHA and self.follows(evidence.fit)
+
+    def material_gain(self, fewer: Fit, more: Fit) -> bool:
+        """Whether one more effect explains enough to be worth a name, significant or not."""
+        return total(self.problem, more) - total(self.problem, fewer) > MATERIAL
+
+    def follows(self, model: Fit) -> bool:
+        """Whether a model comes near the noise, where that is stated."""
+        each = model.misfit(self.problem.shots) / self.problem.sizes
         # A driven block in which stick ends at the wrong moment is far off whatever the model.
         driven = self.problem.shots.excitation is Excitation.DRIVEN
         misfit = float(np.median(each) if driven else np.average(each, weights=self.problem.sizes))
-        return evidence.p_value > ALPHA and not (self.certain and misfit > LARGE**2)
+        return not (self.certain and misfit > LARGE**2)
 
     def polished(self, fits: Sequence[Fit]) -> list[Fit]:
         """Refit on all samples, the likeliest first."""
@@ -171,6 +181,8 @@ def search(setup: Setup, nominal: Fit) -> Search:
         return Search(first, against, None, (), {}, {}, alternatives(setup.problem, singles))
     ranked = setup.polished(_finalists(setup, rough_pairs))
     everything = alternatives(setup.problem, [*ranked, *singles])
+    if not setup.material_gain(singles[0], ranked[0]) and setup.follows(singles[0]):
+        return _accept_single(setup.problem, first, against, singles)
     last = setup.look(ranked[0])
     if not setup.suffices(last):
         return _plausible(setup, first, against, singles[0], rough, everything) or Search(
