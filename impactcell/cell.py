@@ -100,6 +100,7 @@ class CellState:
     named_batch: NamedBatch | None = None
     module_batch: str | None = None
     announcement_seen: int = 0
+    grid: tuple[float, int] = (0.0, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +128,19 @@ def initial_state(design: CellDesign) -> CellState:
         signature.initial_state(design.signature),
         gap.GapState(),
         alarms.initial_state(design.alarms),
+        grid=_grid(design),
     )
+
+
+def adapted(design: CellDesign, state: CellState) -> CellState:
+    """Make a state fit the design: a signature on another grid is learned anew, all else stays."""
+    if state.grid == _grid(design):
+        return state
+    return replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
+
+
+def _grid(design: CellDesign) -> tuple[float, int]:
+    return design.signature.length_m, design.signature.points
 
 
 def step(

@@ -156,7 +156,7 @@ class ForeignJournalError(JournalError):
 
 
 class JournalFullError(JournalError):
-    """The disk or the journal's quota is full."""
+    """The disk or its quota is full, or the file cannot be written now."""
 
     retry: ClassVar[bool] = True
 

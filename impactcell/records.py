@@ -52,7 +52,7 @@ class Channel:
 
 
 def uniform_times(start_s: float, rate_hz: float, count: int) -> Samples:
-    """Sample times `start_s + i / rate_hz` of a channel without gaps, the same bits wherever they are made."""
+    """Give sample times `start_s + i / rate_hz` of a channel without gaps: the same bits wherever made."""
     return start_s + np.arange(count) / rate_hz
 
 

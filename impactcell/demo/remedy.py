@@ -94,5 +94,5 @@ class Remedy:
             await process.wait()
             raise
         if process.returncode:
-            self._say(f"impactcell {arguments[0]} failed: {errors.decode().strip().splitlines()[-1]}")
+            self._say(f"impactcell {arguments[0]} failed: {errors.decode().strip()[-200:]}")
             raise asyncio.CancelledError

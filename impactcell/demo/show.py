@@ -37,7 +37,10 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     ImpactCellError
         The simulator did not start, or no cycle came.
     """
-    sys.stderr.write("setting up; the first time on a machine takes a minute, to compile\n")
+    if sys.stderr.isatty():
+        sys.stderr.write("setting up; the first time on a machine takes a minute, to compile\n")
+    # Until the event loop takes the signal over, an end has to pass through `set_up`, which cleans up.
+    signal.signal(signal.SIGTERM, _end)
     with set_up(scenario, cycles) as stage:
         show = _Show(stage, cycles)
         if as_json or not sys.stdout.isatty():
@@ -46,7 +49,7 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
             interrupted = asyncio.run(_live(show))
     if as_json:
         print(json.dumps(show.summary()))  # noqa: T201 - the result of the verb
-    if interrupted and cycles is not None:
+    if interrupted:
         raise KeyboardInterrupt
 
 
@@ -66,8 +69,8 @@ class _Show:
 
     async def run(self, draw: Callable[["_Show", Snapshot], None]) -> bool:
         """Run to the end; True if it was ended by Ctrl-C."""
-        stop, done = asyncio.Event(), asyncio.Event()
-        news = asyncio.Event()
+        stop, news = asyncio.Event(), asyncio.Event()
+        ended_by: list[signal.Signals] = []
 
         remedy = Remedy(self.stage.cell, self._say)
 
@@ -77,12 +80,15 @@ class _Show:
             news.set()
             draw(self, snapshot)
             if self.cycles is not None and self.seen >= self.cycles:
-                done.set()
                 stop.set()
+
+        def end(number: signal.Signals) -> None:
+            ended_by.append(number)
+            stop.set()
 
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, stop.set)
+            loop.add_signal_handler(number, end, number)
         self.service = Service([self.stage.cell], observe)
         watch = asyncio.create_task(self._watch(news, stop))
         try:
@@ -92,7 +98,7 @@ class _Show:
             watch.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await watch
-        return not done.is_set()
+        return signal.SIGINT in ended_by
 
     def _say(self, text: str) -> None:
         if not self.told or self.told[-1][1] != text:
@@ -134,12 +140,25 @@ class _Show:
         happened = sorted([*self.stage.story, *self.told], key=lambda entry: entry[0])
         told = [text for cycle, text in happened if cycle <= last]
         who = f"user {USER}, password {self.stage.password}"
+        status = self.service.running[self.stage.cell.name].status if self.service else None
+        link = "connected" if status is None or status.connected else "not connected"
         return Scene(
-            self.stage.cell.name, f"{self.endpoint} · {who}", told[-1] if told else "", list(self.snapshots)
+            self.stage.cell.name,
+            f"{self.endpoint} · {who}",
+            told[-1] if told else "",
+            list(self.snapshots),
+            link,
         )
 
     def summary(self) -> dict[str, Any]:
         """One object that says how the demo went; null for what is not known."""
+        if not self.snapshots:
+            return {
+                "cell": self.stage.cell.name,
+                "endpoint": self.endpoint,
+                "cycles": 0,
+                "missed": self.missed,
+            }
         last = self.snapshots[-1]
         return {
             "cell": self.stage.cell.name,
@@ -169,6 +188,10 @@ class _Show:
             "story": [{"cycle": cycle, "what": text} for cycle, text in self.stage.story],
             "told": [{"cycle": cycle, "what": text} for cycle, text in self.told],
         }
+
+
+def _end(*_: object) -> None:
+    raise SystemExit(0)
 
 
 async def _live(show: _Show) -> bool:

@@ -60,6 +60,8 @@ def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
     source = CONFIG / "sim" / f"{scenario}.yaml"
     if scenario not in SCENARIOS:
         raise SettingsError(f"there is no scenario '{scenario}'; choose one of {', '.join(SCENARIOS)}")
+    if not source.is_file():
+        raise SettingsError(f"the demo needs a checkout of the project: there is no {source}")
     directory = Path(tempfile.mkdtemp(prefix="impactcell-demo-"))
     try:
         content = yaml.safe_load(source.read_text(encoding="utf-8"))
@@ -111,10 +113,11 @@ def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-ar
 
 @contextlib.contextmanager
 def _simulator(scenario: Path) -> Iterator[int]:
+    errors = (scenario.parent / "simulator.log").open("w+", encoding="utf-8")
     process = subprocess.Popen(  # noqa: S603 - our own simulator
         [sys.executable, "-m", "simulator", "serve", str(scenario)],
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=errors,
         text=True,
         cwd=CONFIG.parent,
     )
@@ -122,12 +125,14 @@ def _simulator(scenario: Path) -> Iterator[int]:
         assert process.stdout is not None  # noqa: S101 - a pipe was asked for
         line = process.stdout.readline()
         if not line:
-            _, errors = process.communicate(timeout=5)
-            raise ImpactCellError(f"the simulator did not start: {errors.strip()}")
+            process.wait(timeout=5)
+            errors.seek(0)
+            raise ImpactCellError(f"the simulator did not start: {errors.read().strip()}")
         yield int(json.loads(line)["port"])
     finally:
         process.terminate()
         process.communicate()
+        errors.close()
 
 
 def _placed(scenario: str, directory: Path, port: int) -> Path:

@@ -159,7 +159,8 @@ class Module:
                 continue
             skip //= 2
             last = want.mark
-            reception = Reception(read.capture, want.mark, want.missed, want.restarted, read.faults)
+            capture = replace(read.capture, session=want.mark.session)
+            reception = Reception(capture, want.mark, want.missed, want.restarted, read.faults)
             self._count(reception, readable=read.readable)
             yield reception
 

@@ -73,6 +73,11 @@ REPORT = (
 )  # fmt: skip
 """Registers of a poll, where the map has them."""
 
+LIGHTEST_KG, HEAVIEST_KG = 0.01, 1e5
+"""What a part can weigh; anything else is a wrong register, and would cost the estimators much time."""
+LATEST_NS = 2**63 - 1
+"""The year 2262."""
+
 _BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
 _POSITIONING = REPORT[7:]
 
@@ -160,6 +165,13 @@ def capture(
     lying = {fault.split("_count", 1)[0].removeprefix("register ") for fault in faults}
     velocity = _checked(registers, header, "velocity", faults, math.nan)
     mass = _checked(registers, header, "mass", faults, math.nan, missing=True)
+    if not math.isnan(mass) and not LIGHTEST_KG <= mass <= HEAVIEST_KG:
+        faults.append(f"register mass ({registers['mass'].address}): {mass:g} kg cannot be")
+        mass = math.nan
+    time_ns = _integer(header["cycle_time"])
+    if time_ns > LATEST_NS:
+        faults.append(f"register cycle_time ({registers['cycle_time'].address}): {time_ns} ns is no date")
+        time_ns = 0
     stroke = _checked(registers, header, "stroke", faults, math.inf, infinite=True)
     dwell = _checked(registers, header, "dwell", faults, math.nan, missing=True, zero=True)
     direction = _integer(header.get("direction", 1))
@@ -188,7 +200,7 @@ def capture(
         actuator=channels.get("actuator"),
         direction=direction,
         stroke_m=stroke,
-        time_ns=_integer(header["cycle_time"]),
+        time_ns=time_ns,
         batch_id=str(header.get("batch_id", "")) or None,
         dwell_s=dwell,
         start_m=start,

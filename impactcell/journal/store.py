@@ -3,7 +3,7 @@
 Write-ahead log with full synchronisation. A cycle, its capture, its alarms and the state that it led to
 are one transaction: after any crash the file shows the cycle with all of it, or not at all.
 
-A `Journal` is used from one thread at a time; `service.py` gives it a thread of its own.
+A `Journal` is used from one thread at a time; `impactcell.service.worker` gives it a thread of its own.
 """
 
 import math
@@ -19,6 +19,7 @@ from impactcell import values
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
 from impactcell.journal.blobs import decode_capture, encode_capture
 from impactcell.journal.history import Page, PastValue, Question, past_alarms, past_values
+from impactcell.journal.lock import locked
 from impactcell.journal.retention import Retention, thin
 from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, TABLES
 from impactcell.records import Alarm, Capture, Snapshot
@@ -69,9 +70,14 @@ class Journal:
 
     def __init__(self, path: Path, cell: str | None, *, read_only: bool = False) -> None:
         self.path = path
-        if read_only and not path.is_file():
-            raise JournalError(f"{path}: there is no such journal")
-        new = not path.exists() or path.stat().st_size == 0
+        try:
+            if read_only and not path.is_file():
+                raise JournalError(f"{path}: there is no such journal")
+            self._lock = None if read_only else locked(path)
+        except OSError as error:
+            raise JournalError(
+                f"{path}: cannot be opened ({error.strerror}); check its directory and owner"
+            ) from error
         mode = "ro" if read_only else "rwc"
         try:
             self._db = sqlite3.connect(
@@ -81,16 +87,20 @@ class Journal:
                 check_same_thread=False,
             )
         except sqlite3.Error as error:
-            raise JournalError(f"{path}: cannot be opened ({error}); is the directory there?") from error
+            raise JournalError(
+                f"{path}: cannot be opened ({error}); check its directory and owner"
+            ) from error
         try:
-            if new:
+            self._check_readable()
+            if not read_only and self._pragma("page_count") == 0:
                 self._create(cell or "")
             self._check(cell)
             if not read_only:
-                self._db.execute("PRAGMA journal_mode = WAL")
-                self._db.execute("PRAGMA synchronous = FULL")
+                with self._errors():
+                    self._db.execute("PRAGMA journal_mode = WAL")
+                    self._db.execute("PRAGMA synchronous = FULL")
         except BaseException:
-            self._db.close()
+            self.close()
             raise
 
     def __enter__(self) -> Self:
@@ -104,6 +114,8 @@ class Journal:
     def close(self) -> None:
         """Close the file; what was committed stays."""
         self._db.close()
+        if self._lock is not None:
+            self._lock.close()
 
     @property
     def cell(self) -> str:
@@ -138,7 +150,9 @@ class Journal:
                     _INSERT_CYCLE, [_sql(column.of(capture, snapshot)) for column in COLUMNS]
                 ).lastrowid
             except sqlite3.IntegrityError as error:
-                raise JournalError(f"{self.path}: cycle {capture.cycle} is stored already") from error
+                raise JournalError(
+                    f"{self.path}: cycle {capture.cycle} is stored already, or holds what it cannot ({error})"
+                ) from error
             self._db.execute("INSERT INTO captures VALUES (?, ?)", (row, encode_capture(capture)))
             self._put_alarms(changed)
             self._db.execute("INSERT OR REPLACE INTO state VALUES (1, ?, ?)", (row, state))
@@ -159,12 +173,14 @@ class Journal:
 
     def state(self) -> bytes | None:
         """Return the state of the last durable cycle; None in a new journal."""
-        row = self._db.execute("SELECT blob FROM state").fetchone()
+        with self._errors():
+            row = self._db.execute("SELECT blob FROM state").fetchone()
         return None if row is None else bytes(row[0])
 
     def position(self) -> Position | None:
         """Return the last durable cycle; None in a new journal."""
-        row = self._db.execute("SELECT session, cycle FROM cycles ORDER BY seq DESC LIMIT 1").fetchone()
+        with self._errors():
+            row = self._db.execute("SELECT session, cycle FROM cycles ORDER BY seq DESC LIMIT 1").fetchone()
         return None if row is None else Position(*row)
 
     def captures(self, first_cycle: int | None = None, last_cycle: int | None = None) -> Iterator[Capture]:
@@ -194,12 +210,14 @@ class Journal:
 
     def count(self) -> int:
         """Return how many cycles the journal holds."""
-        return int(self._db.execute("SELECT count(*) FROM cycles").fetchone()[0])
+        with self._errors():
+            return int(self._db.execute("SELECT count(*) FROM cycles").fetchone()[0])
 
     def audit(self) -> tuple[AuditEntry, ...]:
         """Return every action of a person, oldest first."""
-        rows = self._db.execute("SELECT time_ns, user, action, arguments, result FROM audit ORDER BY id")
-        return tuple(AuditEntry(*row) for row in rows)
+        with self._errors():
+            rows = self._db.execute("SELECT time_ns, user, action, arguments, result FROM audit ORDER BY id")
+            return tuple(AuditEntry(*row) for row in rows)
 
     def _create(self, cell: str) -> None:
         self._db.execute("PRAGMA auto_vacuum = INCREMENTAL")
@@ -210,12 +228,23 @@ class Journal:
             self._db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
             self._db.execute(f"PRAGMA user_version = {FORMAT}")
 
-    def _check(self, cell: str | None) -> None:
+    def _check_readable(self) -> None:
         try:
-            (application_id,) = self._db.execute("PRAGMA application_id").fetchone()
-            (version,) = self._db.execute("PRAGMA user_version").fetchone()
+            self._pragma("page_count")
         except sqlite3.DatabaseError as error:
-            raise ForeignJournalError(f"{self.path}: not a journal ({error}); it is left as it is") from error
+            if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
+                raise ForeignJournalError(
+                    f"{self.path}: not a journal ({error}); it is left as it is"
+                ) from error
+            raise JournalError(
+                f"{self.path}: cannot be opened ({error}); check its owner and directory"
+            ) from error
+
+    def _pragma(self, name: str) -> int:
+        return int(self._db.execute(f"PRAGMA {name}").fetchone()[0])
+
+    def _check(self, cell: str | None) -> None:
+        application_id, version = self._pragma("application_id"), self._pragma("user_version")
         if application_id != APPLICATION_ID:
             raise ForeignJournalError(
                 f"{self.path}: a database, but no journal of impactcell; it is left as it is"
@@ -230,7 +259,8 @@ class Journal:
             )
 
     def _meta(self, key: str) -> str:
-        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        with self._errors():
+            row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         return "" if row is None else str(row[0])
 
     def _put_alarms(self, changed: Sequence[Alarm]) -> None:
@@ -260,8 +290,10 @@ class Journal:
                 raise JournalFullError(
                     f"{self.path}: the disk or its quota is full ({error}); make room"
                 ) from error
-            raise JournalError(f"{self.path}: cannot be written ({error})") from error
-        except sqlite3.DatabaseError as error:
+            raise JournalFullError(
+                f"{self.path}: cannot be written now ({error}); check its disk, directory and owner"
+            ) from error
+        except (sqlite3.DatabaseError, OverflowError) as error:
             raise JournalError(f"{self.path}: cannot be used ({error})") from error
 
 

@@ -39,7 +39,10 @@ class CellActions:
 
     async def abort_positioning(self, cell: str, actor: Actor) -> None:
         """End the positioning task that runs."""
-        await self._cells[cell].abort_positioning(_audit(actor, "AbortPositioning"))
+        try:
+            await self._cells[cell].abort_positioning(_audit(actor, "AbortPositioning"))
+        except PositioningError as error:
+            raise RefusedError("BadInvalidState", str(error)) from error
 
     async def act_on_condition(
         self,

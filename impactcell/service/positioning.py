@@ -154,15 +154,17 @@ class PositioningTask:
 
     async def run(self) -> None:
         """Run until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._watch_plc(), name=f"{self._cell.name} PLC target")
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                await self._drive()
+
+    async def _watch_plc(self) -> None:
         while True:
-            try:
-                async with asyncio.timeout(WATCH_S):
-                    await self._wake.wait()
-            except TimeoutError:
-                await self._look_at_plc()
-                continue
-            self._wake.clear()
-            await self._drive()
+            await self._look_at_plc()
+            await asyncio.sleep(WATCH_S)
 
     async def _look_at_plc(self) -> None:
         """Start a task where the PLC has raised the sequence of its target."""

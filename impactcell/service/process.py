@@ -71,8 +71,7 @@ class Service:
                 for task in tasks:
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
-                for running in self.running.values():
-                    await running.close()
+                await asyncio.gather(*(running.close() for running in self.running.values()))
 
     async def reload(self) -> None:
         """Read every cell's files again; see `RunningCell.reload`."""
@@ -112,7 +111,8 @@ class Service:
                 raise
             except Exception:
                 running.log.exception("a fault of this program; the cell is begun anew in %g s", RESTART_S)
-                server.mark_bad(running.cell.name, time.time_ns())
+                with contextlib.suppress(KeyError):
+                    server.mark_bad(running.cell.name, time.time_ns())
                 await asyncio.sleep(RESTART_S)
 
 

@@ -1,5 +1,6 @@
 """A few cycles of the cell's own model before the first real one, so that all is compiled when it comes."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,11 +14,13 @@ CYCLES = 8
 FORCE_HZ, POSITION_HZ = 100_000.0, 10_000.0
 
 
-def rehearse(design: CellDesign) -> None:
-    """Take cycles of the nominal plant through the whole pipeline, and forget them."""
+def rehearse(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
+    """Take cycles of the nominal plant through the whole pipeline, and forget them; `stop` ends it early."""
     hurried = replace(design, signature=replace(design.signature, learned_cycles=2))
     state = core.initial_state(hurried)
     for cycle in range(1, CYCLES + 1):
+        if stop():
+            return
         state = core.step(hurried, state, _capture(hurried, cycle), PositioningState()).state
 
 

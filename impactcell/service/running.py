@@ -63,7 +63,7 @@ class RunningCell:
         self._link_news: asyncio.Queue[ModuleStatus] = asyncio.Queue()
         self._last_cycle_s = time.monotonic()
         self._stale = False
-        self._model_seen_ns = cell.settings.model.stat().st_mtime_ns
+        self._model_seen_ns = self._model_time_ns()
 
     @property
     def status(self) -> ModuleStatus:
@@ -108,20 +108,20 @@ class RunningCell:
 
     async def reload(self) -> None:
         """Take over from the cell's files what can change without a restart: model, tracking, alarms."""
+        self._model_seen_ns = self._model_time_ns()
         try:
-            fresh = read_cell(self.cell.path)
+            fresh = await asyncio.to_thread(read_cell, self.cell.path)
         except ImpactCellError as error:
             self.log.warning("not reloaded, all goes on as before: %s", error)
             return
-        fixed = [
-            name
-            for name in ("cell", "module", "opcua", "journal", "monitoring", "identification")
+        fixed = {
+            name: getattr(self.cell.settings, name)
+            for name in ("cell", "module", "opcua", "journal", "monitoring", "identification", "positioning")
             if getattr(fresh.settings, name) != getattr(self.cell.settings, name)
-        ]
+        }
         if fixed:
             self.log.warning("changed, but taken over only by a restart: %s", ", ".join(fixed))
-        self.cell = replace(self.cell, settings=fresh.settings, model=fresh.model)
-        self._model_seen_ns = fresh.settings.model.stat().st_mtime_ns
+        self.cell = replace(self.cell, settings=fresh.settings.model_copy(update=fixed), model=fresh.model)
         design = cell_design(self.cell)
         await self.worker.redesign(design)
         if self._positioning is not None:
@@ -157,7 +157,9 @@ class RunningCell:
 
     async def _acquire(self) -> None:
         await self.worker.rehearse()
-        async with contextlib.aclosing(self._module.captures(after=self.worker.durable)) as receptions:
+        async with contextlib.aclosing(
+            self._module.captures(after=self.worker.last or self.worker.durable)
+        ) as receptions:
             async for reception in receptions:
                 await self._take(reception)
 
@@ -235,9 +237,17 @@ class RunningCell:
             if late and not self._stale and self.server is not None and self._module.status.connected:
                 self._stale = True
                 self.server.mark_stale(self.cell.name, time.time_ns())
-            with contextlib.suppress(FileNotFoundError):  # a file being replaced: look again at the next tick
-                if self.cell.settings.model.stat().st_mtime_ns != self._model_seen_ns:
-                    await self.reload()
+            await self.worker.retry()
+            await self._look_at_journal()
+            if self._model_time_ns() not in (0, self._model_seen_ns):
+                await self.reload()
+
+    def _model_time_ns(self) -> int:
+        """When the model file was written; 0 while it is being replaced, or cannot be seen."""
+        try:
+            return self.cell.settings.model.stat().st_mtime_ns
+        except OSError:
+            return 0
 
     def _show_restored(self, server: Server) -> None:
         self._show_alarms(self.worker.alarms)

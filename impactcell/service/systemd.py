@@ -1,9 +1,12 @@
 """The service manager's protocol: readiness, watchdog and stopping, as in sd_notify(3)."""
 
+import logging
 import os
 import socket
 
 from impactcell.errors import SettingsError
+
+log = logging.getLogger(__name__)
 
 
 def notify(state: str) -> bool:
@@ -13,9 +16,13 @@ def notify(state: str) -> bool:
         return False
     if address[0] not in "/@":
         raise SettingsError(f"NOTIFY_SOCKET={address}: neither a path nor an abstract socket")
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as channel:
-        channel.connect("\0" + address[1:] if address[0] == "@" else address)
-        channel.sendall(state.encode())
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as channel:
+            channel.connect("\0" + address[1:] if address[0] == "@" else address)
+            channel.sendall(state.encode())
+    except OSError as error:
+        log.warning("the service manager at NOTIFY_SOCKET=%s cannot be told %s: %s", address, state, error)
+        return False
     return True
 
 

@@ -2,10 +2,13 @@
 
 import asyncio
 import logging
+import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 from impactcell import cell as core
@@ -66,8 +69,11 @@ class Worker:
         self._journal = journal
         self._keep = keep
         self._backlog: deque[Callable[[Journal], None]] = deque()
-        self._since_thinned = 0
+        self._since_thinned = THIN_EVERY
+        self._closing = threading.Event()
         self.journal_fault = ""
+        self.last: Mark | None = None
+        """The last cycle taken in since the start, durable or not."""
         self.dropped = 0
         restored = self._restore()
         self._state = restored.state
@@ -97,8 +103,23 @@ class Worker:
         return None if position is None else Mark(position.session, position.cycle)
 
     async def rehearse(self) -> None:
-        """Compile what a cycle needs, so that the first one is not late."""
-        await self.run(lambda: rehearse(self._design))
+        """Compile what a cycle needs, so that the first one is not late.
+
+        It runs in a thread that nobody waits for: compiling cannot be interrupted, and must not hold up
+        an end of the service.
+        """
+        loop, done = asyncio.get_running_loop(), asyncio.Event()
+
+        def work() -> None:
+            try:
+                rehearse(self._design, self._closing.is_set)
+            except Exception:
+                log.exception("cell=%s the rehearsal failed; the first cycle will be slow", self._design.name)
+            if not self._closing.is_set():
+                loop.call_soon_threadsafe(done.set)
+
+        threading.Thread(target=work, name=f"rehearsal-{self._design.name}", daemon=True).start()
+        await done.wait()
 
     async def process(
         self,
@@ -126,6 +147,11 @@ class Worker:
         """Change the state by a person's command, and write down who did it."""
         await self.run(lambda: self._change(change, audit))
 
+    async def retry(self) -> None:
+        """Try again to write what the journal could not take, also while no cycles come."""
+        if self._backlog and self._journal is not None:
+            await self.run(partial(self._write_backlog, self._journal))
+
     async def note(self, audit: AuditEntry) -> None:
         """Write down what a person did that is not in the state."""
         await self.run(lambda: self._record((), audit))
@@ -135,6 +161,7 @@ class Worker:
 
         def swap() -> None:
             self._design = design
+            self._state = core.adapted(design, self._state)
             self._keep_model()
 
         await self.run(swap)
@@ -146,9 +173,10 @@ class Worker:
 
     async def close(self) -> None:
         """Finish what has begun, and close the journal."""
+        self._closing.set()
         if self._journal is not None:
             await self.run(self._journal.close)
-        self._thread.shutdown()
+        self._thread.shutdown(wait=False)
 
     async def run(self, work: Callable[[], T]) -> T:
         """Do some work in the cell's thread, after all that was asked for before."""
@@ -164,7 +192,8 @@ class Worker:
         if blob is None:
             return Durable(core.initial_state(self._design))
         try:
-            return values.loads(Durable, blob)
+            stored = values.loads(Durable, blob)
+            return replace(stored, state=core.adapted(self._design, stored.state))
         except ValueError as error:
             log.warning(
                 "cell=%s the journal's state is of another version (%s); tracking begins anew, cycles go on",
@@ -180,7 +209,8 @@ class Worker:
         announcement: Announcement | None,
         faults: tuple[str, ...],
     ) -> Processed:
-        stepped = core.step(self._design, self._state, capture, positioning, announcement, faults)
+        stepped = self._stepped(capture, positioning, announcement, faults)
+        self.last = Mark(capture.session, capture.cycle)
         self._state, self._snapshot = stepped.state, stepped.snapshot
         if self._journal is None:
             return Processed(stepped, Mark(capture.session, capture.cycle))
@@ -188,6 +218,23 @@ class Worker:
         blob = self._blob()
         self._store(lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed))
         return Processed(stepped, self.durable)
+
+    def _stepped(
+        self,
+        capture: Capture,
+        positioning: PositioningState,
+        announcement: Announcement | None,
+        faults: tuple[str, ...],
+    ) -> Stepped:
+        try:
+            return core.step(self._design, self._state, capture, positioning, announcement, faults)
+        except Exception as error:
+            # A capture that nobody foresaw must not stop the cell: the cycle counts, its content does not.
+            name = self._design.name
+            log.exception("cell=%s cycle=%d cannot be computed; it counts as unreadable", name, capture.cycle)
+            fault = f"{name}: cycle {capture.cycle}: cannot be computed ({type(error).__name__}: {error})"
+            empty = replace(capture, force=None, position=None, actuator=None, summary=None)
+            return core.step(self._design, self._state, empty, positioning, announcement, (*faults, fault))
 
     def _blob(self) -> bytes:
         return values.dumps(Durable(self._state, self._snapshot, self.belief))
@@ -206,16 +253,27 @@ class Worker:
         self._write_backlog(self._journal)
 
     def _write_backlog(self, journal: Journal) -> None:
-        try:
-            while self._backlog:
+        fault = ""
+        while self._backlog:
+            try:
                 self._backlog[0](journal)
-                self._backlog.popleft()
-            if self._since_thinned >= THIN_EVERY:
-                self._since_thinned = 0
-                journal.thin(self._keep, self._state.time_ns)
-            self.journal_fault = ""
-        except JournalError as error:
-            self.journal_fault = str(error)
+            except JournalError as error:
+                if error.retry:
+                    self.journal_fault = str(error)
+                    return
+                # What can never be stored must not keep what can from being stored.
+                fault = str(error)
+                self.dropped += 1
+                log.error("cell=%s an entry of the journal is lost: %s", self._design.name, error)  # noqa: TRY400
+            self._backlog.popleft()
+        self.journal_fault = fault
+        if self._since_thinned >= THIN_EVERY:
+            self._since_thinned = 0
+            try:
+                # A module's clock that runs ahead must not make everything look old.
+                journal.thin(self._keep, min(self._state.time_ns, time.time_ns()))
+            except JournalError as error:
+                self.journal_fault = str(error)
 
     def _find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
         self._state, moved = core.find(self._design, self._state, finding, time_ns)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from impactcell import yamlfile
 from impactcell.errors import MapError, SettingsError
@@ -35,19 +36,41 @@ def read_cell(path: Path) -> Cell:
     SettingsError
         With every fault of the three files, one `file:line:column: message` a line.
     """
-    settings, _ = yamlfile.read(path, CellSettings)
-    faults = []
+    faults: list[str] = []
+    settings = layout = model = None
     try:
-        register_map = read_register_map(settings.module.register_map, settings.module.word_order)
+        settings, _ = yamlfile.read(path, CellSettings)
+        map_file: Path | None = settings.module.register_map
+        model_file: Path | None = settings.model
+        order = settings.module.word_order
+    except SettingsError as error:
+        faults.append(str(error))
+        (map_file, model_file), order = _named(path), None
+    try:
+        layout = None if map_file is None else read_register_map(map_file, order)
     except SettingsError as error:
         faults.append(str(error))
     try:
-        model = read_model(settings.model)
+        model = None if model_file is None else read_model(model_file)
     except SettingsError as error:
         faults.append(str(error))
-    if faults:
+    if settings is None or layout is None or model is None:
         raise SettingsError("\n".join(faults))
-    return Cell(path, settings, register_map, model)
+    return Cell(path, settings, layout, model)
+
+
+def _named(path: Path) -> tuple[Path | None, Path | None]:
+    """Map and model that a faulty cell file names: their faults are told together with its own."""
+    try:
+        data, _ = yamlfile.load(path)
+    except SettingsError:
+        return None, None
+    cell = data if isinstance(data, dict) else {}
+    module = cell.get("module")
+    names = module.get("register_map") if isinstance(module, dict) else None, cell.get("model")
+    files = [path.parent / name if isinstance(name, str) else None for name in names]
+    found = [file if file is not None and file.is_file() else None for file in files]
+    return found[0], found[1]
 
 
 def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
@@ -66,6 +89,11 @@ def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
     except MapError as error:
         raise SettingsError("\n".join(f"{path}: {fault}" for fault in str(error).splitlines())) from error
     return layout if word_order is None else layout.with_word_order(word_order)
+
+
+def _port(cell: Cell) -> int | None:
+    """Port of the cell's endpoint; None where the system chooses one."""
+    return urlsplit(cell.settings.opcua.endpoint).port or None
 
 
 def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
@@ -91,10 +119,7 @@ def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
                 faults.append(
                     f"{cell.path}: {other.path} has the same journal file; a journal belongs to one cell"
                 )
-            if (
-                cell.settings.opcua != other.settings.opcua
-                and cell.settings.opcua.endpoint == other.settings.opcua.endpoint
-            ):
+            if cell.settings.opcua != other.settings.opcua and _port(cell) == _port(other):
                 faults.append(f"{cell.path}: {other.path} has the same endpoint, but other opcua settings")
     if faults:
         raise SettingsError("\n".join(faults))

@@ -7,6 +7,7 @@ import json
 import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
+from urllib.parse import urlsplit
 
 from pydantic import (
     AfterValidator,
@@ -49,8 +50,13 @@ Probability = Annotated[float, Field(gt=0, lt=1)]
 
 
 def _endpoint(value: str) -> str:
-    if not value.startswith("opc.tcp://"):
-        raise ValueError("an OPC UA endpoint starts with opc.tcp://, as in opc.tcp://127.0.0.1:4840")
+    parts = urlsplit(value)
+    try:
+        whole = parts.scheme == "opc.tcp" and bool(parts.hostname) and parts.port is not None
+    except ValueError:
+        whole = False
+    if not whole:
+        raise ValueError("an OPC UA endpoint has host and port, as in opc.tcp://127.0.0.1:4840/impactcell")
     return value
 
 

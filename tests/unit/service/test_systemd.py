@@ -23,6 +23,8 @@ def test_state_reaches_the_manager(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 def test_no_manager_no_message(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     assert not systemd.notify("READY=1")
+    monkeypatch.setenv("NOTIFY_SOCKET", "/nowhere/notify")
+    assert not systemd.notify("READY=1")
     monkeypatch.setenv("NOTIFY_SOCKET", "tcp:1")
     with pytest.raises(SettingsError, match="NOTIFY_SOCKET"):
         systemd.notify("READY=1")

@@ -76,6 +76,30 @@ def test_one_fault(config: Path, old: str, new: str, complaint: str) -> None:
         read_cell(edited(config, old, new))
 
 
+@pytest.mark.parametrize(
+    "endpoint", ["opc.tcp://", "opc.tcp://h:notaport", "opc.tcp://h:99999", "http://h:1", "h:1"]
+)
+def test_an_endpoint_that_could_not_be_listened_on(config: Path, endpoint: str) -> None:
+    with pytest.raises(SettingsError, match="has host and port"):
+        read_cell(edited(config, "cell: prototype", f"cell: prototype\nopcua: {{endpoint: '{endpoint}'}}"))
+
+
+def test_faults_of_cell_map_and_model_at_once(config: Path) -> None:
+    (config / "maps" / "bad.yaml").write_text("format: 1\nname: bad\nregisters: {}\n")
+    (config / "models" / "bad.yaml").write_text("format: 1\nname: 7\n")
+    path = config / "cells" / "bad.yaml"
+    path.write_text(
+        "format: 1\ncell: c\nmodule: {register_map: ../maps/bad.yaml, window: 1000}\n"
+        "model: ../models/bad.yaml\nalarms: {wear_limit: 0.2}\n"
+    )
+    with pytest.raises(SettingsError) as caught:
+        read_cell(path)
+    for file in (path, config / "maps" / "bad.yaml", config / "models" / "bad.yaml"):
+        assert file.name in str(caught.value)
+    assert "maps/bad.yaml" in str(caught.value)
+    assert "models/bad.yaml" in str(caught.value)
+
+
 def test_cells_of_one_process_do_not_share_what_is_one_cells(config: Path) -> None:
     journal = f"cell: prototype\njournal: {{file: {config / 'one.sqlite'}}}"
     first = edited(config, "cell: prototype", journal, "first")
