@@ -34,7 +34,7 @@ bench: install
 	$(BIN)/python -m tests.benchmarks $(ARGS)
 
 # Written anew only when pyproject.toml changes its bounds.
-lock:
+lock: install
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile --universal --python-version 3.11 --extra dev --upgrade --no-header \
 		--no-emit-index-url --no-emit-find-links pyproject.toml -o requirements.lock

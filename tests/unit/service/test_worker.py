@@ -1,0 +1,121 @@
+"""A worker stores what can be stored, in order, and survives what nobody foresaw."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell import cell as core
+from impactcell.errors import JournalFullError
+from impactcell.fieldbus.ring import Mark
+from impactcell.journal.retention import Retention
+from impactcell.journal.store import Journal
+from impactcell.records import Capture, Channel, PositioningState, Quality
+from impactcell.service.design import cell_design
+from impactcell.service.worker import Worker
+from impactcell.settings import read_cell
+from tests.integration.processes import CONFIG
+from tests.snapshots import make_capture
+
+
+@pytest.fixture(scope="module")
+def design() -> core.CellDesign:
+    return cell_design(read_cell(CONFIG / "cells" / "prototype.yaml"))
+
+
+def cycles(path: Path) -> list[int]:
+    with Journal(path, None, read_only=True) as journal:
+        return [capture.cycle for capture in journal.captures()]
+
+
+async def process(worker: Worker, capture: Capture) -> Mark | None:
+    return (await worker.process(capture, PositioningState(), None)).durable
+
+
+async def test_an_entry_that_can_never_be_stored_blocks_nothing(
+    tmp_path: Path, design: core.CellDesign
+) -> None:
+    worker = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    assert await process(worker, make_capture(1)) == Mark(1, 1)
+    assert await process(worker, make_capture(1)) == Mark(1, 1)
+    assert "stored already" in worker.journal_fault
+    assert await process(worker, replace(make_capture(2), time_ns=2**63)) == Mark(1, 1)
+    assert await process(worker, make_capture(3)) == Mark(1, 3)
+    assert worker.journal_fault == ""
+    await worker.close()
+    assert cycles(tmp_path / "j") == [1, 3]
+
+
+async def test_what_cannot_be_stored_now_is_stored_later_in_order(
+    tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(tmp_path / "j", "c")
+    worker = Worker(design, journal, Retention())
+
+    def full(*_: object) -> None:
+        raise JournalFullError("the disk is full")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(journal, "append", full)
+        for cycle in (1, 2, 3):
+            assert await process(worker, make_capture(cycle)) is None
+        assert worker.journal_fault == "the disk is full"
+    await worker.retry()
+    assert worker.journal_fault == ""
+    assert worker.durable == Mark(1, 3)
+    await worker.close()
+    assert cycles(tmp_path / "j") == [1, 2, 3]
+
+
+async def test_a_capture_that_cannot_be_computed_counts_as_unreadable(
+    design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worker = Worker(design, None, Retention())
+    step = core.step
+
+    def fails_with_samples(
+        design: core.CellDesign, state: core.CellState, capture: Capture, *rest: object
+    ) -> object:
+        if capture.force is not None:
+            raise np.linalg.LinAlgError("singular")
+        return step(design, state, capture, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(core, "step", fails_with_samples)
+    processed = await worker.process(make_capture(1), PositioningState(), None)
+    assert processed.stepped.snapshot.cycle == 1
+    assert processed.stepped.snapshot.friction.mu_s.quality is Quality.BAD
+    assert worker.last == Mark(1, 1)
+    await worker.close()
+
+
+async def test_odd_captures_are_survived(design: core.CellDesign) -> None:
+    worker = Worker(design, None, Retention())
+    good = make_capture(1)
+    force = good.force
+    assert force is not None
+    for cycle, odd in enumerate(
+        [
+            replace(good, position=Channel(np.zeros(200), np.zeros(200))),
+            replace(good, force=Channel(force.time_s[:1], force.values[:1])),
+            replace(good, mass_kg=float("nan"), velocity_m_s=float("nan")),
+            replace(good, force=replace(force, values=force.values * 1e12)),
+        ],
+        start=1,
+    ):
+        processed = await worker.process(replace(odd, cycle=cycle), PositioningState(), None)
+        assert processed.stepped.snapshot.cycle == cycle
+    await worker.close()
+
+
+async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, design: core.CellDesign) -> None:
+    worker = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    await process(worker, make_capture(1))
+    finer = replace(design, signature=replace(design.signature, points=50))
+    await worker.redesign(finer)
+    await process(worker, make_capture(2))
+    await worker.close()
+    again = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    assert again.durable == Mark(1, 2)
+    await process(again, make_capture(3))
+    await again.close()
