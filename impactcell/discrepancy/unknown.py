@@ -6,11 +6,13 @@ import numpy as np
 
 from impactcell.discrepancy.evidence import ALPHA, Evidence
 from impactcell.discrepancy.locate import ALL
-from impactcell.discrepancy.phases import BETWEEN_SHOTS
+from impactcell.discrepancy.phases import BETWEEN_SHOTS, PHASES, course_of, phases
+from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import CHANNELS, Index
 from impactcell.records import Samples
 
 STRONG_SHARE = 0.25
+SMALL = 1.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,11 +69,34 @@ def by_phase(evidence: Evidence) -> dict[str, float]:
     return made
 
 
-def describe(evidence: Evidence) -> Unexplained:
+def phase_of_gap(problem: Problem, evidence: Evidence) -> str:
+    """Phase in which a gap arises: contact, or the slide and the stop after it, whichever holds more of it.
+
+    What goes wrong in the contact is carried on into the slide, and a fit spreads what goes wrong there
+    over the contact; the larger share of the squared residuals tells which of the two it was.
+    """
+    if evidence.fit.misfit(problem.shots).sum() <= SMALL * problem.shots.values.size:
+        strength = by_phase(evidence)
+        return max(strength, key=lambda name: strength[name])
+    phase = phases(problem, course_of(problem, evidence.fit))
+    excess = {
+        name: float((evidence.fit.residual[phase == number] ** 2 - 1.0).sum())
+        for number, name in enumerate(PHASES)
+        if (phase == number).any()
+    }
+    after = {name: value for name, value in excess.items() if name in {"free_slide", "stop", "driven"}}
+    contact = {name: value for name, value in excess.items() if name not in after}
+    side = contact if sum(contact.values()) > sum(after.values()) else after
+    return max(side, key=lambda name: side[name])
+
+
+def describe(problem: Problem, evidence: Evidence) -> Unexplained:
     """Describe what a fitted model leaves."""
     chart, tests, made = evidence.map, evidence.map_tests, evidence.map_scores
-    strength = by_phase(evidence)
-    phase = max(strength, key=lambda name: strength[name])
+    phase = phase_of_gap(problem, evidence)
+    if phase not in chart.rows:
+        strength = by_phase(evidence)
+        phase = max(strength, key=lambda name: strength[name])
     row = chart.rows.index(phase)
     p = np.ones(len(chart.columns))
     for column in range(len(chart.columns)):

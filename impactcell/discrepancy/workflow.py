@@ -151,7 +151,7 @@ def investigate(
         search=found,
         parameters=estimates(final, tangent),
         proof=proof,
-        unexplained=describe(found.final) if verdict == UNKNOWN else None,
+        unexplained=describe(problem, found.nominal) if verdict == UNKNOWN else None,
         proposals=propose(problem, final, _rivals(found)),
         seed=seed,
     )
