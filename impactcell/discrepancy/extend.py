@@ -168,6 +168,9 @@ def search(setup: Setup, nominal: Fit) -> Search:
     against = setup.look(singles[0])
     if setup.suffices(against):
         return _accept_single(setup.problem, first, against, singles)
+    plausible = _plausible(setup, first, against, singles[0], rough, alternatives(setup.problem, singles))
+    if plausible is not None:
+        return plausible
     tasks = [(setup.coarse, one, setup.library, (setup.seed, 1)) for one in rough[1:SEEDS_OF_PAIRS]]
     sources = [against.scan, *setup.mapper(_scan, tasks)]
     pairs: dict[frozenset[str], Fit] = {}
@@ -185,9 +188,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
         return _accept_single(setup.problem, first, against, singles)
     last = setup.look(ranked[0])
     if not setup.suffices(last):
-        return _plausible(setup, first, against, singles[0], rough, everything) or Search(
-            first, last, None, (), {}, {}, everything
-        )
+        return Search(first, last, None, (), {}, {}, everything)
     return _accept_pair(setup.problem, first, last, ranked, rough, sources, everything)
 
 

@@ -125,7 +125,7 @@ def investigate(
             nominal = fit_nominal(problem, plant)
     say("locating the gap and naming effects")
     coarse = Problem(thinned(problem.shots, COARSE), len(material.batches))
-    found = search(Setup(problem, coarse, material, names, seed, each, "stated" in floor.source), nominal)
+    found = search(Setup(problem, coarse, material, names, seed, each, _certain(material, floor)), nominal)
     final = found.accepted or nominal
     say("proving on held-out shots")
     held_problem = Problem(laid_out(material, held_out, floor.noise_std), len(material.batches))
@@ -155,6 +155,11 @@ def investigate(
         proposals=propose(problem, final, _rivals(found)),
         seed=seed,
     )
+
+
+def _certain(material: Material, floor: noise.Floor) -> bool:
+    """Whether what is above the floor is a gap: noise is stated, or sampled fast enough to be seen."""
+    return "stated" in floor.source or material.excitation is Excitation.TAP
 
 
 def _followed(problem: Problem, nominal: Fit) -> Index:
