@@ -11,16 +11,25 @@ which `impactcell.values` writes and reads back bit for bit.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from impactcell import alarms
 from impactcell.alarms import AlarmSettings, AlarmState, Finding, Occurrence, Transition
+from impactcell.intake import (
+    Announcement,
+    BatchSaid,
+    Known,
+    NamedBatch,
+    completed,
+    doubted,
+    mean_period_s,
+    named_batch,
+)
 from impactcell.prediction import Model, estimate
 from impactcell.records import (
     Alarm,
     AlarmName,
     Capture,
-    Channel,
     Evidence,
     FrictionEstimate,
     PositioningState,
@@ -39,9 +48,6 @@ from impactcell.tracking import (
 )
 from impactcell.tracking.signature import SignatureSettings, SignatureState, SignatureTracked
 
-PERIOD_GAIN = 0.05
-"""How fast the mean time between cycles follows."""
-
 
 @dataclass(frozen=True, slots=True)
 class CellDesign:
@@ -49,10 +55,8 @@ class CellDesign:
 
     Attributes
     ----------
-    mass_kg, stroke_m : float or None
-        Taken where the module reports none.
-    force_noise_std_n, position_noise_std_m : float
-        Of the sensors.
+    known : Known
+        What holds where the module says nothing.
     false_alarm_cycles : float
         Designed mean number of cycles between two false alarms of one rule.
     """
@@ -62,28 +66,8 @@ class CellDesign:
     tracker: TrackerSettings
     signature: SignatureSettings
     alarms: AlarmSettings
-    mass_kg: float | None = None
-    stroke_m: float | None = None
-    force_noise_std_n: float = 0.4
-    position_noise_std_m: float = 1.5e-6
+    known: Known = field(default_factory=Known)
     false_alarm_cycles: float = 100_000.0
-
-
-@dataclass(frozen=True, slots=True)
-class NamedBatch:
-    """A batch named by a person: holds until the module names another than it did then."""
-
-    batch_id: str
-    module_said: str | None
-    expected: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Announcement:
-    """A batch change that the PLC announces through the module; `sequence` 0 before the first."""
-
-    sequence: int = 0
-    from_cycle: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,9 +81,7 @@ class CellState:
     cycle: int = 0
     time_ns: int = 0
     period_s: float = 0.0
-    named_batch: NamedBatch | None = None
-    module_batch: str | None = None
-    announcement_seen: int = 0
+    batch: BatchSaid = field(default_factory=BatchSaid)
     grid: tuple[float, int] = (0.0, 0)
 
 
@@ -152,14 +134,14 @@ def step(
     faults: tuple[str, ...] = (),
 ) -> Stepped:
     """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
-    capture = completed(design, capture)
-    state, batch_id, expected = _batch(state, capture, announcement)
-    friction = _doubted(estimate(capture, design.model), faults)
-    period_s = _period_s(state, capture)
+    capture = completed(design.known, capture)
+    named = named_batch(state.batch, capture, announcement)
+    friction = doubted(estimate(capture, design.model), faults)
+    period_s = mean_period_s(state.period_s, (state.cycle, state.time_ns), capture)
     tracked = track(
         design.tracker,
         state.tracker,
-        Reading.of(capture.cycle, capture.time_ns, friction, batch_id, expected=expected),
+        Reading.of(capture.cycle, capture.time_ns, friction, named.batch_id, expected=named.expected),
     )
     signed = _sign(design, state, capture, tracked, period_s)
     gapped = gap.follow(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
@@ -169,6 +151,7 @@ def step(
     )
     after = replace(
         state,
+        batch=named.said,
         tracker=tracked.state,
         signature=signed.state,
         gap=gapped.state,
@@ -195,22 +178,6 @@ def step(
     return Stepped(after, snapshot, tuple(t.alarm for t in moved), _notes(friction, tracked))
 
 
-def completed(design: CellDesign, capture: Capture) -> Capture:
-    """Fill in what the module does not report: mass, stroke and the noise of its sensors."""
-    mass_kg, stroke_m = capture.mass_kg, capture.stroke_m
-    if math.isnan(mass_kg) and design.mass_kg is not None:
-        mass_kg = design.mass_kg
-    if math.isinf(stroke_m) and design.stroke_m is not None:
-        stroke_m = design.stroke_m
-    return replace(
-        capture,
-        mass_kg=mass_kg,
-        stroke_m=stroke_m,
-        force=_with_noise(capture.force, design.force_noise_std_n),
-        position=_with_noise(capture.position, design.position_noise_std_m),
-    )
-
-
 def find(
     design: CellDesign, state: CellState, finding: Finding, time_ns: int
 ) -> tuple[CellState, tuple[Alarm, ...]]:
@@ -233,7 +200,8 @@ def act(state: CellState, name: AlarmName, occurrence: Occurrence) -> tuple[Cell
 
 def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState:
     """Name the batch from the next cycle on; an expected change raises no alarm and re-baselines."""
-    return replace(state, named_batch=NamedBatch(batch_id, state.module_batch, expected))
+    named = NamedBatch(batch_id, state.batch.by_module, expected)
+    return replace(state, batch=replace(state.batch, by_person=named))
 
 
 def renew_surface(state: CellState) -> CellState:
@@ -258,54 +226,6 @@ def _sign(
         gravity_m_s2=plant.gravity_m_s2,
         period_s=period_s,
     )
-
-
-def _doubted(friction: FrictionEstimate, faults: tuple[str, ...]) -> FrictionEstimate:
-    """Make an estimate from a capture with faults uncertain at best, and say why."""
-    if not faults or friction.mu_s.quality is not Quality.GOOD:
-        return friction
-    reason = "; ".join(faults)
-    mu_s = replace(friction.mu_s, quality=Quality.UNCERTAIN, reason=reason)
-    mu_k = replace(friction.mu_k, quality=max(friction.mu_k.quality, Quality.UNCERTAIN), reason=reason)
-    return replace(friction, mu_s=mu_s, mu_k=mu_k)
-
-
-def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
-    return (
-        channel if channel is None or channel.noise_std is not None else replace(channel, noise_std=noise_std)
-    )
-
-
-def _batch(
-    state: CellState, capture: Capture, announcement: Announcement | None
-) -> tuple[CellState, str | None, bool]:
-    """Which batch this cycle belongs to, and whether its change was expected."""
-    named, batch_id, expected = state.named_batch, capture.batch_id, False
-    if named is not None and named.module_said == capture.batch_id:
-        batch_id, expected = named.batch_id, named.expected
-        named = replace(named, expected=False)
-    else:
-        named = None
-    seen = state.announcement_seen
-    if (
-        announcement is not None
-        and announcement.sequence != seen
-        and capture.cycle >= announcement.from_cycle
-    ):
-        expected, seen = True, announcement.sequence
-    after = replace(state, named_batch=named, module_batch=capture.batch_id, announcement_seen=seen)
-    return after, batch_id, expected
-
-
-def _period_s(state: CellState, capture: Capture) -> float:
-    """Mean time between cycles, 0 before it is known; pauses of a shift change count little."""
-    cycles, elapsed_s = capture.cycle - state.cycle, (capture.time_ns - state.time_ns) * 1e-9
-    if not state.time_ns or cycles <= 0 or elapsed_s <= 0.0:
-        return state.period_s
-    now_s = elapsed_s / cycles
-    if not state.period_s:
-        return now_s
-    return state.period_s + PERIOD_GAIN * (min(now_s, 10.0 * state.period_s) - state.period_s)
 
 
 def _findings(

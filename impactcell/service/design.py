@@ -7,6 +7,7 @@ from impactcell.alarms import AlarmSettings, RuleSettings
 from impactcell.alarms.rules import DEFAULT_RULES
 from impactcell.cell import CellDesign
 from impactcell.fieldbus.link import ModuleLink, TlsFiles
+from impactcell.intake import Known
 from impactcell.journal.retention import Retention
 from impactcell.records import AlarmName
 from impactcell.scada import CellDescription, Limits, Machine, Ranges, ServerSettings
@@ -39,10 +40,12 @@ def cell_design(cell: Cell) -> CellDesign:
             false_alarm_cycles=settings.alarms.false_alarm_cycles,
         ),
         alarms=alarm_settings(cell),
-        mass_kg=settings.part.mass_kg,
-        stroke_m=None if stroke_mm is None else stroke_mm * MM,
-        force_noise_std_n=settings.sensors.force_noise_std_n,
-        position_noise_std_m=settings.sensors.position_noise_std_um * UM,
+        known=Known(
+            mass_kg=settings.part.mass_kg,
+            stroke_m=None if stroke_mm is None else stroke_mm * MM,
+            force_noise_std_n=settings.sensors.force_noise_std_n,
+            position_noise_std_m=settings.sensors.position_noise_std_um * UM,
+        ),
         false_alarm_cycles=settings.alarms.false_alarm_cycles,
     )
 

@@ -64,7 +64,7 @@ class PositioningTask:
         if worker.belief is not None:
             self._planner.resume(worker.belief)
         self._design = design
-        self._mass_kg = design.mass_kg
+        self._mass_kg = design.known.mass_kg
         self._module = module
         self._positioner = Positioner(module)
         self._worker = worker

@@ -27,17 +27,17 @@ def rehearse(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> No
 def _capture(design: CellDesign, cycle: int) -> Capture:
     tap = Strike(
         velocity_m_s=0.06,
-        mass_kg=design.mass_kg or 18.9,
-        stroke_m=design.stroke_m or float("inf"),
-        halts_at_separation=design.stroke_m is None,
+        mass_kg=design.known.mass_kg or 18.9,
+        stroke_m=design.known.stroke_m or float("inf"),
+        halts_at_separation=design.known.stroke_m is None,
     )
     motion = strike(design.model.plant, tap)
     random = np.random.default_rng(cycle)
     force_s = uniform_times(0.0, FORCE_HZ, int(motion.separation_s * 1.2 * FORCE_HZ))
     position_s = uniform_times(0.0, POSITION_HZ, int((motion.stop_s * 1.1 + 0.005) * POSITION_HZ))
-    force = motion.sample(force_s).force_n + random.normal(0.0, design.force_noise_std_n, len(force_s))
+    force = motion.sample(force_s).force_n + random.normal(0.0, design.known.force_noise_std_n, len(force_s))
     position = motion.sample(position_s).position_m + random.normal(
-        0.0, design.position_noise_std_m, len(position_s)
+        0.0, design.known.position_noise_std_m, len(position_s)
     )
     return Capture(
         cycle=cycle,

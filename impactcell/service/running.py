@@ -8,9 +8,9 @@ from dataclasses import replace
 from functools import partial
 
 from impactcell.alarms import Finding
-from impactcell.cell import Announcement
 from impactcell.errors import ImpactCellError, PositioningError
 from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
+from impactcell.intake import Announcement
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.records import Alarm, AlarmName, Evidence, PositioningState, Snapshot

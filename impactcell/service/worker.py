@@ -14,9 +14,10 @@ from typing import TypeVar
 from impactcell import cell as core
 from impactcell import values
 from impactcell.alarms import Finding, Occurrence, Transition
-from impactcell.cell import Announcement, CellDesign, CellState, Stepped
+from impactcell.cell import CellDesign, CellState, Stepped
 from impactcell.errors import JournalError
 from impactcell.fieldbus.ring import Mark
+from impactcell.intake import Announcement
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.positioning import Belief

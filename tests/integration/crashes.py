@@ -73,4 +73,4 @@ def judged(cell_file: Path, journal_file: Path) -> Outcome:
 
 
 def _without_alarms(state: core.CellState) -> bytes:
-    return values.dumps(replace(state, alarms=None, announcement_seen=0))  # type: ignore[arg-type]
+    return values.dumps(replace(state, alarms=None))  # type: ignore[arg-type]

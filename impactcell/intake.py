@@ -1,0 +1,126 @@
+"""What is settled about a cycle before anything is computed: what the module left out, batch, doubts."""
+
+import math
+from dataclasses import dataclass, replace
+
+from impactcell.records import Capture, Channel, FrictionEstimate, Quality
+
+PERIOD_GAIN = 0.05
+"""How fast the mean time between cycles follows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is known of a cell where its module says nothing.
+
+    Attributes
+    ----------
+    mass_kg, stroke_m : float or None
+        Taken where the module reports none.
+    force_noise_std_n, position_noise_std_m : float
+        Of the sensors.
+    """
+
+    mass_kg: float | None = None
+    stroke_m: float | None = None
+    force_noise_std_n: float = 0.4
+    position_noise_std_m: float = 1.5e-6
+
+
+@dataclass(frozen=True, slots=True)
+class NamedBatch:
+    """A batch named by a person: holds until the module names another than it did then."""
+
+    batch_id: str
+    module_said: str | None
+    expected: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Announcement:
+    """A batch change that the PLC announces through the module; `sequence` 0 before the first."""
+
+    sequence: int = 0
+    from_cycle: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class BatchSaid:
+    """What has been said of the batch so far: by a person, by the module, by announcements of the PLC."""
+
+    by_person: NamedBatch | None = None
+    by_module: str | None = None
+    announcement_seen: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """The batch of a cycle, whether its change was expected, and what has been said after it."""
+
+    said: BatchSaid
+    batch_id: str | None
+    expected: bool
+
+
+def completed(known: Known, capture: Capture) -> Capture:
+    """Fill in what the module does not report: mass, stroke and the noise of its sensors."""
+    mass_kg, stroke_m = capture.mass_kg, capture.stroke_m
+    if math.isnan(mass_kg) and known.mass_kg is not None:
+        mass_kg = known.mass_kg
+    if math.isinf(stroke_m) and known.stroke_m is not None:
+        stroke_m = known.stroke_m
+    return replace(
+        capture,
+        mass_kg=mass_kg,
+        stroke_m=stroke_m,
+        force=_with_noise(capture.force, known.force_noise_std_n),
+        position=_with_noise(capture.position, known.position_noise_std_m),
+    )
+
+
+def doubted(friction: FrictionEstimate, faults: tuple[str, ...]) -> FrictionEstimate:
+    """Make an estimate from a capture with faults uncertain at best, and say why."""
+    if not faults or friction.mu_s.quality is not Quality.GOOD:
+        return friction
+    reason = "; ".join(faults)
+    mu_s = replace(friction.mu_s, quality=Quality.UNCERTAIN, reason=reason)
+    mu_k = replace(friction.mu_k, quality=max(friction.mu_k.quality, Quality.UNCERTAIN), reason=reason)
+    return replace(friction, mu_s=mu_s, mu_k=mu_k)
+
+
+def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
+    return (
+        channel if channel is None or channel.noise_std is not None else replace(channel, noise_std=noise_std)
+    )
+
+
+def named_batch(said: BatchSaid, capture: Capture, announcement: Announcement | None) -> Named:
+    """Decide which batch a cycle belongs to, and whether its change was expected."""
+    by_person, batch_id, expected = said.by_person, capture.batch_id, False
+    if by_person is not None and by_person.module_said == capture.batch_id:
+        batch_id, expected = by_person.batch_id, by_person.expected
+        by_person = replace(by_person, expected=False)
+    else:
+        by_person = None
+    seen = said.announcement_seen
+    if (
+        announcement is not None
+        and announcement.sequence != seen
+        and capture.cycle >= announcement.from_cycle
+    ):
+        expected, seen = True, announcement.sequence
+    return Named(BatchSaid(by_person, capture.batch_id, seen), batch_id, expected)
+
+
+def mean_period_s(before_s: float, since: tuple[int, int], capture: Capture) -> float:
+    """Follow the mean time between cycles, 0 before it is known; pauses of a shift change count little.
+
+    `since` is number and time (ns) of the cycle before.
+    """
+    cycles, elapsed_s = capture.cycle - since[0], (capture.time_ns - since[1]) * 1e-9
+    if not since[1] or cycles <= 0 or elapsed_s <= 0.0:
+        return before_s
+    now_s = elapsed_s / cycles
+    if not before_s:
+        return now_s
+    return before_s + PERIOD_GAIN * (min(now_s, 10.0 * before_s) - before_s)
