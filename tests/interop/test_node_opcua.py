@@ -241,7 +241,8 @@ def test_nodesets_load_without_a_warning(node: str, companions: str) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stderr == ""
-    lines = done.stdout.splitlines()
+    # It also says what it thinks of the version of Node.js; that is not about our files.
+    lines = [line for line in done.stdout.splitlines() if "verify_pcks1" not in line]
     assert len(lines) == 1, "node-opcua had something to say: " + done.stdout
     said = json.loads(lines[0][2:])
     assert said["methods"] == ["StartBatch", "ResetWear", "SetTarget", "AbortPositioning"]
