@@ -7,6 +7,7 @@ from pathlib import Path
 
 from impactcell import cell as core
 from impactcell import values
+from impactcell.intake import BatchSaid
 from impactcell.journal.store import Journal
 from impactcell.records import PositioningState
 from impactcell.service.design import cell_design
@@ -73,4 +74,4 @@ def judged(cell_file: Path, journal_file: Path) -> Outcome:
 
 
 def _without_alarms(state: core.CellState) -> bytes:
-    return values.dumps(replace(state, alarms=None))  # type: ignore[arg-type]
+    return values.dumps(replace(state, alarms=None, batch=BatchSaid()))  # type: ignore[arg-type]
