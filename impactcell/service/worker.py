@@ -75,7 +75,6 @@ class Worker:
         self.journal_fault = ""
         self.last: Mark | None = None
         """The last cycle taken in since the start, durable or not."""
-        self.dropped = 0
         restored = self._restore()
         self._state = restored.state
         self._snapshot = restored.snapshot
@@ -247,7 +246,6 @@ class Worker:
         self._backlog.append(entry)
         if len(self._backlog) > BACKLOG:
             self._backlog.popleft()
-            self.dropped += 1
             log.error(
                 "cell=%s the journal cannot be written; its oldest waiting entry is lost", self._design.name
             )
@@ -264,8 +262,7 @@ class Worker:
                     return
                 # What can never be stored must not keep what can from being stored.
                 fault = str(error)
-                self.dropped += 1
-                log.error("cell=%s an entry of the journal is lost: %s", self._design.name, error)  # noqa: TRY400
+                    log.error("cell=%s an entry of the journal is lost: %s", self._design.name, error)  # noqa: TRY400
             self._backlog.popleft()
         self.journal_fault = fault
         if self._since_thinned >= THIN_EVERY:
