@@ -262,7 +262,7 @@ class Worker:
                     return
                 # What can never be stored must not keep what can from being stored.
                 fault = str(error)
-                    log.error("cell=%s an entry of the journal is lost: %s", self._design.name, error)  # noqa: TRY400
+                log.error("cell=%s an entry of the journal is lost: %s", self._design.name, error)  # noqa: TRY400
             self._backlog.popleft()
         self.journal_fault = fault
         if self._since_thinned >= THIN_EVERY:
