@@ -68,12 +68,12 @@ def run(cells: Cells, *, quiet: Quiet = False, verbose: Verbose = False) -> None
 @app.command()
 def check(cells: Cells, *, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Report every fault of the cell files at once as file:line:column: message."""
-    del verbose
+    del quiet, verbose
+    from impactcell.commands.telling import tell
     from impactcell.settings import read_cells
 
     read_cells(cells)
-    if not quiet:
-        typer.echo(f"{len(cells)} cell file{'s' * (len(cells) > 1)} in order")
+    tell(f"{len(cells)} cell file{'s' * (len(cells) > 1)} in order")
 
 
 @app.command()
@@ -176,12 +176,12 @@ def export(
 @app.command()
 def figures(output: Directory, *, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Redraw the source paper's figures from this code."""
-    del verbose
+    del quiet, verbose
+    from impactcell.commands.telling import tell
     from impactcell.figures import draw
 
     for path in draw(output):
-        if not quiet:
-            typer.echo(path)
+        tell(str(path))
 
 
 @model.command("accept")

@@ -47,6 +47,13 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument(
         "--truth", type=Path, metavar="FILE", help="write what really happened, a JSON line a cycle"
     )
+    serve.add_argument("-q", "--quiet", action="store_true", help="only errors and the address it listens at")
+    serve.add_argument(
+        "-v",
+        "--verbose",
+        action="store_true",
+        help="what really happened, a JSON line a cycle, also on standard error",
+    )
     serve.set_defaults(run=_serve)
     return parser
 
@@ -68,7 +75,7 @@ def _serve(options: argparse.Namespace) -> int:
         scenario = scenario.model_copy(
             update={"listen": scenario.listen.model_copy(update={"port": options.port})}
         )
-    return run(scenario, registers, options.truth)
+    return run(scenario, registers, options.truth, verbose=options.verbose)
 
 
 def _campaign(options: argparse.Namespace) -> int:

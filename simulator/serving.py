@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TextIO
 
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
@@ -39,28 +40,31 @@ def read_register_map(file: Path) -> RegisterMap:
 
 
 @contextlib.contextmanager
-def _truths(file: Path | None) -> Iterator[Callable[[Truth], None] | None]:
-    """Give a function that writes each truth as a JSON line to `file`, at once; None without a file."""
-    if file is None:
-        yield None
-        return
-    with file.open("w", encoding="utf-8") as out:
+def _truths(file: Path | None, *, verbose: bool) -> Iterator[Callable[[Truth], None]]:
+    """Give a function that writes each truth as a JSON line, at once: to `file`, and to stderr if verbose."""
+    with contextlib.ExitStack() as stack:
+        outs: list[TextIO] = [sys.stderr] if verbose else []
+        if file is not None:
+            outs.append(stack.enter_context(file.open("w", encoding="utf-8")))
 
         def write(truth: Truth) -> None:
-            out.write(json.dumps(truth) + "\n")
-            out.flush()
+            for out in outs:
+                out.write(json.dumps(truth) + "\n")
+                out.flush()
 
         yield write
 
 
-async def serve(scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None) -> None:
+async def serve(
+    scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None, *, verbose: bool = False
+) -> None:
     """Serve until SIGTERM or SIGINT; prints one JSON line with the addresses once it listens."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
     try:
-        with _truths(truth_file) as tell:
+        with _truths(truth_file, verbose=verbose) as tell:
             epoch_ns = time.time_ns()
             device = Device(
                 scenario,
@@ -121,10 +125,12 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
                 await asyncio.wait_for(stop.wait(), nap_s)
 
 
-def run(scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None) -> int:
+def run(
+    scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None, *, verbose: bool = False
+) -> int:
     """Serve in an event loop of its own; returns the exit code."""
     try:
-        asyncio.run(serve(scenario, registers, truth_file))
+        asyncio.run(serve(scenario, registers, truth_file, verbose=verbose))
     except OSError as error:
         print(f"{scenario.name}: cannot listen or write: {error.strerror or error}", file=sys.stderr)  # noqa: T201
         return 1

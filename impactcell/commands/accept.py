@@ -1,10 +1,10 @@
 """`impactcell model accept`: an extended model into service, without losing what the cell has learned."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 from impactcell.commands.calibrate import calibrated
+from impactcell.commands.telling import tell
 from impactcell.modelfile import read_model, write_model
 from impactcell.settings import read_cell
 
@@ -28,6 +28,4 @@ def accept(cell: Path, extended: Path) -> None:
     previous = target.with_name(f"{target.stem}.previous{target.suffix}")
     previous.write_bytes(target.read_bytes())
     write_model(model, target)
-    sys.stdout.write(
-        f"{given.name} runs with model {model.name} from the next cycle on; before: {previous}\n"
-    )
+    tell(f"{given.name} runs with model {model.name} from the next cycle on; before: {previous}")

@@ -4,6 +4,7 @@ import getpass
 import sys
 from pathlib import Path
 
+from impactcell.commands.telling import tell
 from impactcell.errors import AccessError
 from impactcell.scada.certificates import make_certificate, own_hosts, write_pair
 from impactcell.scada.descriptions import Role, default_application_uri
@@ -41,7 +42,7 @@ def add_user(file: Path, name: str, role: str = "observer", certificate: Path | 
     users[name] = user
     write_users(file, users)
     verb = "changed" if before is not None else "added"
-    _say(f"{name} {verb} as {user.role.name.lower()} in {file}")
+    tell(f"{name} {verb} as {user.role.name.lower()} in {file}")
 
 
 def _ask_password(name: str) -> str:
@@ -69,7 +70,7 @@ def remove_user(file: Path, name: str) -> None:
         raise AccessError(f"{file}: there is no user {name!r}; see `impactcell users list {file}`")
     del users[name]
     write_users(file, users)
-    _say(f"{name} removed from {file}")
+    tell(f"{name} removed from {file}")
 
 
 def list_users(file: Path, *, rights: bool = False) -> None:
@@ -106,8 +107,8 @@ def make_certs(pki: Path, application_uri: str | None = None, hosts: list[str] |
         except OSError as error:
             raise AccessError(f"{pki / folder}: {error.strerror}") from error
     path, _ = write_pair(pki / "own", certificate, key)
-    _say(f"{path}: certificate of {uri}, valid until {certificate.not_valid_after_utc:%Y-%m-%d}")
-    _say(f"SHA-1 {thumbprint(der(certificate))}")
+    tell(f"{path}: certificate of {uri}, valid until {certificate.not_valid_after_utc:%Y-%m-%d}")
+    tell(f"SHA-1 {thumbprint(der(certificate))}")
 
 
 def trust_cert(file: Path, pki: Path | None = None) -> None:
@@ -139,7 +140,7 @@ def trust_cert(file: Path, pki: Path | None = None) -> None:
             file.unlink()
     except OSError as error:
         raise AccessError(f"{target}: {error.strerror}") from error
-    _say(f"{certificate.subject.rfc4514_string()} is trusted: {target}")
+    tell(f"{certificate.subject.rfc4514_string()} is trusted: {target}")
 
 
 def list_certs(pki: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from impactcell import campaign
 from impactcell.campaign.recorded import from_captures
+from impactcell.commands.telling import tell
 from impactcell.errors import CampaignError
 from impactcell.journal.store import Journal
 
@@ -31,4 +32,4 @@ def export(
         sys.stderr.write(f"{recorded.other_stroke} cycles with another stroke were left out\n")
     if recorded.no_channels:
         sys.stderr.write(f"{recorded.no_channels} cycles without samples were left out\n")
-    sys.stdout.write(f"{len(recorded.campaign.shots)} shots in {output}\n")
+    tell(f"{len(recorded.campaign.shots)} shots in {output}")

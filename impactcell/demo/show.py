@@ -15,6 +15,7 @@ from typing import Any
 from rich.console import Console
 from rich.live import Live
 
+from impactcell.commands.telling import quiet
 from impactcell.demo.remedy import Remedy
 from impactcell.demo.stage import USER, Stage, set_up
 from impactcell.demo.view import Scene, render
@@ -37,14 +38,14 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     ImpactCellError
         The simulator did not start, or no cycle came.
     """
-    if sys.stderr.isatty():
+    if sys.stderr.isatty() and not quiet():
         sys.stderr.write("setting up; the first time on a machine takes a minute, to compile\n")
     # Until the event loop takes the signal over, an end has to pass through `set_up`, which cleans up.
     signal.signal(signal.SIGTERM, _end)
     with set_up(scenario, cycles) as stage:
         show = _Show(stage, cycles)
-        if as_json or not sys.stdout.isatty():
-            interrupted = asyncio.run(show.run(_plain if not as_json else _nothing))
+        if as_json or quiet() or not sys.stdout.isatty():
+            interrupted = asyncio.run(show.run(_nothing if as_json or quiet() else _plain))
         else:
             interrupted = asyncio.run(_live(show))
     if as_json:
@@ -219,7 +220,7 @@ def _plain(_: _Show, snapshot: Snapshot) -> None:
 
 
 def _nothing(_: _Show, __: Snapshot) -> None:
-    """Draw nothing: the summary is all that is asked for."""
+    """Draw nothing: the summary, if anything, is all that is asked for."""
 
 
 def _number(value: float) -> float | None:

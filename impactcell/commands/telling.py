@@ -1,0 +1,20 @@
+"""What a verb says beside its result: `-q` silences it, `-v` adds to it."""
+
+import logging
+import sys
+
+_log = logging.getLogger("impactcell")
+
+
+def tell(text: str) -> None:
+    """Say on standard output what was done; nothing with `-q`.
+
+    What a verb is asked for (rows, a list, JSON) is its result and is written whatever the options.
+    """
+    if not quiet():
+        sys.stdout.write(f"{text}\n")
+
+
+def quiet() -> bool:
+    """Whether `-q` was given."""
+    return not _log.isEnabledFor(logging.INFO)

@@ -1,0 +1,44 @@
+"""`-q` silences what is said beside a result, and never the result."""
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from impactcell.__main__ import app
+from impactcell.journal.store import Journal
+from tests.snapshots import make_capture, make_snapshot
+
+PKG = logging.getLogger("impactcell")
+
+
+@pytest.fixture(autouse=True)
+def level() -> Iterator[None]:
+    """Start as `main` does, and leave the level as it was."""
+    before = PKG.level
+    PKG.setLevel(logging.INFO)
+    yield
+    PKG.setLevel(before)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    app(list(arguments), standalone_mode=False)
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("options", "said"), [((), "1 shots in "), (("-v",), "1 shots in "), (("-q",), "")])
+def test_export(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], said: str
+) -> None:
+    with Journal(tmp_path / "j", "press-1") as journal:
+        capture = make_capture(1)
+        journal.append(capture, make_snapshot(capture), b"state")
+    out = run(capsys, "export", str(tmp_path / "j"), "-o", str(tmp_path / "c"), *options)
+    assert out[: len(said)] == said
+    assert bool(out) == bool(said)
+    assert (tmp_path / "c" / "shots.csv").exists()
+
+
+def test_a_result_is_written_whatever_the_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, "schema", "-q").startswith("{")
