@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.fieldbus.registers import Register, RegisterMap, Value, Words
-from impactcell.records import Capture, Channel, Summary
+from impactcell.records import Capture, Channel, Summary, uniform_times
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +248,7 @@ def _channel(
         faults.append(f"{where}: no time axis, {name}_rate is {rate_hz:g} Hz")
         return None
     values = np.asarray(register.decode(words), dtype=np.float64)
-    time_s = start_s + np.arange(values.size) / rate_hz
+    time_s = uniform_times(start_s, rate_hz, values.size)
     full_scale = register.full_scale
     if full_scale is not None:
         clipped = int(np.count_nonzero((values <= full_scale[0]) | (values >= full_scale[1])))
@@ -264,4 +264,5 @@ def _channel(
         return None
     if values.size > 1 and values.min() == values.max():
         faults.append(f"{where}: constant at {values[0]:g}")
-    return Channel(time_s, values, full_scale=full_scale)
+    resolution = None if register.kind in ("f32", "f64") else register.si_factor
+    return Channel(time_s, values, full_scale=full_scale, resolution=resolution)

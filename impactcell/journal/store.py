@@ -251,7 +251,8 @@ class Journal:
             )
         if version != FORMAT:
             raise ForeignJournalError(
-                f"{self.path}: journal format {version}, this program writes {FORMAT}; it is left as it is"
+                f"{self.path}: journal format {version}, this program writes {FORMAT}; it is left as it is: "
+                "name another file"
             )
         if cell is not None and self.cell != cell:
             raise ForeignJournalError(

@@ -90,4 +90,4 @@ def test_integer_codes_are_kept_small() -> None:
 @given(st.binary(max_size=200), st.booleans())
 def test_foreign_bytes_are_refused(noise: bytes, prefixed: bool) -> None:
     with pytest.raises(JournalError):
-        decode_capture((b"ICC1" if prefixed else b"") + noise)
+        decode_capture((b"ICC2" if prefixed else b"") + noise)
