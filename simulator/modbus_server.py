@@ -25,7 +25,12 @@ GATEWAY_NO_RESPONSE: Final = 11
 
 _TABLES: Final = {3: "holding", 4: "input"}
 _HEADER: Final = struct.Struct(">HHHB")
+_READ: Final = struct.Struct(">BHH")
 _TWO: Final = struct.Struct(">HH")
+_HEADS: Final = {
+    (function, count): bytes((function, 2 * count)) for function in _TABLES for count in range(1, 126)
+}
+"""What the reply to a read begins with."""
 _PIECE_S: Final = 0.002
 """How long a piece of a split frame, or a frame to be joined with the next, is held back."""
 
@@ -126,13 +131,15 @@ class ModbusServer:
     def _answer(self, function: int, pdu: bytes) -> bytes:
         table = _TABLES.get(function)
         if table is not None:
-            address, count = _TWO.unpack(pdu[1:])
+            _, address, count = _READ.unpack(pdu)
             if not 1 <= count <= 125:
                 raise ValueError(count)
             if address + count > 65_536:
                 raise LookupError(address)
             words = self.device.read(table, address, count)
-            return bytes((function, 2 * count)) + words.astype(WIRE, copy=False).tobytes()
+            if words.dtype is not WIRE:
+                words = words.astype(WIRE, copy=False)
+            return _HEADS[function, count] + words.tobytes()
         if function == 6:
             address, _ = _TWO.unpack(pdu[1:])
             self.device.write(address, np.frombuffer(pdu, dtype=WIRE, offset=3))
@@ -180,23 +187,34 @@ class _Link(asyncio.Protocol):
         if self._transport is not None:
             self._transport.abort()
 
+    @property
+    def _honest(self) -> bool:
+        """Whether nothing befalls the replies."""
+        return not (self._server.faults.active or self._mute or self._joined)
+
     def data_received(self, data: bytes) -> None:
         server = self._server
         if server.before is not None:
             server.before()
         held = self._held + data if self._held else data
         replies: list[bytes] = []
-        at, size = 0, len(held)
+        at, size, honest = 0, len(held), self._honest
+        unpack, pack, answer = _HEADER.unpack_from, _HEADER.pack, server.answer
         while size - at >= 7:
-            transaction, protocol, length, unit = _HEADER.unpack_from(held, at)
+            transaction, protocol, length, unit = unpack(held, at)
             if protocol or not 2 <= length <= 254:
                 self.abort()
                 return
             if at + 6 + length > size:
                 break
-            pdu = server.answer(unit, held[at + 7 : at + 6 + length])
-            at += 6 + length
-            reply = _HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
+            end = at + 6 + length
+            pdu = answer(unit, held[at + 7 : end])
+            at = end
+            head = pack(transaction, 0, len(pdu) + 1, unit)
+            if honest:
+                replies += (head, pdu)
+                continue
+            reply = head + pdu
             if self._mute:
                 continue
             fault = server.faults.choose() if server.faults.active else None

@@ -139,12 +139,8 @@ class Module:
             try:
                 polled = await self._poll()
                 backoff.reset()
-                if (polled.session, polled.cycle_counter) != (newest.session, newest.cycle):
-                    same = polled.session == newest.session
-                    schedule.saw_cycle(
-                        loop.time(), distance(newest.cycle, polled.cycle_counter) if same else 0
-                    )
-                    newest = Mark(polled.session, polled.cycle_counter)
+                if newest != (newest := Mark(polled.session, polled.cycle_counter)):
+                    schedule.saw_cycle(loop.time())
                 want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, skip)
                 if want is None:
                     await asyncio.sleep(schedule.delay_s(loop.time(), self._client.round_trip_s))
@@ -158,8 +154,12 @@ class Module:
                 skip = min(max(1, 2 * skip), self.registers.slots // 2)
                 continue
             skip //= 2
-            last = want.mark
             capture = replace(read.capture, session=want.mark.session)
+            schedule.learn(
+                1e-9 * capture.time_ns or loop.time(),
+                distance(last.cycle, want.mark.cycle) if last and last.session == want.mark.session else 0,
+            )
+            last = want.mark
             reception = Reception(capture, want.mark, want.missed, want.restarted, read.faults)
             self._count(reception, readable=read.readable)
             yield reception

@@ -62,7 +62,7 @@ BUSY: Final = 6
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One request PDU and what a good reply to it looks like.
+    """One request and what a good reply to it looks like.
 
     Attributes
     ----------
@@ -74,16 +74,32 @@ class Request:
         How it must begin: function and byte count of a read, the whole echo of a write.
     what : str
         The request in words, for messages.
+    tail : bytes
+        The request's frame after its transaction.
+    reply_head : bytes
+        A good reply's frame after its transaction, as far as it is known beforehand: up to its data.
     """
 
     pdu: bytes
     reply_length: int
     reply_prefix: bytes
     what: str
+    tail: bytes
+    reply_head: bytes
+
+    @property
+    def data_length(self) -> int:
+        """Bytes of data of a good reply."""
+        return self.reply_length - len(self.reply_prefix)
+
+
+def _request(unit: int, pdu: bytes, reply_length: int, reply_prefix: bytes, what: str) -> Request:
+    tail, head = frame(0, unit, pdu)[2:], HEADER.pack(0, 0, reply_length + 1, unit)[2:] + reply_prefix
+    return Request(pdu, reply_length, reply_prefix, what, tail, head)
 
 
 @lru_cache(maxsize=4096)
-def read_request(function: Function, address: int, count: int) -> Request:
+def read_request(function: Function, address: int, count: int, unit: int = 1) -> Request:
     """Request for `count` registers from `address` on (cached: the same blocks are read every cycle).
 
     Raises
@@ -96,10 +112,10 @@ def read_request(function: Function, address: int, count: int) -> Request:
     kind = ReadHoldingRegistersRequest if function == Function.READ_HOLDING else ReadInputRegistersRequest
     pdu = bytes([function]) + kind(address=address, count=count).encode()
     what = f"{count} {'holding' if function == Function.READ_HOLDING else 'input'} registers from {address}"
-    return Request(pdu, 2 + 2 * count, bytes([function, 2 * count]), what)
+    return _request(unit, pdu, 2 + 2 * count, bytes([function, 2 * count]), what)
 
 
-def write_request(address: int, words: Words) -> Request:
+def write_request(address: int, words: Words, unit: int = 1) -> Request:
     """Request that writes `words` from `address` on: function 6 for one register, 16 for more.
 
     Raises
@@ -115,10 +131,10 @@ def write_request(address: int, words: Words) -> Request:
     if count == 1:
         single = WriteSingleRegisterRequest(address=address, registers=values)
         pdu = bytes([Function.WRITE_SINGLE]) + single.encode()
-        return Request(pdu, 5, pdu, what)
+        return _request(unit, pdu, 5, pdu, what)
     multiple = WriteMultipleRegistersRequest(address=address, registers=values)
     pdu = bytes([Function.WRITE_MULTIPLE]) + multiple.encode()
-    return Request(pdu, 5, pdu[:5], what)
+    return _request(unit, pdu, 5, pdu[:5], what)
 
 
 def frame(transaction: int, unit: int, pdu: bytes) -> bytes:
@@ -164,6 +180,11 @@ class FrameReader:
     def pending(self) -> int:
         """Bytes that are held back because their frame is not complete."""
         return len(self._held)
+
+    def take(self, data: bytes) -> bytes:
+        """Hand over what is held back, and `data` behind it, to be fed again where it is not used."""
+        held, self._held = self._held, b""
+        return held + data if held else data
 
     def feed(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
         """Take in `data`; yield transaction, unit and PDU of each complete frame.

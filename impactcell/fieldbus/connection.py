@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
-from impactcell.fieldbus.codec import BUSY, FrameReader, Request, check_reply, frame
+from impactcell.fieldbus.codec import BUSY, FrameReader, Request, check_reply
 from impactcell.fieldbus.link import ModuleLink
 
 BUSY_PAUSE_S: Final = 0.02
@@ -62,7 +62,7 @@ class Connection(asyncio.Protocol):
         Set once the socket is gone.
     """
 
-    def __init__(self, link: ModuleLink, transactions: Iterator[int]) -> None:
+    def __init__(self, link: ModuleLink, transactions: Iterator[bytes]) -> None:
         self.link = link
         self.round_trip_s = float("nan")
         self.lost = asyncio.Event()
@@ -72,7 +72,7 @@ class Connection(asyncio.Protocol):
         self._socket: socket.socket | None = None
         self._reader = FrameReader()
         self._waiting: deque[Part] = deque()
-        self._flying: dict[int, Part] = {}
+        self._flying: dict[bytes, Part] = {}
         self._busy: dict[asyncio.TimerHandle, Part] = {}
         self._unconfirmed: list[Exchange] = []
         self._timer: asyncio.TimerHandle | None = None
@@ -125,7 +125,8 @@ class Connection(asyncio.Protocol):
             # The system falls back to delayed acknowledgements by itself, so this is set anew on each read.
             self._socket.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
         try:
-            for transaction, unit, pdu in self._reader.feed(data):
+            rest = self._take_good(self._reader.take(data))
+            for transaction, unit, pdu in self._reader.feed(rest):
                 self._answer(transaction, unit, pdu)
             if not self._reader.pending:
                 self._confirm()
@@ -150,7 +151,7 @@ class Connection(asyncio.Protocol):
         """Send what the window allows, in one write."""
         if self._transport is None or self._resting is not None:
             return
-        frames = []
+        frames: list[bytes] = []
         now = self._loop.time()
         while self._waiting and len(self._flying) < self.link.window:
             part = self._waiting.popleft()
@@ -162,7 +163,7 @@ class Connection(asyncio.Protocol):
             while transaction in self._flying:
                 transaction = next(self._transactions)
             self._flying[transaction] = part
-            frames.append(frame(transaction, self.link.device_id, part.request.pdu))
+            frames += (transaction, part.request.tail)
         if frames:
             self._transport.write(b"".join(frames))
             if self._timer is None:
@@ -181,11 +182,41 @@ class Connection(asyncio.Protocol):
         timeout = f"within {self.link.timeout_s:g} s"
         self.give_up(LinkError(f"{self.link}: no answer to {oldest.request.what} {timeout}"))
 
-    def _answer(self, transaction: int, unit: int, pdu: bytes) -> None:
+    def _take_good(self, data: bytes) -> bytes:
+        """Use the good replies at the front of `data` up to the first that is not, or not whole; the rest.
+
+        Nearly all are good, and of those everything but the data is known beforehand: they are compared with
+        it and need no taking apart.
+        """
+        flying, at, size = self._flying, 0, len(data)
+        while (part := flying.get(data[at : at + 2])) is not None:
+            head = part.request.reply_head
+            start = at + 2 + len(head)
+            end = start + part.request.data_length
+            if end > size or not data.startswith(head, at + 2):
+                break
+            self._use(data[at : at + 2], part, data[start:end])
+            at = end
+        return data[at:]
+
+    def _use(self, transaction: bytes, part: Part, data: bytes) -> None:
+        """Take the data of a good reply."""
+        if self._unconfirmed:
+            self._confirm()
+        del self._flying[transaction]
+        exchange, offset = part.exchange, part.offset
+        exchange.data[offset : offset + len(data)] = data
+        exchange.missing.discard(offset)
+        if not exchange.missing:
+            self.round_trip_s = self._loop.time() - part.sent_s
+            self._unconfirmed.append(exchange)
+
+    def _answer(self, number: int, unit: int, pdu: bytes) -> None:
         """Use one reply; raises ProtocolError, with the request still open, where it is not a good one."""
+        transaction = number.to_bytes(2, "big")
         part = self._flying.get(transaction)
         if part is None:
-            raise ProtocolError(f"an answer to transaction {transaction}, which is not open")
+            raise ProtocolError(f"an answer to transaction {number}, which is not open")
         if unit != self.link.device_id:
             raise ProtocolError(f"an answer from device {unit} to {part.request.what}")
         try:
@@ -195,14 +226,7 @@ class Connection(asyncio.Protocol):
             del self._flying[transaction]
             self._refused(part, refused)
             return
-        self._confirm()
-        del self._flying[transaction]
-        exchange = part.exchange
-        exchange.data[part.offset : part.offset + len(data)] = data
-        exchange.missing.discard(part.offset)
-        if not exchange.missing:
-            self.round_trip_s = self._loop.time() - part.sent_s
-            self._unconfirmed.append(exchange)
+        self._use(transaction, part, data)
 
     def _confirm(self) -> None:
         """Hand over what is complete, now that the stream is known to be in step.

@@ -5,12 +5,13 @@ import contextlib
 import itertools
 import random
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
 from impactcell.errors import LinkError
-from impactcell.fieldbus.codec import Function, read_request, write_request
+from impactcell.fieldbus.codec import Function, Request, read_request, write_request
 from impactcell.fieldbus.connection import Connection, Exchange, Part
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import WIRE, Words
@@ -20,14 +21,24 @@ _STRIDE: Final = 40_503
 _READ_FUNCTION: Final = {"holding": Function.READ_HOLDING, "input": Function.READ_INPUT}
 
 
-def _transactions() -> Iterator[int]:
+def _transactions() -> Iterator[bytes]:
     """Yield transaction ids: each of the 65 536 once before any comes again.
 
     They start anywhere, so that a gateway's late reply to an earlier client is not for one of ours, and lie
     far apart, so that a peer that is off by a little never hits another request in flight.
     """
     start = random.getrandbits(16)
-    return ((start + number * _STRIDE) & 0xFFFF for number in itertools.count())
+    return (((start + number * _STRIDE) & 0xFFFF).to_bytes(2, "big") for number in itertools.count())
+
+
+@lru_cache(maxsize=256)
+def _requests(table: str, address: int, count: int, step: int, unit: int) -> tuple[tuple[int, Request], ...]:
+    """Requests that read a block, each with where in its bytes the reply goes."""
+    function = _READ_FUNCTION[table]
+    return tuple(
+        (2 * first, read_request(function, address + first, min(step, count - first), unit))
+        for first in range(0, count, step)
+    )
 
 
 class PartialBlock:
@@ -129,20 +140,12 @@ class ModbusClient:
 
     async def complete(self, block: "PartialBlock") -> Words:
         """Read what `block` still lacks; after an error it keeps what did arrive. Raises as `read` does."""
-        function, step = _READ_FUNCTION[block.table], block.step
-        if block.missing:
-            exchange = Exchange(block.data, block.missing)
+        missing = block.missing
+        if missing:
+            exchange = Exchange(block.data, missing)
+            requests = _requests(block.table, block.address, block.count, block.step, self.link.device_id)
             self._open().submit(
-                [
-                    Part(
-                        exchange,
-                        read_request(
-                            function, block.address + offset // 2, min(step, block.count - offset // 2)
-                        ),
-                        offset,
-                    )
-                    for offset in sorted(block.missing)
-                ]
+                [Part(exchange, request, offset) for offset, request in requests if offset in missing]
             )
             await exchange.done
         return block.words()
@@ -150,7 +153,9 @@ class ModbusClient:
     async def write(self, address: int, words: Words) -> None:
         """Write holding registers in one request, before any read that waits; raises as `read` does."""
         exchange = Exchange(bytearray(), {0})
-        self._open().submit([Part(exchange, write_request(address, words), 0)], first=True)
+        self._open().submit(
+            [Part(exchange, write_request(address, words, self.link.device_id), 0)], first=True
+        )
         await exchange.done
 
     def _open(self) -> Connection:

@@ -10,17 +10,24 @@ from impactcell.fieldbus.backoff import CEILING_S, Backoff
 from impactcell.fieldbus.polling import FINE_S, IDLE_S, QUIET_S, PollSchedule
 
 
-def follow(periods_s: list[float], round_trip_s: float = 1e-4) -> tuple[list[float], float]:
-    """Poll through cycles with these periods; returns how late each was seen, and polls per cycle."""
+def follow(
+    periods_s: list[float], round_trip_s: float = 1e-4, busy_s: float = 0.0
+) -> tuple[list[float], float]:
+    """Poll through cycles with these periods; returns how late each was seen, and polls per cycle.
+
+    The poller is held up before each poll for a random time of mean `busy_s`.
+    """
     schedule, now_s, due_s = PollSchedule(), 0.0, 0.0
     late, polls = [], 0
+    held_up = np.random.default_rng(9)
     for period_s in periods_s:
         due_s += period_s
         while now_s < due_s:
-            now_s += schedule.delay_s(now_s, round_trip_s)
+            now_s += schedule.delay_s(now_s, round_trip_s) + held_up.exponential(busy_s)
             polls += 1
         late.append(now_s - due_s)
         schedule.saw_cycle(now_s)
+        schedule.learn(due_s)
     return late, polls / len(periods_s)
 
 
@@ -28,7 +35,21 @@ def test_regular_cycles_are_seen_soon_with_few_polls() -> None:
     jitter = np.random.default_rng(1).normal(0.5, 0.002, 300)
     late, polls = follow(list(jitter))
     assert np.quantile(late[20:], 0.99) < 2 * FINE_S
-    assert polls < 50  # three milliseconds all the time would be 167
+    assert polls < 15  # three milliseconds all the time would be 167
+
+
+def test_a_busy_service_polls_no_more_for_it() -> None:
+    periods = list(np.random.default_rng(1).normal(0.5, 0.002, 300))
+    assert follow(periods, busy_s=0.02)[1] <= follow(periods)[1]
+
+
+def test_after_a_pause_the_rhythm_is_soon_known_again() -> None:
+    jitter = np.random.default_rng(1).normal(0.5, 0.002, 80)
+    jitter[40] = 10_000.0
+    late, _ = follow(list(jitter))
+    assert late[40] <= IDLE_S
+    assert max(late[41:]) <= QUIET_S + 1e-9
+    assert max(late[65:]) < 2 * FINE_S
 
 
 def test_irregular_cycles_are_never_seen_later_than_the_quiet_poll() -> None:
@@ -40,7 +61,8 @@ def test_irregular_cycles_are_never_seen_later_than_the_quiet_poll() -> None:
 
 def test_an_idle_module_is_left_in_peace() -> None:
     schedule = PollSchedule()
-    schedule.saw_cycle(0.0)
+    schedule.learn(0.0)
+    schedule.learn(0.5)
     schedule.saw_cycle(0.5)
     assert schedule.delay_s(60.0, 1e-4) == IDLE_S
 
