@@ -95,7 +95,12 @@ def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
 
 
 def named_batch(said: BatchSaid, capture: Capture, announcement: Announcement | None) -> Named:
-    """Decide which batch a cycle belongs to, and whether its change was expected."""
+    """Decide which batch a cycle belongs to, and whether its change was expected.
+
+    The batch is what the module wrote down with the cycle itself. Of announcements only the newest can be
+    seen: after an outage with several of them, each change of the module's batch before the newest applies
+    counts as one of those between, as many as its sequence says there were.
+    """
     by_person, batch_id, expected = said.by_person, capture.batch_id, False
     if by_person is not None and by_person.module_said == capture.batch_id:
         batch_id, expected = by_person.batch_id, by_person.expected
@@ -103,12 +108,12 @@ def named_batch(said: BatchSaid, capture: Capture, announcement: Announcement | 
     else:
         by_person = None
     seen = said.announcement_seen
-    if (
-        announcement is not None
-        and announcement.sequence != seen
-        and capture.cycle >= announcement.from_cycle
-    ):
-        expected, seen = True, announcement.sequence
+    if announcement is not None and announcement.sequence != seen:
+        changed = said.by_module is not None and capture.batch_id not in (None, said.by_module)
+        if capture.cycle >= announcement.from_cycle:
+            expected, seen = True, announcement.sequence
+        elif changed and 0 < seen < announcement.sequence - 1:
+            expected, seen = True, seen + 1
     return Named(BatchSaid(by_person, capture.batch_id, seen), batch_id, expected)
 
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
+from impactcell.celllog import CellLogger
 from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.backoff import Backoff
@@ -26,8 +27,6 @@ from impactcell.fieldbus.ring import Mark, distance, next_wanted
 from impactcell.fieldbus.transport import ModbusClient
 
 __all__ = ["Module", "ModuleStatus", "Reception"]
-
-log = logging.getLogger(__name__)
 
 _NOT_THIS_DEVICE: Final = (1, 2, 3, 10, 11)
 """Exceptions that say that there are no such registers, or nobody with this device id behind a gateway."""
@@ -61,6 +60,7 @@ class Module:
         self.cell = cell
         self.link = link
         self.registers = registers
+        self._log = CellLogger(logging.getLogger(__name__), cell)
         self.report: ModuleReport | None = None
         """What the module said at the last poll; None before the first."""
         self._polled: Mapping[str, Value] = {}
@@ -121,7 +121,7 @@ class Module:
             try:
                 await self._send_acknowledgement()
             except FieldbusError as error:
-                log.info("%s: acknowledgement of cycle %d will be repeated: %s", self.cell, mark.cycle, error)
+                self._log.info("the acknowledgement will be repeated: %s", error, cycle=mark.cycle)
 
     async def captures(self, after: Mark | None = None) -> AsyncGenerator[Reception]:
         """Yield each cycle after `after` once, in order; ends only when it is closed.
@@ -227,9 +227,9 @@ class Module:
         if (before.connected, before.reason) == (connected, reason):
             return
         if connected:
-            log.info("%s: connected to %s", self.cell, self.link)
+            self._log.info("connected to %s", self.link)
         else:
-            log.log(level, "%s", reason)
+            self._log.log(level, "%s", reason.removeprefix(f"{self.cell}: "))
         if self._on_change is not None:
             self._on_change(self.status)
 
@@ -242,5 +242,6 @@ class Module:
             restarts=status.restarts + reception.restarted,
             unreadable=status.unreadable + (not readable),
         )
+        cycle = reception.mark.cycle
         for fault in reception.faults:
-            log.warning("%s", fault)
+            self._log.warning("%s", fault.removeprefix(f"{self.cell}: cycle {cycle}: "), cycle=cycle)

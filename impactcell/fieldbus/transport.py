@@ -33,7 +33,7 @@ def _transactions() -> Iterator[bytes]:
 
 @lru_cache(maxsize=256)
 def _requests(table: str, address: int, count: int, step: int, unit: int) -> tuple[tuple[int, Request], ...]:
-    """Requests that read a block, each with where in its bytes the reply goes."""
+    """Cut a block into requests, each with where in its bytes the reply goes."""
     function = _READ_FUNCTION[table]
     return tuple(
         (2 * first, read_request(function, address + first, min(step, count - first), unit))

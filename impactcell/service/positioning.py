@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from impactcell.cell import CellDesign
+from impactcell.celllog import CellLogger
 from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import Module
 from impactcell.fieldbus.commands import Positioner, TapCommand
@@ -15,8 +16,6 @@ from impactcell.positioning.sequence import Phase, Sequence
 from impactcell.records import Evidence, PositioningState, Quality, Snapshot
 from impactcell.service.worker import Worker
 from impactcell.settings import Cell
-
-log = logging.getLogger(__name__)
 
 WATCH_S = 0.1
 """Between two looks at the PLC's target register."""
@@ -49,6 +48,7 @@ class PositioningTask:
             force_n=math.inf if actuator.max_force_n is None else actuator.max_force_n,
             travel_m=(0.0, settings.travel_mm * 1e-3),
         )
+        self._log = CellLogger(logging.getLogger(__name__), cell.name)
         self._cell = sequence.Cell(
             cell.name, limits, settings.encoder_resolution_um * 1e-6, two_sided=actuator.both_ends
         )
@@ -179,7 +179,7 @@ class PositioningTask:
         try:
             await self.begin(report.target_m)
         except PositioningError as error:
-            log.warning("cell=%s the PLC's target is refused: %s", self._cell.name, error)
+            self._log.warning("the PLC's target is refused: %s", error)
             self._set(Sequence(Phase.FAULTED, reason=str(error), evidence=Evidence()))
 
     async def _drive(self) -> None:

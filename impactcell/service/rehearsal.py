@@ -1,5 +1,6 @@
 """A few cycles of the cell's own model before the first real one, so that all is compiled when it comes."""
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,15 +14,30 @@ from impactcell.records import Capture, Channel, PositioningState, uniform_times
 CYCLES = 8
 FORCE_HZ, POSITION_HZ = 100_000.0, 10_000.0
 
+_one_at_a_time = threading.Lock()
+_rehearsed: set[tuple[object, ...]] = set()
+
 
 def rehearse(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
-    """Take cycles of the nominal plant through the whole pipeline, and forget them; `stop` ends it early."""
+    """Take cycles of the nominal plant through the whole pipeline, and forget them; `stop` ends it early.
+
+    Once a process is enough for all cells that need the same code: many that start together are not kept from
+    their modules by each other.
+    """
+    kind = (*design.model.plant.effects, design.tracker.batch, design.known.stroke_m is None)
+    with _one_at_a_time:
+        if kind not in _rehearsed and _rehearse(design, stop):
+            _rehearsed.add(kind)
+
+
+def _rehearse(design: CellDesign, stop: Callable[[], bool]) -> bool:
     hurried = replace(design, signature=replace(design.signature, learned_cycles=2))
     state = core.initial_state(hurried)
     for cycle in range(1, CYCLES + 1):
         if stop():
-            return
+            return False
         state = core.step(hurried, state, _capture(hurried, cycle), PositioningState()).state
+    return True
 
 
 def _capture(design: CellDesign, cycle: int) -> Capture:

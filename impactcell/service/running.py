@@ -2,12 +2,14 @@
 
 import asyncio
 import contextlib
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 from impactcell.alarms import Finding
+from impactcell.celllog import CellLogger
 from impactcell.errors import ImpactCellError, PositioningError
 from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
 from impactcell.intake import Announcement
@@ -16,7 +18,6 @@ from impactcell.journal.store import AuditEntry, Journal
 from impactcell.records import Alarm, AlarmName, Evidence, PositioningState, Snapshot
 from impactcell.scada import ModuleState, Server
 from impactcell.service.design import cell_design, module_link, retention
-from impactcell.service.logs import CellLogger
 from impactcell.service.monitoring import CellHealth
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.worker import Worker
@@ -46,7 +47,7 @@ class RunningCell:
 
     def __init__(self, cell: Cell, observe: Observer | None = None) -> None:
         self.cell = cell
-        self.log = CellLogger(cell.name)
+        self.log = CellLogger(logging.getLogger(__name__), cell.name)
         settings = cell.settings.journal
         journal = None if settings is None else Journal(settings.file, cell.name)
         keep = Retention() if settings is None else retention(settings)

@@ -3,35 +3,26 @@
 import asyncio
 import logging
 import threading
-import time
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TypeVar
 
 from impactcell import cell as core
 from impactcell import values
 from impactcell.alarms import Finding, Occurrence, Transition
 from impactcell.cell import CellDesign, CellState, Stepped
-from impactcell.errors import JournalError
+from impactcell.celllog import CellLogger
 from impactcell.fieldbus.ring import Mark
 from impactcell.intake import Announcement
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.positioning import Belief
 from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Snapshot
+from impactcell.service.keeping import Keeper
 from impactcell.service.rehearsal import rehearse
 
 T = TypeVar("T")
-
-log = logging.getLogger(__name__)
-
-BACKLOG = 64
-"""Cycles kept in memory while the journal cannot be written."""
-THIN_EVERY = 256
-"""Cycles between two looks at what the journal may drop."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,12 +58,9 @@ class Worker:
     def __init__(self, design: CellDesign, journal: Journal | None, keep: Retention) -> None:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"cell-{design.name}")
         self._design = design
-        self._journal = journal
-        self._keep = keep
-        self._backlog: deque[Callable[[Journal], None]] = deque()
-        self._since_thinned = THIN_EVERY
+        self.log = CellLogger(logging.getLogger(__name__), design.name)
+        self._keeper = Keeper(design.name, journal, keep)
         self._closing = threading.Event()
-        self.journal_fault = ""
         self.last: Mark | None = None
         """The last cycle taken in since the start, durable or not."""
         restored = self._restore()
@@ -99,8 +87,12 @@ class Worker:
     @property
     def durable(self) -> Mark | None:
         """The last cycle that is safely stored."""
-        position = None if self._journal is None else self._journal.position()
-        return None if position is None else Mark(position.session, position.cycle)
+        return self._keeper.durable
+
+    @property
+    def journal_fault(self) -> str:
+        """Why something was not stored, or is not yet; empty while all is."""
+        return self._keeper.fault
 
     async def rehearse(self) -> None:
         """Compile what a cycle needs, so that the first one is not late.
@@ -114,7 +106,7 @@ class Worker:
             try:
                 rehearse(self._design, self._closing.is_set)
             except Exception:
-                log.exception("cell=%s the rehearsal failed; the first cycle will be slow", self._design.name)
+                self.log.exception("the rehearsal failed; the first cycle will be slow")
             if not self._closing.is_set():
                 loop.call_soon_threadsafe(done.set)
 
@@ -149,8 +141,8 @@ class Worker:
 
     async def retry(self) -> None:
         """Try again to write what the journal could not take, also while no cycles come."""
-        if self._backlog and self._journal is not None:
-            await self.run(partial(self._write_backlog, self._journal))
+        if self._keeper.waits:
+            await self.run(self._keeper.retry)
 
     async def note(self, audit: AuditEntry) -> None:
         """Write down what a person did that is not in the state."""
@@ -168,14 +160,13 @@ class Worker:
 
     async def read(self, question: Callable[[Journal], T]) -> T | None:
         """Ask the journal; None without one."""
-        journal = self._journal
+        journal = self._keeper.journal
         return None if journal is None else await self.run(lambda: question(journal))
 
     async def close(self) -> None:
         """Finish what has begun, and close the journal."""
         self._closing.set()
-        if self._journal is not None:
-            await self.run(self._journal.close)
+        await self.run(self._keeper.close)
         self._thread.shutdown(wait=False)
 
     async def run(self, work: Callable[[], T]) -> T:
@@ -185,20 +176,19 @@ class Worker:
     def _keep_model(self) -> None:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
         model = values.dumps(self._design.model).decode()
-        self._store(lambda journal: journal.keep_model(model))
+        self._keeper.store(lambda journal: journal.keep_model(model))
 
     def _restore(self) -> Durable:
-        blob = None if self._journal is None else self._journal.state()
+        journal = self._keeper.journal
+        blob = None if journal is None else journal.state()
         if blob is None:
             return Durable(core.initial_state(self._design))
         try:
             stored = values.loads(Durable, blob)
             return replace(stored, state=core.adapted(self._design, stored.state))
         except ValueError as error:
-            log.warning(
-                "cell=%s the journal's state is of another version (%s); tracking begins anew, cycles go on",
-                self._design.name,
-                error,
+            self.log.warning(
+                "the journal's state is of another version (%s); tracking begins anew, cycles go on", error
             )
             return Durable(core.initial_state(self._design))
 
@@ -212,11 +202,12 @@ class Worker:
         stepped = self._stepped(capture, positioning, announcement, faults)
         self.last = Mark(capture.session, capture.cycle)
         self._state, self._snapshot = stepped.state, stepped.snapshot
-        if self._journal is None:
-            return Processed(stepped, Mark(capture.session, capture.cycle))
-        self._since_thinned += 1
+        if self._keeper.journal is None:
+            return Processed(stepped, self.last)
         blob = self._blob()
-        self._store(lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed))
+        self._keeper.cycle(
+            lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed), capture.time_ns
+        )
         return Processed(stepped, self.durable)
 
     def _stepped(
@@ -231,47 +222,13 @@ class Worker:
         except Exception as error:
             # A capture that nobody foresaw must not stop the cell: the cycle counts, its content does not.
             name = self._design.name
-            log.exception("cell=%s cycle=%d cannot be computed; it counts as unreadable", name, capture.cycle)
+            self.log.exception("cannot be computed; it counts as unreadable", cycle=capture.cycle)
             fault = f"{name}: cycle {capture.cycle}: cannot be computed ({type(error).__name__}: {error})"
             empty = replace(capture, force=None, position=None, actuator=None, summary=None)
             return core.step(self._design, self._state, empty, positioning, announcement, (*faults, fault))
 
     def _blob(self) -> bytes:
         return values.dumps(Durable(self._state, self._snapshot, self.belief))
-
-    def _store(self, entry: Callable[[Journal], None]) -> None:
-        """Write `entry` after all that could not be written before: no state may be ahead of its cycles."""
-        if self._journal is None:
-            return
-        self._backlog.append(entry)
-        if len(self._backlog) > BACKLOG:
-            self._backlog.popleft()
-            log.error(
-                "cell=%s the journal cannot be written; its oldest waiting entry is lost", self._design.name
-            )
-        self._write_backlog(self._journal)
-
-    def _write_backlog(self, journal: Journal) -> None:
-        fault = ""
-        while self._backlog:
-            try:
-                self._backlog[0](journal)
-            except JournalError as error:
-                if error.retry:
-                    self.journal_fault = str(error)
-                    return
-                # What can never be stored must not keep what can from being stored.
-                fault = str(error)
-                log.error("cell=%s an entry of the journal is lost: %s", self._design.name, error)  # noqa: TRY400
-            self._backlog.popleft()
-        self.journal_fault = fault
-        if self._since_thinned >= THIN_EVERY:
-            self._since_thinned = 0
-            try:
-                # A module's clock that runs ahead must not make everything look old.
-                journal.thin(self._keep, min(self._state.time_ns, time.time_ns()))
-            except JournalError as error:
-                self.journal_fault = str(error)
 
     def _find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
         self._state, moved = core.find(self._design, self._state, finding, time_ns)
@@ -297,7 +254,7 @@ class Worker:
 
     def _record(self, moved: tuple[Alarm, ...], audit: AuditEntry | None) -> None:
         blob = self._blob()
-        self._store(lambda journal: journal.record(blob, moved, audit))
+        self._keeper.store(lambda journal: journal.record(blob, moved, audit))
 
 
 def _with_result(audit: AuditEntry, result: str) -> AuditEntry:
