@@ -137,7 +137,8 @@ def _shot(
             continue
         time = np.arange(1, max(int(last * sensor.rate_hz + 1e-6), 1) + 1) / sensor.rate_hz
         if drive is not None and name == "force":
-            values = np.array([motion.sensed(force) for force in drive.force_n(time)])
+            shown = drive.force_n(time - motion.sensor_delay_s, lag_s=motion.sensor_lag_s)
+            values = np.array([motion.sensed(force) for force in shown])
         else:
             values = getattr(motion, column)(time)
         channels[name] = _measured(scenario, sensor, time, values, random)
@@ -154,9 +155,11 @@ class _Drive:
         self._phases = random.uniform(0.0, 2.0 * np.pi, drive.lines)
         self._amplitude = drive.rms_n * math.sqrt(2.0 / drive.lines)
 
-    def force_n(self, time: Any) -> Any:
-        angles = np.multiply.outer(time, self._rates) + self._phases
-        return self._amplitude * np.sin(angles).sum(axis=-1)
+    def force_n(self, time: Any, lag_s: float = 0.0) -> Any:
+        """Force, or what a first-order lag shows of it once it has settled."""
+        response = 1.0 / (1.0 + 1j * self._rates * lag_s)
+        angles = np.multiply.outer(time, self._rates) + self._phases + np.angle(response)
+        return self._amplitude * (np.abs(response) * np.sin(angles)).sum(axis=-1)
 
 
 def _measured(

@@ -193,6 +193,17 @@ class Motion:
         """Return what the force channel shows for a steady force."""
         return self._forces.sensed(force)
 
+    @property
+    def sensor_lag_s(self) -> float:
+        """Time constant of the force channel, 0 where it follows at once."""
+        lag = self._forces.sensor_lag()
+        return lag[1] if lag is not None else 0.0
+
+    @property
+    def sensor_delay_s(self) -> float:
+        """By how much force is recorded late."""
+        return self._forces.delay
+
     def _force(self, time: Samples, *, sensor: bool) -> Samples:
         forces, path = self._forces, self._path
         lag = forces.sensor_lag() if sensor else None

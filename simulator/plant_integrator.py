@@ -209,8 +209,12 @@ class _Run:
                 return
 
     def _longest_step_s(self) -> float:
-        """Return how long a step may be, so that its continuous output is as exact as its end."""
-        if self.phase.slip == 0 and self.forces.presliding == 0.0:
+        """Return how long a step may be, so that its continuous output is as exact as its end.
+
+        In stick nothing moves that could limit a step, but a force that goes on by itself may break the part
+        away and be small again within a long one.
+        """
+        if self.phase.slip == 0 and self.forces.presliding == 0.0 and not self.forces.ongoing:
             return float("inf")
         return LONGEST_CONTACT_STEP_S if self.phase.contact is Contact.TOUCHING else LONGEST_SLIDE_STEP_S
 

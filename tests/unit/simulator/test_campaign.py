@@ -129,6 +129,19 @@ def test_free_slide_and_driven(tmp_path: Path) -> None:
     assert shot.force.values.min() < 0.0 < shot.force.values.max()
 
 
+def test_a_lagging_or_late_sensor_shows_another_drive() -> None:
+    rate, lag, late = 1000.0, 0.02, 0.005
+    sensors = {name: {"rate_hz": rate, "noise_std": 0.0} for name in ("force", "position")}
+    same = {"excitation": "driven", "sensors": sensors, "drive": {"duration_s": 1.0}, "shots": 1}
+    same |= {"strengths": {"force_sensor_lag": {"time_constant_s": lag}, "channel_skew": {"delay_s": late}}}
+    time, force = make(scenario(**same))[1][0].channels["force"]
+    _, lagged = make(scenario(**same, hide=["force_sensor_lag"]))[1][0].channels["force"]
+    _, delayed = make(scenario(**same, hide=["channel_skew"]))[1][0].channels["force"]
+    # tau G' + G = F, in the middle of the record by central differences; and G(t) = F(t - delay).
+    np.testing.assert_allclose(lag * np.gradient(lagged, time)[1:-1] + lagged[1:-1], force[1:-1], atol=0.05)
+    np.testing.assert_allclose(delayed[5:], force[:-5], atol=1e-9)
+
+
 def test_gaps_resolution_unstated_noise_and_mass(tmp_path: Path) -> None:
     sensors = {
         "force": {"rate_hz": 10000, "noise_std": 0.4, "gap_share": 0.2},

@@ -188,6 +188,18 @@ def test_driven_part_reverses() -> None:
     assert velocity.max() > 0.1
 
 
+def test_a_drive_that_peaks_briefly_breaks_a_resting_part_away() -> None:
+    mass, peak = 5.0, 1.3
+
+    def force(t: float) -> float:
+        return 0.2 * mass * G * peak * math.exp(-(((t - 0.9) / 0.02) ** 2))
+
+    motion = driven(PLANT, mass, force, 1.5)
+    breakaway = 0.9 - 0.02 * math.sqrt(math.log(peak))
+    assert motion.breakaway_s == pytest.approx(breakaway, rel=1e-8)
+    assert motion.events[-1].kind == "stop"
+
+
 @settings(max_examples=40, deadline=None)
 @given(
     stiffness=st.floats(4e5, 9e5),
