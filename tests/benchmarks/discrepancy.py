@@ -1,140 +1,176 @@
 """Discrepancy workflow: hidden effects against answers, over campaigns made by the simulator's own plant.
 
-`python -m tests.benchmarks.discrepancy [--rows FILE] [--per 4] [--kinds single,none]` runs the study: a row a
-campaign, appended as it is done; what is there already is not done again. `tables` reads the rows.
+`python -m tests.benchmarks.discrepancy [--workers 2]` runs the study, a row a campaign appended to `--rows`
+as it is done; what is there already is not done again. `--rivals` runs the rivals on every third campaign of
+these rows, into a file of their own beside them. `--table` only prints the tables of the rows there are.
 """
 
 import argparse
-import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tests.benchmarks import _discrepancy_judge as judge
+from tests.benchmarks import _discrepancy_rivals as rivals
+from tests.benchmarks._discrepancy_judge import judged
+from tests.benchmarks._discrepancy_plan import CONFOUNDED, jobs
+from tests.benchmarks._discrepancy_run import ROWS, rows, study
 from tests.benchmarks.table import Table
-from tests.discrepancy.study import ROWS, rows, study
 
-ANSWERS = ("right", "tied", "unknown", "no_gap", "partial", "wrong")
-
-
-def judged(row: dict[str, Any]) -> str:
-    """right, tied, unknown, no_gap or wrong."""
-    if row["verdict"] in {"error", "no_gap"}:
-        return row["verdict"]
-    hidden, named = set(row["hidden"]), list(row["named"])
-    if row["verdict"] == "unknown":
-        return "unknown" if set(named) <= hidden else "wrong"
-    groups = [{effect, *row["tied"].get(effect, [])} for effect in named]
-    right = len(groups) == len(hidden) and all(any(one in group for group in groups) for one in hidden)
-    if not right:
-        missed = all(any(one in hidden for one in group) for group in groups)
-        return "partial" if missed and groups else "wrong"
-    return "tied" if row["verdict"] == "tied" else "right"
+Row = dict[str, Any]
+NAMED = {judge.RIGHT, judge.TIED}
+FALSELY = {judge.WRONG, judge.PARTIAL, judge.FALSE}
+NAMES = {
+    judge.RIGHT: "named",
+    judge.TIED: "tied with it",
+    judge.EQUAL: "near-equivalent",
+    judge.NO_GAP: "no gap",
+    judge.PARTIAL: "part of it",
+    judge.FALSE: "unknown, wrong beside",
+}
 
 
-def interval(count: int, total: int) -> str:
-    """Wilson interval of a share at 95 %."""
-    if not total:
-        return "-"
-    z, share = 1.96, count / total
-    middle = (share + z * z / (2 * total)) / (1 + z * z / total)
-    half = z * math.sqrt(share * (1 - share) / total + z * z / (4 * total * total)) / (1 + z * z / total)
-    return f"{100 * max(middle - half, 0):.1f}-{100 * min(middle + half, 1):.1f} %"
-
-
-def share(rows_of: list[dict[str, Any]], accepted: set[str]) -> tuple[str, str]:
-    """Share of rows whose judgement is among `accepted`, with its interval."""
-    count = sum(judged(row) in accepted for row in rows_of)
-    total = len(rows_of)
-    measured = f"{count}/{total}" + (f" = {100 * count / total:.1f} %" if total else "")
-    return measured, interval(count, total)
+def kept(found: list[Row], kind: str) -> list[Row]:
+    """Rows of a kind of job; `visible` and `subtle` go by the measured held-out gap."""
+    if kind in {"visible", "subtle"}:
+        low, high = (2.0, np.inf) if kind == "visible" else (1.2, 1.5)
+        alone = [row for row in found if row["job"]["kind"] in {"single", "subtle"} and "gap" in row]
+        return [row for row in alone if low <= row["gap"]["held_out"]["before"] <= high]
+    return [row for row in found if row["job"]["kind"] == kind]
 
 
 def tables(file: Path = ROWS) -> list[Table]:
-    """Bars and confusion matrix from the rows there are."""
+    """Bars, hidden effect against answer, and the rivals, from the rows there are."""
     found = rows(file)
-    gap = [row.get("gap", {}).get("held_out", {}).get("before") or 0.0 for row in found]
-    single = [row for row in found if row["kind"] in {"single", "subtle"}]
-    size = {row["key"]: value for row, value in zip(found, gap, strict=True)}
-    visible = [row for row in single if size[row["key"]] >= 2.0]
-    subtle = [row for row in single if 1.2 <= size[row["key"]] <= 1.5]
-    confounded = [row for row in single if row["hidden"][0] in {"mass_error", "force_sensor_gain"}]
-    none = [row for row in found if row["kind"] == "none"]
-    two = [row for row in found if row["kind"] == "two"]
-    outside = [row for row in found if row["kind"] == "outside"]
-    removed = [row for row in found if row["kind"] == "removed"]
-    right = {"right", "tied"}
-    bars: list[list[str]] = []
-
-    def bar(what: str, limit: str, rows_of: list[dict[str, Any]], accepted: set[str]) -> None:
-        bars.append([what, limit, *share(rows_of, accepted)])
-
-    bar("visible (gap >= 2): named, or tied with it", ">= 95 %", visible, right)
-    bar("visible: anything else named", "<= 5 %", visible, {"wrong", "partial"})
-    bar("subtle (gap 1.2 to 1.5): named, or tied with it", ">= 80 %", subtle, right)
-    bar("subtle: anything else named", "<= 5 %", subtle, {"wrong", "partial"})
-    bar("exact confound: tied", "always", [row for row in confounded if row["verdict"] != "no_gap"], {"tied"})
-    bar("nothing hidden: something named", "<= 5 %", none, {"wrong", "partial", "right", "tied"})
-    bar("two hidden: both right", ">= 85 %", two, right)
-    bar("outside the vocabulary: unknown, nothing listed", ">= 80 %", outside, {"unknown"})
-    bar("effect removed from the library: wrong name", "<= 5 %", removed, {"wrong", "partial"})
-    closed = [row for row in visible if judged(row) in right]
-    after = [row["gap"]["held_out"]["after"] for row in closed]
-    if after:
-        bars.append(
-            ["held-out gap after the right effect (median; 95th percentile)", "<= 1.1",
-             f"{np.median(after):.3f}; {np.quantile(after, 0.95):.3f}", f"{len(after)} campaigns"]
-        )  # fmt: skip
-    covered = [one for row in found if judged(row) in right for one in row.get("covered", [])]
-    if covered:
-        count = sum(covered)
-        bars.append(
-            ["parameters inside their 95 % intervals", "90-98 %",
-             f"{count}/{len(covered)} = {100 * count / len(covered):.1f} %", interval(count, len(covered))]
-        )  # fmt: skip
-    note = f"{len(found)} campaigns of 30 to 100 shots, made by the simulator's own plant."
-    return [
-        Table("Discrepancy: bars", ("what", "bar", "measured", "95 % interval"), bars, note),
-        confusion(found),
-    ]
+    rival = rivals.table(found, rows(rivals.beside(file)))
+    return [bars(found), *([rival] if rival else []), confusion(found), reach(found)]
 
 
-def confusion(found: list[dict[str, Any]]) -> Table:
+def bars(found: list[Row]) -> Table:
+    """The bars of the study, each with its interval."""
+    made: list[list[str]] = []
+
+    def bar(what: str, limit: str, of: list[Row], holds: Callable[[Row], bool]) -> None:
+        made.append([what, limit, *judge.share(sum(map(holds, of)), len(of))])
+
+    def among(answers: set[str]) -> Callable[[Row], bool]:
+        return lambda row: judged(row) in answers
+
+    visible, subtle = kept(found, "visible"), kept(found, "subtle")
+    confounded = [row for row in [*visible, *subtle] if row["job"]["hidden"][0] in CONFOUNDED]
+    outside = kept(found, "outside")
+    bar("visible (gap >= 2): named, or tied with it", ">= 95 %", visible, among(NAMED))
+    bar("visible: anything else named", "<= 5 %", visible, among(FALSELY))
+    bar("subtle (gap 1.2 to 1.5): named, or tied with it", ">= 80 %", subtle, among(NAMED))
+    bar("subtle: anything else named", "<= 5 %", subtle, among(FALSELY))
+    bar("exact confound: tied, with what would break it", "always", confounded, judge.confound_said)
+    bar("nothing hidden: something named", "<= 5 %", kept(found, "none"), lambda row: bool(row.get("named")))
+    bar("nothing hidden: unknown or failed", "-", kept(found, "none"), among({judge.UNKNOWN, judge.ERROR}))
+    bar("two hidden: both right", ">= 85 %", kept(found, "two"), among(NAMED))
+    bar("outside the vocabulary: unknown", ">= 90 %", outside, lambda row: row["verdict"] == judge.UNKNOWN)
+    bar("outside: unknown, with the right phase", ">= 90 %", outside, judge.phase_right)
+    bar("outside: nothing falsely listed", ">= 80 %", outside, lambda row: not row.get("named"))
+    removed = kept(found, "removed")
+    bar("removed from the library: a wrong name", "<= 5 %", removed, among({judge.WRONG, judge.FALSE}))
+    made += closed([row for row in visible if judged(row) in NAMED])
+    right = [row for row in found if row["job"]["hidden"] and judged(row) in NAMED]
+    for what, limit, key in (
+        ("parameters of effects inside their 95 % intervals", "90-98 %", "effects"),
+        ("parameters of the plant beside them", "-", "nominal"),
+    ):
+        inside = [one for row in right for one in row["covered"][key]]
+        made.append([what, limit, *judge.share(sum(inside), len(inside))])
+    seconds = [row["seconds"] for row in found if row["job"]["shots"] == 60 and "seconds" in row]
+    if seconds:
+        median, late = np.median(seconds), np.quantile(seconds, 0.95)
+        made.append(
+            ["processor time of 60 shots (median; 95th percentile)", "-", f"{median:.1f}; {late:.1f} s", ""]
+        )
+    alone, none = (sum(bool(row["job"]["hidden"]) is said for row in found) for said in (True, False))
+    note = f"{alone} campaigns with hidden effects and {none} without, made by the simulator's own plant."
+    return Table("Discrepancy: bars", ("what", "bar", "measured", "95 % interval"), made, note)
+
+
+def closed(right: list[Row]) -> list[list[str]]:
+    """Held-out gap after the right effect: of the traces alone, and the larger of traces and factors."""
+    if not right:
+        return []
+    made = []
+    for what, limit, after in (
+        ("of traces", "<= 1.1", [row["gap"]["parts"]["held_out"]["after"]["traces"] for row in right]),
+        ("of traces or factors", "<= 1.1", [row["gap"]["held_out"]["after"] for row in right]),
+    ):
+        middle, late = np.median(after), np.quantile(after, 0.95)
+        under = f"{100 * np.mean(np.array(after) <= 1.1):.0f} % are"
+        made.append(
+            [
+                f"held-out gap {what} after (median; 95th percentile)",
+                limit,
+                f"{middle:.3f}; {late:.3f}",
+                under,
+            ]
+        )
+    return made
+
+
+def confusion(found: list[Row]) -> Table:
     """Effect against answer: named, tied, unknown, nothing, or something else (and what)."""
-    lines: list[list[str]] = []
-    kinds: dict[str, list[dict[str, Any]]] = {}
+    suffix = {"outside": ", not in any library", "removed": ", removed"}
+    kinds: dict[str, list[Row]] = {}
     for row in found:
-        group = {"single": "", "subtle": "", "none": "nothing", "two": "two effects"}.get(
-            row["kind"], row["kind"]
-        )
-        name = row["hidden"][0] if not group else group if row["kind"] in {"none", "two"} else ""
-        name = name or (
-            f"{row['hidden'][0]}, {'not in any library' if row['kind'] == 'outside' else 'removed'}"
-        )
-        kinds.setdefault(name, []).append(row)
-    for name in sorted(kinds):
+        kind = row["job"]["kind"]
+        name = {"none": "nothing", "two": "two effects"}.get(kind) or row["job"]["hidden"][0]
+        kinds.setdefault(name + suffix.get(kind, ""), []).append(row)
+    lines = []
+    for name in sorted(kinds, key=lambda one: ("," in one, one)):
         answers = [judged(row) for row in kinds[name]]
-        others = sorted(
-            {"+".join(row["named"]) for row in kinds[name] if judged(row) in {"wrong", "partial"}}
-        )
-        lines.append(
-            [name, *(str(answers.count(one)) for one in ANSWERS),
-             ", ".join(others)]
-        )  # fmt: skip
-    columns = ("hidden", "named", "tied with it", "unknown", "no gap", "one of two", "wrong", "named instead")
+        others = sorted({"+".join(row["named"]) for row in kinds[name] if judged(row) in FALSELY})
+        counts = [str(answers.count(one) or "") for one in judge.ANSWERS]
+        lines.append([name, *counts, ", ".join(others)])
+    columns = ("hidden", *(NAMES.get(one, one) for one in judge.ANSWERS), "named instead")
     return Table("Discrepancy: hidden effect against answer", columns, lines)
 
 
-if __name__ == "__main__":
+def reach(found: list[Row]) -> Table:
+    """Strengths and gaps of every effect as they were calibrated, and where no sensible strength sufficed."""
+    lines = []
+    alone = [row for row in found if row["job"]["kind"] in {"single", "removed", "outside"} and "gap" in row]
+    for effect in sorted({row["job"]["hidden"][0] for row in alone}):
+        mine = [row for row in alone if row["job"]["hidden"][0] == effect]
+        multiples = sorted(row["multiples"][0] for row in mine)
+        gaps = sorted(row["gap"]["held_out"]["before"] for row in mine)
+        short = sum(row["expected"][0] < 2.0 for row in mine)
+        lines.append(
+            [effect, f"{multiples[0]:.3g} to {multiples[-1]:.3g}", f"{gaps[0]:.2f} to {gaps[-1]:.2f}",
+             f"in {short} of {len(mine)}" if short else ""]
+        )  # fmt: skip
+    columns = ("effect", "multiples of the default strength", "held-out gap before", "out of reach of 2")
+    note = "Strengths are calibrated to gaps of 2.3 to 6, on 24 shots, up to 6 times the simulator's default."
+    return Table("Discrepancy: visible campaigns, as they were made", columns, lines, note)
+
+
+def main() -> None:
+    """Run what the arguments say, then print the tables."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--rows", type=Path, default=ROWS)
-    parser.add_argument("--per", type=int, default=2)
-    parser.add_argument("--kinds", default="")
+    parser.add_argument("--kinds", default="", help="only these kinds of jobs, comma-separated")
+    parser.add_argument("--limit", type=int, help="only the first so many jobs of the plan")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--rivals", action="store_true", help="run the rivals on every third campaign")
     parser.add_argument("--table", action="store_true", help="only print the tables of the rows there are")
     given = parser.parse_args()
-    if not given.table:
-        study(given.rows, given.per, set(filter(None, given.kinds.split(","))), given.workers)
+    wanted = set(filter(None, given.kinds.split(",")))
+    plan = [job for job in jobs() if not wanted or job.kind in wanted][: given.limit]
+    if given.rivals:
+        study(rivals.beside(given.rows), rivals.subset(plan, rows(given.rows)), given.workers, rivals.run)
+    elif not given.table:
+        study(given.rows, plan, given.workers)
     for made in tables(given.rows):
         print(made.markdown())
+
+
+if __name__ == "__main__":
+    main()

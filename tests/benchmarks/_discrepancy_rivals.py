@@ -1,0 +1,236 @@
+"""What others do with the same training shots: forward selection by BIC or likelihood ratio, and PySINDy.
+
+The two forward selections take samples as independent and the sensors' noise as known. From the effects with
+the largest first-order gain each is fitted beside what the model has, everything refitted; the best joins
+until the criterion says no, or four have joined. They name no ties: whatever wins is their answer.
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from impactcell.discrepancy import name, noise
+from impactcell.discrepancy.campaign import laid_out, prepare, split
+from impactcell.discrepancy.fit import Fit, fit
+from impactcell.discrepancy.problem import Problem
+from impactcell.discrepancy.start import fit_nominal
+from impactcell.discrepancy.tangent import linearise, scores
+from impactcell.errors import DiscrepancyError
+from impactcell.physics.effects import LIBRARY
+from tests.benchmarks import _discrepancy_judge as judge
+from tests.benchmarks._discrepancy_sindy import sindy
+from tests.benchmarks.table import Table
+from tests.discrepancy.study import Job, campaign
+
+MOST = 4
+TRIED, FINISHED = 5, 2
+FEW_STEPS, MANY_STEPS = 5, 30
+FAMILY = 0.01
+Row = dict[str, Any]
+NAMES = {"ours": "impactcell", "bic": "BIC", "ratio": "likelihood ratio", "sindy": "PySINDy"}
+
+
+@dataclass(frozen=True)
+class Task:
+    """A campaign of the study, with the strengths it was made with."""
+
+    job: Job
+    multiples: tuple[float, ...]
+
+    @property
+    def key(self) -> str:
+        """Key of the campaign's own row."""
+        return self.job.key
+
+
+def beside(file: Path) -> Path:
+    """Where the rivals' rows are."""
+    return file.with_name(f"{file.stem}-rivals.jsonl")
+
+
+def subset(plan: list[Job], found: list[Row]) -> list[Task]:
+    """Every third job of each kind, as far as it is done."""
+    multiples = {row["key"]: tuple(row["multiples"]) for row in found}
+    seen: dict[str, int] = {}
+    made = []
+    for job in plan:
+        place = seen[job.kind] = seen.get(job.kind, -1) + 1
+        if place % 3 == 0 and job.key in multiples:
+            made.append(Task(job, multiples[job.key]))
+    return made
+
+
+def run(task: Task) -> Row:
+    """Answers of the rivals on one campaign."""
+    job = task.job
+    material = prepare(campaign(job, task.multiples))
+    floor = noise.sensors(material)
+    training, _ = split(material, job.seed)
+    library = tuple(effect for effect in LIBRARY if effect != job.removed)
+    row: Row = {"key": job.key, "job": json.loads(job.key)}
+    started = time.process_time()
+    problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
+    nominal = fit_nominal(problem)
+    steps = Steps(problem, library)
+    for which, criterion in (("bic", bic), ("ratio", likelihood_ratio)):
+        row[which] = [[effect] for effect in forward(steps, nominal, criterion)]
+    row["seconds"] = round(time.process_time() - started, 2)
+    started = time.process_time()
+    row["sindy"] = sindy(problem, nominal, library)
+    return row | {"sindy_seconds": round(time.process_time() - started, 2)}
+
+
+@dataclass
+class Steps:
+    """Fits of one effect more than a model has; kept, as the two criteria mostly go the same way."""
+
+    problem: Problem
+    library: tuple[str, ...]
+    made: dict[tuple[str, ...], list[Fit]] = field(default_factory=dict)
+
+    def beyond(self, model: Fit) -> list[Fit]:
+        """Fit the most promising effects beside those of `model`."""
+        if model.effects not in self.made:
+            self.made[model.effects] = self._fits(model)
+        return self.made[model.effects]
+
+    def _fits(self, model: Fit) -> list[Fit]:
+        tangent = linearise(self.problem, model)
+        found = name.candidates(self.problem, model, tangent, self.library)
+        scored = scores(tangent, found.products)
+        ranked = []
+        for number, effect in enumerate(found.names):
+            best = name.best_probes(found, scored, number, 1)
+            if best:
+                ranked.append((best[0][0], effect, best[0][1]))
+        ranked.sort(key=lambda one: -one[0])
+        few = [self._fit(model, effect, start) for _, effect, start in ranked[:TRIED]]
+        order = sorted(filter(None, few), key=lambda one: -total(self.problem, one))
+        done = [self._finished(one) for one in order[:FINISHED]]
+        return [*filter(None, done), *order[FINISHED:]]
+
+    def _fit(self, model: Fit, effect: str, start: np.ndarray) -> Fit | None:
+        at = np.concatenate([model.at, start])
+        effects = (*model.effects, effect)
+        try:
+            return fit(self.problem, effects, at, model.local, spread=model.spread, most_steps=FEW_STEPS)
+        except DiscrepancyError:
+            return None
+
+    def _finished(self, one: Fit) -> Fit | None:
+        return fit(self.problem, one.effects, one.at, one.local, spread=one.spread, most_steps=MANY_STEPS)
+
+
+def total(problem: Problem, model: Fit) -> float:
+    """Log-likelihood of all samples and factors."""
+    return float(model.log_likelihood(problem.shots).sum())
+
+
+def bic(problem: Problem, old: Fit, new: Fit) -> float:
+    """Fall of Schwarz's criterion; positive where the effect joins."""
+    more = len(new.coordinates) - len(old.coordinates)
+    return 2.0 * (total(problem, new) - total(problem, old)) - more * math.log(problem.shots.values.size)
+
+
+def likelihood_ratio(problem: Problem, old: Fit, new: Fit) -> float:
+    """Ratio statistic less the quantile it has to exceed, at 1 % over the whole library (Bonferroni)."""
+    more = len(new.coordinates) - len(old.coordinates)
+    ratio = 2.0 * (total(problem, new) - total(problem, old))
+    return ratio - float(chi2.isf(FAMILY / len(LIBRARY), more))
+
+
+def forward(steps: Steps, nominal: Fit, gain: Callable[[Problem, Fit, Fit], float]) -> tuple[str, ...]:
+    """Effects that join while the criterion says so."""
+    model = nominal
+    while len(model.effects) < MOST:
+        fits = steps.beyond(model)
+        best = max(fits, key=lambda new: gain(steps.problem, model, new), default=None)
+        if best is None or gain(steps.problem, model, best) <= 0.0:
+            break
+        model = best
+    return model.effects
+
+
+def answered(row: Row, groups: list[list[str]]) -> Row:
+    """Row of an answer as `judged` reads it, whose groups cannot be told apart by the method itself."""
+    return {
+        "job": row["job"],
+        "verdict": "named" if groups else "no_gap",
+        "named": [one[0] for one in groups],
+        "tied": {one[0]: one[1:] for one in groups},
+    }
+
+
+def generous(row: Row) -> Row:
+    """Same row with exact confounds tied: no method can tell them, and these know of no ties."""
+    named = list(row["named"])
+    tied = {
+        one: sorted(
+            {*row["tied"].get(one, []), *(judge.CONFOUNDED - {one} if one in judge.CONFOUNDED else ())}
+        )
+        for one in named
+    }
+    return row | {"tied": tied}
+
+
+def table(found: list[Row], rivals: list[Row]) -> Table | None:
+    """Bars of ours beside the rivals', on the campaigns that all were given."""
+    if not rivals:
+        return None
+    ours = {row["key"]: row for row in found}
+    rivals = [row for row in rivals if row["key"] in ours]
+    answers = {
+        which: [
+            ours[row["key"]] if which == "ours" else generous(answered(row, row[which])) for row in rivals
+        ]
+        for which in NAMES
+    }
+    right = {judge.RIGHT, judge.TIED}
+    falsely = {judge.WRONG, judge.PARTIAL, judge.FALSE}
+    wanted: list[tuple[str, set[str], set[str]]] = [
+        ("one effect, gap >= 2: named, or tied with it", {"visible"}, right),
+        ("one effect, gap >= 2: anything else", {"visible"}, falsely),
+        ("one effect, gap 1.2 to 1.5: named, or tied with it", {"subtle"}, right),
+        ("one effect, gap 1.2 to 1.5: anything else", {"subtle"}, falsely),
+        ("nothing hidden: something named", {"none"}, right | falsely),
+        ("two hidden: both right", {"two"}, right),
+        ("outside the vocabulary: something named", {"outside"}, right | falsely),
+        ("removed from the library: a wrong name", {"removed"}, {judge.WRONG, judge.FALSE, judge.PARTIAL}),
+    ]
+    lines = []
+    for what, kinds, accepted in wanted:
+        cells = [what]
+        for which in NAMES:
+            mine = [
+                answer
+                for row, answer in zip(rivals, answers[which], strict=True)
+                if category(ours[row["key"]]) in kinds
+            ]
+            count = sum(judge.judged(answer) in accepted for answer in mine)
+            cells.append(" · ".join(part for part in judge.share(count, len(mine))))
+        lines.append(cells)
+    seconds = [
+        [row.get("seconds", math.nan) for row in (ours[one["key"]] for one in rivals)],
+        [row["seconds"] for row in rivals],
+        [row["sindy_seconds"] for row in rivals],
+    ]
+    own, both, fast = (f"{np.nanmedian(one):.1f} s" for one in seconds)
+    lines.append(["processor time (median)", own, both, "(with BIC)", fast])
+    note = f"The same {len(rivals)} campaigns: every third of each kind. An exact confound counts as right."
+    return Table("Discrepancy: beside rivals", ("what", *NAMES.values()), lines, note)
+
+
+def category(row: Row) -> str:
+    """Kind of a campaign; one effect alone goes by the measured gap."""
+    kind = str(row["job"]["kind"])
+    if kind not in {"single", "subtle"}:
+        return kind
+    gap = row.get("gap", {}).get("held_out", {}).get("before") or 0.0
+    return "visible" if gap >= 2.0 else "subtle" if 1.2 <= gap <= 1.5 else "neither"

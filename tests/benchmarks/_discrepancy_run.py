@@ -1,0 +1,110 @@
+"""Runs the discrepancy study: a row of a file for each campaign, resumable."""
+
+import json
+import math
+import sys
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from impactcell.discrepancy.result import result
+from impactcell.discrepancy.workflow import investigate
+from impactcell.errors import ImpactCellError
+from impactcell.physics.effects import LIBRARY
+from tests.benchmarks._discrepancy_plan import calibrated
+from tests.discrepancy.study import Job, campaign, hidden, scenario
+
+ROWS = Path("bench-results/discrepancy-final.jsonl")
+
+
+def run(job: Job) -> dict[str, Any]:
+    """One row of the study."""
+    started = time.process_time()
+    multiples, gaps = calibrated(job)
+    row: dict[str, Any] = {
+        "key": job.key,
+        "job": json.loads(job.key),
+        "multiples": multiples,
+        "expected": gaps,
+    }
+    given = campaign(job, multiples)
+    row["made_in_s"] = round(time.process_time() - started, 2)
+    library = [effect for effect in LIBRARY if effect != job.removed]
+    started = time.process_time()
+    try:
+        found = investigate(given, seed=job.seed, library=library)
+    except (ImpactCellError, ValueError, np.linalg.LinAlgError) as error:
+        return row | {"verdict": "error", "error": f"{type(error).__name__}: {error}"}
+    outcome = result(found)
+    return row | {
+        "verdict": outcome["verdict"],
+        "named": [one["effect"] for one in outcome["effects"]],
+        "tied": {one["effect"]: one["tied_with"] for one in outcome["effects"]},
+        "p": [one["p_value"] for one in outcome["effects"]],
+        "where": [one["where"]["phase"] for one in outcome["effects"]],
+        "unexplained": outcome["unexplained"],
+        "proposals": [one["separates"] for one in outcome["next_experiment"]],
+        "gap": outcome["gap"],
+        "p_nominal": found.search.nominal.p_value,
+        "p_final": found.search.final.p_value,
+        "covered": covered(job, multiples, outcome),
+        "tried": [
+            [*one.effects, round(one.behind, 1), round(one.behind_std, 1)]
+            for one in found.search.alternatives[:6]
+        ],
+        "seconds": round(time.process_time() - started, 2),
+    }
+
+
+def covered(job: Job, multiples: tuple[float, ...], outcome: dict[str, Any]) -> dict[str, list[bool]]:
+    """Whether the intervals hold the truth: of the parameters of rightly named effects, and of the plant."""
+    effects = []
+    truths = hidden(job, multiples)
+    for one in outcome["effects"]:
+        for name, truth in truths.get(one["effect"], {}).items():
+            effects += _inside(truth, one["parameters"][name], turn=name.endswith("phase_rad"))
+    plant = scenario(job, multiples).plant
+    known = {
+        "stiffness_n_per_m": plant.stiffness_n_per_m,
+        "damping_n_s_per_m": plant.damping_n_s_per_m,
+        "mu_k": plant.mu_s * plant.ratio,
+        "ratio": 1.0 / plant.ratio,
+    }
+    nominal = [inside for name, truth in known.items() for inside in _inside(truth, outcome["nominal"][name])]
+    return {"effects": effects, "nominal": nominal}
+
+
+def _inside(truth: float | list[float], got: dict[str, Any], *, turn: bool = False) -> list[bool]:
+    """Whether an interval holds the truth, one entry a batch; an end that is None is open."""
+    made = []
+    truths = truth if isinstance(truth, list) else [truth]
+    ends = got["ci95"] if isinstance(got["value"], list) else [got["ci95"]]
+    for value, (low, high) in zip(truths, ends, strict=True):
+        low = -math.inf if low is None else low
+        high = math.inf if high is None else high
+        turns = (-2.0 * math.pi, 0.0, 2.0 * math.pi) if turn else (0.0,)
+        made.append(any(low <= value + one <= high for one in turns))
+    return made
+
+
+def rows(file: Path = ROWS) -> list[dict[str, Any]]:
+    """Rows of earlier runs."""
+    if not file.exists():
+        return []
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
+
+
+def study(file: Path, todo: Iterable[Job], workers: int, work: Callable[[Job], dict[str, Any]] = run) -> None:
+    """Do what is missing, in order; a row is appended and flushed as soon as it is done."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    done = {row["key"] for row in rows(file)}
+    missing = [job for job in todo if job.key not in done]
+    print(f"{len(done)} done, {len(missing)} to do", file=sys.stderr, flush=True)
+    with file.open("a", encoding="utf-8") as out, ProcessPoolExecutor(workers) as pool:
+        for future in as_completed([pool.submit(work, job) for job in missing]):
+            out.write(json.dumps(future.result(), allow_nan=True) + "\n")
+            out.flush()
