@@ -5,21 +5,20 @@ test that follows.
 """
 
 import math
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 
 from impactcell.campaign import Campaign, Excitation
-from impactcell.discrepancy.shots import Index, Shot, Shots
+from impactcell.discrepancy.blocks import blocks
+from impactcell.discrepancy.drives import friction, reduced
+from impactcell.discrepancy.shots import POSITION, Index, Shot, Shots, lay_out
 from impactcell.discrepancy.units import check_units
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel, Samples
 
 FEWEST_SHOTS = 6
 HELD_OUT = 0.25
-BLOCKS = 24
-SHORTEST_BLOCK = 40
 GAP_FACTOR = 5.0
 EMPTY = np.empty(0)
 
@@ -61,8 +60,10 @@ def prepare(campaign: Campaign) -> Material:
     """
     captures = campaign.shots
     notes: list[str] = []
+    records = list(range(1, len(captures) + 1))
     if campaign.excitation is Excitation.DRIVEN:
-        captures = _blocks(captures)
+        cut = blocks(captures)
+        captures, records = tuple(block for block, _ in cut), [record for _, record in cut]
     if len(captures) < FEWEST_SHOTS:
         unit = "blocks" if campaign.excitation is Excitation.DRIVEN else "shots"
         message = (
@@ -77,7 +78,7 @@ def prepare(campaign: Campaign) -> Material:
             batches.append(name)
     groups: dict[tuple[float, ...], int] = {}
     shots = []
-    for place, capture in enumerate(captures, 1):
+    for place, (capture, record) in enumerate(zip(captures, records, strict=True), 1):
         batch = batches.index(capture.batch_id or "")
         settings = (
             round(capture.velocity_m_s, 9) if math.isfinite(capture.velocity_m_s) else -1.0,
@@ -87,7 +88,7 @@ def prepare(campaign: Campaign) -> Material:
         )
         key = settings if campaign.excitation is Excitation.TAP else (float(place),)
         group = groups.setdefault(key, len(groups))
-        shots.append(_shot(capture, place, len(captures), batch, group, campaign.excitation))
+        shots.append(_shot(capture, record, len(campaign.shots), batch, group, campaign.excitation))
     _say_what_lacks(campaign, shots, notes)
     check_units(campaign.excitation, campaign.gravity_m_s2, shots)
     stated = (_stated(captures, "force"), _stated(captures, "position"), _stated(captures, "actuator"))
@@ -108,14 +109,18 @@ def prepare(campaign: Campaign) -> Material:
 def split(material: Material, seed: int) -> tuple[Index, Index]:
     """Places of the training and of the held-out shots, each in file order.
 
-    A quarter is held out, spread over the settings; of a driven record it is the last third. Held-out shots
-    come first from settings that have replicates, so that no setting is lost to training.
+    A quarter is held out, spread over the settings; of a driven record it is the last third of each. Held-out
+    shots come first from settings that have replicates, so that no setting is lost to training.
     """
     n = len(material.shots)
     places = np.arange(n)
     if material.excitation is Excitation.DRIVEN:
-        cut = n - max(n // 3, 1)
-        return places[:cut], places[cut:]
+        record = np.array([shot.place for shot in material.shots])
+        last = [
+            mine[len(mine) - len(mine) // 3 :] for mine in (places[record == r] for r in np.unique(record))
+        ]
+        held = np.concatenate(last) if sum(map(len, last)) > n // 4 else places[n - max(n // 3, 1) :]
+        return np.setdiff1d(places, held), held
     rng = np.random.default_rng([seed, 1])
     order = rng.permutation(n)
     keys = np.array([_stratum(shot) for shot in material.shots])
@@ -158,6 +163,8 @@ def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, exci
         "start": capture.start_m,
     }
     covariates |= {name: value for name, value in capture.covariates.items() if isinstance(value, float)}
+    if excitation is Excitation.DRIVEN:
+        covariates["direction"] = math.copysign(1.0, covariates["initial_speed"])
     return Shot(
         number=capture.cycle,
         place=place,
@@ -198,49 +205,6 @@ def _stated(captures: tuple[Capture, ...], name: str) -> float:
     return math.nan
 
 
-def _blocks(captures: tuple[Capture, ...]) -> tuple[Capture, ...]:
-    """Cut long driven records into blocks longer than the correlation time of their velocity."""
-    out: list[Capture] = []
-    per_record = max(BLOCKS // len(captures), 1)
-    for capture in captures:
-        position, force = capture.position, capture.force
-        if position is None or force is None:
-            continue
-        shortest = max(2 * _correlation(position.values), SHORTEST_BLOCK)
-        count = max(min(per_record, len(position.values) // shortest), 1)
-        edges = np.linspace(0, len(position.values), count + 1).astype(int)
-        for first, last in pairwise(edges):
-            inside = slice(int(first), int(last))
-            times = position.time_s[inside]
-            # One sample of force either side, so that the drive covers the block.
-            low = max(int(np.searchsorted(force.time_s, times[0], "right")) - 1, 0)
-            high = min(int(np.searchsorted(force.time_s, times[-1], "left")) + 1, len(force.time_s))
-            out.append(
-                replace(
-                    capture,
-                    cycle=capture.cycle if count == 1 else len(out) + 1,
-                    position=replace(position, time_s=times - times[0], values=position.values[inside]),
-                    force=replace(
-                        force, time_s=force.time_s[low:high] - times[0], values=force.values[low:high]
-                    ),
-                    start_m=float(position.values[first]),
-                )
-            )
-    return tuple(out)
-
-
-def _correlation(position: Samples) -> int:
-    """Count the samples after which the velocity's correlation has fallen to 1/e."""
-    velocity = np.diff(position)
-    velocity = velocity - velocity.mean()
-    power = np.abs(np.fft.rfft(velocity, 2 * len(velocity))) ** 2
-    correlation = np.fft.irfft(power)[: len(velocity)]
-    if correlation[0] <= 0.0:
-        return 1
-    below = np.flatnonzero(correlation < correlation[0] / math.e)
-    return int(below[0]) if len(below) else len(velocity)
-
-
 def _say_what_lacks(campaign: Campaign, shots: list[Shot], notes: list[str]) -> None:
     tap = campaign.excitation is Excitation.TAP
     if tap and not any(len(shot.times[0]) for shot in shots):
@@ -272,8 +236,9 @@ def _say_what_lacks(campaign: Campaign, shots: list[Shot], notes: list[str]) -> 
 
 
 def laid_out(material: Material, places: Index, noise_std: tuple[float, float, float]) -> Shots:
-    """Lay out some of the shots for fits."""
-    from impactcell.discrepancy.shots import lay_out
-
+    """Lay out some of the shots for fits; driven blocks with a smooth drive and their whiteners."""
     items = tuple(material.shots[int(place)] for place in places)
+    if material.excitation is Excitation.DRIVEN:
+        mu_k, _ = friction(material.shots, material.gravity_m_s2)
+        items = tuple(reduced(shot, noise_std[POSITION], material.gravity_m_s2, mu_k) for shot in items)
     return lay_out(material.excitation, material.gravity_m_s2, material.stroke_m, items, noise_std)

@@ -52,7 +52,7 @@ class Problem:
     def residual(self, effects: tuple[str, ...], at: Samples, local: Local) -> Samples:
         """Whitened residuals, shape (N,)."""
         predicted = self.forward.samples(effects, self.parameters(effects, at), local)
-        return (self.shots.values - predicted) * self.shots.weights
+        return self.shots.whitened(self.shots.values - predicted)
 
     def moved(self, local: Local, steps: Samples) -> Local:
         """Return each shot's own numbers after steps of shape (n, q) in the order of `own`."""
@@ -91,7 +91,7 @@ class Problem:
         made = np.empty((len(self.own), base.size))
         for column, name in enumerate(self.own):
             if name == "shift_m":
-                made[column] = self.shots.weights * (self.shots.channel == 1)
+                made[column] = self.shots.whitened((self.shots.channel == 1).astype(np.float64))
                 continue
             steps = np.zeros((self.count, len(self.own)))
             size = STEP if name != "speed_m_s" else STEP * max(float(np.abs(local.speed_m_s).max()), 1e-3)
@@ -107,7 +107,7 @@ class Problem:
     def first_local(self, share: float = 1.0) -> Local:
         """Where a fit starts from: initial speeds by a parabola through the first `share` of each record.
 
-        With a share of 0 every part starts at rest.
+        With a share of 0 a driven block starts with the speed that was measured.
         """
         n = self.count
         mass = np.array([shot.mass_kg for shot in self.shots.items])
@@ -120,6 +120,9 @@ class Problem:
                 time, position = shot.times[1], shot.values[1]
                 count = min(len(time), max(6, round(share * len(time))))
                 _, slope, level = np.polyfit(time[:count], position[:count], 2)
-                speed[i] = slope * shot.direction if share > 0.0 else 0.0
-                shift[i] = level if share > 0.0 else float(position[:count].mean())
+                speed[i] = slope * shot.direction
+                shift[i] = level
+                if share <= 0.0:
+                    speed[i] = shot.covariates["initial_speed"] * shot.direction
+                    shift[i] = position[0]
         return Local(np.zeros(n), mass, speed, shift)

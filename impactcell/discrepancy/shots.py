@@ -1,6 +1,6 @@
 """Shots as the workflow works on them: covariates, samples of all channels in one row, replicate groups."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,8 @@ class Shot:
         Times and values of the driving force; shape (2, 0) unless the part is driven.
     covariates : dict of str to float
         Everything of `shots.csv` that is a number or was made one.
+    whitener : ndarray, shape (n, n)
+        Makes residuals of a driven block independent and of unit variance; shape (0, 0) elsewhere.
     """
 
     number: int
@@ -52,6 +54,7 @@ class Shot:
     values: tuple[Samples, Samples, Samples]
     drive: Samples
     covariates: dict[str, float]
+    whitener: Samples = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def size(self) -> int:
@@ -91,6 +94,13 @@ class Shots:
     def of(self, shot: int) -> slice:
         """Select the samples of one shot."""
         return slice(int(self.bounds[shot]), int(self.bounds[shot + 1]))
+
+    def whitened(self, change: Samples) -> Samples:
+        """Scale residuals, shape (N,), so that they are independent and of unit variance."""
+        if self.excitation is not Excitation.DRIVEN:
+            made: Samples = change * self.weights
+            return made
+        return np.concatenate([shot.whitener @ change[self.of(i)] for i, shot in enumerate(self.items)])
 
     @property
     def times(self) -> Samples:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from impactcell.campaign import Excitation
+from impactcell.discrepancy.drives import friction
 from impactcell.discrepancy.fit import Fit, begin, fit
 from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.shots import FORCE, POSITION, Shot
@@ -14,10 +15,7 @@ from impactcell.physics import Plant
 from impactcell.records import Samples
 
 RATIOS = (1.15, 1.5)
-GRID_BLOCKS = 6
-GRID_STEPS = 2
-DRIVEN_RATIOS = (1.05, 1.25, 1.5)
-DRIVEN_FRICTION = (0.05, 0.5, 6)
+DRIVEN_RATIOS = (1.05, 1.3)
 STIFFNESSES = (5e4, 2e5, 6e5, 2e6, 8e6)
 
 
@@ -35,7 +33,8 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
     if shots.excitation is Excitation.FREE_SLIDE:
         starts.append(np.array([math.log(mu)]))
     elif shots.excitation is Excitation.DRIVEN:
-        starts += _driven(problem)
+        mu, ratio = friction(shots.items, shots.gravity_m_s2)
+        starts += [np.array([math.log(mu), math.log(one)]) for one in (ratio, *DRIVEN_RATIOS)]
     else:
         found = _contact(shots.items)
         pairs = [found] if found is not None else [(k, 0.7e-3 * k) for k in STIFFNESSES]
@@ -64,27 +63,6 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
     if best is None:
         raise DiscrepancyError(f"the nominal model cannot be fitted: {failures[0]}")
     return best
-
-
-def _driven(problem: Problem) -> list[Samples]:
-    """Best of a grid of friction and ratio by how many blocks they explain.
-
-    A block in which stick ends at the wrong moment is far off whatever else is right, so that a sum of
-    squares says nothing yet; the logarithm of each block's misfit does.
-    """
-    grid = [
-        np.array([math.log(mu), math.log(ratio)])
-        for mu in np.geomspace(*DRIVEN_FRICTION)
-        for ratio in DRIVEN_RATIOS
-    ]
-    few = np.unique(np.linspace(0, problem.count - 1, GRID_BLOCKS).astype(np.int64))
-    problem = Problem(problem.shots.chosen(few), problem.forward.batches)
-    ranked: list[tuple[float, int]] = []
-    for place, at in enumerate(grid):
-        residual = problem.residual((), at, begin(problem, (), at, GRID_STEPS))
-        misfit = np.add.reduceat(residual**2, problem.shots.bounds[:-1]) / problem.sizes
-        ranked.append((float(np.log1p(misfit).sum()), place))
-    return [grid[place] for _, place in sorted(ranked)[:1]]
 
 
 def _given(problem: Problem, plant: Plant) -> Samples:

@@ -10,7 +10,8 @@ from impactcell.discrepancy import noise
 from impactcell.discrepancy.campaign import Material, laid_out, prepare, split
 from impactcell.discrepancy.experiment import Proposal, propose
 from impactcell.discrepancy.extend import Mapper, Search, Setup, search
-from impactcell.discrepancy.fit import Fit
+from impactcell.discrepancy.fit import Fit, refit_own
+from impactcell.discrepancy.followed import decided, followed
 from impactcell.discrepancy.intervals import Estimate, estimates
 from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.prove import Proof, prove
@@ -22,7 +23,6 @@ from impactcell.physics import Plant
 from impactcell.physics.effects import LIBRARY
 
 NO_GAP, NAMED, TIED, UNKNOWN = "no_gap", "named", "tied", "unknown"
-LOST = 30.0
 COARSE = 400
 """Samples of a channel and shot that a search among many models reads."""
 
@@ -113,11 +113,12 @@ def investigate(
     say("fitting the nominal model")
     nominal = fit_nominal(problem, plant)
     if campaign.excitation is Excitation.DRIVEN:
-        kept = _followed(problem, nominal)
+        kept = followed(problem, nominal)
         if len(kept) < len(training):
             note = (
                 f"{len(training) - len(kept)} of {len(training)} training blocks were left out: in them "
-                "stick ends at a moment that the nominal model does not find."
+                "stick ends, or does not, by so little that noise decides, or the nominal model does not "
+                "follow them."
             )
             material = replace(material, notes=(*material.notes, note))
             training = training[kept]
@@ -129,6 +130,9 @@ def investigate(
     final = found.accepted or nominal
     say("proving on held-out shots")
     held_problem = Problem(laid_out(material, held_out, floor.noise_std), len(material.batches))
+    if campaign.excitation is Excitation.DRIVEN:
+        held_out = held_out[decided(held_problem, refit_own(held_problem, final))]
+        held_problem = Problem(laid_out(material, held_out, floor.noise_std), len(material.batches))
     proof, replicates, held_nominal, held_final = _prove(
         material, floor, (problem, held_problem), nominal, final, (training, held_out), seed
     )
@@ -162,13 +166,6 @@ def _certain(material: Material, floor: noise.Floor) -> bool:
     return "stated" in floor.source or material.excitation is Excitation.TAP
 
 
-def _followed(problem: Problem, nominal: Fit) -> Index:
-    """Blocks that the model follows at all; one that sticks at the wrong time is far off everywhere."""
-    misfit = nominal.misfit(problem.shots) / problem.sizes
-    limit = LOST * float(np.median(misfit))
-    return np.flatnonzero(misfit <= max(limit, 4.0))
-
-
 def _verdict(found: Search) -> str:
     if found.accepted is None:
         return UNKNOWN
@@ -187,8 +184,6 @@ def _prove(
     seed: int,
 ) -> tuple[Proof, noise.Replicates, Fit, Fit]:
     problem, held_problem = problems
-    from impactcell.discrepancy.fit import refit_own
-
     held = refit_own(held_problem, final)
     log_factor = np.empty(len(material.shots))
     log_factor[places[0]] = final.local.log_factor
