@@ -26,7 +26,7 @@ from impactcell.discrepancy.own import (
 )
 from impactcell.discrepancy.parameters import Coordinate
 from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.shots import Shots
+from impactcell.discrepancy.shots import Index, Shots
 from impactcell.errors import DiscrepancyError
 from impactcell.records import Samples
 
@@ -39,6 +39,7 @@ PROMISE = 2.0
 RESCUES = 2
 FAR = 4.0
 NOT_IT = 25.0
+NEAR = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,10 +120,11 @@ def fit(
     point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
     if most_steps >= WHOLE:
         for _ in range(RESCUES):
-            if not _stuck(problem, effects, point, spread):
+            stuck = _stuck(problem, effects, point, spread)
+            if not len(stuck):
                 break
             before = point.cost
-            point = _recentred(coordinates, _rescued(problem, effects, point, spread, limits), spread)
+            point = _recentred(coordinates, _rescued(problem, effects, point, spread, limits, stuck), spread)
             point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
             if point.cost > before - 1.0:
                 break
@@ -142,38 +144,51 @@ def _recentred(coordinates: tuple[Coordinate, ...], point: Point, spread: float)
 
 
 def _rescued(
-    problem: Problem, effects: tuple[str, ...], point: Point, spread: float, limits: tuple[Samples, Samples]
+    problem: Problem,
+    effects: tuple[str, ...],
+    point: Point,
+    spread: float,
+    limits: tuple[Samples, Samples],
+    stuck: Index,
 ) -> Point:
     """Start the stuck shots again, at shared parameters to which only the other shots are fitted.
 
     A few shots whose events come in another order hold up the fit of all: every step that helps the others
     makes them worse.
     """
-    again = begin_at(problem, effects, point.at, spread, (0.0, -spread, spread))
-    point = better_of(problem, point, again, spread)
+    point = _begun_again(problem, effects, point, spread, stuck)
     misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
     good = np.flatnonzero(misfit <= FAR * float(np.median(misfit)))
     if len(good) == problem.count or len(good) < 0.6 * problem.count:
         return point
     part = Problem(problem.shots.chosen(good), problem.forward.batches)
-    local = Local(
-        *(getattr(point.local, name)[good] for name in ("log_factor", "mass_kg", "speed_m_s", "shift_m"))
-    )
-    start = point_at(part, effects, point.at, local, spread)
+    start = point_at(part, effects, point.at, point.local.of(good), spread)
     found, _ = _descend(part, effects, start, spread, limits, (WHOLE, 1.0))
-    other = begin_at(problem, effects, found.at, spread, (0.0, -spread, spread))
+    moved = point_at(problem, effects, found.at, point.local.put(good, found.local), spread)
+    others = np.setdiff1d(np.arange(problem.count), good)
+    other = _begun_again(problem, effects, moved, spread, others)
     return other if other.cost < point.cost else point
 
 
-def _stuck(problem: Problem, effects: tuple[str, ...], point: Point, spread: float) -> bool:
-    """Whether some shot's own numbers are not at their optimum: the cost would still fall to first order."""
+def _begun_again(
+    problem: Problem, effects: tuple[str, ...], point: Point, spread: float, which: Index
+) -> Point:
+    """Start some shots again; each keeps what suits it better."""
+    part = Problem(problem.shots.chosen(which), problem.forward.batches)
+    again = begin_at(part, effects, point.at, spread, (0.0, -spread, spread))
+    new = point_at(problem, effects, point.at, point.local.put(which, again.local), spread)
+    return better_of(problem, point, new, spread)
+
+
+def _stuck(problem: Problem, effects: tuple[str, ...], point: Point, spread: float) -> Index:
+    """Shots whose own numbers are not at their optimum: the cost would still fall to first order."""
     misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
     if float(np.median(misfit)) > NOT_IT:
-        return False
+        return np.empty(0, dtype=np.int64)
     Jl = problem.own_derivatives(effects, point.at, point.local, point.residual)
     _, _, blocks = normal(problem, np.empty((0, point.residual.size)), Jl, point, spread)
     promise = np.einsum("iq,iqr,ir->i", blocks.gradient, blocks.inverse, blocks.gradient)
-    return bool((promise > PROMISE).any())
+    return np.flatnonzero(promise > PROMISE)
 
 
 def _descend(
@@ -189,12 +204,15 @@ def _descend(
     most_steps, tolerance = budget
     damping = 1e-3
     calm = 0
+    near = False
+    J = Jl = np.empty(0)
     for _ in range(most_steps):
-        J = problem.shared_derivatives(effects, point.at, point.local, point.residual)
-        Jl = problem.own_derivatives(effects, point.at, point.local, point.residual)
+        if not near:
+            J = problem.shared_derivatives(effects, point.at, point.local, point.residual)
+            Jl = problem.own_derivatives(effects, point.at, point.local, point.residual)
         H, g, blocks = normal(problem, J, Jl, point, spread)
         taken = False
-        for _attempt in range(8):
+        for _attempt in range(1 if near else 8):
             free = ~(((point.at <= lower) & (g < 0.0)) | ((point.at >= upper) & (g > 0.0)))
             step = np.zeros_like(point.at)
             scaled = H[np.ix_(free, free)].copy()
@@ -211,14 +229,20 @@ def _descend(
             damping *= 10.0
             if damping > GIVES_UP:
                 break
+        if not taken and near:
+            damping /= 10.0
+            near = False
+            continue
         if not taken:
             break
+        # Derivatives are worth having anew only when the parameters have moved since.
+        near = float(np.abs(trial.at - point.at).max(initial=0.0)) < NEAR
         gain = point.cost - trial.cost
         point = trial
         damping = max(damping / 8.0, 1e-9)
-        fresh = max(float(np.sqrt(np.mean(point.local.log_factor**2))), SMALLEST_SPREAD)
-        moved = abs(math.log(fresh / spread))
-        spread = fresh
+        newest = max(float(np.sqrt(np.mean(point.local.log_factor**2))), SMALLEST_SPREAD)
+        moved = abs(math.log(newest / spread))
+        spread = newest
         point = replace(point, cost=cost_of(point.residual, point.local, spread))
         # A model that is far from the floor need not be found to the last digit.
         excess = max(point.cost - point.residual.size, 0.0)

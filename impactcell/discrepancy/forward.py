@@ -1,12 +1,12 @@
 """Predictions of the plant for a whole set of shots, in the layout of `Shots`."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.shots import Shots
+from impactcell.discrepancy.shots import Index, Shots
 from impactcell.physics import Strike
 from impactcell.physics import layout as at
 from impactcell.physics.course import integrate_all
@@ -63,6 +63,17 @@ class Local:
     mass_kg: Samples
     speed_m_s: Samples
     shift_m: Samples
+
+    def of(self, places: Index) -> "Local":
+        """Return the numbers of some of the shots."""
+        return Local(*(getattr(self, one.name)[places] for one in fields(self)))
+
+    def put(self, places: Index, other: "Local") -> "Local":
+        """Return the same numbers but for those of some shots, which are taken from `other`."""
+        made = {one.name: getattr(self, one.name).copy() for one in fields(self)}
+        for name, values in made.items():
+            values[places] = getattr(other, name)
+        return Local(**made)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

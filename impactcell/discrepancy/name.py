@@ -10,7 +10,7 @@ from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.parameters import NOMINAL, of_effect, plant_name
 from impactcell.discrepancy.phases import course_of
 from impactcell.discrepancy.probes import SMALL, Probe, Range, probes
-from impactcell.discrepancy.problem import Problem
+from impactcell.discrepancy.problem import Problem, without_jumps
 from impactcell.discrepancy.shots import Index
 from impactcell.discrepancy.tangent import Products, Scores, Tangent, products, together
 from impactcell.errors import PhysicsError
@@ -19,6 +19,8 @@ from impactcell.physics.effects import LIBRARY
 from impactcell.physics.program import assemble
 from impactcell.records import Samples
 
+FORWARD = 0.1
+"""Step forward, in units of `SMALL`."""
 LARGEST = 5.0
 WEAK = 0.3
 """Strengths in units of an effect's typical one."""
@@ -74,7 +76,7 @@ def candidates(problem: Problem, fit: Fit, tangent: Tangent, library: Sequence[s
             if between is not None:
                 parts.append(unit.modulated(-between / fit.spread))
             else:
-                change = direction(problem, fit, identifier, probe)
+                change = direction(problem, fit, identifier, probe, alone=len(grid) == 1)
                 if change is None or not change.any():
                     continue
                 parts.append(products(tangent, change))
@@ -87,18 +89,33 @@ def candidates(problem: Problem, fit: Fit, tangent: Tangent, library: Sequence[s
     return Candidates(tuple(names), together(parts), np.array(groups, dtype=np.int64), side, tuple(kept))
 
 
-def direction(problem: Problem, fit: Fit, identifier: str, probe: Probe) -> Samples | None:
-    """Change of the whitened prediction when an effect joins at a probe; None where the plant cannot."""
+def direction(
+    problem: Problem, fit: Fit, identifier: str, probe: Probe, *, alone: bool = True
+) -> Samples | None:
+    """Change of the whitened prediction when an effect joins at a probe; None where the plant cannot.
+
+    A direction that is `alone` is a central difference: what the friction factors can do as well must cancel
+    to the last digits. Of a whole grid each is a small step forward.
+    """
     effects = (*fit.effects, identifier)
+    ahead, back = probe.at.copy(), probe.at.copy()
+    both = probe.scaled and probe.side == 0
+    if both and alone:
+        back[probe.amplitude] -= 2.0 * SMALL
+    elif both:
+        ahead[probe.amplitude] -= (1.0 - FORWARD) * SMALL
     try:
-        ahead = problem.residual(effects, np.concatenate([fit.at, probe.at]), fit.local)
-        if probe.scaled and probe.side == 0:
-            # A central difference: what the friction factors can do as well must cancel to the last digits.
-            back = probe.at.copy()
-            back[probe.amplitude] -= 2.0 * SMALL
-            change = 0.5 * (problem.residual(effects, np.concatenate([fit.at, back]), fit.local) - ahead)
+        there = problem.residual(effects, np.concatenate([fit.at, ahead]), fit.local)
+        if both and alone:
+            here = problem.residual(effects, np.concatenate([fit.at, back]), fit.local)
+            change = 0.5 * (here - there)
+            change[np.abs(here + there - 2.0 * fit.residual) > 1.0 + np.abs(change)] = 0.0
+        elif both:
+            change = without_jumps(fit.residual - there) / FORWARD
         else:
-            change = fit.residual - ahead
+            change = fit.residual - there
+            if probe.scaled:
+                change = without_jumps(change)
     except PhysicsError:
         return None
     return change if np.isfinite(change).all() else None

@@ -121,27 +121,19 @@ def normal(
     problem: Problem, J: Samples, Jl: Samples, point: Point, spread: float
 ) -> tuple[Samples, Samples, Blocks]:
     """Set up the normal equations of the shared coordinates, each shot's own eliminated."""
-    n, q, p = problem.count, len(Jl), len(J)
-    A = np.empty((n, q, q))
-    C = np.empty((n, q, p))
-    gl = np.empty((n, q))
-    H = np.zeros((p, p))
-    g = np.zeros(p)
-    for i in range(n):
-        part = problem.shots.of(i)
-        Ji, Li, ri = J[:, part], Jl[:, part], point.residual[part]
-        H += Ji @ Ji.T
-        g += Ji @ ri
-        A[i] = Li @ Li.T
-        C[i] = Li @ Ji.T
-        gl[i] = Li @ ri
+    q, p = len(Jl), len(J)
+    rows = np.vstack([Jl, J, point.residual])
+    gram = np.array([rows[:, part] @ rows[:, part].T for part in map(problem.shots.of, range(problem.count))])
+    A, C, gl = gram[:, :q, :q].copy(), gram[:, :q, q : q + p], gram[:, :q, -1].copy()
+    whole = gram[:, q:, q:].sum(0)
+    H, g = whole[:p, :p], whole[:p, -1]
     A[:, 0, 0] += 1.0 / spread**2
     gl[:, 0] -= point.local.log_factor / spread**2
     diagonal = np.einsum("iqq->iq", A)
     A[:, np.arange(q), np.arange(q)] += 1e-10 * diagonal + (diagonal == 0.0)
     inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
-    H -= np.einsum("iqa,iqr,irb->ab", C, inverse, C, optimize=True)
-    g -= np.einsum("iqa,iqr,ir->a", C, inverse, gl, optimize=True)
+    H = H - np.einsum("iqa,iqr,irb->ab", C, inverse, C, optimize=True)
+    g = g - np.einsum("iqa,iqr,ir->a", C, inverse, gl, optimize=True)
     return H, g, Blocks(inverse, C, gl)
 
 

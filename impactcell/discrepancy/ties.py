@@ -1,4 +1,9 @@
-"""Which fitted models the shots do not tell apart (Vuong 1989, the shot as the unit)."""
+"""Which fitted models the shots do not tell apart: out-of-shot likelihoods, shot by shot (Vuong 1989).
+
+What a model says of a shot is judged by parameters to which that shot and its replicates did not contribute,
+so that an effect with more parameters has no advantage. The parameters without them are one Gauss-Newton step
+away from those with them.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -7,13 +12,28 @@ import numpy as np
 
 from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.problem import Problem
+from impactcell.discrepancy.shots import Index
+from impactcell.discrepancy.tangent import linearise
+from impactcell.records import Samples
 
 TIED = 2.2
+ALIKE = 2.0
+DECISIVE = 150.0
+"""Log-likelihood, over the best model's mean squared residual, beyond which a few shots alone decide."""
+LARGEST_FOLD = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contender:
+    """A fitted model with its log-likelihood of every shot out of shot, shape (n,)."""
+
+    fit: Fit
+    each: Samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alternative:
-    """A set of effects that was fitted, and how much less likely it is than the best of its size."""
+    """A set of effects that was fitted, and how much less likely it is out of shot than the best."""
 
     fit: Fit
     log_likelihood: float
@@ -26,16 +46,45 @@ class Alternative:
         return self.fit.effects
 
 
-def behind(problem: Problem, best: Fit, other: Fit) -> tuple[float, float]:
-    """By how much `other` is less likely than `best`, and the standard deviation of that over shots."""
-    difference = best.log_likelihood(problem.shots) - other.log_likelihood(problem.shots)
-    return float(difference.sum()), float(difference.std() * np.sqrt(len(difference)))
+def folds(problem: Problem) -> Index:
+    """Fold of every shot: its replicate group, or itself where a group holds many of the shots."""
+    group = np.array([shot.group for shot in problem.shots.items])
+    _, member, size = np.unique(group, return_inverse=True, return_counts=True)
+    large = size[member] > LARGEST_FOLD * problem.count
+    return np.where(large, problem.count + np.arange(problem.count), member)
 
 
-def is_tied(problem: Problem, best: Fit, other: Fit) -> bool:
-    """Whether the shots do not tell two models apart (Vuong's test, the shot as the unit)."""
-    gap, std = behind(problem, best, other)
-    return gap <= TIED * std or gap < 2.0
+def out_of_shot(problem: Problem, model: Fit) -> Contender:
+    """Log-likelihood of every shot under parameters fitted without its fold.
+
+    With u and H the gradient and information of a fold and H_0 those of all shots, the parameters without it
+    lie at -(H_0 - H)^-1 u, where the fold's misfit is larger by 2 u's + s'H s with s = (H_0 - H)^-1 u.
+    """
+    tangent = linearise(problem, model)
+    scale = np.sqrt(np.maximum(np.diag(tangent.information), 1e-300))
+    H = tangent.shot_information / np.outer(scale, scale)
+    u = tangent.shot_gradient / scale
+    each = model.log_likelihood(problem.shots)
+    fold = folds(problem)
+    for number in np.unique(fold):
+        mine = fold == number
+        step = np.linalg.pinv(H[~mine].sum(0), rcond=1e-10, hermitian=True) @ u[mine].sum(0)
+        each[mine] -= u[mine] @ step + 0.5 * np.einsum("a,iab,b->i", step, H[mine], step)
+    return Contender(model, each)
+
+
+def ranked(problem: Problem, fits: Iterable[Fit]) -> list[Contender]:
+    """Sort fits by their likelihood out of shot, the likeliest first."""
+    made = [out_of_shot(problem, one) for one in fits]
+    return sorted(made, key=lambda one: (-float(one.each.sum()), one.fit.effects))
+
+
+def is_tied(problem: Problem, best: Contender, other: Contender) -> bool:
+    """Whether the shots do not tell two models apart."""
+    difference = best.each - other.each
+    gap, std = float(difference.sum()), float(difference.std() * np.sqrt(len(difference)))
+    dispersion = max(float(best.fit.misfit(problem.shots).mean() / problem.sizes.mean()), 1.0)
+    return gap < ALIKE or (gap <= TIED * std and gap < DECISIVE * dispersion)
 
 
 def total(problem: Problem, made: Fit) -> float:
@@ -48,12 +97,13 @@ def by_likelihood(problem: Problem, fits: Iterable[Fit]) -> list[Fit]:
     return sorted(fits, key=lambda made: (-total(problem, made), made.effects))
 
 
-def alternatives(problem: Problem, fits: Sequence[Fit]) -> tuple[Alternative, ...]:
-    """Compare fits with the likeliest of them."""
+def alternatives(contenders: Sequence[Contender]) -> tuple[Alternative, ...]:
+    """Compare models with the likeliest of them, the likeliest first."""
     made = []
-    best = max(fits, key=lambda one: total(problem, one)) if fits else None
-    for one in fits:
+    best = max(contenders, key=lambda one: float(one.each.sum()), default=None)
+    for one in contenders:
         if best is not None:
-            gap, std = behind(problem, best, one)
-            made.append(Alternative(one, total(problem, one), gap, std))
+            difference = best.each - one.each
+            std = float(difference.std() * np.sqrt(len(difference)))
+            made.append(Alternative(one.fit, float(one.each.sum()), float(difference.sum()), std))
     return tuple(sorted(made, key=lambda one: -one.log_likelihood))

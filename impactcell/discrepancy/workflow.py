@@ -125,7 +125,8 @@ def investigate(
             problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
             nominal = fit_nominal(problem, plant)
     say("locating the gap and naming effects")
-    coarse = Problem(thinned(problem.shots, COARSE), len(material.batches))
+    fewer = thinned(problem.shots, COARSE)
+    coarse = problem if fewer is problem.shots else Problem(fewer, len(material.batches))
     found = search(Setup(problem, coarse, material, names, seed, each, _certain(material, floor)), nominal)
     final = found.accepted or nominal
     say("proving on held-out shots")
