@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.compiled import Wholes, compiled
 from impactcell.prediction.reading import noise_std
 from impactcell.records import Channel, Samples
 
@@ -20,6 +21,36 @@ FINE_POSITION_BLOCK_S = 5e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Scatter:
+    """How the samples of each block lie about its means.
+
+    Attributes
+    ----------
+    count : ndarray, shape (n,)
+        Samples of the block.
+    times, values, both : ndarray, shape (n,)
+        Sums of (t - mean t)², (y - mean y)² and of their product.
+    noise_std : float
+        Of one sample.
+    """
+
+    count: Samples
+    times: Samples
+    values: Samples
+    both: Samples
+    noise_std: float
+
+    def squares(self, slope: Samples) -> Samples:
+        """Sum of squares about straight lines of that slope through each block's means, in noise."""
+        within: Samples = self.values - 2.0 * slope * self.both + slope**2 * self.times
+        return within / self.noise_std**2
+
+
+NONE = np.empty(0)
+NO_SCATTER = Scatter(NONE, NONE, NONE, NONE, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Blocks:
     """Means of consecutive samples of one channel.
 
@@ -27,14 +58,17 @@ class Blocks:
     ----------
     time_s, values, std : ndarray, shape (n,)
         Mean time, mean value, and its standard deviation from the noise of one sample.
+    scatter : Scatter
+        What the means leave out.
     """
 
     time_s: Samples
     values: Samples
     std: Samples
+    scatter: Scatter = NO_SCATTER
 
 
-NOTHING = Blocks(np.empty(0), np.empty(0), np.empty(0))
+NOTHING = Blocks(NONE, NONE, NONE)
 
 
 def blocks(
@@ -76,10 +110,33 @@ def blocks(
     starts = starts[starts < count]
     if len(starts) == 0 or starts[0] != 0:
         starts = np.concatenate([[0], starts])
-    sizes = np.diff(np.append(starts, count))
     sigma = noise_std(channel)
-    return Blocks(
-        np.add.reduceat(times, starts) / sizes,
-        np.add.reduceat(values, starts) / sizes,
-        sigma / np.sqrt(sizes),
-    )
+    table = _gathered(times, values, starts)
+    scatter = Scatter(table[0], table[3], table[4], table[5], sigma)
+    return Blocks(table[1], table[2], sigma / np.sqrt(table[0]), scatter)
+
+
+@compiled
+def _gathered(times: Samples, values: Samples, starts: Wholes) -> Samples:
+    """Count, means and sums about the means of each block, shape (6, n)."""
+    table = np.zeros((6, len(starts)))
+    for block in range(len(starts)):
+        first = starts[block]
+        end = starts[block + 1] if block + 1 < len(starts) else len(times)
+        size = end - first
+        t0, y0 = times[first], values[first]  # sums of what is left keep their digits
+        t, y, tt, yy, ty = 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(first, end):
+            dt, dy = times[i] - t0, values[i] - y0
+            t += dt
+            y += dy
+            tt += dt * dt
+            yy += dy * dy
+            ty += dt * dy
+        table[0, block] = size
+        table[1, block] = t0 + t / size
+        table[2, block] = y0 + y / size
+        table[3, block] = tt - t * t / size
+        table[4, block] = yy - y * y / size
+        table[5, block] = ty - t * y / size
+    return table

@@ -1,7 +1,7 @@
 """Gauss-Newton descent of a tap's posterior on one side of the kink of immediate breakaway."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,10 @@ class Minimum:
     theta : ndarray, shape (4,)
     side : int
     residual : ndarray, shape (n,)
-    jacobian : ndarray, shape (n, 4)
+    normal : ndarray, shape (p, p)
+        Product of the derivative by what is fitted with itself.
+    slope : ndarray, shape (p,)
+        Product of that derivative with the residual.
     cost : float
         Half the sum of squares, data and prior.
     settled : bool
@@ -63,7 +66,8 @@ class Minimum:
     theta: Samples
     side: int
     residual: Samples
-    jacobian: Samples
+    normal: Samples
+    slope: Samples
     cost: float
     settled: bool = True
 
@@ -74,19 +78,17 @@ class Minimum:
 
     def as_side(self, known: Belief, misfit: float = 1.0) -> Side:
         """Give the quadratic about the minimum, the data's weight divided by `misfit` squared."""
-        free = known.free
-        slope = self.jacobian[:, free] / misfit
-        residual = self.residual / misfit
-        prior = known.weight[free] ** 2
-        curvature = slope.T @ slope + np.diag(prior)
+        free, prior = known.free, known.weight[known.free] ** 2
+        curvature = self.normal / misfit**2 + np.diag(prior)
         away = (self.theta - known.mean)[free]
-        gradient = slope.T @ residual + prior * away
-        step = -np.linalg.solve(curvature, gradient)
+        gradient = self.slope / misfit**2 + prior * away
+        inverse = np.linalg.inv(curvature)
+        step = -inverse @ gradient
         mean = self.theta.copy()
         mean[free] += step
         covariance = np.zeros((PARAMETERS, PARAMETERS))
-        covariance[np.ix_(free, free)] = np.linalg.inv(curvature)
-        cost = 0.5 * float(residual @ residual + prior @ away**2) + 0.5 * float(gradient @ step)
+        covariance[free[:, None], free] = inverse
+        cost = 0.5 * (self.chi2 / misfit**2 + float(prior @ away**2) + float(gradient @ step))
         _, log_determinant = np.linalg.slogdet(curvature)
         return Side(mean, covariance, cost, -float(log_determinant), self.side)
 
@@ -97,40 +99,44 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
     Below the kink (`side` -1) the model is that of immediate breakaway. Above it (`side` +1) the residuals
     are continued linearly along mu_k/mu_s from the kink.
     """
-    theta = start.copy()
-    residual, jacobian = _linear(response, theta, side)
-    cost = 0.5 * float(residual @ residual) + known.cost(theta)
     free, prior = known.free, known.weight[known.free] ** 2
     longest = np.minimum(0.5, LONGEST_IN_STD / np.maximum(known.weight[free], 1e-12))
+    best = _at(response, known, start, side)
     damping = 0.0
     for _ in range(MOST_STEPS):
-        slope = jacobian[:, free]
-        curvature = slope.T @ slope + np.diag(prior)
-        gradient = slope.T @ residual + prior * (theta - known.mean)[free]
+        curvature = best.normal + np.diag(prior)
+        gradient = best.slope + prior * (best.theta - known.mean)[free]
         step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
         if not np.isfinite(step).all():
             break
-        noise = max(2.0 * cost / response.size, 1.0)
+        noise = max(2.0 * best.cost / response.size, 1.0)
         if float(step @ curvature @ step) < SETTLED**2 * noise and damping <= 1e-3:
-            return Minimum(theta, side, residual, jacobian, cost)
-        moved = theta.copy()
-        moved[free] += np.clip(step, -longest, longest)
+            return best
+        moved = best.theta.copy()
+        moved[free] += np.minimum(np.maximum(step, -longest), longest)
         try:
-            new_residual, new_jacobian = _linear(response, moved, side)
-            new_cost = 0.5 * float(new_residual @ new_residual) + known.cost(moved)
+            tried = _at(response, known, moved, side)
         except PhysicsError:
-            new_cost = math.inf
-        if new_cost <= cost + NO_GAIN * noise:
-            settled = abs(new_cost - cost) < NO_GAIN * noise and damping <= 1e-2
-            theta, residual, jacobian, cost = moved, new_residual, new_jacobian, new_cost
+            tried = replace(best, cost=math.inf)
+        if tried.cost <= best.cost + NO_GAIN * noise:
+            settled = abs(tried.cost - best.cost) < NO_GAIN * noise and damping <= 1e-2
+            best = tried
             if settled:
-                return Minimum(theta, side, residual, jacobian, cost)
+                return best
             damping = 0.0 if damping < 1e-2 else 0.1 * damping
         else:
             damping = max(10.0 * damping, 1e-2)
             if damping > 1e8:
                 break
-    return Minimum(theta, side, residual, jacobian, cost, settled=False)
+    return replace(best, settled=False)
+
+
+def _at(response: Response, known: Belief, theta: Samples, side: int) -> Minimum:
+    """Give the linear model at `theta`."""
+    residual, jacobian = _linear(response, theta, side)
+    by_free = jacobian[:, known.free]
+    cost = 0.5 * float(residual @ residual) + known.cost(theta)
+    return Minimum(theta, side, residual, by_free.T @ by_free, by_free.T @ residual, cost)
 
 
 def _linear(response: Response, theta: Samples, side: int) -> tuple[Samples, Samples]:

@@ -8,6 +8,8 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+from scipy.optimize import brentq
+
 from impactcell.errors import NegativeRootError, PredictionError
 from impactcell.prediction.model import REFERENCE_VELOCITY, DistanceForm, Model, Predictor, Sensitivity
 from impactcell.prediction.reading import Reading
@@ -153,14 +155,11 @@ def by_distance(model: Model, mixed: Mix, velocity_m_s: float, slid: Reading) ->
             f"sliding distance {1e6 * slid.value:.4g} µm is that of a part without friction; "
             "check mass and velocity"
         )
-    low, high = LOWEST_MU, limit
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if mixed.sliding_distance(middle, velocity_m_s) > slid.value:
-            low = middle
-        else:
-            high = middle
-    value = 0.5 * (low + high)
+    value = float(
+        brentq(
+            lambda mu_s: mixed.sliding_distance(mu_s, velocity_m_s) - slid.value, LOWEST_MU, limit, xtol=1e-15
+        )
+    )
     slope = abs(mixed.slope_of_distance(value, velocity_m_s))
     sensitivity = _sensitivity(mixed, "distance_sensitivity")
     std = math.hypot(

@@ -14,6 +14,7 @@ from impactcell.errors import (
     ClippedForceError,
     NoSeparationError,
 )
+from impactcell.prediction.local import longest_run, polynomial, running_mean, spread, survey, widest_cubic
 from impactcell.records import Capture, Channel, Samples
 
 CONTACT_SMOOTHING_S = 2e-4
@@ -48,14 +49,14 @@ def checked(channel: Channel | None, name: str) -> Channel:
         raise CaptureError(
             f"the {name} record has {len(channel.values)} samples at {len(channel.time_s)} times"
         )
-    bad = len(channel.values) - int(np.isfinite(channel.values + channel.time_s).sum())
+    bad, ascending, lowest, highest = survey(channel.time_s, channel.values)
     if bad:
         raise CaptureError(f"{bad} of {len(channel.values)} {name} samples are not numbers")
     if len(channel.values) < 8:
         raise CaptureError(f"the {name} record has only {len(channel.values)} samples")
-    if not (channel.time_s[1:] > channel.time_s[:-1]).all():
+    if not ascending:
         raise CaptureError(f"the times of the {name} record do not increase")
-    if channel.values.max() == channel.values.min():
+    if highest == lowest:
         raise CaptureError(f"the {name} is constant at {channel.values[0]:.6g}")
     return channel
 
@@ -72,7 +73,7 @@ def displacement(capture: Capture) -> Channel:
         As `checked`.
     """
     position = checked(capture.position, "position")
-    first = float(np.median(position.values[:5]))
+    first = sorted(position.values[:5].tolist())[2]
     if abs(first - capture.start_m) < abs(first):
         return replace(position, values=position.values - capture.start_m)
     return position
@@ -109,9 +110,9 @@ def peak_force(channel: Channel) -> Reading:
     top = int(np.argmax(smooth))
     if smooth[top] < 8.0 * sigma:
         raise CaptureError(f"no contact: the force stays below {smooth[top]:.3g} N, noise is {sigma:.3g} N")
-    found = _widest_fit(times, values, sigma, times[top], sides=(1.0, 1.0))
+    found = _widest_fit(times, values, sigma, times[top], 1.0, 1.0)
     if found is None:  # a jump beside the peak, as when the actuator halts within the contact
-        sided = [_widest_fit(times, values, sigma, times[top], sides=s) for s in ((1.0, 0.0), (0.0, 1.0))]
+        sided = [_widest_fit(times, values, sigma, times[top], *s) for s in ((1.0, 0.0), (0.0, 1.0))]
         found = max((one for one in sided if one is not None), key=lambda one: one.value, default=None)
     return found or Reading(float(smooth[top]), sigma)
 
@@ -122,9 +123,7 @@ def refuse_clipped(force: Channel) -> None:
     if force.full_scale is not None and highest >= force.full_scale[1]:
         count = int((force.values >= force.full_scale[1]).sum())
         raise ClippedForceError(f"{count} force samples are at full scale, {force.full_scale[1]:.6g} N")
-    at_top = np.flatnonzero(force.values == highest)
-    runs = np.split(at_top, np.flatnonzero(np.diff(at_top) > 1) + 1)
-    longest = max(len(run) for run in runs)
+    longest = longest_run(force.values, highest)
     if longest >= CLIPPED_RUN and (force.resolution or 0.0) < 2.0 * (force.noise_std or 0.0):
         raise ClippedForceError(f"{longest} force samples in a row stand at {highest:.6g} N: clipped")
 
@@ -150,25 +149,21 @@ def loss_of_contact(force: Channel) -> Reading:
     if last >= len(smooth) - max(2, width):
         raise NoSeparationError(f"the force was still {smooth[-1]:.3g} N when its record ended")
     times, values = force.time_s, force.values
-    window = 1.5e-3
+    window, end_s = 1.5e-3, float(times[last])
     for _ in range(5):
-        near = (times > times[last] - window) & (times <= times[last]) & (values > 3.0 * sigma)
-        if near.sum() < 6:
+        first = int(np.searchsorted(times, end_s - window, "right"))
+        pressed = values[first : last + 1] > 3.0 * sigma
+        falling = values[first : last + 1][pressed]
+        freedom = len(falling) - 3
+        if freedom < 3:
             break
-        origin, scale = times[last], window
-        u = (times[near] - origin) / scale
-        basis = np.vander(u, 3)
-        coefficients, *_ = np.linalg.lstsq(basis, values[near])
-        residual = values[near] - basis @ coefficients
-        freedom = len(u) - 3
-        roots = np.roots(coefficients)
-        real = [root.real for root in roots if abs(root.imag) < 1e-9 and -0.5 < root.real < 1.0]
-        if real and (residual @ residual) / sigma**2 < freedom + 4.0 * math.sqrt(2.0 * freedom):
+        parabola, factor, squares = polynomial(times[first : last + 1][pressed], falling, end_s, window, 2)
+        real = [root for root in _real_roots(*parabola.tolist()) if -0.5 < root < 1.0]
+        if real and squares / sigma**2 < freedom + 4.0 * math.sqrt(2.0 * freedom):
             root = min(real, key=abs)
-            leverage = np.vander([root], 3)[0]
-            error = sigma * math.sqrt(float(leverage @ np.linalg.inv(basis.T @ basis) @ leverage))
-            slope = abs(float(np.polyval(np.polyder(coefficients), root)))
-            return Reading(float(origin + scale * root), scale * min(error / max(slope, 1e-300), 1.0))
+            slope = abs(float(parabola[1] + 2.0 * parabola[2] * root))
+            error = sigma * spread(factor, root)
+            return Reading(end_s + window * root, window * min(error / max(slope, 1e-300), 1.0))
         window /= 1.6
     step = float(np.median(np.diff(times[max(0, last - 50) : last + 2])))
     return Reading(float(times[last] + 0.5 * step * width), step * width)
@@ -183,54 +178,27 @@ def _smooth(channel: Channel) -> Samples:
     width = _smoothing_width(channel)
     if width == 1:
         return channel.values
-    running = np.concatenate([np.zeros(1), np.cumsum(channel.values)])
-    index = np.arange(len(channel.values))
-    first = np.maximum(index - width // 2, 0)
-    last = np.minimum(index - width // 2 + width, len(index))
-    smooth: Samples = (running[last] - running[first]) / (last - first)
-    return smooth
+    return running_mean(channel.values, width)
+
+
+def _real_roots(c0: float, c1: float, c2: float) -> tuple[float, ...]:
+    """Real zeros of c0 + c1 u + c2 u²."""
+    if c2 == 0.0:
+        return (-c0 / c1,) if c1 else ()
+    inside = c1 * c1 - 4.0 * c0 * c2
+    if not inside >= 0.0:
+        return ()
+    larger = -0.5 * (c1 + math.copysign(math.sqrt(inside), c1))
+    return (larger / c2, c0 / larger) if larger else (0.0,)
 
 
 def _widest_fit(
-    times: Samples, values: Samples, sigma: float, at_s: float, sides: tuple[float, float]
+    times: Samples, values: Samples, sigma: float, at_s: float, left: float, right: float
 ) -> Reading | None:
-    """Maximum of a cubic over the widest window about `at_s` in which its residuals are noise.
-
-    Lepski's rule: windows grow until the residuals, or the maximum against those of narrower windows,
-    show more than noise. What bias stays is of the size of the noise: hence the factor `BIASED`.
-    """
-    accepted: Reading | None = None
-    earlier: list[Reading] = []
+    """Maximum of a cubic about `at_s`; what bias stays is of the size of the noise: hence `BIASED`."""
     step = float(np.median(np.diff(times[:100])))
-    half = max(2.5e-4, 4.0 * step)
-    centre = at_s
-    while half <= WIDEST_WINDOW_S or accepted is None:
-        first = int(np.searchsorted(times, centre - sides[0] * half - 0.01 * step, "left"))
-        last = int(np.searchsorted(times, centre + sides[1] * half + 0.01 * step, "right"))
-        if last - first < 6:
-            half *= 1.3
-            if half > 4.0 * WIDEST_WINDOW_S:
-                return accepted
-            continue
-        u = (times[first:last] - centre) / half
-        basis = np.vander(u, 4)
-        gram = np.linalg.inv(basis.T @ basis)
-        coefficients = gram @ (basis.T @ values[first:last])
-        residual = values[first:last] - basis @ coefficients
-        freedom = last - first - 4
-        if (residual @ residual) / sigma**2 > freedom + 3.0 * math.sqrt(2.0 * freedom):
-            break
-        grid = np.linspace(u[0], u[-1], 81)
-        best = grid[int(np.argmax(np.polyval(coefficients, grid)))]
-        leverage = np.vander([best], 4)[0]
-        reading = Reading(
-            float(leverage @ coefficients), sigma * math.sqrt(float(leverage @ gram @ leverage))
-        )
-        if any(abs(reading.value - before.value) > 2.0 * before.std for before in earlier):
-            break
-        accepted = Reading(reading.value, BIASED * reading.std)
-        earlier.append(reading)
-        if sides == (1.0, 1.0):
-            centre = float(np.clip(centre + half * best, at_s - half, at_s + half))
-        half *= 1.3
-    return accepted
+    narrowest_s = max(2.5e-4, 4.0 * step)
+    found, value, std = widest_cubic(
+        times, values, sigma, at_s, left, right, narrowest_s, WIDEST_WINDOW_S, step
+    )
+    return Reading(value, BIASED * std) if found else None

@@ -87,7 +87,7 @@ class Response:
             position_time_s=[position.time_s] * copies,
             gravity_m_s2=plant.gravity_m_s2,
         )
-        self._force_count = len(force.values)
+        self._scatters = force.scatter, position.scatter
         self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
 
     def doubted(self, factor: Samples) -> "Response":
@@ -95,6 +95,26 @@ class Response:
         other = copy(self)
         other._weights = self._weights / factor  # noqa: SLF001  # its own copy
         return other
+
+    def gap(self, residual: Samples) -> float:
+        """RMS of the residuals of single samples over the noise of their sensor, from those of the blocks.
+
+        Within a block the model is taken as straight, which it is to a hundredth of the noise; blocks about a
+        jump, whose means say nothing, are left out.
+        """
+        model = self._values - residual / self._weights
+        split = len(self.force_time_s)
+        total = count = 0.0
+        for times, scatter, part in (
+            (self.force_time_s, self._scatters[0], slice(None, split)),
+            (self.position_time_s, self._scatters[1], slice(split, None)),
+        ):
+            if len(times) > 2:
+                used = self._weights[part] * scatter.noise_std > 0.5 * np.sqrt(scatter.count)
+                squares = residual[part] ** 2 + scatter.squares(_slopes(times, model[part]))
+                total += float(squares[used].sum())
+                count += float(scatter.count[used].sum())
+        return math.sqrt(total / count)
 
     def kink(self, theta: Samples) -> float:
         """Give z = ln(mu_s m g / (b v)), positive where the part sticks first."""
@@ -169,6 +189,18 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
         force = replace(force, std=force.std * _straddling(force.time_s, jumps))
     position = blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return Response(plant, tap, force, position)
+
+
+def _slopes(times: Samples, values: Samples) -> Samples:
+    """Slope of the model in each block from its neighbours; beside a jump from the one this side of it."""
+    step = np.diff(values) / np.diff(times)
+    left, right = np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])
+    across = np.empty_like(values)
+    across[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])
+    across[0], across[-1] = step[0], step[-1]
+    least = 2.0 * np.minimum(np.abs(left), np.abs(right))
+    slope: Samples = np.where(left * right > 0.0, np.clip(across, -least, least), 0.0)
+    return slope
 
 
 def _straddling(times: Samples, jumps: list[float]) -> Samples:

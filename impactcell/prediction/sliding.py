@@ -1,11 +1,13 @@
 """The free slide as read off a capture: distance from the last loss of contact to rest, and deceleration."""
 
+import cmath
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
+from impactcell.prediction.local import polynomial, spread, value_at
 from impactcell.prediction.reading import Reading, checked, displacement, loss_of_contact, noise_std
 from impactcell.records import Capture, Samples
 
@@ -67,42 +69,44 @@ def _rest(
     if len(sliding) < 8:
         raise NoStopError("the slide is too short for its position samples")
     last = int(sliding[-1])
-    inside = (times > separation_s) & (times <= times[last])
-    if inside.sum() < 8:
+    first = int(np.searchsorted(times, separation_s, "right"))
+    inside = slice(first, last + 1)
+    if last + 1 - first < 8:
         raise NoStopError("the slide is too short for its position samples")
     origin, span = separation_s, float(times[last] - separation_s)
-    u = (times[inside] - origin) / span
-    basis = np.vander(u, 4)
-    coefficients, *_ = np.linalg.lstsq(basis, moved[inside])
-    inverse = np.linalg.inv(basis.T @ basis)
-    speed = np.polyder(coefficients)
+    cubic, factor, _ = polynomial(times[inside], moved[inside], origin, span, 3)
+    _, c1, c2, c3 = cubic.tolist()
+    last_speed, braking = c1 + 2.0 * c2 + 3.0 * c3, -(2.0 * c2 + 6.0 * c3)
     # The zero of the speed next after the last sample that still moved is the stop.
-    near = [root.real for root in np.roots(speed) if abs(root.imag) < 0.2 and 0.7 < root.real < 1.6]
+    near = [root.real for root in _zeros(c1, 2.0 * c2, 3.0 * c3) if abs(root.imag) < 0.2]
+    near = [root for root in near if 0.7 < root < 1.6]
     if near:
         stop = min(near, key=lambda root: abs(root - 1.0))
     else:  # cut off on the way, or braked otherwise than a cubic says
-        last_speed, braking = float(np.polyval(speed, 1.0)), -float(np.polyval(np.polyder(speed), 1.0))
         stop = 1.0 + (last_speed / braking if braking > 0.0 else math.inf if last_speed > 0.0 else 0.0)
     stop_s = origin + span * max(stop, 1.0)
     quiet = (last + len(times)) // 2  # what lies after it is at rest, if anything is
     if stop_s > times[-1] and not _still(times[quiet:], moved[quiet:], sigma):
-        left = 1e3 * float(np.polyval(speed, 1.0)) / span
+        left = 1e3 * last_speed / span
         raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
     stop_s = min(stop_s, float(times[-1]))
     after = moved[times > stop_s] if stop_s < times[-1] else moved[quiet:]
     if len(after) >= 3:
         rest = Reading(float(after.mean()), sigma / math.sqrt(len(after)))
     else:
-        rest = Reading(
-            float(np.polyval(coefficients, stop)), sigma * float(np.sqrt(np.ones(4) @ inverse @ np.ones(4)))
-        )
-    parabola, *_ = np.linalg.lstsq(basis[:, 1:], moved[inside])
-    spread = float(np.linalg.inv(basis[:, 1:].T @ basis[:, 1:])[0, 0])
-    return (
-        rest,
-        float(stop_s),
-        Reading(-2.0 * float(parabola[0]) / span**2, 2.0 * sigma * math.sqrt(spread) / span**2),
-    )
+        rest = Reading(value_at(cubic, stop), sigma * spread(factor, 1.0))
+    parabola, factor, _ = polynomial(times[inside], moved[inside], origin, span, 2)
+    # The inverse of the normal equations has 1 / L² in its last place: the variance of the highest power.
+    deceleration = Reading(-2.0 * float(parabola[2]) / span**2, 2.0 * sigma / float(factor[2, 2]) / span**2)
+    return rest, float(stop_s), deceleration
+
+
+def _zeros(c0: float, c1: float, c2: float) -> tuple[complex, ...]:
+    """Zeros of c0 + c1 u + c2 u², complex ones too."""
+    if c2 == 0.0:
+        return (-c0 / c1,) if c1 else ()
+    root = cmath.sqrt(c1 * c1 - 4.0 * c0 * c2)
+    return (-c1 + root) / (2.0 * c2), (-c1 - root) / (2.0 * c2)
 
 
 def _still(times: Samples, moved: Samples, sigma: float) -> bool:
@@ -115,16 +119,11 @@ def _still(times: Samples, moved: Samples, sigma: float) -> bool:
 
 def _level(times: Samples, values: Samples, at_s: float, sigma: float) -> Reading:
     """Value of a smooth channel at a time, from a cubic through its neighbourhood."""
-    found = None
     for half in (2e-3, 4e-3, 8e-3):
-        near = np.abs(times - at_s) <= half
-        if near.sum() >= 8:
-            found = near
-            break
-    if found is None:
-        return Reading(float(np.interp(at_s, times, values)), sigma)
-    scale = float(np.abs(times[found] - at_s).max())
-    basis = np.vander((times[found] - at_s) / scale, 4)
-    coefficients, *_ = np.linalg.lstsq(basis, values[found])
-    inverse = np.linalg.inv(basis.T @ basis)
-    return Reading(float(coefficients[-1]), sigma * math.sqrt(float(inverse[-1, -1])))
+        first = int(np.searchsorted(times, at_s - half, "left"))
+        last = int(np.searchsorted(times, at_s + half, "right"))
+        if last - first >= 8:
+            scale = max(at_s - float(times[first]), float(times[last - 1]) - at_s)
+            cubic, factor, _ = polynomial(times[first:last], values[first:last], at_s, scale, 3)
+            return Reading(float(cubic[0]), sigma * spread(factor, 0.0))
+    return Reading(float(np.interp(at_s, times, values)), sigma)

@@ -13,19 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
-from impactcell.physics import Ensemble, Plant
+from impactcell.physics import Plant
 from impactcell.prediction.descent import Belief, Minimum, descend
 from impactcell.prediction.doubt import DOUBTED, LATER, doubt, phases
 from impactcell.prediction.model import Model
 from impactcell.prediction.posterior import Posterior, mixture
-from impactcell.prediction.reading import checked, displacement, noise_std, refuse_clipped
+from impactcell.prediction.reading import checked, refuse_clipped
 from impactcell.prediction.response import (
     DAMPING,
     MU_K,
     RATIO,
     STIFFNESS,
     Response,
-    commanded,
     parameters,
     respond,
     with_parameters,
@@ -150,7 +149,7 @@ def _fit(capture: Capture, plant: Plant, known: Belief, start: Samples, slid: Sl
             residual, _ = response.linear(best.theta, best.side)
             fits = _both_sides(response.doubted(doubt(residual, phase) * LATER[phase]), known, best.theta)
             best, _ = _likelier(fits, known, offset)
-    gap = _gap(plant, plain.theta, capture)
+    gap = response.gap(plain.residual)
     if misfit > MISSED:
         raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
     best, _ = _likelier(fits, known, offset)
@@ -189,6 +188,8 @@ def _likelier(fits: list[Minimum], known: Belief, offset: float) -> tuple[Minimu
     """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
     freedom = max(len(fits[0].residual) - len(known.free), 1)
     misfit = math.sqrt(min(one.chi2 for one in fits) / freedom)
+    if len(fits) == 1:
+        return fits[0], misfit
     weights = mixture(tuple(one.as_side(known, max(misfit, 1.0)) for one in fits), Z, offset).weights
     best = fits[int(np.argmax(weights))]
     return best, math.sqrt(best.chi2 / freedom)
@@ -199,23 +200,6 @@ def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
     mean, std = posterior.moments(of)
     value = math.exp(mean + 0.5 * std * std)
     return value, value * math.sqrt(math.expm1(std * std))
-
-
-def _gap(plant: Plant, theta: Samples, capture: Capture) -> float:
-    """RMS of the residuals of every sample over the noise of its sensor."""
-    force, position = checked(capture.force, "force"), displacement(capture)
-    ensemble = Ensemble(
-        [commanded(capture)],
-        tuple(plant.effects),
-        force_time_s=[force.time_s],
-        position_time_s=[position.time_s],
-        gravity_m_s2=plant.gravity_m_s2,
-    )
-    traces = ensemble.traces(ensemble.parameters(with_parameters(plant, theta)))
-    of_force = (force.values - traces.force_n) / noise_std(force)
-    of_position = (position.values - traces.position_m) / noise_std(position)
-    total = float(np.square(of_force).sum() + np.square(of_position).sum())
-    return math.sqrt(total / (len(of_force) + len(of_position)))
 
 
 def braking_friction(model: Model, mass_kg: float, slid: Slide) -> float:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError, NotConvergedError
-from impactcell.physics import Plant
+from impactcell.physics import Plant, strike
 from impactcell.prediction import Model, Prior
+from impactcell.prediction.reading import noise_std
+from impactcell.prediction.response import commanded, with_parameters
 from impactcell.prediction.waveform import fit
 from impactcell.records import Channel
 from tests.taps import VISCOUS, Tap
@@ -115,6 +117,19 @@ def test_noise_above_what_the_sensors_state_widens_the_standard_deviation() -> N
     found = fit(loud, MODEL)
     assert found.gap == pytest.approx(2.0, rel=0.1)
     assert found.mu_k_std > 1.5 * honest.mu_k_std
+
+
+@pytest.mark.parametrize("stroke_m", [1.5e-3, 5e-3])
+def test_the_gap_is_that_of_every_sample(stroke_m: float) -> None:
+    capture = Tap(2500 / 6e4, 0.2, stroke_m=stroke_m).capture(np.random.default_rng(7), force_hz=1e5)
+    found = fit(capture, MODEL)
+    motion = strike(with_parameters(MODEL.plant, found.theta), commanded(capture))
+    squares = []
+    for channel, name in ((capture.force, "force_n"), (capture.position, "position_m")):
+        assert channel is not None
+        model = getattr(motion.sample(channel.time_s), name)
+        squares.append(np.square((channel.values - model) / noise_std(channel)))
+    assert found.gap == pytest.approx(math.sqrt(np.concatenate(squares).mean()), rel=1e-3)
 
 
 def test_an_effect_that_the_model_lacks_shows_in_the_gap_and_in_the_standard_deviation() -> None:

@@ -1,0 +1,93 @@
+"""Polynomials and means by compiled code, against numpy's and against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from impactcell.prediction.blocks import blocks
+from impactcell.prediction.local import (
+    longest_run,
+    polynomial,
+    running_mean,
+    spread,
+    survey,
+    value_at,
+    widest_cubic,
+)
+from impactcell.records import Channel
+
+
+@given(
+    st.integers(1, 3),
+    st.integers(8, 400),
+    st.floats(-100.0, 100.0),
+    st.sampled_from([1e-4, 1.0, 1e3]),
+    st.integers(0, 99),
+)
+def test_a_polynomial_is_that_of_least_squares(
+    degree: int, count: int, origin: float, scale: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    u = np.sort(rng.uniform(-1.0, 1.0, count))
+    u[0], u[-1] = -1.0, 1.0
+    values = 1e3 + rng.normal(size=count) + 5.0 * u**2
+    fitted, factor, squares = polynomial(origin + scale * u, values, origin, scale, degree)
+    basis = np.vander(u, degree + 1, increasing=True)
+    expected, residual, *_ = np.linalg.lstsq(basis, values)
+    assert fitted == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert squares == pytest.approx(float(residual[0]), rel=1e-6)
+    covariance = np.linalg.inv(basis.T @ basis)
+    at = 0.3 ** np.arange(degree + 1)
+    assert spread(factor, 0.3) == pytest.approx(math.sqrt(at @ covariance @ at), rel=1e-6)
+    assert value_at(fitted, 0.3) == pytest.approx(float(expected @ at), rel=1e-9)
+
+
+def test_samples_at_one_time_determine_no_polynomial() -> None:
+    fitted, _, _ = polynomial(np.zeros(9), np.arange(9.0), 0.0, 1.0, 2)
+    assert not np.isfinite(fitted).all()
+
+
+@given(st.integers(1, 60), st.integers(1, 12), st.integers(0, 99))
+def test_a_running_mean_is_that_of_the_values_about_each(count: int, width: int, seed: int) -> None:
+    values = np.random.default_rng(seed).normal(size=count)
+    mean = running_mean(values, width)
+    for i in range(count):
+        near = values[max(0, i - width // 2) : max(0, i - width // 2 + width)]
+        assert mean[i] == pytest.approx(near.mean(), abs=1e-12)
+
+
+def test_a_survey_counts_what_is_wrong() -> None:
+    times, values = np.array([0.0, 1.0, 1.0, 3.0]), np.array([2.0, -5.0, math.nan, 7.0])
+    assert survey(times, values) == (1, False, -5.0, 7.0)
+    assert survey(times[:2], values[:2]) == (0, True, -5.0, 2.0)
+    assert longest_run(np.array([1.0, 7.0, 7.0, 2.0, 7.0, 7.0, 7.0]), 7.0) == 3
+    assert longest_run(np.array([1.0, 2.0]), 7.0) == 0
+
+
+def test_the_widest_cubic_stops_where_the_record_bends_away() -> None:
+    rng = np.random.default_rng(5)
+    times = np.arange(4001) * 1e-5
+    top = 300.0 - 4e5 * (times - 0.02) ** 2
+    found, value, std = widest_cubic(
+        times,
+        np.where(times < 0.0225, top, 0.0) + rng.normal(0.0, 0.4, 4001),
+        0.4, 0.02, 1.0, 1.0, 2.5e-4, 4e-3, 1e-5,
+    )  # fmt: skip
+    assert found
+    assert abs(value - 300.0) < 5.0 * std
+    assert 0.4 / math.sqrt(500) < std < 0.2
+
+
+def test_scatter_and_means_of_blocks_hold_all_squares() -> None:
+    rng = np.random.default_rng(8)
+    times = np.cumsum(rng.uniform(0.2, 1.8, 500)) * 1e-5
+    values = 1e3 + 2e4 * times + rng.normal(0.0, 0.3, 500)
+    made = blocks(Channel(times, values, 0.3), 2e-4, 2e-5, [])
+    line = 990.0 + 1.5e4 * made.time_s
+    direct = float(np.square((values - 990.0 - 1.5e4 * times) / 0.3).sum())
+    between = float(np.square((made.values - line) / made.std).sum())
+    within = float(made.scatter.squares(np.full(len(line), 1.5e4)).sum())
+    assert between + within == pytest.approx(direct, rel=1e-9)
