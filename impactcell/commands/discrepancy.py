@@ -14,9 +14,9 @@ from typing import Any
 
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.campaign.recorded import from_captures
-from impactcell.discrepancy.extend import Mapper
 from impactcell.discrepancy.report import write_report
 from impactcell.discrepancy.result import result, text_of
+from impactcell.discrepancy.trials import Mapper
 from impactcell.discrepancy.workflow import Findings, investigate, plant_of
 from impactcell.errors import CampaignError, DiscrepancyError, PhysicsError, PredictionError
 from impactcell.modelfile import write_model
@@ -61,6 +61,8 @@ def discrepancy(
     DiscrepancyError
         The nominal model cannot be fitted to it.
     """
+    if (campaign is None) == (journal is None):
+        raise CampaignError("name either a campaign directory or --journal DB")
     plant = None
     name = "fitted"
     if cell is not None:
@@ -88,13 +90,11 @@ def sentence(findings: Findings) -> str:
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:
-    if (campaign is None) == (journal is None):
-        raise CampaignError("name either a campaign directory or --journal DB")
-    if campaign is not None:
+    if journal is None:
+        assert campaign is not None  # noqa: S101 - one of them is given
         return str(campaign.name), read(campaign)
     from impactcell.journal.store import Journal
 
-    assert journal is not None  # noqa: S101 - the check above
     with Journal(journal, None, read_only=True) as store:
         try:
             recorded = from_captures(store.captures(), plant.gravity_m_s2 if plant else 9.81)

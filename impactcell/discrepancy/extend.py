@@ -6,54 +6,19 @@ with it. When no set suffices nothing is added: forward selection on an effect o
 wrong names until it gives up.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
-import numpy as np
-
-from impactcell.campaign import Excitation
-from impactcell.discrepancy import name
-from impactcell.discrepancy.campaign import Material
-from impactcell.discrepancy.evidence import ALPHA, Evidence, Scan, examine, scan
-from impactcell.discrepancy.fit import Fit, fit
+from impactcell.discrepancy.evidence import Evidence, Scan, scan
+from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.ties import (
-    Alternative,
-    Contender,
-    alternatives,
-    by_likelihood,
-    is_tied,
-    ranked,
-    total,
-)
-from impactcell.errors import DiscrepancyError
-from impactcell.physics import Kind
-from impactcell.physics.effects import LIBRARY
-from impactcell.records import Samples
+from impactcell.discrepancy.ties import Alternative, Contender, alternatives, by_likelihood, is_tied, total
+from impactcell.discrepancy.trials import REFITS, Setup, backward, finalists, refits
 
-REFITS = 10
-STEPS = 25
-FIRST = 2
-RACE = 5
-AHEAD = 4
-POLISH = 40
-FINALISTS = 2
-MOST_FINALISTS = 6
-STARTS = 2
 SEEDS_OF_PAIRS = 4
 SECONDS = 5
-SMALLEST_GAIN = 15.0
 MOST = 0.5
-LARGE = 1.1
-MATERIAL = 30.0
-"""Log-likelihood that a second effect has to add; an effect that is worth less has no visible gap."""
-NARROWER = 0.85
-"""Or by which factor it has to lower the spread of the friction factors, if it acts between shots."""
 BETTER = 2.0
 RIVAL = 0.5
-
-Mapper = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,119 +48,8 @@ class Search:
     alternatives: tuple[Alternative, ...] = field(default=())
 
 
-def _refit(task: tuple[Problem, tuple[str, ...], list[Samples], Fit, int]) -> Fit | None:
-    """Fit a set of effects from several starts of its last effect, and keep the best.
-
-    None if the plant has no answer at any start.
-    """
-    problem, effects, starts, base, steps = task
-    first = min(steps, FIRST) if len(starts) > 1 else steps
-    tried = [_try(problem, effects, np.concatenate([base.at, start]), base, first) for start in starts]
-    ranked = by_likelihood(problem, [made for made in tried if made is not None])
-    if not ranked or first == steps:
-        return ranked[0] if ranked else None
-    return _try(problem, effects, ranked[0].at, ranked[0], steps - first) or ranked[0]
-
-
-def _try(problem: Problem, effects: tuple[str, ...], at: Samples, base: Fit, steps: int) -> Fit | None:
-    try:
-        return fit(problem, effects, at, base.local, spread=base.spread, most_steps=steps)
-    except DiscrepancyError:
-        return None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Setup:
-    """What a search works on: all samples, fewer of them, and what may be named.
-
-    `certain` says that the noise is stated, so that what is left above it is a gap.
-    """
-
-    problem: Problem
-    coarse: Problem
-    material: Material
-    library: tuple[str, ...]
-    seed: int
-    mapper: Mapper
-    certain: bool
-
-    def look(self, model: Fit) -> Evidence:
-        """All evidence against a model."""
-        key = (self.seed, len(model.effects))
-        return examine(self.problem, self.coarse, model, self.material, self.library, key)
-
-    def suffices(self, evidence: Evidence) -> bool:
-        """Whether nothing significant is left, and nothing large either where the noise is stated."""
-        return evidence.p_value > ALPHA and self.follows(evidence.fit)
-
-    def closes(self, evidence: Evidence) -> bool:
-        """Whether what is left beside an effect is not significant, or too little to be worth a name."""
-        return self.suffices(evidence) or (self.follows(evidence.fit) and not self.worth(evidence))
-
-    def worth(self, evidence: Evidence) -> bool:
-        """Whether some candidate or some cell of the map promises enough to be worth a name."""
-        gains = evidence.scan.gains()
-        promised = [gain for effect, gain in gains.items() if LIBRARY[effect].kind is not Kind.BETWEEN_SHOTS]
-        between = [gain for effect, gain in gains.items() if LIBRARY[effect].kind is Kind.BETWEEN_SHOTS]
-        chart, gain = evidence.map, evidence.map_scores.gain
-        promised += gain[chart.channel >= 0].tolist()
-        between += gain[chart.channel < 0].tolist()
-        share = max(between, default=0.0) / self.problem.count
-        return max(promised, default=0.0) > 2.0 * MATERIAL or share > 1.0 - NARROWER**2
-
-    def material_gain(self, fewer: Fit, more: Fit) -> bool:
-        """Whether one more effect explains enough to be worth a name, significant or not."""
-        gain = total(self.problem, more) - total(self.problem, fewer)
-        return gain > MATERIAL or more.spread < NARROWER * fewer.spread
-
-    def follows(self, model: Fit) -> bool:
-        """Whether a model comes near the noise, where that is stated."""
-        each = model.misfit(self.problem.shots) / self.problem.sizes
-        # A driven block in which stick ends at the wrong moment is far off whatever the model.
-        driven = self.problem.shots.excitation is Excitation.DRIVEN
-        misfit = float(np.median(each) if driven else np.average(each, weights=self.problem.sizes))
-        return not (self.certain and misfit > LARGE**2)
-
-    def polished(self, fits: Sequence[Fit]) -> list[Contender]:
-        """Refit on all samples, the likeliest out of shot first."""
-        tasks = [(self.problem, one.effects, [np.empty(0)], one, POLISH) for one in fits]
-        return ranked(self.problem, [made for made in self.mapper(_refit, tasks) if made is not None])
-
-
 def _scan(task: tuple[Problem, Fit, tuple[str, ...], tuple[int, ...]]) -> Scan:
     return scan(*task)
-
-
-def refits(setup: Setup, scanned: Scan, most: int) -> list[Fit]:
-    """Fit the most promising candidates beside what the model has already, the likeliest first."""
-    tasks = []
-    gains = scanned.gains()
-    for effect in sorted(gains, key=lambda one: -gains[one])[:most]:
-        if gains[effect] < SMALLEST_GAIN and scanned.p_of(effect) > ALPHA:
-            continue
-        starts = name.starts(scanned.candidates, scanned.scores, effect, STARTS)
-        if starts:
-            tasks.append((setup.coarse, (*scanned.fit.effects, effect), starts, scanned.fit, RACE))
-    raced = by_likelihood(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
-    # A few steps tell who cannot win; the others run to the end.
-    none = [np.empty(0)]
-    ahead = [(setup.coarse, one.effects, none, one, STEPS) for one in raced[:AHEAD]]
-    finished = [made for made in setup.mapper(_refit, ahead) if made is not None]
-    return by_likelihood(setup.coarse, [*finished, *raced[AHEAD:]])
-
-
-def backward(nominal: Fit, model: Fit) -> list[Fit]:
-    """Start fits of a model without each of its new effects in turn, from where it stands.
-
-    What a second effect seems to add may be no more than a way round the place where the fit of the first
-    had come to rest.
-    """
-    made = []
-    for left_out in model.effects[len(nominal.effects) :]:
-        kept = tuple(effect for effect in model.effects if effect != left_out)
-        mine = np.array([one.effect != left_out for one in model.coordinates])
-        made.append(replace(model, effects=kept, at=model.at[mine]))
-    return made
 
 
 def search(setup: Setup, nominal: Fit) -> Search:
@@ -206,7 +60,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     rough = refits(setup, first.scan, REFITS)
     if not rough:
         return Search(first, first, None, (), {}, {})
-    singles = setup.polished(_finalists(setup, rough))
+    singles = setup.polished(finalists(setup, rough))
     against = setup.look(singles[0].fit)
     if setup.closes(against):
         return _accept_single(setup.problem, first, against, singles)
@@ -218,7 +72,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     rough_pairs = _pairs(setup, sources)
     if not rough_pairs:
         return Search(first, against, None, (), {}, {}, alternatives(singles))
-    pairs = setup.polished(_finalists(setup, rough_pairs))
+    pairs = setup.polished(finalists(setup, rough_pairs))
     again = setup.polished(backward(nominal, pairs[0].fit))
     if again and total(setup.problem, again[0].fit) > total(setup.problem, singles[0].fit) + BETTER:
         effects = {one.fit.effects for one in again}
@@ -279,16 +133,6 @@ def _plausible(
     return Search(
         first, against, best, (effect,), {effect: tied}, {effect: first.scan.p_of(effect)}, everything
     )
-
-
-def _finalists(setup: Setup, rough: list[Fit]) -> list[Fit]:
-    """Keep the likeliest, and those that fewer samples do not tell from it."""
-    in_sample = [Contender(one, one.log_likelihood(setup.coarse.shots)) for one in rough[:MOST_FINALISTS]]
-    return [
-        one.fit
-        for place, one in enumerate(in_sample)
-        if place < FINALISTS or is_tied(setup.coarse, in_sample[0], one)
-    ]
 
 
 def _accept_single(problem: Problem, first: Evidence, against: Evidence, singles: list[Contender]) -> Search:

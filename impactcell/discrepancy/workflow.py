@@ -9,7 +9,7 @@ from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy import noise
 from impactcell.discrepancy.campaign import Material, laid_out, prepare, split
 from impactcell.discrepancy.experiment import Proposal, propose
-from impactcell.discrepancy.extend import Mapper, Search, Setup, search
+from impactcell.discrepancy.extend import Search, search
 from impactcell.discrepancy.fit import Fit, refit_own
 from impactcell.discrepancy.followed import decided, followed
 from impactcell.discrepancy.intervals import Estimate, estimates
@@ -18,6 +18,7 @@ from impactcell.discrepancy.prove import Proof, prove
 from impactcell.discrepancy.shots import Index, thinned
 from impactcell.discrepancy.start import fit_nominal
 from impactcell.discrepancy.tangent import linearise
+from impactcell.discrepancy.trials import Mapper, Setup
 from impactcell.discrepancy.unknown import Unexplained, describe
 from impactcell.physics import Plant
 from impactcell.physics.effects import LIBRARY
