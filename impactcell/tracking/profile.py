@@ -12,25 +12,37 @@ random walk in x (Wecker & Ansley 1983, JASA 78:81) without its first-order erro
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigh
 
 from impactcell.compiled import compiled
 from impactcell.records import Samples
+from impactcell.tracking import linear
 from impactcell.tracking.slide import Slide
 
 FINE_STEPS = 500  # of the double integral over a slide
-ROUGHNESS_DECADES = (-9.0, 9.0)  # of the smoothing parameter searched
+STRENGTHS = np.logspace(-9.0, 9.0, 37)  # of the smoothing searched, over that which weighs like the data
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Information:
-    """What one slide says of the spline coefficients: shape (j, j) and (j,)."""
+    """What one slide says of the spline coefficients.
+
+    Attributes
+    ----------
+    matrix, vector : ndarray
+        G and h, shapes (j, j) and (j,).
+    reached_m : float
+        How far the part slid.
+    seen : int
+        Coefficients of the splines it met; rows of G and h beyond are zero.
+    """
 
     matrix: Samples
     vector: Samples
     reached_m: float
+    seen: int
 
 
 def information(
@@ -49,80 +61,18 @@ def information(
     fine = np.linspace(min(t[0], 0.0), t[-1], FINE_STEPS)
     # between blocks the path bends by less than a micrometre, which friction does not notice
     path = np.interp(fine, t, x)
-    spacing = float(grid_m[1] - grid_m[0])
-    integrals = _double_integrals(path, fine[1] - fine[0], float(grid_m[0]), spacing, len(grid_m))
-    place = (t - fine[0]) / (fine[1] - fine[0])
-    low = np.minimum(place.astype(np.int64), FINE_STEPS - 2)
-    part = (place - low)[:, np.newaxis]
-    at_blocks = integrals[low] * (1.0 - part) + integrals[low + 1] * part
-    measured = x
-    if viscous_per_mass != 0.0:
-        travelled = np.concatenate([[0.0], np.cumsum((path[1:] + path[:-1]) / 2.0) * (fine[1] - fine[0])])
-        measured = x + viscous_per_mass * np.interp(t, fine, travelled)
+    points, spacing = len(grid_m), float(grid_m[1] - grid_m[0])
+    integrals = _double_integrals(path, float(fine[1] - fine[0]), float(grid_m[0]), spacing, points)
     weight = 1.0 / np.sqrt(slide.variance)
-    columns = -gravity_m_s2 * at_blocks * weight[:, np.newaxis]
+    columns = _columns(t, x, weight, fine, path, integrals, gravity_m_s2, viscous_per_mass)
     # integrating x_0 and v_0 out projects their two columns away
     q = _orthonormal(weight, weight * t)
-    columns = columns - q @ (q.T @ columns)
-    target = measured * weight
-    target = target - q @ (q.T @ target)
-    return Information(columns.T @ columns, columns.T @ target, float(x[-1]))
-
-
-def on_grid(points: int) -> Samples:
-    """Matrix from g + 2 coefficients to friction at the g grid points, shape (g, g + 2)."""
-    matrix = np.zeros((points, points + 2))
-    for i in range(points):
-        matrix[i, i : i + 3] = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
-    return matrix
-
-
-def roughness(coefficients: int) -> Samples:
-    """Penalty D of second differences, shape (j, j)."""
-    second = np.diff(np.eye(coefficients), 2, axis=0)
-    return second.T @ second
-
-
-def smooth(matrix: Samples, vector: Samples, penalty: Samples) -> tuple[Samples, Samples, float]:
-    """Posterior of coefficients under exp(-lambda/2 beta' D beta), lambda weighted by restricted likelihood.
-
-    Returns
-    -------
-    mean : ndarray, shape (j,)
-    covariance : ndarray, shape (j, j)
-    strength : float
-        The lambda of largest likelihood.
-    """
-    scale = float(np.trace(matrix)) / float(np.trace(penalty))
-    base = matrix + scale * penalty
-    # both matrices diagonal at once: base = V^-T V^-1, scale D = V^-T diag(e) V^-1, matrix has 1 - e
-    share, vectors = eigh(scale * penalty, base)
-    share = np.clip(share, 0.0, 1.0)
-    share[:2] = 0.0  # level and slope are not penalised; rounding must not say otherwise
-    inner = vectors.T @ vector
-    strengths = np.logspace(*ROUGHNESS_DECADES, 37)
-    diagonal = (1.0 - share)[np.newaxis, :] + strengths[:, np.newaxis] * share[np.newaxis, :]
-    diagonal = np.maximum(diagonal, 1e-300)
-    fit = (
-        (inner**2 / diagonal).sum(axis=1)
-        - np.log(diagonal).sum(axis=1)
-        + (len(share) - 2) * np.log(strengths)
-    )
-    # averaged over what lambda may be: the most likely one alone smooths away features it should doubt
-    share_of = np.exp(0.5 * (fit - fit.max()))
-    share_of /= share_of.sum()
-    inverse = share_of @ (1.0 / diagonal)
-    means = inner / diagonal
-    spread = means - share_of @ means
-    covariance = (vectors * inverse) @ vectors.T
-    covariance += vectors @ ((spread * share_of[:, np.newaxis]).T @ spread) @ vectors.T
-    return vectors @ (share_of @ means), covariance, float(strengths[int(np.argmax(fit))] * scale)
-
-
-def posterior(matrix: Samples, vector: Samples, penalty: Samples, strength: float) -> tuple[Samples, Samples]:
-    """Posterior mean and covariance of coefficients at a given lambda."""
-    factor = cho_factor(matrix + strength * penalty)
-    return cho_solve(factor, vector), cho_solve(factor, np.eye(len(vector)))
+    columns -= q @ (q.T @ columns)
+    products = columns.T @ columns
+    seen = integrals.shape[1]
+    matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
+    matrix[:seen, :seen], vector[:seen] = products[:seen, :seen], products[:seen, seen]
+    return Information(matrix, vector, float(x[-1]), seen)
 
 
 def _orthonormal(first: Samples, second: Samples) -> Samples:
@@ -132,10 +82,96 @@ def _orthonormal(first: Samples, second: Samples) -> Samples:
     return np.column_stack([one, other / np.sqrt(other @ other)])
 
 
+@lru_cache(maxsize=64)
+def on_grid(points: int) -> Samples:
+    """Matrix from g + 2 coefficients to friction at the g grid points, shape (g, g + 2)."""
+    matrix = np.zeros((points, points + 2))
+    for i in range(points):
+        matrix[i, i : i + 3] = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+    matrix.flags.writeable = False
+    return matrix
+
+
+@lru_cache(maxsize=64)
+def roughness(coefficients: int) -> Samples:
+    """Penalty D of second differences, shape (j, j)."""
+    second = np.diff(np.eye(coefficients), 2, axis=0)
+    penalty: Samples = second.T @ second
+    penalty.flags.writeable = False
+    return penalty
+
+
+def smooth(seen: Information) -> tuple[Samples, Samples, float]:
+    """Posterior of the coefficients seen under exp(-lambda/2 beta' D beta), s in number.
+
+    lambda is weighted by its restricted likelihood. Coefficients beyond follow the last ones in a straight
+    line, at no penalty, so that they may be left out.
+
+    Returns
+    -------
+    mean : ndarray, shape (s,)
+    covariance : ndarray, shape (s, s)
+    strength : float
+        The lambda of largest likelihood.
+    """
+    n = seen.seen
+    matrix, penalty = seen.matrix[:n, :n], roughness(n)
+    scale = float(np.trace(matrix)) / float(np.trace(penalty))
+    # both matrices diagonal at once: base = V^-T V^-1, scale D = V^-T diag(e) V^-1, matrix has 1 - e
+    share, vectors = linear.both_diagonal(scale * penalty, matrix + scale * penalty)
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
+    share[:2] = 0.0  # level and slope are not penalised; rounding must not say otherwise
+    inner = vectors.T @ seen.vector[:n]
+    diagonal = np.maximum((1.0 - share) + STRENGTHS[:, np.newaxis] * share, 1e-300)
+    fit = (inner**2 / diagonal - np.log(diagonal)).sum(axis=1) + (n - 2) * np.log(STRENGTHS)
+    best = int(fit.argmax())
+    # averaged over what lambda may be: the most likely one alone smooths away features it should doubt
+    share_of = np.exp(0.5 * (fit - fit[best]))
+    share_of /= share_of.sum()
+    means = inner / diagonal
+    spread = means - share_of @ means
+    within = (spread.T * share_of) @ spread
+    within.flat[:: n + 1] += share_of @ (1.0 / diagonal)
+    return vectors @ (share_of @ means), vectors @ within @ vectors.T, float(STRENGTHS[best] * scale)
+
+
+@compiled
+def _columns(
+    t: Samples,
+    x: Samples,
+    weight: Samples,
+    fine: Samples,
+    path: Samples,
+    integrals: Samples,
+    gravity: float,
+    viscous_per_mass: float,
+) -> Samples:
+    """Weighted columns of the coefficients, and position last, at the blocks, shape (n, s + 1)."""
+    seen, step = integrals.shape[1], fine[1] - fine[0]
+    travelled = np.zeros(len(fine))
+    for k in range(1, len(fine)):
+        travelled[k] = travelled[k - 1] + (path[k] + path[k - 1]) / 2.0 * step
+    columns = np.empty((len(t), seen + 1))
+    for k in range(len(t)):
+        place = (t[k] - fine[0]) / step
+        low = min(int(place), len(fine) - 2)
+        part = place - low
+        for i in range(seen):
+            at_block = integrals[low, i] * (1.0 - part) + integrals[low + 1, i] * part
+            columns[k, i] = -gravity * at_block * weight[k]
+        drag = travelled[low] * (1.0 - part) + travelled[low + 1] * part
+        columns[k, seen] = (x[k] + viscous_per_mass * drag) * weight[k]
+    return columns
+
+
 @compiled
 def _double_integrals(path: Samples, step: float, first: float, spacing: float, points: int) -> Samples:
-    """Integrate every B-spline twice along the path; trapezium, then the exact second integral of it."""
-    n, j = len(path), points + 2
+    """Integrate every B-spline met twice along the path; trapezium, then the exact second integral of it."""
+    n = len(path)
+    furthest = 0.0
+    for k in range(n):
+        furthest = max(furthest, (path[k] - first) / spacing)
+    j = min(int(furthest), points - 2) + 4
     out = np.zeros((n, j))
     speed = np.zeros(j)
     before = np.zeros(j)

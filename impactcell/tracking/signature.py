@@ -115,11 +115,11 @@ def update(
     seen = profile.information(slide, grid, gravity_m_s2, viscous_per_mass)
     friction, std = _published(seen, settings)
     known = state.reference
-    if known.cycles < settings.learned_cycles or known.weight < FEWEST_OF_MATERIAL:
-        left = max(settings.learned_cycles - known.cycles, FEWEST_OF_MATERIAL - int(known.weight))
+    if known.variation.cycles < settings.learned_cycles or known.weight < FEWEST_OF_MATERIAL:
+        left = max(settings.learned_cycles - known.variation.cycles, FEWEST_OF_MATERIAL - int(known.weight))
         reason = f"the reference is being learned, {left} more cycles"
         signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
-        return SignatureTracked(_learned(state, seen, settings, None), signature, None, judged=False)
+        return SignatureTracked(learned(state, seen, settings, None), signature, None, judged=False)
     usual = float(np.nanmean(friction))
     verdict = deviation.judge(known, seen, grid, usual)
     limit = 1.0 / settings.false_alarm_cycles
@@ -134,38 +134,38 @@ def update(
         Quality.GOOD,
     )
     evidence = _evidence(settings, verdict, capture.cycle, period_s) if deviant else None
-    return SignatureTracked(_learned(state, seen, settings, verdict), signature, evidence, judged=True)
+    return SignatureTracked(learned(state, seen, settings, verdict), signature, evidence, judged=True)
 
 
 def _published(seen: profile.Information, settings: SignatureSettings) -> tuple[Samples, Samples]:
     """Friction and its standard deviation on the grid, nan where the part did not get."""
-    penalty = profile.roughness(settings.points + 2)
-    mean, covariance, _ = profile.smooth(seen.matrix, seen.vector, penalty)
-    on_grid = profile.on_grid(settings.points)
-    friction = on_grid @ mean
-    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", on_grid, covariance, on_grid), 0.0))
+    mean, covariance, _ = profile.smooth(seen)
+    met = seen.seen - 2
+    on_grid = profile.on_grid(met)
+    friction, std = np.full(settings.points, math.nan), np.full(settings.points, math.nan)
+    friction[:met] = on_grid @ mean
+    std[:met] = np.sqrt(np.maximum(((on_grid @ covariance) * on_grid).sum(axis=1), 0.0))
     beyond = settings.grid_m > seen.reached_m
     friction[beyond] = std[beyond] = math.nan
     return friction, std
 
 
-def _learned(
+def learned(
     state: SignatureState,
     seen: profile.Information,
     settings: SignatureSettings,
     verdict: deviation.Verdict | None,
 ) -> SignatureState:
     """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
-    penalty = profile.roughness(settings.points + 2)
     if verdict is None:
-        return replace(state, reference=references.learn(state.reference, seen, penalty), deviant_run=0)
+        return replace(state, reference=references.learn(state.reference, seen), deviant_run=0)
     if verdict.p_value < 1.0 / settings.false_alarm_cycles:
         run = state.deviant_run + 1
         if run < GIVEN_UP:
             return replace(state, deviant_run=run)
-        fresh = references.learn(references.restart(state.reference), seen, penalty)
+        fresh = references.learn(references.restart(state.reference), seen)
         return replace(state, reference=fresh, deviant_run=0)
-    fresh = references.learn(state.reference, seen, penalty)
+    fresh = references.learn(state.reference, seen)
     if verdict.spe_freedom > 0:
         ratio = verdict.spe / verdict.spe_freedom
         fresh = replace(fresh, spe_sum=fresh.spe_sum + ratio, spe_count=fresh.spe_count + 1)

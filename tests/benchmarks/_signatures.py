@@ -1,15 +1,14 @@
-"""Friction along the stroke: its error, power against deviant cycles, speed of the in-cycle filter."""
+"""Friction along the stroke: its error, and the speed of the in-cycle filter."""
 
 import math
 import time
 
 import numpy as np
 from filterpy.kalman import KalmanFilter
-from scipy.stats import norm
 
-from impactcell.tracking import incycle, profile, signature
-from impactcell.tracking.slide import find_slide
-from tests.benchmarks._slides import FRICTION, GRAVITY, slide
+from impactcell.tracking import incycle, signature
+from tests.benchmarks import _deviant
+from tests.benchmarks._slides import FRICTION, slide
 from tests.benchmarks.table import Table
 
 NOISE = 0.42e-6
@@ -65,89 +64,9 @@ def error_table(*, quick: bool) -> Table:
     return Table("Friction along the stroke", columns, rows, note)
 
 
-def _normal(rng: np.random.Generator):
-    """A normal cycle: texture, and level, tilt and curvature that vary from cycle to cycle."""
-    a, b, c = 0.005 * rng.normal(size=3) * (2.0, 1.0, 1.0)
-
-    def friction(x):
-        shape = a + b * (x / 1e-3 - 1.0) + c * np.cos(np.pi * x / 2e-3)
-        return FRICTION * (1.0 + 0.03 * np.sin(2.0 * np.pi * x / 1.3e-3) + shape)
-
-    return friction
-
-
-MODES = (
-    lambda x: 0.01 * np.ones_like(x),
-    lambda x: 0.005 * (x / 1e-3 - 1.0),
-    lambda x: 0.005 * np.cos(np.pi * x / 2e-3),
-)
-DEVIATIONS = {
-    "bump": lambda x: np.exp(-0.5 * ((x - 0.9e-3) / 0.25e-3) ** 2),
-    "level": np.ones_like,
-    "tilt": lambda x: x / 1e-3 - 1.0,
-    "ripple": lambda x: np.sin(2.0 * np.pi * x / 0.7e-3 + 0.4),
-}
-
-
-def power_table(*, quick: bool) -> Table:
-    """Power at one false alarm in 100000 cycles, the oracle knowing the shape and how cycles vary."""
-    settings = signature.SignatureSettings()
-    grid = settings.grid_m
-    state = signature.initial_state(settings)
-    learned = 150 if quick else 400
-    false = judged = 0
-    for k in range(learned):
-        rng = np.random.default_rng([8, k])
-        capture, _ = slide(_normal(rng), SPEED, 1e4, NOISE, k)
-        done = signature.update(settings, state, capture)
-        false += done.deviation is not None
-        judged += done.judged
-        state = done.state
-    rows = [["false alarms", "1e-5 a cycle", f"{false} of {judged}", "", "", ""]]
-    to_coefficients = np.linalg.pinv(profile.on_grid(settings.points))
-    alpha = 1.0 / settings.false_alarm_cycles
-    for name, shape in DEVIATIONS.items():
-        # the oracle: known shape, known variation, known sensor noise
-        capture, _ = slide(_normal(np.random.default_rng([8, 0])), SPEED, 1e4, NOISE, 0)
-        seen = profile.information(find_slide(capture), grid, GRAVITY)
-        C = to_coefficients @ (FRICTION * np.array([m(grid) for m in MODES]).T)
-        P = seen.matrix - seen.matrix @ C @ np.linalg.solve(
-            np.eye(3) + C.T @ seen.matrix @ C, C.T @ seen.matrix
-        )
-        s = to_coefficients @ (FRICTION * shape(grid))
-        unit = math.sqrt(s @ P @ s)
-        cells = []
-        for oracle in (0.5, 0.9, 0.99):
-            amplitude = (norm.isf(alpha) + norm.ppf(oracle)) / unit
-            runs = 60 if quick else 200
-            hits = 0
-            for k in range(runs):
-                rng = np.random.default_rng([9, k])
-                base, sign = _normal(rng), rng.choice([-1.0, 1.0])
-                capture, _ = slide(
-                    lambda x, b=base, a=amplitude * sign, s=shape: b(x) + a * FRICTION * s(np.asarray(x)),
-                    SPEED,
-                    1e4,
-                    NOISE,
-                    5000 + k,
-                )
-                hits += signature.update(settings, state, capture).deviation is not None
-            cells.append(f"{oracle - hits / runs:+.2f} ({100 * amplitude:.1f} %)")
-        rows.append(
-            [
-                f"{name}: oracle's power minus ours",
-                "<= 0.1",
-                cells[2],
-                f"± {1.96 * math.sqrt(0.09 / runs):.2f}",
-                *cells[:2],
-            ]
-        )
-    columns = ["what", "bar", "oracle at 0.99", "95 %", "oracle at 0.5", "oracle at 0.9"]
-    note = (
-        f"Reference of {learned} cycles; in brackets the amplitude at which the oracle has that power. "
-        "Not knowing shape and place costs a search over all of them, most where the oracle itself is unsure."
-    )
-    return Table("Deviant cycle at 1e-5 false alarms", columns, rows, note)
+def power_table(*, quick: bool) -> list[Table]:
+    """False alarms of deviant cycles, and the power against them."""
+    return [_deviant.false_alarm_table(quick=quick), _deviant.power_table(quick=quick)]
 
 
 def speed_table(*, quick: bool) -> Table:
