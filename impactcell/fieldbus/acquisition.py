@@ -243,5 +243,9 @@ class Module:
             unreadable=status.unreadable + (not readable),
         )
         cycle = reception.mark.cycle
+        if reception.missed:
+            self._log.warning(
+                "%d before it are lost: the module had overwritten them", reception.missed, cycle=cycle
+            )
         for fault in reception.faults:
             self._log.warning("%s", fault.removeprefix(f"{self.cell}: cycle {cycle}: "), cycle=cycle)

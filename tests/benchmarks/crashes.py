@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import sys
 import tempfile
 from pathlib import Path
 
@@ -22,18 +23,19 @@ def study(runs: int) -> list[dict[str, int | bool]]:
             continue
         with tempfile.TemporaryDirectory() as directory:
             outcome = asyncio.run(crash(Path(directory), KILLS, seed))
-        first, last = outcome.cycles[0], outcome.cycles[-1]
         entry = {
             "seed": seed,
             "kills": KILLS,
             "cycles": len(outcome.cycles),
-            "lost": len(set(range(first, last + 1)) - set(outcome.cycles)),
+            "lost": outcome.lost,
+            "overwritten": outcome.overwritten,
             "twice": len(outcome.cycles) - len(set(outcome.cycles)),
             "same_state": outcome.same_state,
         }
         done.append(entry)
         with RESULTS.open("a") as out:
             out.write(json.dumps(entry) + "\n")
+        print(f"crashes: {entry}", file=sys.stderr, flush=True)
     return done
 
 
@@ -46,7 +48,7 @@ def tables(quick: bool = False) -> list[Table]:
             f"cycles lost, of {sum(int(e['cycles']) for e in done)}",
             "0",
             str(sum(int(e["lost"]) for e in done)),
-            "",
+            f"{sum(int(e['overwritten']) for e in done)} more overwritten in the module, each of them told",
         ),
         ("cycles twice", "0", str(sum(int(e["twice"]) for e in done)), ""),
         (
