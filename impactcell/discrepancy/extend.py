@@ -12,7 +12,7 @@ from impactcell.discrepancy.evidence import Evidence, Scan, scan
 from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.ties import Alternative, Contender, alternatives, by_likelihood, is_tied, total
-from impactcell.discrepancy.trials import REFITS, Setup, backward, finalists, refits
+from impactcell.discrepancy.trials import REFITS, Setup, backward, finalists, finish, race
 
 SEEDS_OF_PAIRS = 4
 SECONDS = 5
@@ -57,7 +57,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     first = setup.look(nominal)
     if setup.suffices(first):
         return Search(first, first, nominal, (), {}, {})
-    rough = refits(setup, first.scan, REFITS)
+    rough = finish(setup, race(setup, first.scan, REFITS))
     if not rough:
         return Search(first, first, None, (), {}, {})
     singles = setup.polished(finalists(setup, rough))
@@ -73,6 +73,8 @@ def search(setup: Setup, nominal: Fit) -> Search:
     if not rough_pairs:
         return Search(first, against, None, (), {}, {}, alternatives(singles))
     pairs = setup.polished(finalists(setup, rough_pairs))
+    if not setup.follows(pairs[0].fit):
+        return Search(first, against, None, (), {}, {}, alternatives([*pairs, *singles]))
     again = setup.polished(backward(nominal, pairs[0].fit))
     if again and total(setup.problem, again[0].fit) > total(setup.problem, singles[0].fit) + BETTER:
         effects = {one.fit.effects for one in again}
@@ -94,11 +96,11 @@ def _pairs(setup: Setup, sources: list[Scan]) -> list[Fit]:
     """Fit the most promising second effects beside several first ones, the likeliest first."""
     best: dict[frozenset[str], Fit] = {}
     for source in sources:
-        for made in refits(setup, source, SECONDS):
+        for made in race(setup, source, SECONDS):
             key = frozenset(made.effects)
             if key not in best or total(setup.coarse, made) > total(setup.coarse, best[key]):
                 best[key] = made
-    return by_likelihood(setup.coarse, best.values())
+    return finish(setup, by_likelihood(setup.coarse, best.values()))
 
 
 def _plausible(

@@ -25,7 +25,7 @@ REFITS = 10
 STEPS = 25
 FIRST = 2
 RACE = 5
-AHEAD = 4
+AHEAD = 5
 POLISH = 40
 FINALISTS = 2
 MOST_FINALISTS = 6
@@ -119,8 +119,8 @@ class Setup:
         return ranked(self.problem, [made for made in self.mapper(_refit, tasks) if made is not None])
 
 
-def refits(setup: Setup, scanned: Scan, most: int) -> list[Fit]:
-    """Fit the most promising candidates beside what the model has already, the likeliest first."""
+def race(setup: Setup, scanned: Scan, most: int) -> list[Fit]:
+    """Fit the most promising candidates beside what the model has already by a few steps."""
     tasks = []
     gains = scanned.gains()
     for effect in sorted(gains, key=lambda one: -gains[one])[:most]:
@@ -129,8 +129,11 @@ def refits(setup: Setup, scanned: Scan, most: int) -> list[Fit]:
         starts = name.starts(scanned.candidates, scanned.scores, effect, STARTS)
         if starts:
             tasks.append((setup.coarse, (*scanned.fit.effects, effect), starts, scanned.fit, RACE))
-    raced = by_likelihood(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
-    # A few steps tell who cannot win; the others run to the end.
+    return by_likelihood(setup.coarse, [made for made in setup.mapper(_refit, tasks) if made is not None])
+
+
+def finish(setup: Setup, raced: list[Fit]) -> list[Fit]:
+    """Run the likeliest of a race to the end."""
     none = [np.empty(0)]
     ahead = [(setup.coarse, one.effects, none, one, STEPS) for one in raced[:AHEAD]]
     finished = [made for made in setup.mapper(_refit, ahead) if made is not None]

@@ -10,8 +10,12 @@ import pytest
 from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign
 from impactcell.commands.discrepancy import discrepancy
+from impactcell.discrepancy.fit import fit
 from impactcell.discrepancy.noise import replicate_spread
+from impactcell.discrepancy.own import point_at, settle
+from impactcell.discrepancy.problem import Problem, without_jumps
 from impactcell.discrepancy.result import result, text_of
+from impactcell.discrepancy.ties import folds, is_tied, out_of_shot
 from impactcell.discrepancy.workflow import Findings, investigate
 from impactcell.errors import CampaignError
 from impactcell.modelfile import read_model
@@ -53,6 +57,47 @@ def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
     half = 0.5 * (estimate.high - estimate.low)
     assert abs(estimate.value - truth) < 3.0 * half
     assert found.proof.after.trace < 1.05
+
+
+def test_a_jump_at_one_sample_is_no_slope() -> None:
+    slope = np.sin(np.linspace(0.0, 6.0, 200))
+    jumped = slope.copy()
+    jumped[[50, 120]] = 40.0, -900.0
+    expected = slope.copy()
+    expected[[50, 120]] = 0.0
+    assert np.array_equal(without_jumps(jumped), expected)
+    assert np.array_equal(without_jumps(30.0 * slope), 30.0 * slope)
+
+
+def test_likelihood_out_of_shot_is_that_of_a_fit_without_the_shot() -> None:
+    found = investigate(make(shots=20))
+    problem, model = found.problem, found.nominal
+    inside = model.log_likelihood(problem.shots)
+    outside = out_of_shot(problem, model).each
+    expected, got = [], []
+    for fold in folds(problem)[[0, 5, 9]]:
+        mine = np.flatnonzero(folds(problem) == fold)
+        others = np.setdiff1d(np.arange(problem.count), mine)
+        rest = Problem(problem.shots.chosen(others), problem.forward.batches)
+        refitted = fit(rest, (), model.at, model.local.of(others), spread=model.spread, tolerance=1e-6)
+        alone = Problem(problem.shots.chosen(mine), problem.forward.batches)
+        start = point_at(alone, (), refitted.at, model.local.of(mine), model.spread)
+        settled = settle(alone, (), start, model.spread, 8)
+        there = replace(model, at=refitted.at, local=settled.local, residual=settled.residual)
+        expected.append((inside[mine] - there.log_likelihood(alone.shots)).sum())
+        got.append((inside[mine] - outside[mine]).sum())
+    assert np.sum(got) == pytest.approx(np.sum(expected), rel=0.25)
+    assert np.sum(got) > 0.1
+
+
+def test_few_shots_that_decide_are_no_tie() -> None:
+    found = investigate(make(shots=20))
+    best = out_of_shot(found.problem, found.nominal)
+    each = best.each.copy()
+    each[:2] -= 400.0
+    assert not is_tied(found.problem, best, replace(best, each=each))
+    each[:2] += 390.0
+    assert is_tied(found.problem, best, replace(best, each=each))
 
 
 def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
