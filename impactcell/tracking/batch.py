@@ -8,11 +8,12 @@ import numpy as np
 from impactcell.tracking import bank as banks
 from impactcell.tracking import wear
 from impactcell.tracking.screening import Place
-from impactcell.tracking.settings import TrackerSettings
+from impactcell.tracking.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.state import Reading, Shift, TrackerState
 
 FEWEST_DIFFERENCES = 18.0  # the scale of the noise must rest on so many before a shift is believed
 LEARNING_DIFFERENCES = 100.0  # before so many,
+BOTH = 2.0  # ways to a false alarm where batches are known: within one, and between two
 SETTLED = 1.15  # it must not have moved by such a factor since the first cycles were gone over with it
 
 
@@ -53,12 +54,18 @@ def find_shift(
     predicted = before[0] + ahead * before[1]
     width = spread[0, 0] + 2.0 * ahead * spread[0, 1] + ahead**2 * spread[1, 1] + variance
     innovation = float((reading.mu_s - predicted) / math.sqrt(width))
-    count, _, statistic = banks.run_cycle(table, len(state.bank), design, values, float(state.accepted))
-    fresh = replace(state, bank=table[:count].copy())
+    outliers = np.array(state.outliers)
+    count, _, statistic = banks.run_cycle(
+        table, len(state.bank), design, values, outliers, float(state.accepted)
+    )
+    fresh = replace(state, bank=table[:count].copy(), outliers=(float(outliers[0]), float(outliers[1])))
     if announced > 0.0:
         # an announced change is no finding, and what came before it has been settled by it
         return replace(fresh, accepted_before=where.index - 1, accepted=where.index), None, innovation
-    threshold = banks.threshold(settings.false_alarm_cycles)
+    # with known batches, false alarms are shared out to changes within a batch and between batches
+    known = settings.batch is BatchKnowledge.KNOWN and reading.batch_id is not None
+    ways = BOTH if known else 1.0
+    threshold = banks.threshold(ways * settings.false_alarm_cycles)
     certain = statistic > threshold and _settled(state)
     if announced < 0.0 or where.lag > 0 or not certain:
         return fresh, None, innovation
@@ -84,7 +91,7 @@ def compare_batch(
     prior = settings.step_std * math.sqrt(variance)
     statistic = 0.5 * (size / std) ** 2 + math.log(std / prior)
     length = max(1.0, (state.batch_start - state.first) / max(state.batch_count - 1, 1))
-    threshold = math.log(max(settings.false_alarm_cycles / length, 20.0))
+    threshold = math.log(max(BOTH * settings.false_alarm_cycles / length, 20.0))
     shift = Shift(state.batch_start, size, std, index, statistic, threshold)
     if state.tested:
         reported = state.shift is not None and state.shift.cycle == state.batch_start

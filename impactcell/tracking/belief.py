@@ -1,11 +1,11 @@
 """What is believed of wear: probability above the limit, and cycles until it is reached."""
 
 import math
-from collections.abc import Callable
 
-from scipy.optimize import brentq
+import numpy as np
 from scipy.special import ndtr, ndtri
 
+from impactcell.compiled import compiled
 from impactcell.records import Quality, WearState
 
 INTERVAL = 0.95  # coverage of cycles_to_limit_low .. high
@@ -36,26 +36,47 @@ def wear_state(
         above, expected, low, high = 0.0, math.inf, math.inf, math.inf
     else:
         above = float(ndtr((level - limit) / std)) if std > 0.0 else float(level > limit)
-
-        def reached(cycles: float, z: float) -> float:
-            variance = level_var + cycles * (2.0 * cross + cycles * slope_var)
-            variance += noise[0] * cycles + noise[1] * cycles**3 / 3.0
-            return level + slope * cycles + z * math.sqrt(max(variance, 0.0)) - limit
-
         spread = float(ndtri(0.5 + INTERVAL / 2.0))
-        expected, low, high = (_first(reached, z) for z in (0.0, spread, -spread))
+        spreads = (level_var, cross, slope_var, *noise)
+        expected, low, high = (
+            _first(level - limit, slope, spreads, z, FARTHEST) for z in (0.0, spread, -spread)
+        )
     return WearState(
         level, std, slope, math.sqrt(slope_var), limit, above, expected, low, high, quality, reason
     )
 
 
-def _first(reached: Callable[[float, float], float], z: float) -> float:
-    """First number of cycles at which `reached` is positive; inf if beyond FARTHEST."""
-    if reached(0.0, z) >= 0.0:
+@compiled
+def _above(
+    above: float, slope: float, spreads: tuple[float, float, float, float, float], z: float, cycles: float
+) -> float:
+    """Return level minus limit after so many cycles, plus z standard deviations of it."""
+    level_var, cross, slope_var, level_noise, slope_noise = spreads
+    variance = level_var + cycles * (2.0 * cross + cycles * slope_var)
+    variance += level_noise * cycles + slope_noise * cycles**3 / 3.0
+    return above + slope * cycles + z * math.sqrt(max(variance, 0.0))
+
+
+@compiled
+def _first(
+    above: float,
+    slope: float,
+    spreads: tuple[float, float, float, float, float],
+    z: float,
+    farthest: float,
+) -> float:
+    """First number of cycles at which `_above` is positive, by bisection; inf if beyond `farthest`."""
+    if _above(above, slope, spreads, z, 0.0) >= 0.0:
         return 0.0
     near, far = 0.0, 1.0
-    while reached(far, z) < 0.0:
+    while _above(above, slope, spreads, z, far) < 0.0:
         near, far = far, far * 2.0
-        if far > FARTHEST:
-            return math.inf
-    return float(brentq(reached, near, far, args=(z,), rtol=1e-9))
+        if far > farthest:
+            return np.inf
+    while far - near > 1e-10 * far:
+        middle = 0.5 * (near + far)
+        if _above(above, slope, spreads, z, middle) < 0.0:
+            near = middle
+        else:
+            far = middle
+    return far

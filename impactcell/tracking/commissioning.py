@@ -49,6 +49,15 @@ class History:
     batches: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Replayed:
+    """The bank after the history, outliers among how many readings, and the history's log likelihood."""
+
+    bank: Samples
+    outliers: tuple[float, float]
+    likelihood: float
+
+
 def remember(
     history: History, index: int, value: float, std: float, announced: float, batch: str | None
 ) -> History:
@@ -63,8 +72,8 @@ def remember(
 
 def replay(
     settings: TrackerSettings, history: History, factor: float, level_walk: float, slope_walk: float
-) -> tuple[Samples, float]:
-    """Run the bank over the history; give it back with the log likelihood.
+) -> Replayed:
+    """Run the bank over the history.
 
     Parameters
     ----------
@@ -93,8 +102,9 @@ def replay(
         slope_walk**2 * unit,
         settings.outlier_probability,
     )
-    count, likelihood = banks.run_series(table, len(first), design, readings, rows[0, INDEX])
-    return table[:count].copy(), likelihood
+    outliers = np.zeros(2)
+    count, likelihood = banks.run_series(table, len(first), design, readings, outliers, rows[0, INDEX])
+    return Replayed(table[:count].copy(), (float(outliers[0]), float(outliers[1])), likelihood)
 
 
 def most_likely(settings: TrackerSettings, history: History, factor: float) -> tuple[float, float]:
@@ -102,7 +112,7 @@ def most_likely(settings: TrackerSettings, history: History, factor: float) -> t
     start = (settings.level_noise, settings.slope_noise)
 
     def likelihood(level: float, slope: float) -> float:
-        return replay(settings, history, factor, level, slope)[1]
+        return replay(settings, history, factor, level, slope).likelihood
 
     none = likelihood(*start)
     level, best = start[0], none

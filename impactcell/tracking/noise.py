@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from impactcell.compiled import compiled
 from impactcell.records import Samples
 
 CLIP = 2.5
@@ -103,26 +104,30 @@ def count_identical(noise: Noise, value: float) -> Noise:
 def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:
     """Fit the factor to all of the first values at once, for following it up from a wrong one takes long."""
     squared = np.diff(values) ** 2 / (stds[1:] ** 2 + stds[:-1] ** 2)
-    factor = _fit(squared, 0.0 if noise.guessed else DECLARED_WEIGHT)
+    # start from the median, which outliers hardly move: that of a squared standard normal is 0.4549
+    start = max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
+    factor = _fit(squared, start, 0.0 if noise.guessed else DECLARED_WEIGHT)
     if not 1.0 / CONTRADICTED < factor < CONTRADICTED:
         # what was declared is plainly wrong, and is no longer to weigh against the data
-        factor = _fit(squared, 0.0)
+        factor = _fit(squared, start, 0.0)
     return replace(noise, factor=factor, rough=factor)
 
 
-def _fit(squared: Samples, before: float) -> float:
-    """Fit the factor to squared differences by EM, with `before` differences at a factor of one."""
-    # start from the median, which outliers hardly move: that of a squared standard normal is 0.4549
-    factor = max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
-    for _ in range(30):
-        total = sum(float(s) * _share(float(s), factor) for s in squared)
-        factor = max((before + total) / (before + len(squared)), SMALLEST_FACTOR)
-    return factor
-
-
+@compiled
 def _share(squared: float, factor: float) -> float:
     """How much of a squared difference counts: by the odds that there is an outlier in it."""
     odds = CONTAMINATED / (1.0 - CONTAMINATED) / math.sqrt(WIDE)
     odds *= math.exp(min(0.5 * squared / factor * (1.0 - 1.0 / WIDE), 700.0))
     good = 1.0 / (1.0 + odds)
     return good + (1.0 - good) / WIDE
+
+
+@compiled
+def _fit(squared: Samples, factor: float, before: float) -> float:
+    """Fit the factor to squared differences by EM, with `before` differences at a factor of one."""
+    for _ in range(30):
+        total = 0.0
+        for one in squared:
+            total += one * _share(one, factor)
+        factor = max((before + total) / (before + len(squared)), SMALLEST_FACTOR)
+    return factor

@@ -38,7 +38,7 @@ def outcome(
         level, slope, covariance, offset, offset_std = _of_filter(state.filter)
     else:
         level, slope, covariance, offset, offset_std = _of_bank(state)
-        state = _refined(state)
+    state = _refined(state)
     walks = (state.level_variance, state.slope_variance)
     published = belief.wear_state(level, slope, covariance, walks, settings.wear_limit, quality, reason)
     last = state.shift

@@ -32,7 +32,7 @@ class TrackerSettings:
     slope_std : float
         Prior standard deviation of the wear a cycle, in the same unit.
     outlier_probability : float
-        Prior probability that an estimate is an outlier.
+        Prior probability that an estimate is an outlier; how many there are is learned.
     outlier_threshold : float
         Huber's threshold, in standard deviations of the innovation.
     commissioning_cycles : int
@@ -52,7 +52,7 @@ class TrackerSettings:
     hazard: float = 3e-3
     step_std: float = 4.0
     slope_std: float = 0.1
-    outlier_probability: float = 0.003
+    outlier_probability: float = 0.001
     outlier_threshold: float = 2.5
     commissioning_cycles: int = 500
     level_noise: float = 0.0

@@ -63,6 +63,8 @@ class TrackerState:
         The filter that believes the PLC's batch ids.
     bank : ndarray, shape (k, 22)
         Run-length hypotheses, see `impactcell.tracking.bank`.
+    outliers : tuple of float
+        Outliers among the bank's readings, and how many readings, both fading.
     accepted, accepted_before : int
         Indices of the last two cycles at which the bank's shift was reported.
     batch_start, batch_count : int
@@ -75,6 +77,7 @@ class TrackerState:
     noise: Noise = field(default_factory=Noise)
     filter: WearFilter | None = None
     bank: Samples = field(default_factory=lambda: np.zeros((0, WIDTH)))
+    outliers: tuple[float, float] = (0.0, 0.0)
     accepted: int = 0
     accepted_before: int = 0
     batch_id: str | None = None

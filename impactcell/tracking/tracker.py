@@ -67,7 +67,7 @@ def _begin(
     index: int,
 ) -> TrackerState:
     slope_std = settings.slope_std * math.sqrt(variance)
-    first = reading.batch_id
+    first = reading.batch_id if settings.batch is BatchKnowledge.KNOWN else None
     history = commissioning.remember(commissioning.History(), index, reading.mu_s, std, -1.0, first)
     return replace(
         state,
@@ -78,7 +78,7 @@ def _begin(
         first=index,
         level_variance=settings.level_noise**2 * variance,
         slope_variance=settings.slope_noise**2 * variance,
-        batch_id=first,
+        batch_id=reading.batch_id,
         batch_start=index,
         batch_count=1,
         history=history,
@@ -92,10 +92,10 @@ def _announce(
     said = reading.batch_id
     believed = settings.batch is BatchKnowledge.KNOWN and said is not None
     if where.lag > 0:
-        return state, -1.0 if believed else 0.0
+        return state, 0.0
     if said is None or said == state.batch_id:
         # an odd first value must not pass for a batch of one cycle
-        sure = believed or where.index < state.first + FIRST_CYCLES
+        sure = where.index < state.first + FIRST_CYCLES
         return state, 1.0 if reading.expected_change else -1.0 if sure else 0.0
     fresh = replace(
         state,
@@ -126,6 +126,10 @@ def _take(
     if current is None:
         mean, covariance = banks.moments(state.bank)
         return replace(state, filter=wear.resume(mean, covariance, said)), shift, innovation
+    if shift is not None:
+        # what was learned of the noise from here on would be learned from a mix of two materials
+        changed = wear.change_within(current, *banks.moments(state.bank))
+        return replace(state, filter=changed, tested=True, history=None), shift, innovation
     if where.lag == 0:
         current = wear.pass_cycles(current, where.passed, state.level_variance, state.slope_variance)
         if said != current.current:
@@ -182,9 +186,10 @@ def _learn(
     unchanged = level == state.level_variance and slope == state.slope_variance
     if unchanged and not rescaled:
         return state, notes
-    bank, _ = commissioning.replay(settings, history, state.noise.factor, level_walk, slope_walk)
+    again = commissioning.replay(settings, history, state.noise.factor, level_walk, slope_walk)
     filtered = state.filter and commissioning.replay_filter(
         settings, history, state.noise.factor, level_walk, slope_walk
     )
-    fresh = replace(state, bank=bank, filter=filtered, level_variance=level, slope_variance=slope)
+    fresh = replace(state, bank=again.bank, outliers=again.outliers, filter=filtered)
+    fresh = replace(fresh, level_variance=level, slope_variance=slope)
     return replace(fresh, replayed_factor=state.noise.factor), notes

@@ -29,7 +29,8 @@ class WearFilter:
     Attributes
     ----------
     batches : tuple of str
-        The reference batch, then those with an offset in the state, least recently seen first.
+        The reference batch (None once its material has changed under the same name), then those with an
+        offset in the state, least recently seen first.
     current : str
         The present batch.
     mean : ndarray, shape (2 + len(batches) - 1,)
@@ -37,7 +38,7 @@ class WearFilter:
     covariance : ndarray, shape (n, n)
     """
 
-    batches: tuple[str, ...]
+    batches: tuple[str | None, ...]
     current: str
     mean: Samples
     covariance: Samples
@@ -59,6 +60,18 @@ def start(value: float, variance: float, slope_std: float, batch: str) -> WearFi
 def resume(mean: Samples, covariance: Samples, batch: str) -> WearFilter:
     """Go on from the bank's state [total, slope, offset, shift]; the present batch becomes the reference."""
     return WearFilter((batch,), batch, mean[:2].copy(), covariance[:2, :2].copy())
+
+
+def change_within(state: WearFilter, mean: Samples, covariance: Samples) -> WearFilter:
+    """Go on from the bank's state after the present batch changed without a new name.
+
+    What the filter took in since the change is wrong, and the bank has it right: level = total - offset,
+    slope and the present batch's offset are taken from it. Offsets of batches before are given up.
+    """
+    taken = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+    reference = None if state.current == state.batches[0] else state.batches[0]
+    batches = (reference, state.current)
+    return WearFilter(batches, state.current, taken @ mean, taken @ covariance @ taken.T)
 
 
 def pass_cycles(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:
@@ -131,14 +144,14 @@ def offset(state: WearFilter, batch: str) -> tuple[float, float]:
     return contrast(state, batch, state.batches[0])
 
 
-def contrast(state: WearFilter, batch: str, other: str) -> tuple[float, float]:
+def contrast(state: WearFilter, batch: str, other: str | None) -> tuple[float, float]:
     """Offset of `batch` minus that of `other`, and its standard deviation."""
     n = len(state.mean)
     row = _row(state.batches, batch, n) - _row(state.batches, other, n)
     return float(row @ state.mean), math.sqrt(max(float(row @ state.covariance @ row), 0.0))
 
 
-def _row(batches: tuple[str, ...], batch: str, n: int) -> Samples:
+def _row(batches: tuple[str | None, ...], batch: str | None, n: int) -> Samples:
     row = np.zeros(n)
     row[0] = 1.0
     if batch != batches[0]:

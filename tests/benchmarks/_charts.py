@@ -58,7 +58,7 @@ def ewma_arl(limit: float) -> float:
 
 
 @compiled
-def _detect(z: np.ndarray, start: int, kind: int, limit: float) -> int:
+def detect(z: np.ndarray, start: int, kind: int, limit: float) -> int:
     """First alarm of one chart from index 0 on; -1 - index if it comes before `start`."""
     up = down = level = 0.0
     sums = np.zeros(len(z) + 1)
@@ -101,7 +101,7 @@ def _glr_limit(arl: float) -> float:
         rng = np.random.default_rng(77)
         alarms = cycles = 0
         while cycles < 600_000:
-            t = _detect(rng.normal(size=100_000), 10**9, 3, limit)
+            t = detect(rng.normal(size=100_000), 10**9, 3, limit)
             alarms += t < 0
             cycles += -t if t < 0 else t
         found.append((limit, np.log(cycles / max(alarms, 1))))
@@ -117,7 +117,7 @@ def delay(kind: int, limit: float, shift: float, runs: int, seed: int) -> np.nda
         rng = np.random.default_rng([seed, run])
         z = rng.normal(size=length)
         z[50:] += shift if run % 2 else -shift
-        t = _detect(z, 50, kind, limit)
+        t = detect(z, 50, kind, limit)
         if t >= 0:
             delays.append(t - 50 + 1)
     return np.array(delays, dtype=float)

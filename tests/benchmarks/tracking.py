@@ -10,7 +10,7 @@ from impactcell import alarms
 from impactcell.alarms import AlarmSettings
 from impactcell.records import AlarmName
 from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, gap, initial_state, signature, track
-from tests.benchmarks import _inside, _signatures, _slides, _steps
+from tests.benchmarks import _inside, _signatures, _slides, _steps, _tracker
 from tests.benchmarks.table import Table
 
 
@@ -21,9 +21,12 @@ def tables(*, quick: bool = False) -> list[Table]:
         _signatures.speed_table,
         _signatures.error_table,
         _signatures.power_table,
-        _inside.known_table,
-        _inside.unknown_table,
         _steps.table,
+        _inside.steps_table,
+        _inside.wear_table,
+        _tracker.known_table,
+        _tracker.unknown_table,
+        _tracker.starts_table,
     ):
         print(f"  {make.__module__}.{make.__name__} ...", file=sys.stderr, flush=True)
         found = make(quick=quick)

@@ -8,44 +8,55 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from scipy.stats import multivariate_normal
 
-from impactcell.tracking import bank
+from impactcell.tracking import (
+    BatchKnowledge,
+    Reading,
+    TrackerSettings,
+    bank,
+    hypotheses,
+    initial_state,
+    track,
+)
 
 
 def run(values, design, announced=None, variance=1.0, slope_std=0.1, accepted=0.0):
     table = np.zeros((bank.ROWS, bank.WIDTH))
-    first = bank.seed(values[0], variance, slope_std, 0, design[6])
+    first = bank.seed(values[0], variance, slope_std, 0, design[4])
     table[: len(first)] = first
     count, densities, statistics = len(first), [], []
+    outliers = np.zeros(2)
     for t, value in enumerate(values[1:], start=1):
         told = 0.0 if announced is None else announced[t]
         reading = np.array([value, variance, 1.0, 0.0, t, told])
-        count, density, statistic = bank.run_cycle(table, count, design, reading, accepted)
+        count, density, statistic = bank.run_cycle(table, count, design, reading, outliers, accepted)
         densities.append(density)
         statistics.append(statistic)
     return table[:count], np.array(densities), np.array(statistics)
 
 
 def exact_posterior(values, hazard, step_std, slope_std):
-    """Every set of change cycles and scales of step, each a linear Gaussian model solved in one piece."""
+    """Every set of change cycles and kinds of step, each a linear Gaussian model solved in one piece."""
     n = len(values)
     weights, means, lasts = [], [], []
-    for changes in itertools.product([0.0, bank.SMALL_STEP, bank.LARGE_STEP], repeat=n - 1):
-        at = [t for t, c in enumerate(changes, start=1) if c]
+    for kinds in itertools.product([None, *hypotheses.STEPS], repeat=n - 1):
+        at = [(t, kind) for t, kind in enumerate(kinds, start=1) if kind]
         # unknowns: level at cycle 0 (known from the first value), slope, one shift a change
         design = np.zeros((n, 2 + len(at)))
         design[:, 0], design[:, 1] = 1.0, np.arange(n)
-        for k, t in enumerate(at):
+        for k, (t, _) in enumerate(at):
             design[t:, 2 + k] = 1.0
-        prior = np.diag([1.0, slope_std**2, *[(step_std * changes[t - 1]) ** 2 for t in at]])
+        expected = np.array([0.0, 0.0, *[step_std * mean for _, (mean, _, _) in at]])
+        prior = np.diag([1.0, slope_std**2, *[(step_std * std) ** 2 for _, (_, std, _) in at]])
         later = design[1:]
-        residual = values[1:] - values[0]
+        residual = values[1:] - values[0] - later @ expected
         cov = later @ prior @ later.T + np.eye(n - 1)
         weight = multivariate_normal.logpdf(residual, np.zeros(n - 1), cov)
-        weight += len(at) * math.log(hazard / 2.0) + (n - 1 - len(at)) * math.log1p(-hazard)
+        weight += len(at) * math.log(hazard) + (n - 1 - len(at)) * math.log1p(-hazard)
+        weight += sum(math.log(share) for _, (_, _, share) in at)
         gain = prior @ later.T @ np.linalg.inv(cov)
         weights.append(weight)
         means.append((gain @ residual)[1])
-        lasts.append(at[-1] if at else 0)
+        lasts.append(at[-1][0] if at else 0)
     w = np.exp(np.array(weights) - max(weights))
     w /= w.sum()
     last = np.bincount(lasts, weights=w, minlength=n)
@@ -56,13 +67,13 @@ def exact_posterior(values, hazard, step_std, slope_std):
 @pytest.mark.parametrize("shift", [0.0, 1.5, 4.0])
 def test_last_change_and_slope_against_enumeration(shift):
     rng = np.random.default_rng(3)
-    values = 0.03 * np.arange(8) + rng.normal(size=8)
+    values = 0.03 * np.arange(7) + rng.normal(size=7)
     values[4:] += shift
     hazard, step_std, slope_std = 0.02, 3.0, 0.1
     design = bank.design(hazard, step_std**2, 0.0, 0.0, 1e-12)
     table, densities, _ = run(values, design, slope_std=slope_std)
     last, slope, total = exact_posterior(values, hazard, step_std, slope_std)
-    ours = np.zeros(8)
+    ours = np.zeros(7)
     for row in table:
         ours[int(row[bank.CHANGE])] += math.exp(row[bank.WEIGHT])
     # histories before the last change are merged by moments: near, not equal
@@ -88,7 +99,7 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
     oracle.R *= variance
     for t, value in enumerate(values[1:], start=1):
         reading = np.array([value, variance, 1.0, 0.0, t, -1.0])
-        count, density, _ = bank.run_cycle(table, 1, design, reading, 0.0)
+        count, density, _ = bank.run_cycle(table, 1, design, reading, np.zeros(2), 0.0)
         oracle.predict()
         oracle.update(value)
         assert count == 1
@@ -106,11 +117,11 @@ def test_a_late_reading_gives_the_same_state_as_in_time():
     def take(order):
         table = np.zeros((bank.ROWS, bank.WIDTH))
         table[0] = bank.seed(values[0], 1.0, 0.1, 0, 0.01)[0]
-        count, newest = 1, 0
+        count, newest, outliers = 1, 0, np.zeros(2)
         for t in order:
             passed, lag = max(t - newest, 0), max(newest - t, 0)
             reading = np.array([values[t], 1.0, passed, lag, t, -1.0])
-            count, _, _ = bank.run_cycle(table, count, design, reading, 0.0)
+            count, _, _ = bank.run_cycle(table, count, design, reading, outliers, 0.0)
             newest = max(newest, t)
         return bank.moments(table[:count])
 
@@ -149,3 +160,56 @@ def test_the_bank_stays_small_and_normalised_over_a_long_run():
 
 def test_a_threshold_for_each_rate():
     assert bank.threshold(1e6) - bank.threshold(1e5) == pytest.approx(math.log(10.0))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.03])
+def test_how_many_outliers_there_are_is_learned(share):
+    rng = np.random.default_rng(6)
+    values = rng.normal(size=3000)
+    odd = rng.random(3000) < share
+    values[odd] += 10.0 * rng.normal(size=int(odd.sum()))
+    prior = 0.005
+    table = np.zeros((bank.ROWS, bank.WIDTH))
+    first = bank.seed(values[0], 1.0, 0.1, 0, prior)
+    table[: len(first)] = first
+    count, outliers, made = len(first), np.zeros(2), bank.design(3e-3, 16.0, 0.0, 0.0, prior)
+    for t, value in enumerate(values[1:], start=1):
+        reading = np.array([value, 1.0, 1.0, 0.0, t, 0.0])
+        count, _, _ = bank.run_cycle(table, count, made, reading, outliers, 0.0)
+    learned = bank.outlier_probability(prior, *outliers)
+    # a quarter of the outliers are too small to be told from good values
+    assert 0.6 * share <= learned <= 1.2 * share + 0.2 * prior
+
+
+def test_the_tracker_gives_the_alarms_of_its_bank_alone():
+    rng = np.random.default_rng(12)
+    z = rng.normal(size=1600) + 3.3e-4 * np.arange(1600)
+    z[500:] += 2.0
+    z[1100:] -= 1.0
+    z[::150] += 9.0
+    config, std = TrackerSettings(batch=BatchKnowledge.UNKNOWN), 0.002
+    state, ours = initial_state(), []
+    for i, value in enumerate(z.tolist()):
+        done = track(config, state, Reading(i, 0.2 + std * value, std))
+        state = done.state
+        if done.shift is not None:
+            ours.append((i, done.shift.change_cycle, done.shift.size / std))
+    # the bank, told what the tracker has to learn: the scale of the noise
+    made = bank.design(config.hazard, config.step_std**2, 0.0, 0.0, config.outlier_probability)
+    table, outliers = np.zeros((bank.ROWS, bank.WIDTH)), np.zeros(2)
+    first = bank.seed(z[0], 1.0, config.slope_std, 0, config.outlier_probability)
+    table[: len(first)] = first
+    count, accepted, its = len(first), 0.0, []
+    for t in range(1, len(z)):
+        reading = np.array([z[t], 1.0, 1.0, 0.0, t, 0.0])
+        count, _, statistic = bank.run_cycle(table, count, made, reading, outliers, accepted)
+        if statistic > bank.threshold(config.false_alarm_cycles):
+            before, accepted = accepted, float(t)
+            change, size, _ = bank.last_shift(table[:count], before, accepted)
+            its.append((t, change, size))
+    assert len(its) == 2
+    assert len(ours) == len(its)
+    for mine, other in zip(ours, its, strict=True):
+        assert abs(mine[0] - other[0]) <= 2
+        assert abs(mine[1] - other[1]) <= 3
+        assert mine[2] == pytest.approx(other[2], abs=0.15)

@@ -195,6 +195,27 @@ def test_a_known_batch_that_comes_back_is_recognised():
     assert (last.batch.batch_id, last.batch.offset, last.batch.offset_std) == ("A", 0.0, 0.0)
 
 
+@pytest.mark.parametrize("name", ["A", "B"], ids=["in the first batch", "in a later one"])
+def test_a_change_within_a_known_batch_is_found_and_is_no_wear(name):
+    readings = [replace(r, batch_id="A" if r.cycle < 200 else name) for r in series(700, slope=2e-6)]
+    readings = [replace(r, mu_s=r.mu_s + 3.0 * STD) if r.cycle >= 450 else r for r in readings]
+    outcomes = run(KNOWN, readings)
+    found = [(r.cycle, o.shift) for r, o in zip(readings, outcomes, strict=True) if o.shift]
+    assert len(found) == 1
+    cycle, evidence = found[0]
+    assert 450 <= cycle <= 460
+    assert evidence.statistic > evidence.threshold
+    last = outcomes[-1]
+    assert abs(last.batch.last_shift_cycle - 450) <= 2
+    assert abs(last.batch.offset - 3.0 * STD) < 3.0 * last.batch.offset_std + 0.5 * STD
+    assert last.batch.batch_id == name
+    # level and rate are those of the first batch, before and after
+    assert abs(last.wear.level - (0.2 + 2e-6 * 699)) < 3.5 * last.wear.level_std
+    assert abs(last.wear.rate_per_cycle - 2e-6) < 3.0 * last.wear.rate_std
+    after = [Reading(700 + i, 0.2 + 2e-6 * (700 + i), STD, 0, "C") for i in range(50)]
+    assert all(finite(o) and o.used for o in run(KNOWN, after[:4], last.state))
+
+
 def test_wear_reset_starts_a_new_reference():
     last = run(UNKNOWN, series(200, slope=1e-5))[-1]
     fresh = track(UNKNOWN, reset_wear(last.state), Reading(200, 0.15, STD, 300 * SECOND))
