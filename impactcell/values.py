@@ -6,12 +6,13 @@ and numpy arrays, nested to any depth; each is restored to the type its annotati
 """
 
 import base64
+import binascii
 import dataclasses
 import enum
 import json
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
@@ -19,18 +20,24 @@ import numpy as np
 
 T = TypeVar("T")
 
-_PLAIN = frozenset({int, str, bool, type(None)})
+
+_quoted = json.encoder.encode_basestring_ascii
 
 
 @cache
-def _field_names(kind: type) -> tuple[str, ...] | None:
-    """Names of a dataclass's fields; None for any other class. A state has hundreds of them, each cycle."""
-    return tuple(f.name for f in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else None
+def _fields(kind: type) -> tuple[tuple[str, str], ...] | None:
+    """Name of each of a dataclass's fields and what stands before its value; None for any other class."""
+    if not dataclasses.is_dataclass(kind):
+        return None
+    names = [field.name for field in dataclasses.fields(kind)]
+    return tuple((name, f'{"," if i else "{"}"{name}":') for i, name in enumerate(names))
 
 
 def dumps(value: object) -> bytes:
     """Write a frozen dataclass as UTF-8 JSON; equal values give equal bytes."""
-    return json.dumps(to_json(value), separators=(",", ":"), allow_nan=False).encode()
+    parts: list[str] = []
+    _write(value, parts.append)
+    return "".join(parts).encode()
 
 
 def loads(kind: type[T], data: bytes) -> T:
@@ -48,39 +55,56 @@ def loads(kind: type[T], data: bytes) -> T:
     return restored
 
 
-def to_json(value: Any) -> Any:
-    """Turn a value into mappings, lists, strings and integers."""
+def _write(value: Any, add: Callable[[str], None]) -> None:
+    """Add a value's JSON piece by piece: a state has a thousand of them, each cycle."""
     kind: Any = type(value)
     if kind is float:
-        return value.hex()
-    if kind in _PLAIN:
-        return value
-    names = _field_names(kind)
-    if names is not None:
-        return {name: to_json(getattr(value, name)) for name in names}
-    if isinstance(value, enum.Enum):
-        return value.name
-    if isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, float):
-        return float(value).hex()
-    if isinstance(value, np.ndarray):
+        add(f'"{value.hex()}"')
+    elif kind is str:
+        add(_quoted(value))
+    elif value is None or kind is bool:
+        add(_WORDS[value])
+    elif kind is int:
+        add(str(value))
+    elif (fields := _fields(kind)) is not None:
+        for name, before in fields:
+            add(before)
+            _write(getattr(value, name), add)
+        add("}" if fields else "{}")
+    elif isinstance(value, enum.Enum):
+        add(_quoted(value.name))
+    elif isinstance(value, np.ndarray):
         raw = np.ascontiguousarray(value)
         raw = raw.astype(raw.dtype.newbyteorder("<"), copy=False)
-        return {
-            "dtype": raw.dtype.str,
-            "shape": list(value.shape),
-            "base64": base64.b64encode(raw.tobytes()).decode(),
-        }
-    if isinstance(value, tuple | list):
-        return [to_json(item) for item in value]
-    if isinstance(value, Mapping):
-        return {str(key): to_json(item) for key, item in value.items()}
-    raise TypeError(f"{type(value).__name__} has no exact written form")
+        text = binascii.b2a_base64(raw.tobytes(), newline=False).decode()
+        shape = ",".join(map(str, value.shape))
+        add(f'{{"dtype":"{raw.dtype.str}","shape":[{shape}],"base64":"{text}"}}')
+    elif isinstance(value, tuple | list):
+        add("[")
+        for i, item in enumerate(value):
+            if i:
+                add(",")
+            _write(item, add)
+        add("]")
+    elif isinstance(value, Mapping):
+        add("{")
+        for i, (key, item) in enumerate(value.items()):
+            add(f"{',' if i else ''}{_quoted(str(key))}:")
+            _write(item, add)
+        add("}")
+    elif isinstance(value, float):
+        add(f'"{float(value).hex()}"')
+    elif isinstance(value, int | str):
+        add(json.dumps(value))
+    else:
+        raise TypeError(f"{kind.__name__} has no exact written form")
+
+
+_WORDS = {None: "null", True: "true", False: "false"}
 
 
 def from_json(kind: Any, data: Any) -> Any:
-    """Turn what `to_json` made back into a value of the annotated type `kind`."""
+    """Turn parsed JSON back into a value of the annotated type `kind`."""
     origin = typing.get_origin(kind)
     if origin in (typing.Union, types.UnionType):
         return _from_union(kind, data)
