@@ -16,6 +16,7 @@ from impactcell.discrepancy.workflow import Findings
 UNITS = ("N", "mm", "mm")
 SCALES = (1.0, 1e3, 1e3)
 INK, BEFORE, AFTER = "#22313f", "#c8553d", "#2a7f8e"
+MEASURED, UNSEEN = "#9fb0bf", "#eceff2"
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.size": 9,
@@ -39,7 +40,7 @@ def _svg(figure: Figure) -> str:
 
 
 def chart(evidence: Evidence) -> str:
-    """Map of phases against covariates: colour is the statistic, a ring what is significant over the map."""
+    """Map of phases against covariates: colour for the statistic, a ring if significant, grey if untested."""
     made = evidence.map
     rows, columns = len(made.rows), len(made.columns)
     statistic = np.full(rows * columns, np.nan)
@@ -52,6 +53,7 @@ def chart(evidence: Evidence) -> str:
         figure = Figure(figsize=(1.6 + 0.85 * columns, 0.9 + 0.42 * rows))
         axes = figure.add_subplot()
         shown = np.ma.masked_invalid(np.sqrt(statistic).reshape(rows, columns))
+        axes.set_facecolor(UNSEEN)
         image = axes.imshow(shown, cmap="YlOrRd", vmin=1.0, vmax=6.0, aspect="auto")
         for row in range(rows):
             for column in range(columns):
@@ -80,6 +82,8 @@ def traces(findings: Findings) -> str:
     problem = findings.held_problem
     shots = problem.shots
     old, new = findings.held_nominal, findings.held_final
+    extended = findings.final is not findings.nominal
+    models = ((old, BEFORE, "before"), (new, AFTER, "after")) if extended else ((old, AFTER, "nominal"),)
     misfit = old.misfit(shots) / problem.sizes
     order = np.argsort(misfit)
     chosen = [int(order[0]), int(order[len(order) // 2]), int(order[-1])]
@@ -103,24 +107,20 @@ def traces(findings: Findings) -> str:
                 upper = figure.add_subplot(grid[2 * row, column])
                 lower = figure.add_subplot(grid[2 * row + 1, column], sharex=upper)
                 step = max(len(t) // 400, 1)
-                upper.plot(t[::step], measured[::step], ".", color="#9fb0bf", markersize=2, label="measured")
-                upper.plot(t, fitted, color=AFTER, linewidth=1.1, label="model after")
-                upper.tick_params(labelbottom=False)
-                lower.axhspan(-2, 2, color="#eef2f5", zorder=0)
-                lower.plot(
-                    t[::step],
-                    _smooth(old.residual[part][mine], step)[::step],
-                    color=BEFORE,
-                    linewidth=0.8,
-                    label="before",
-                )
-                lower.plot(
-                    t[::step],
-                    _smooth(new.residual[part][mine], step)[::step],
+                upper.plot(t[::step], measured[::step], ".", color=MEASURED, markersize=4, label="measured")
+                upper.plot(
+                    t,
+                    fitted,
                     color=AFTER,
-                    linewidth=0.8,
-                    label="after",
+                    linewidth=1.1,
+                    label="extended model" if extended else "nominal model",
                 )
+                upper.tick_params(labelbottom=False)
+                lower.tick_params(labelbottom=row == len(channels) - 1)
+                lower.axhspan(-2, 2, color="#eef2f5", zorder=0)
+                for model, colour, label in models:
+                    shown = _smooth(model.residual[part][mine], step)[::step]
+                    lower.plot(t[::step], shown, color=colour, linewidth=0.8, label=label)
                 if column == 0:
                     upper.set_ylabel(f"{CHANNELS[channel]} [{UNITS[channel]}]")
                     lower.set_ylabel("residual\n[noise std]")
@@ -128,7 +128,10 @@ def traces(findings: Findings) -> str:
                     upper.set_title(_setting(item), fontsize=9)
                     if column == 0:
                         upper.legend(frameon=False, fontsize=8)
-                        lower.legend(frameon=False, fontsize=8, ncols=2)
+                        if extended:
+                            lower.legend(
+                                frameon=False, fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1, 0.8)
+                            )
                 if row == len(channels) - 1:
                     lower.set_xlabel("time [ms]")
         return _svg(figure)
@@ -155,12 +158,11 @@ def factors(findings: Findings) -> str:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.5, 2.3))
         axes = figure.add_subplot()
-        for model, held, colour, label in (
-            (findings.nominal, findings.held_nominal, BEFORE, "before"),
-            (findings.final, findings.held_final, AFTER, "after"),
-        ):
-            if colour == AFTER and findings.final is findings.nominal:
-                continue
+        models = [(findings.final, findings.held_final, AFTER, "training")]
+        if findings.final is not findings.nominal:
+            nominal = (findings.nominal, findings.held_nominal, BEFORE, "before")
+            models = [nominal, (findings.final, findings.held_final, AFTER, "after")]
+        for model, held, colour, label in models:
             axes.plot(
                 findings.training + 1,
                 100.0 * model.local.log_factor,
@@ -171,7 +173,7 @@ def factors(findings: Findings) -> str:
             )
             axes.plot(
                 findings.held_out + 1, 100.0 * held.local.log_factor, "o", color=colour, markersize=4.5,
-                markerfacecolor="white", label=f"{label}, held out",
+                markerfacecolor="white", label=f"{label}, held out".removeprefix("training, "),
             )  # fmt: skip
         axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
         axes.set_xlabel("shot, in order")

@@ -1,5 +1,6 @@
 """One self-contained page: verdict, map, traces, evidence, parameters, held-out gap, what to measure next."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -7,11 +8,16 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy import figures
 from impactcell.discrepancy.evidence import ALPHA
+from impactcell.discrepancy.intervals import Estimate
+from impactcell.discrepancy.prove import Proof
 from impactcell.discrepancy.result import where
 from impactcell.discrepancy.workflow import NAMED, NO_GAP, TIED, Findings
 from impactcell.physics.effects import LIBRARY
 
-GUIDE = "impactcell/discrepancy/README.md"
+GUIDE = (Path(__file__).parent / "README.md").as_uri() + "#a-new-effect"
+LARGE = 1.25
+"""RMS of a region's residuals, in noise floors, from which on it is shown as large."""
+UNITS = {"stiffness_n_per_m": "N/m", "damping_n_s_per_m": "N s/m"}
 
 
 def write_report(findings: Findings, source: str, file: Path) -> None:
@@ -42,19 +48,26 @@ def verdict_sentence(findings: Findings) -> str:
     if findings.verdict == NAMED:
         return f"Missing: {names}; with it the held-out gap falls from {before} to {after} noise floors."
     if findings.verdict == TIED:
-        rivals = sorted({words(one) for tied in findings.search.ties.values() for one in tied})
+        ties = findings.search.ties
+        groups = [" or ".join(map(words, (effect, *ties.get(effect, ())))) for effect in findings.added]
         return (
-            f"Missing: {names}, which these shots cannot tell from {' or '.join(rivals)}; "
+            f"Missing: {', and '.join(groups)}, which these shots cannot tell apart; "
             f"the held-out gap falls from {before} to {after} noise floors."
         )
     left = findings.unexplained
     phase = words(left.phase) if left else "some phase"
+    if findings.added:
+        return (
+            f"Missing: {names}, and something that no known effect explains: with {names} the held-out gap "
+            f"falls from {before} to {after} noise floors only; what is left is largest in phase {phase}."
+        )
     return f"No known effect explains a held-out gap of {before} noise floors, largest in phase {phase}."
 
 
 def content(findings: Findings, source: str) -> dict[str, Any]:
     """Everything the template shows."""
     search = findings.search
+    extended = findings.final is not findings.nominal
     return {
         "source": source,
         "verdict": findings.verdict,
@@ -98,10 +111,17 @@ def content(findings: Findings, source: str) -> dict[str, Any]:
                 "value": one.value,
                 "low": one.low,
                 "high": one.high,
+                "unit": _unit(one),
             }
             for one in findings.parameters
         ],
         "proof": findings.proof,
+        "regions": _regions(findings.proof),
+        "large": LARGE,
+        "uncertain": 1.0 / math.sqrt(2.0 * max(len(findings.held_out), 1)),
+        "extended": extended,
+        "change": lambda form, before, after: form % before + (f" → {form % after}" if extended else ""),
+        "nominal_effects": [words(one) for one in findings.nominal.effects],
         "floor": findings.floor,
         "replicates": findings.replicates,
         "spread": findings.final.spread,
@@ -110,6 +130,27 @@ def content(findings: Findings, source: str) -> dict[str, Any]:
         "seed": findings.seed,
         "guide": GUIDE,
         "words": words,
+    }
+
+
+def _unit(one: Estimate) -> str:
+    """Return the unit of a parameter; empty for a pure number."""
+    if not one.effect:
+        return UNITS.get(one.parameter, "")
+    unit = next(known.unit for known in LIBRARY[one.effect].parameters if known.name == one.parameter)
+    return "" if unit == "1" else unit
+
+
+def _regions(proof: Proof) -> dict[str, Any]:
+    """Held-out RMS before and after, phases down and channels across; None where nothing was recorded."""
+    values = {(phase, channel): (before, after) for phase, channel, before, after in proof.regions}
+    channels = list(dict.fromkeys(channel for _, channel in values))
+    return {
+        "channels": channels,
+        "rows": [
+            (phase, [values.get((phase, channel)) for channel in channels])
+            for phase in dict.fromkeys(phase for phase, _ in values)
+        ],
     }
 
 

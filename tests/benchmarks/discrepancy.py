@@ -2,7 +2,8 @@
 
 `python -m tests.benchmarks.discrepancy [--workers 2]` runs the study, a row a campaign appended to `--rows`
 as it is done; what is there already is not done again. `--rivals` runs the rivals on every third campaign of
-these rows, into a file of their own beside them. `--table` only prints the tables of the rows there are.
+these rows, into a file of their own beside them. `--table` only prints the tables of the rows there are, and
+`--readme` writes them into the README of the workflow, below the marker in its section on the study.
 """
 
 import argparse
@@ -21,6 +22,8 @@ from tests.benchmarks._discrepancy_run import ROWS, rows, study
 from tests.benchmarks.table import Table
 
 Row = dict[str, Any]
+README = Path("impactcell/discrepancy/README.md")
+MARKER = "<!-- tables of the study -->\n"
 NAMED = {judge.RIGHT, judge.TIED}
 FALSELY = {judge.WRONG, judge.PARTIAL, judge.FALSE}
 NAMES = {
@@ -152,6 +155,12 @@ def reach(found: list[Row]) -> Table:
     return Table("Discrepancy: visible campaigns, as they were made", columns, lines, note)
 
 
+def write_readme(made: list[Table], file: Path = README) -> None:
+    """Put the tables into the README, in the place of those that are there."""
+    text, _, _ = file.read_text(encoding="utf-8").partition(MARKER)
+    file.write_text(text + MARKER + "\n" + "\n".join(one.markdown() for one in made), encoding="utf-8")
+
+
 def main() -> None:
     """Run what the arguments say, then print the tables."""
     parser = argparse.ArgumentParser()
@@ -161,15 +170,19 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--rivals", action="store_true", help="run the rivals on every third campaign")
     parser.add_argument("--table", action="store_true", help="only print the tables of the rows there are")
+    parser.add_argument("--readme", action="store_true", help="write these tables into the README, too")
     given = parser.parse_args()
     wanted = set(filter(None, given.kinds.split(",")))
     plan = [job for job in jobs() if not wanted or job.kind in wanted][: given.limit]
     if given.rivals:
         study(rivals.beside(given.rows), rivals.subset(plan, rows(given.rows)), given.workers, rivals.run)
-    elif not given.table:
+    elif not (given.table or given.readme):
         study(given.rows, plan, given.workers)
-    for made in tables(given.rows):
-        print(made.markdown())
+    made = tables(given.rows)
+    for one in made:
+        print(one.markdown())
+    if given.readme:
+        write_readme(made)
 
 
 if __name__ == "__main__":
