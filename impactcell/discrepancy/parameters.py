@@ -6,6 +6,7 @@ mu_s, reciprocals of what vanishes at infinity. On these scales the residuals ar
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -78,6 +79,7 @@ class Coordinate:
         return self.scale
 
 
+@lru_cache
 def nominal(excitation: Excitation) -> tuple[Coordinate, ...]:
     """Free numbers of the nominal plant: those that this excitation can tell anything of."""
     k = Coordinate("", "stiffness_n_per_m", 0, "log", 1.0, math.log(1e2), math.log(1e11), math.log(6e5))
@@ -89,6 +91,7 @@ def nominal(excitation: Excitation) -> tuple[Coordinate, ...]:
     return (mu_k,) if excitation is Excitation.FREE_SLIDE else (mu_k, ratio)
 
 
+@lru_cache(maxsize=256)
 def of_effect(identifier: str, batches: int) -> tuple[Coordinate, ...]:
     """Free numbers of an effect."""
     made: list[Coordinate] = []

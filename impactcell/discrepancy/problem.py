@@ -137,6 +137,8 @@ def without_jumps(change: Samples) -> Samples:
     nothing about the slope, but divided by the step it would outweigh all others.
     """
     size = np.abs(change)
+    if not (size > 1.0).any():
+        return change
     beside = np.maximum(size[:-2], size[2:])
     change[1:-1][size[1:-1] > JUMP * beside + 1.0] = 0.0
     return change

@@ -178,9 +178,8 @@ def products(tangent: Tangent, direction: Samples, prior: Samples | None = None)
     """
     n = len(tangent.bounds) - 1
     below = np.zeros(n) if prior is None else prior
-    d = np.nan_to_num(direction, nan=0.0, posinf=0.0, neginf=0.0)
-    whole = _dot(d, d, tangent.bounds) + below**2
-    rows, priors = _project(d[None], below[None], tangent.basis, tangent.prior_basis, tangent.bounds)
+    whole = _dot(direction, direction, tangent.bounds) + below**2
+    rows, priors = _project(direction[None], below[None], tangent.basis, tangent.prior_basis, tangent.bounds)
     d, below = rows[0], priors[0]
     residual = _dot(d, tangent.residual, tangent.bounds) + below * tangent.prior_residual
     shared = np.add.reduceat(d * tangent.shared, tangent.bounds[:-1], axis=1) + below * tangent.prior_shared
