@@ -193,7 +193,10 @@ class PositioningTask:
                 await self._positioner.tap(TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction))
                 await self._module.read_report()
                 position_m = self._report().position_m
-            except (PositioningError, FieldbusError) as error:
+            except FieldbusError as error:
+                self._set(sequence.failed(self._sequence, f"{self._cell.name}: {error}"))
+                return
+            except PositioningError as error:
                 self._set(sequence.failed(self._sequence, str(error)))
                 return
             if self._sequence is not waiting:
