@@ -3,13 +3,15 @@
 import asyncio
 import contextlib
 import json
+import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,20 +28,56 @@ from tests.integration.processes import CONFIG, ROOT
 
 PERIOD_S = 0.5
 PUBLISHING_MS = 100
+SETTLED_MS = 1000.0
+"""The cycles that waited at the start are worked off once none in a second came later than this."""
+LONGEST_START_S = 60.0
+EVERY_CORE = sorted(os.sched_getaffinity(0))
+ITS_CORE, OTHERS = EVERY_CORE[:1], EVERY_CORE[1:] or EVERY_CORE
+"""The service has one core of its own; modules and client have the others."""
 PASSWORD = "benchmark"
 COLUMNS = ("what", "bar", "measured", "interval")
 
 
 @dataclass(frozen=True)
 class Load:
-    """What one service did with so many cells."""
+    """What one service did with so many cells.
+
+    Attributes
+    ----------
+    cpu : float
+        Of one core.
+    missed_before, missed : int
+        Cycles that the module had overwritten, before what waited at the start was worked off and since.
+    settling_s : float
+        From the first notification until what waited at the start was worked off; nan if it never was.
+    waiting : float
+        Programs that waited for a core meanwhile, this one's included (load average).
+    """
 
     cells: int
     cpu: float
     memory_mb: float
     received: int
+    missed_before: int
     missed: int
+    settling_s: float
     delays_ms: list[float]
+    waiting: float
+
+    def row(self) -> tuple[str, ...]:
+        """Give its row of the table."""
+        p50, p99 = (f"{np.percentile(self.delays_ms, q):.0f}" for q in (50, 99)) if self.delays_ms else "--"
+        return (
+            f"{self.cells}",
+            f"{100 * self.cpu:.0f} %",
+            f"{1e3 * self.cpu / (self.cells / PERIOD_S):.1f} ms",
+            f"{self.memory_mb:.0f} MB",
+            f"{self.received}",
+            f"{self.settling_s:.0f} s, {self.missed_before} missed",
+            f"{self.missed}",
+            f"{p50} / {p99} ms",
+            f"{self.waiting:.1f}",
+        )
 
 
 @contextlib.contextmanager
@@ -52,18 +90,12 @@ def modules(number: int, period_s: float) -> Iterator[list[int]]:
         cwd=ROOT,
     )
     try:
-        psutil.Process(process.pid).cpu_affinity(cores()[1:])
+        psutil.Process(process.pid).cpu_affinity(OTHERS)
         assert process.stdout is not None
         yield json.loads(process.stdout.readline())
     finally:
         process.terminate()
         process.communicate()
-
-
-def cores() -> list[int]:
-    """First the service's core, then those of everything else."""
-    every = sorted(os.sched_getaffinity(0))
-    return [every[0], *(every[1:] or every)]
 
 
 def cell_file(directory: Path, name: str, port: int, monitor: int, *, journal: bool) -> Path:
@@ -89,11 +121,13 @@ def service(files: list[Path]) -> Iterator[tuple[psutil.Process, str, int]]:
     log = files[0].parent / "service.log"
     with log.open("w") as out:
         process = subprocess.Popen(
-            [sys.executable, "-m", "impactcell", "run", *map(str, files)], stderr=out, cwd=ROOT
+            ["taskset", "--cpu-list", str(ITS_CORE[0]), sys.executable, "-m", "impactcell", "run"]
+            + [str(file) for file in files],
+            stderr=out,
+            cwd=ROOT,
         )
     try:
         seen = psutil.Process(process.pid)
-        seen.cpu_affinity(cores()[:1])
         endpoint = _told(log, r" at (opc\.tcp://\S+)", process)
         monitor = int(_told(log, r"metrics at http://[^:]+:(\d+)", process))
         yield seen, endpoint, monitor
@@ -103,8 +137,6 @@ def service(files: list[Path]) -> Iterator[tuple[psutil.Process, str, int]]:
 
 
 def _told(log: Path, pattern: str, process: subprocess.Popen[bytes]) -> str:
-    import re
-
     deadline = time.monotonic() + 120.0
     while time.monotonic() < deadline and process.poll() is None:
         match = re.search(pattern, log.read_text())
@@ -125,8 +157,13 @@ def totals(monitor: int) -> dict[str, float]:
     }
 
 
-async def listen(endpoint: str, cells: list[str], seconds: float) -> list[float]:
-    """Delays from the end of a cycle to its notification, ms, of all cells together."""
+async def listen(
+    endpoint: str, cells: list[str], seconds: float, begun: Callable[[], None]
+) -> tuple[float, list[float]]:
+    """Seconds until settled, and then the delays from a cycle's end to its notification, ms, of all cells.
+
+    `begun` is called when the delays begin to count.
+    """
     delays: list[float] = []
 
     class Handler:
@@ -143,11 +180,17 @@ async def listen(endpoint: str, cells: list[str], seconds: float) -> list[float]
         subscription = await client.create_subscription(PUBLISHING_MS, Handler())
         nodes = [client.get_node(ua.NodeId(f"{cell}/Friction/CycleNumber", index)) for cell in cells]
         await subscription.subscribe_data_change(nodes, queuesize=100)
-        await asyncio.sleep(1.0)
+        started, settling_s = time.monotonic(), math.nan
+        while math.isnan(settling_s) and time.monotonic() - started < LONGEST_START_S:
+            delays.clear()
+            await asyncio.sleep(1.0)
+            if len(delays) >= len(cells) and max(delays) < SETTLED_MS:
+                settling_s = time.monotonic() - started
+        begun()
         delays.clear()
         await asyncio.sleep(seconds)
         await subscription.delete()
-    return delays
+    return settling_s, delays
 
 
 def load(number: int, seconds: float) -> Load:
@@ -160,24 +203,26 @@ def load(number: int, seconds: float) -> Load:
         names = [f"cell-{i}" for i in range(number)]
         files = [cell_file(directory, n, p, 0, journal=True) for n, p in zip(names, ports, strict=True)]
         with service(files) as (process, endpoint, monitor):
-            deadline = time.monotonic() + 120.0
-            while (
-                totals(monitor).get("impactcell_cycles_total", 0) < 4 * number and time.monotonic() < deadline
-            ):
-                time.sleep(0.2)
-            time.sleep(5.0)
-            before, started, cpu = totals(monitor), time.monotonic(), process.cpu_times()
-            delays = asyncio.run(listen(endpoint, names, seconds))
-            elapsed, spent, after = time.monotonic() - started, process.cpu_times(), totals(monitor)
-            used = spent.user + spent.system - cpu.user - cpu.system
+            at: list[tuple[float, float, dict[str, float]]] = []
+
+            def look() -> None:
+                spent = process.cpu_times()
+                at.append((time.monotonic(), spent.user + spent.system, totals(monitor)))
+
+            settling_s, delays = asyncio.run(listen(endpoint, names, seconds, look))
+            look()
             memory = process.memory_info().rss
+    (began, cpu, before), (ended, spent, after) = at
     return Load(
         number,
-        used / elapsed,
+        (spent - cpu) / (ended - began),
         memory / 2**20,
         int(after["impactcell_cycles_total"] - before["impactcell_cycles_total"]),
+        int(before["impactcell_cycles_missed_total"]),
         int(after["impactcell_cycles_missed_total"] - before["impactcell_cycles_missed_total"]),
+        settling_s,
         delays,
+        os.getloadavg()[0],
     )
 
 
@@ -185,27 +230,32 @@ def tables(quick: bool = False) -> list[Table]:
     """Cells on one core, and the delay of one of them."""
     numbers = (1, 4) if quick else (1, 4, 8, 16, 24)
     seconds = 10.0 if quick else 30.0
-    loads = [load(number, seconds) for number in numbers]
-    rows = [
-        (
-            f"{one.cells}",
-            f"{100 * one.cpu:.0f} %",
-            f"{one.memory_mb:.0f} MB",
-            f"{one.received}",
-            f"{one.missed}",
-            f"{np.percentile(one.delays_ms, 50):.0f} / {np.percentile(one.delays_ms, 99):.0f} ms",
-        )
-        for one in loads
-    ]
+    os.sched_setaffinity(0, OTHERS)
+    loads = []
+    for number in numbers:
+        loads.append(load(number, seconds))
+        print("service:", " | ".join(loads[-1].row()), file=sys.stderr, flush=True)
+    os.sched_setaffinity(0, EVERY_CORE)
     most = max((one for one in loads if one.missed == 0), key=lambda one: one.cells, default=None)
     single = loads[0].delays_ms
     return [
         Table(
             "Cells on one core, 2 cycles/s each with 20 000 force and 4 000 position samples",
-            ("cells", "CPU of the core", "memory", "cycles", "missed", "cycle to notification p50 / p99"),
-            rows,
+            (
+                "cells",
+                "CPU of the core",
+                "CPU a cycle",
+                "memory",
+                "cycles",
+                "start worked off in",
+                "missed then",
+                "cycle to notification p50 / p99",
+                "load average",
+            ),
+            [one.row() for one in loads],
             f"The whole service: Modbus, prediction, tracking, alarms, journal, OPC UA (publishing interval "
-            f"{PUBLISHING_MS} ms); modules and client on the other core. {seconds:g} s each.",
+            f"{PUBLISHING_MS} ms); modules and client on the other core. {seconds:g} s each, after what had "
+            "waited in the modules' rings at the start was worked off.",
         ),
         Table(
             "The service",
