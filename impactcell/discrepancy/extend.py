@@ -87,7 +87,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     if not setup.material_gain(singles[0].fit, pairs[0].fit) and setup.follows(singles[0].fit):
         return _accept_single(setup.problem, first, against, singles)
     last = setup.look(pairs[0].fit)
-    if not setup.closes(last):
+    if not setup.suffices(last):
         return Search(first, last, None, (), {}, {}, everything)
     return _accept_pair(setup.problem, first, last, pairs, rough, sources, everything)
 
