@@ -21,9 +21,11 @@ from typing import Any
 import numpy as np
 
 from impactcell.errors import JournalError
+from impactcell.journal.codes import folded_differences, is_uniform, unfolded
 from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 
 MAGIC = b"ICC2"
+NONE = np.empty(0, dtype=np.int64)
 _CHANNELS = ("force", "position", "actuator")
 
 
@@ -112,13 +114,13 @@ def _encode_channel(channel: Channel, arrays: list[bytes]) -> dict[str, Any]:
         arrays.append(_planes(channel.time_s.astype("<f8")))
     else:
         header["uniform"] = [float(channel.time_s[0]), rate_hz]
-    codes = _codes(channel)
-    if codes is None:
+    largest, folded = -1, NONE
+    if channel.resolution:
+        largest, folded = folded_differences(channel.values, channel.resolution)
+    if largest < 0:
         arrays.append(_planes(channel.values.astype("<f8")))
     else:
-        differences = np.diff(codes, prepend=np.int64(0))
-        folded = (differences << 1) ^ (differences >> 63)
-        header["dtype"] = "<u2" if folded.max(initial=0) < 2**16 else "<u8"
+        header["dtype"] = "<u2" if largest < 2**16 else "<u8"
         arrays.append(_planes(folded.astype(header["dtype"])))
     return header
 
@@ -132,8 +134,7 @@ def _decode_channel(header: dict[str, Any], cursor: _Cursor) -> Channel:
         else cursor.take("<f8", count).astype(np.float64)
     )
     if "dtype" in header:
-        folded = cursor.take(header["dtype"], count).astype(np.int64)
-        values = np.cumsum((folded >> 1) ^ -(folded & 1)) * header["resolution"]
+        values = unfolded(cursor.take(header["dtype"], count).astype(np.int64), header["resolution"])
     else:
         values = cursor.take("<f8", count).astype(np.float64)
     full_scale = header["full_scale"]
@@ -153,19 +154,6 @@ def _uniform_rate(time_s: Samples) -> float | None:
     if not math.isfinite(rate_hz):
         return None
     for candidate in (rate_hz, float(round(rate_hz))):
-        if candidate > 0 and np.array_equal(uniform_times(float(time_s[0]), candidate, len(time_s)), time_s):
+        if candidate > 0 and is_uniform(time_s, candidate):
             return candidate
     return None
-
-
-def _codes(channel: Channel) -> np.ndarray[Any, np.dtype[np.int64]] | None:
-    if not channel.resolution or not np.all(np.isfinite(channel.values)):
-        return None
-    with np.errstate(over="ignore"):
-        scaled = np.rint(channel.values / channel.resolution)
-    if np.abs(scaled).max(initial=0) >= 2**53:
-        return None
-    codes = scaled.astype(np.int64)
-    # Negative zero is not a multiple that an integer remembers: compare bits, not values.
-    same = (codes * channel.resolution).view(np.int64) == channel.values.view(np.int64)
-    return codes if bool(np.all(same)) else None

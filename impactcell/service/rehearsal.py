@@ -8,6 +8,7 @@ import numpy as np
 
 from impactcell import cell as core
 from impactcell.cell import CellDesign
+from impactcell.journal.blobs import encode_capture
 from impactcell.physics import Strike, strike
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
 
@@ -36,7 +37,9 @@ def _rehearse(design: CellDesign, stop: Callable[[], bool]) -> bool:
     for cycle in range(1, CYCLES + 1):
         if stop():
             return False
-        state = core.step(hurried, state, _capture(hurried, cycle), PositioningState()).state
+        capture = _capture(hurried, cycle)
+        state = core.step(hurried, state, capture, PositioningState()).state
+        encode_capture(capture)
     return True
 
 
@@ -59,7 +62,7 @@ def _capture(design: CellDesign, cycle: int) -> Capture:
         cycle=cycle,
         velocity_m_s=tap.velocity_m_s,
         mass_kg=tap.mass_kg,
-        force=Channel(force_s, force),
+        force=Channel(force_s, force, resolution=1e-3),
         position=Channel(position_s, position),
         stroke_m=tap.stroke_m,
         time_ns=cycle * 10**9,
