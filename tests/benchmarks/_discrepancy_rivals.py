@@ -5,7 +5,6 @@ the largest first-order gain each is fitted beside what the model has, everythin
 until the criterion says no, or four have joined. They name no ties: whatever wins is their answer.
 """
 
-import json
 import math
 import time
 from collections.abc import Callable
@@ -57,7 +56,7 @@ def beside(file: Path) -> Path:
 
 def subset(plan: list[Job], found: list[Row]) -> list[Task]:
     """Every third job of each kind, as far as it is done."""
-    multiples = {row["key"]: tuple(row["multiples"]) for row in found}
+    multiples = {row["key"]: tuple(row["multiples"]) for row in found if "multiples" in row}
     seen: dict[str, int] = {}
     made = []
     for job in plan:
@@ -74,7 +73,7 @@ def run(task: Task) -> Row:
     floor = noise.sensors(material)
     training, _ = split(material, job.seed)
     library = tuple(effect for effect in LIBRARY if effect != job.removed)
-    row: Row = {"key": job.key, "job": json.loads(job.key)}
+    row: Row = {"key": job.key}
     started = time.process_time()
     problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
     nominal = fit_nominal(problem)
@@ -185,7 +184,7 @@ def table(found: list[Row], rivals: list[Row]) -> Table | None:
     if not rivals:
         return None
     ours = {row["key"]: row for row in found}
-    rivals = [row for row in rivals if row["key"] in ours]
+    rivals = [row for row in rivals if row["key"] in ours and "sindy" in row]
     answers = {
         which: [
             ours[row["key"]] if which == "ours" else generous(answered(row, row[which])) for row in rivals

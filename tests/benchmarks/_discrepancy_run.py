@@ -9,11 +9,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from impactcell.discrepancy.result import result
 from impactcell.discrepancy.workflow import investigate
-from impactcell.errors import ImpactCellError
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks._discrepancy_plan import calibrated
 from tests.discrepancy.study import Job, campaign, hidden, scenario
@@ -27,7 +24,6 @@ def run(job: Job) -> dict[str, Any]:
     multiples, gaps = calibrated(job)
     row: dict[str, Any] = {
         "key": job.key,
-        "job": json.loads(job.key),
         "multiples": multiples,
         "expected": gaps,
     }
@@ -35,10 +31,7 @@ def run(job: Job) -> dict[str, Any]:
     row["made_in_s"] = round(time.process_time() - started, 2)
     library = [effect for effect in LIBRARY if effect != job.removed]
     started = time.process_time()
-    try:
-        found = investigate(given, seed=job.seed, library=library)
-    except (ImpactCellError, ValueError, np.linalg.LinAlgError) as error:
-        return row | {"verdict": "error", "error": f"{type(error).__name__}: {error}"}
+    found = investigate(given, seed=job.seed, library=library)
     outcome = result(found)
     return row | {
         "verdict": outcome["verdict"],
@@ -95,16 +88,24 @@ def rows(file: Path = ROWS) -> list[dict[str, Any]]:
     """Rows of earlier runs."""
     if not file.exists():
         return []
-    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
+    lines = file.read_text(encoding="utf-8").splitlines()
+    made = [json.loads(line) for line in lines if line.strip()]
+    return [row | {"job": json.loads(row["key"])} for row in made]
 
 
-def study(file: Path, todo: Iterable[Job], workers: int, work: Callable[[Job], dict[str, Any]] = run) -> None:
-    """Do what is missing, in order; a row is appended and flushed as soon as it is done."""
+def study(file: Path, todo: Iterable[Any], workers: int, work: Callable[[Any], dict[str, Any]] = run) -> None:
+    """Do what is missing, in order; a row is appended and flushed as soon as it is done.
+
+    A campaign that fails has a row that says so, and does not take the others with it.
+    """
     file.parent.mkdir(parents=True, exist_ok=True)
     done = {row["key"] for row in rows(file)}
     missing = [job for job in todo if job.key not in done]
     print(f"{len(done)} done, {len(missing)} to do", file=sys.stderr, flush=True)
     with file.open("a", encoding="utf-8") as out, ProcessPoolExecutor(workers) as pool:
-        for future in as_completed([pool.submit(work, job) for job in missing]):
-            out.write(json.dumps(future.result(), allow_nan=True) + "\n")
+        given = {pool.submit(work, task): task for task in missing}
+        for future in as_completed(given):
+            error = future.exception()
+            said = {"key": given[future].key, "verdict": "error", "error": f"{type(error).__name__}: {error}"}
+            out.write(json.dumps(said if error else future.result(), allow_nan=True) + "\n")
             out.flush()

@@ -181,10 +181,15 @@ def test_a_sparse_regression_names_the_terms_that_are_there() -> None:
 def test_a_study_goes_on_where_it_was(tmp_path: Any) -> None:
     plan = [Job("none", (), seed) for seed in range(3)]
     file = tmp_path / "rows.jsonl"
-    file.write_text(json.dumps({"key": plan[1].key, "kept": True}) + "\n")
-    study(file, plan, 1, _key)
-    assert [one["key"] for one in rows(file)] == [plan[1].key, plan[0].key, plan[2].key]
+    file.write_text(json.dumps({"key": plan[1].key}) + "\n")
+    study(file, plan, 1, _only_key)
+    found = rows(file)
+    assert [one["key"] for one in found] == [plan[1].key, plan[0].key, plan[2].key]
+    assert [one.get("error") for one in found] == [None, None, "ZeroDivisionError: of this campaign"]
+    assert judge.judged(found[2]) == "error"
 
 
-def _key(job: Job) -> dict[str, Any]:
+def _only_key(job: Job) -> dict[str, Any]:
+    if job.seed == 2:
+        raise ZeroDivisionError("of this campaign")
     return {"key": job.key}
