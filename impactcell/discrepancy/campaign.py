@@ -228,9 +228,8 @@ def _say_what_lacks(campaign: Campaign, shots: list[Shot], notes: list[str]) -> 
             "No replicates: the sensors' noise is only a lower bound of the floor, and gap (b) is null."
         )
     for shot in shots:
-        longest = max(shot.times, key=len)
-        steps = np.diff(longest)
-        if len(steps) and steps.max() > GAP_FACTOR * np.median(steps):
+        steps = [np.diff(times) for times in shot.times if len(times) > 1]
+        if any(one.max() > GAP_FACTOR * np.median(one) for one in steps):
             notes.append(f"Shot {shot.number} has a gap in time; what happened in it is lost.")
             break
 

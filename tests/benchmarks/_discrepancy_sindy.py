@@ -20,7 +20,7 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from pysindy import STLSQ, IdentityLibrary, SINDy, SmoothedFiniteDifference
+from pysindy import STLSQ, SmoothedFiniteDifference
 
 from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.phases import FREE_SLIDE, LOADING, UNLOADING, course_of, phases
@@ -105,18 +105,15 @@ def smoothed(problem: Problem, shot: Shot, on: np.ndarray, over_s: float) -> Smo
         return None
     stretch = slice(int(places[0]), int(places[-1]) + 1)
     t = t[stretch]
-    slope = SmoothedFiniteDifference(smoother_kws={"window_length": window, "polyorder": 3})
-
-    def rate(values: np.ndarray) -> np.ndarray:
-        return np.asarray(slope(values[:, None], t))[:, 0]
-
     x = shot.values[POSITION][stretch] * shot.direction
-    v = rate(x)
     force = np.interp(t, shot.times[FORCE], shot.values[FORCE]) if len(shot.times[FORCE]) else 0.0 * t
     travel = np.minimum(shot.velocity_m_s * t, problem.shots.stroke_m)
     if len(shot.times[ACTUATOR]):
         travel = np.interp(t, shot.times[ACTUATOR], shot.values[ACTUATOR] * shot.direction)
-    made = (t, x, v, rate(v), force, rate(force), travel, rate(travel))
+    slope = SmoothedFiniteDifference(smoother_kws={"window_length": window, "polyorder": 3})
+    v, rate, travel_rate = np.asarray(slope(np.column_stack([x, force, travel]), t)).T
+    a = np.asarray(slope(v[:, None], t))[:, 0]
+    made = (t, x, v, a, force, rate, travel, travel_rate)
     return Smoothed(*(one[:: max(window // SHARE, 1)] for one in made))
 
 
@@ -224,9 +221,9 @@ def selected(shots: list[tuple[np.ndarray, Columns]]) -> list[str]:
 
 
 def _fitted(columns: np.ndarray, y: np.ndarray, on: np.ndarray, threshold: float) -> np.ndarray:
-    """Coefficients of a sparse regression by PySINDy; it warns where none is left."""
-    model = SINDy(optimizer=STLSQ(threshold=threshold, alpha=RIDGE), feature_library=IdentityLibrary())
+    """Coefficients of a sparse regression by PySINDy's optimizer; it warns where none is left."""
+    optimizer = STLSQ(threshold=threshold, alpha=RIDGE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        model.fit(columns[on], t=1.0, x_dot=y[on][:, None])
-    return np.asarray(model.coefficients())[0]
+        optimizer.fit(columns[on], y[on][:, None])
+    return np.asarray(optimizer.coef_)[0]
