@@ -22,7 +22,7 @@ from impactcell.tracking import hypotheses
 WEIGHT, CHANGE, MEAN, COVARIANCE, WIDTH = 0, 1, 2, 6, 22
 CAPACITY = 76
 ROWS = CAPACITY + len(hypotheses.STEPS) + 1
-CALIBRATION = 0.8
+CALIBRATION = 0.6
 WINDOW = 1000.0  # cycles within which a change must be to be reported
 RECENT = 12  # change cycles this recent are each kept
 EXPECTED_CYCLES = 100.0  # cycles that the prior probability of an outlier counts for

@@ -101,6 +101,13 @@ def compare_batch(
     return replace(state, shift=shift, tested=True), shift
 
 
+def not_yet(state: TrackerState) -> str:
+    """Say why no change of batch would be reported yet; empty where one would be."""
+    if _settled(state):
+        return ""
+    return "no change of batch is reported yet: the scale of the noise is still being learned"
+
+
 def _settled(state: TrackerState) -> bool:
     """Whether the scale of the noise is known well enough to tell a shift from noise."""
     if state.noise.weight < FEWEST_DIFFERENCES:

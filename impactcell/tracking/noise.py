@@ -82,12 +82,13 @@ def learn(noise: Noise, value: float, std: float) -> Noise:
     if noise.guessed and weight <= UNSCALED:
         # nothing to judge outliers by yet: the plain mean
         factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
-        return replace(noise, factor=factor, weight=weight, rough=factor, last_value=value, last_std=std)
+        rough = factor
+        return Noise(factor, weight, rough, noise.usual_std, value, std, noise.identical, noise.guessed)
     clipped = min(squared, CLIP**2 * noise.rough) / CONSISTENCY
     rough = max(noise.rough + (clipped - noise.rough) / weight, SMALLEST_FACTOR)
     own = squared * _share(squared, noise.factor)
     factor = max(noise.factor + (own - noise.factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
-    return replace(noise, factor=factor, weight=weight, rough=rough, last_value=value, last_std=std)
+    return Noise(factor, weight, rough, noise.usual_std, value, std, noise.identical, noise.guessed)
 
 
 def variance(noise: Noise, std: float) -> float:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from impactcell.records import BatchState, Evidence, Quality, WearState
 from impactcell.tracking import bank as banks
+from impactcell.tracking import batch as batches
 from impactcell.tracking import belief, wear
 from impactcell.tracking.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.state import Reading, Shift, Tracked, TrackerState
@@ -42,6 +43,7 @@ def outcome(
     walks = (state.level_variance, state.slope_variance)
     published = belief.wear_state(level, slope, covariance, walks, settings.wear_limit, quality, reason)
     last = state.shift
+    learning = batches.not_yet(state)
     batch = BatchState(
         reading.batch_id or state.batch_id or "",
         offset,
@@ -49,8 +51,8 @@ def outcome(
         math.nan if last is None else last.size,
         math.nan if last is None else last.size_std,
         0 if last is None else state.clock.number(last.cycle),
-        quality,
-        reason,
+        Quality.UNCERTAIN if learning else quality,
+        "; ".join([*notes, *([learning] if learning else [])]),
     )
     evidence = None if shift is None else _evidence(settings, state, shift)
     return Tracked(state, published, batch, evidence, expected, innovation, used, tuple(notes))

@@ -72,8 +72,10 @@ def place(clock: Clock, cycle: int, time_ns: int, reorder_limit: int) -> tuple[C
             index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late"
         )
     passed = index - clock.last
-    moved = _timed(replace(clock, last=index), time_ns, passed)
-    return _seen(moved[0], index, reorder_limit), Place(index, passed, 0, repeated=False, note=moved[1])
+    timed, note = _timed(clock, time_ns, passed)
+    seen = (*clock.seen[-reorder_limit:], index)
+    clock = Clock(clock.base, index, seen, timed.time_ns, timed.period_s)
+    return clock, Place(index, passed, 0, repeated=False, note=note)
 
 
 def fault(value: float, std: float) -> tuple[str, bool]:

@@ -11,7 +11,7 @@ from impactcell.tracking.publishing import nothing_yet, outcome
 from impactcell.tracking.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.state import Reading, Shift, Tracked, TrackerState
 
-FIRST_CYCLES = 12  # no unannounced batch change is looked for before
+FIRST_CYCLES = 3  # no unannounced batch change is believed to be before
 RESTLESS = 4.0  # a batch id that lasts fewer cycles than this on average says nothing about batches
 
 

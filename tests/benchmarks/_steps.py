@@ -132,7 +132,7 @@ def bank_delays(streams: int, seed: int) -> dict[float, list[list[float]]]:
 
 
 def table(*, quick: bool) -> Table:
-    cycles = 500_000 if quick else 4_000_000
+    cycles = 500_000 if quick else 3_000_000
     found = false_alarms(cycles, 50_000, seed=_streams.REPORTED + 11)
     # the bound belongs to the rate that was measured, at least what it was designed for
     arl = cycles / max(found, 1)

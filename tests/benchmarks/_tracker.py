@@ -52,7 +52,7 @@ def known_table(*, quick: bool) -> Table:
 
 def unknown_table(*, quick: bool) -> Table:
     """The whole tracker beside the bank alone, which is told the scale of the noise, on the same streams."""
-    runs = 4 if quick else 30
+    runs = 4 if quick else 20
     rows, figures = [], {}
     for size in _inside.SIZES:
         figures[size] = (np.zeros(0), np.zeros(0))
@@ -97,7 +97,7 @@ def unknown_table(*, quick: bool) -> Table:
 
 def starts_table(*, quick: bool) -> Table:
     """False alarms of young trackers, where the scale of the noise rests on few cycles."""
-    runs, cycles = (100 if quick else 1500), 100
+    runs, cycles = (100 if quick else 500), 100
     rows = []
     for knowledge in BatchKnowledge:
         for outliers in (0.0, _streams.OUTLIERS):

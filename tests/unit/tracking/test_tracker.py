@@ -95,6 +95,18 @@ def test_a_bad_reading_is_reported_and_the_next_is_used(config, bad, why):
         assert odd.wear.level == before.wear.level
 
 
+def test_it_says_when_no_change_would_be_reported_yet():
+    outcomes = run(UNKNOWN, series(40, step=8.0, at=5))
+    said = ["still being learned" in o.batch.reason for o in outcomes]
+    assert said[0]
+    assert all(o.batch.quality is Quality.UNCERTAIN for o, s in zip(outcomes, said, strict=True) if s)
+    assert not any(o.shift for o, s in zip(outcomes, said, strict=True) if s)
+    # a change in the very first cycles is found as soon as one may be
+    (found,) = [o.shift for o in outcomes if o.shift]
+    assert found.change_cycle == 5
+    assert not said[-1]
+
+
 def test_nothing_usable_at_all():
     outcomes = run(UNKNOWN, [Reading(i, math.nan, math.nan) for i in range(5)])
     assert outcomes[-1].wear.quality is Quality.BAD
