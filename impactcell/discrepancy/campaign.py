@@ -11,7 +11,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.blocks import blocks
-from impactcell.discrepancy.drives import friction, reduced
+from impactcell.discrepancy.drives import friction, reduced, weighed
 from impactcell.discrepancy.shots import POSITION, Index, Shot, Shots, lay_out
 from impactcell.discrepancy.units import check_units
 from impactcell.errors import CampaignError
@@ -20,6 +20,7 @@ from impactcell.records import Capture, Channel, Samples
 FEWEST_SHOTS = 6
 HELD_OUT = 0.25
 GAP_FACTOR = 5.0
+WRONG_UNIT = 30.0
 EMPTY = np.empty(0)
 
 
@@ -61,7 +62,9 @@ def prepare(campaign: Campaign) -> Material:
     captures = campaign.shots
     notes: list[str] = []
     records = list(range(1, len(captures) + 1))
+    weights: list[float] = []
     if campaign.excitation is Excitation.DRIVEN:
+        weights = [_weight(capture, notes) for capture in captures]
         cut = blocks(captures)
         captures, records = tuple(block for block, _ in cut), [record for _, record in cut]
     if len(captures) < FEWEST_SHOTS:
@@ -89,6 +92,9 @@ def prepare(campaign: Campaign) -> Material:
         key = settings if campaign.excitation is Excitation.TAP else (float(place),)
         group = groups.setdefault(key, len(groups))
         shots.append(_shot(capture, record, len(campaign.shots), batch, group, campaign.excitation))
+    if weights:
+        for shot in shots:
+            shot.covariates["mass"] = weights[shot.place - 1]
     _say_what_lacks(campaign, shots, notes)
     check_units(campaign.excitation, campaign.gravity_m_s2, shots)
     stated = (_stated(captures, "force"), _stated(captures, "position"), _stated(captures, "actuator"))
@@ -181,6 +187,32 @@ def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, exci
         drive=drive,
         covariates=covariates,
     )
+
+
+def _weight(record: Capture, notes: list[str]) -> float:
+    """Mass of a driven record's part as stated; else about what the motion says, and it is fitted.
+
+    Raises
+    ------
+    CampaignError
+        It is neither, or one contradicts the other by what only a wrong unit can explain.
+    """
+    if record.position is None or record.force is None:
+        return record.mass_kg
+    found = weighed(record.position, record.force)
+    if math.isnan(record.mass_kg):
+        if math.isnan(found):
+            message = f"shot {record.cycle}: its mass_kg is not stated, and its motion does not tell it"
+            raise CampaignError(message)
+        notes.append(f"The mass of shot {record.cycle} is not stated and is fitted, block by block.")
+        return found
+    if found > WRONG_UNIT * record.mass_kg or found < record.mass_kg / WRONG_UNIT:
+        message = (
+            f"shot {record.cycle}: its part is stated as {record.mass_kg:.3g} kg, but moves as one of "
+            f"{found:.3g} kg would; check the units of mass_kg, force_n, position_m and time_s"
+        )
+        raise CampaignError(message)
+    return record.mass_kg
 
 
 def _of_each(channels: list[Channel | None], what: str) -> tuple[Samples, Samples, Samples]:

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.linalg import solve_triangular, solveh_banded
 
 from impactcell.discrepancy.blocks import NORMAL_MAD, velocity
-from impactcell.discrepancy.shots import POSITION, Shot
-from impactcell.records import Samples
+from impactcell.discrepancy.shots import POSITION, Index, Shot
+from impactcell.records import Channel, Samples
 
 MOST_SAMPLES = 80
 FEWEST_KNOTS, MOST_KNOTS = 60, 160
@@ -57,7 +57,8 @@ def reduced(shot: Shot, noise_std_m: float, gravity_m_s2: float, mu_k: float) ->
     drive = smooth(shot.drive[0], shot.drive[1], float(time[-1]))
     step = max(math.ceil(len(time) / MOST_SAMPLES), 1)
     chosen = time[::step]
-    G = carried(drive, np.interp(drive.time_s, time, speed), shot.mass_kg, mu_k * shot.mass_kg * gravity_m_s2)
+    mass = shot.covariates["mass"]
+    G = carried(drive, np.interp(drive.time_s, time, speed), mass, mu_k * mass * gravity_m_s2)
     seen = np.array([np.interp(chosen, drive.time_s, column) for column in G.T]).T
     R = noise_std_m**2 * np.eye(len(chosen)) + seen @ _covariance(drive) @ seen.T
     whitener = solve_triangular(np.linalg.cholesky(R), np.eye(len(chosen)), lower=True)
@@ -171,18 +172,14 @@ def friction(shots: tuple[Shot, ...], gravity_m_s2: float) -> tuple[float, float
         time = shot.times[POSITION]
         speed = velocity(time, shot.values[POSITION])
         force = np.interp(time, *shot.drive)
-        impulse = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(time))])
-        lost = impulse / shot.mass_kg - speed
-        fast = np.where(np.abs(speed) > SLIPPING * np.abs(speed).max(), np.sign(speed), 0.0)
-        turns = np.flatnonzero(np.diff(fast)) + 1
-        for part in np.split(np.arange(len(time)), turns):
-            if fast[part[0]] != 0.0 and len(part) >= FEWEST_SLIPPING:
-                slope = np.polyfit(time[part], lost[part], 1)[0] * fast[part[0]]
-                found.append(slope / gravity_m_s2)
-                weights.append((time[part[-1]] - time[part[0]]) ** 3)
+        mass = shot.covariates["mass"]
+        lost = _impulse(time, force) / mass - speed
+        for part, sense in _slips(speed):
+            found.append(np.polyfit(time[part], lost[part], 1)[0] * sense / gravity_m_s2)
+            weights.append((time[part[-1]] - time[part[0]]) ** 3)
         resting = np.abs(speed) <= RESTING * np.abs(speed).max()
         leaves = np.flatnonzero(resting[:-1] & ~resting[1:])
-        edges += (np.abs(force[leaves]) / (shot.mass_kg * gravity_m_s2)).tolist()
+        edges += (np.abs(force[leaves]) / (mass * gravity_m_s2)).tolist()
     if not found:
         return 0.15, 1.2
     order = np.argsort(found)
@@ -190,3 +187,30 @@ def friction(shots: tuple[Shot, ...], gravity_m_s2: float) -> tuple[float, float
     mu_k = float(np.clip(found[order[np.searchsorted(share, 0.5 * share[-1])]], 0.005, 2.0))
     ratio = float(np.median(edges)) / mu_k if edges else 1.2
     return mu_k, min(max(ratio, 1.02), 2.0)
+
+
+def weighed(position: Channel, force: Channel) -> float:
+    """About what a driven part weighs [kg]: what its momentum in slip gains from the impulse of the drive."""
+    time = position.time_s
+    speed = velocity(time, position.values)
+    impulse = _impulse(time, np.interp(time, force.time_s, force.values))
+    rows, right = [], []
+    for part, sense in _slips(speed):
+        columns = np.column_stack([speed[part], sense * time[part]])
+        rows.append(columns - columns.mean(axis=0))
+        right.append(impulse[part] - impulse[part].mean())
+    if not rows:
+        return math.nan
+    mass = float(np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0][0])
+    return mass if mass > 0.0 else math.nan
+
+
+def _impulse(time: Samples, force: Samples) -> Samples:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(time))])
+
+
+def _slips(speed: Samples) -> list[tuple[Index, float]]:
+    """Find the samples of every slip in one direction, and that direction."""
+    fast = np.where(np.abs(speed) > SLIPPING * np.abs(speed).max(), np.sign(speed), 0.0)
+    parts = np.split(np.arange(len(speed)), np.flatnonzero(np.diff(fast)) + 1)
+    return [(part, float(fast[part[0]])) for part in parts if fast[part[0]] and len(part) >= FEWEST_SLIPPING]

@@ -30,7 +30,8 @@ class Problem:
         self.forward = Forward(shots, batches)
         self.count = len(shots)
         free = shots.excitation is not Excitation.TAP
-        self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items]) & (not free)
+        slides = shots.excitation is Excitation.FREE_SLIDE
+        self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items]) & (not slides)
         self.own = ["log_factor"]
         if free:
             self.own += ["speed_m_s", "shift_m"]
@@ -115,6 +116,8 @@ class Problem:
         mass = np.array([shot.mass_kg for shot in self.shots.items])
         known = mass[np.isfinite(mass)]
         mass = np.where(np.isfinite(mass), mass, float(np.median(known)) if len(known) else 1.0)
+        if self.shots.excitation is Excitation.DRIVEN:
+            mass = np.array([shot.covariates["mass"] for shot in self.shots.items])
         speed = np.full(n, math.nan)
         shift = np.zeros(n)
         if self.shots.excitation is not Excitation.TAP:

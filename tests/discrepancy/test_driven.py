@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.blocks import blocks, velocity
-from impactcell.discrepancy.drives import Drive, carried, smooth
+from impactcell.discrepancy.campaign import prepare
+from impactcell.discrepancy.drives import Drive, carried, smooth, weighed
 from impactcell.discrepancy.result import result
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
@@ -102,3 +103,16 @@ def test_a_record_too_short_is_told() -> None:
     short = replace(capture, force=force, position=position)
     with pytest.raises(CampaignError, match="blocks are too few"):
         investigate(replace(given, shots=(short,)))
+
+
+def test_the_motion_weighs_the_part() -> None:
+    given = record(Job("", 7302, coloured=True))
+    (capture,) = given.shots
+    assert capture.position is not None
+    assert capture.force is not None
+    assert weighed(capture.position, capture.force) == pytest.approx(capture.mass_kg, rel=0.05)
+    heavy = replace(capture, mass_kg=1000.0 * capture.mass_kg)
+    with pytest.raises(CampaignError, match="check the units of mass_kg"):
+        prepare(replace(given, shots=(heavy,)))
+    unknown = prepare(replace(given, shots=(replace(capture, mass_kg=float("nan")),)))
+    assert any("mass of shot 1 is not stated" in note for note in unknown.notes)
