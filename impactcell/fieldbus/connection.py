@@ -128,7 +128,7 @@ class Connection(asyncio.Protocol):
             rest = self._take_good(self._reader.take(data))
             for transaction, unit, pdu in self._reader.feed(rest):
                 self._answer(transaction, unit, pdu)
-            if not self._reader.pending:
+            if not self._reader.pending and not self._flying:
                 self._confirm()
         except ProtocolError as error:
             self.give_up(ProtocolError(f"{self.link}: {error}"))
@@ -232,7 +232,8 @@ class Connection(asyncio.Protocol):
         """Hand over what is complete, now that the stream is known to be in step.
 
         A frame that lost bytes fills up with the first ones of the next frame and looks whole; only what
-        comes after it shows that. So a reply counts once nothing, or another good reply, follows it.
+        comes after it shows that, or that the next frame, if it was used up to its end, never comes. So a
+        reply counts once another good reply follows it, or nothing does and no other is due.
         """
         for exchange in self._unconfirmed:
             if not exchange.done.done():

@@ -209,6 +209,26 @@ async def test_a_reply_that_is_not_ours_closes_the_link(kind: FaultKind, told: s
         assert not client.connected
 
 
+async def test_a_reply_filled_up_by_the_whole_of_the_next_one_is_not_used() -> None:
+    async def lose_bytes(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        frames = []
+        for _ in range(2):
+            request = await reader.readexactly(12)
+            address, count = struct.unpack(">HH", request[8:])
+            data = np.arange(address, address + count).astype(WIRE).tobytes()
+            head = request[:4] + struct.pack(">H", 3 + len(data)) + request[6:8] + bytes([len(data)])
+            frames.append(head + data)
+        writer.write(frames[0][: -len(frames[1])] + frames[1])
+
+    async with peer(lose_bytes) as port:
+        client = ModbusClient(ModuleLink(port=port, window=4, timeout_s=0.05))
+        await client.connect()
+        long, short = await asyncio.gather(client.read(100, 60), client.read(7, 3), return_exceptions=True)
+        assert isinstance(long, LinkError)
+        assert isinstance(short, LinkError)
+        await client.close()
+
+
 @pytest.mark.parametrize("seed", range(8))
 async def test_a_reply_of_the_wrong_length_is_never_used(seed: int) -> None:
     faults = FaultInjector(seed)
