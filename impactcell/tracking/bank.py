@@ -27,7 +27,7 @@ WINDOW = 1000.0  # cycles within which a change must be to be reported
 RECENT = 12  # change cycles this recent are each kept
 EXPECTED_CYCLES = 100.0  # cycles that the prior probability of an outlier counts for
 MEMORY = 5000.0  # cycles after which outliers are forgotten
-MOST_OUTLIERS = 0.1  # more of them are no outliers
+MOST_OUTLIERS = 0.1  # where there seem to be more, they are no outliers
 
 
 @compiled
@@ -44,7 +44,7 @@ def run_cycle(
 
     Parameters
     ----------
-    bank : ndarray, shape (at least capacity + 1, 22)
+    bank : ndarray, shape (ROWS, 22)
     design : ndarray
         hazard a cycle, step variance, level and slope process variance a cycle, prior probability of
         an outlier.

@@ -21,7 +21,8 @@ class TrackerSettings:
     wear_limit : float
         mu_s at the reference batch at which the surface is worn; inf for none.
     batch : BatchKnowledge
-        KNOWN: the batch id of each cycle is believed, and cycles without one fall back on the bank.
+        KNOWN: the batch id of each cycle is believed, a change within a batch is looked for all the same,
+        and cycles without an id fall back on the bank.
         UNKNOWN: ids are ignored.
     false_alarm_cycles : float
         Designed mean number of cycles between false batch alarms.
