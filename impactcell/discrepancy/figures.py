@@ -85,6 +85,7 @@ def traces(findings: Findings) -> str:
     extended = findings.final is not findings.nominal
     models = ((old, BEFORE, "before"), (new, AFTER, "after")) if extended else ((old, AFTER, "nominal"),)
     misfit = old.misfit(shots) / problem.sizes
+    missed = shots.unwhitened(new.residual)
     order = np.argsort(misfit)
     chosen = [int(order[0]), int(order[len(order) // 2]), int(order[-1])]
     channels = [number for number in range(3) if (shots.channel == number).any()]
@@ -102,8 +103,7 @@ def traces(findings: Findings) -> str:
                 t = times[part][mine] * 1e3
                 scale = SCALES[channel]
                 measured = shots.values[part][mine] * scale
-                weight = shots.weights[part][mine]
-                fitted = measured - new.residual[part][mine] / weight * scale
+                fitted = measured - missed[part][mine] * scale
                 upper = figure.add_subplot(grid[2 * row, column])
                 lower = figure.add_subplot(grid[2 * row + 1, column], sharex=upper)
                 step = max(len(t) // 400, 1)

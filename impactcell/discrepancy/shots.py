@@ -102,6 +102,15 @@ class Shots:
             return made
         return np.concatenate([shot.whitener @ change[self.of(i)] for i, shot in enumerate(self.items)])
 
+    def unwhitened(self, residual: Samples) -> Samples:
+        """Scale residuals back: measured minus predicted [N, m, m]."""
+        if self.excitation is not Excitation.DRIVEN:
+            made: Samples = residual / self.weights
+            return made
+        return np.concatenate(
+            [np.linalg.solve(shot.whitener, residual[self.of(i)]) for i, shot in enumerate(self.items)]
+        )
+
     @property
     def times(self) -> Samples:
         """Time of every sample, shape (N,)."""
