@@ -24,7 +24,7 @@ from impactcell.tracking.reference import Reference
 from impactcell.tracking.variation import MODES
 
 COMPONENTS = 3  # principal components of T^2
-SHARES = {"t_squared": 0.03, "spe": 0.03, "level": 0.12, "tilt": 0.12, "bump": 0.45, "ripple": 0.25}
+SHARES = {"t_squared": 0.02, "spe": 0.02, "level": 0.11, "tilt": 0.13, "bump": 0.42, "ripple": 0.3}
 LEAST_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
 LARGEST = 0.5  # shapes that even half of the friction would not show are not looked for
 
@@ -73,8 +73,10 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
     # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
     lesser = references.without_variation(C[:, COMPONENTS:], G, y)
     t_squared, spe, freedom = _squares(*lesser, C[:, :COMPONENTS])
-    # small variation beyond the modes, or noise that was declared too low, widens everything
-    scale = max(1.0, (reference.spe_sum + 20.0) / (reference.spe_count + 20.0))
+    # variation beyond the modes, or noise that was declared too low, widens everything once it is certain
+    count = max(reference.spe_count, 1)
+    usual_spe = reference.spe_sum / count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * count))
+    scale = max(1.0, usual_spe)
     found = {
         "t_squared": _hotelling(t_squared, int(cycles)),
         "spe": float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0,

@@ -71,14 +71,20 @@ def precision(reference: Reference) -> Samples:
     return reference.matrix + reference.strength * profile.roughness(n) + VAGUE * np.eye(n)
 
 
-def learn(reference: Reference, slide: profile.Information) -> Reference:
-    """Take one normal cycle into the reference."""
+def learn(reference: Reference, slide: profile.Information, settled: float) -> Reference:
+    """Take one normal cycle into the reference.
+
+    Parameters
+    ----------
+    settled : float
+        Cycles, at least 1, before which the mean is too rough to show how a cycle differs from it.
+    """
     varied, components = reference.variation, reference.components
-    if reference.weight > 0.0:
+    if reference.weight >= settled:
         own = slide.vector - slide.matrix @ reference.mean
         varied = variation.learn(varied, slide.matrix, own, reference.weight)
         components = variation.components(varied, len(own))
-    elif varied.cycles == 0:
+    elif reference.weight == 0.0 and varied.cycles == 0:
         first, _, _ = profile.smooth(slide)
         varied = variation.guess(float(np.median(first)))
         components = variation.components(varied, len(slide.vector))

@@ -41,6 +41,11 @@ class SignatureSettings:
         """Grid points, shape (points,)."""
         return np.linspace(0.0, self.length_m, self.points)
 
+    @property
+    def settled(self) -> float:
+        """Cycles of a material before which its mean is too rough to learn variation from."""
+        return max(float(self.learned_cycles // 6), 1.0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SignatureState:
@@ -116,7 +121,9 @@ def update(
     friction, std = _published(seen, settings)
     known = state.reference
     if known.variation.cycles < settings.learned_cycles or known.weight < FEWEST_OF_MATERIAL:
-        left = max(settings.learned_cycles - known.variation.cycles, FEWEST_OF_MATERIAL - int(known.weight))
+        left = settings.learned_cycles - known.variation.cycles
+        left += int(max(settings.settled - known.weight, 0.0)) if left > 0 else 0
+        left = max(left, FEWEST_OF_MATERIAL - int(known.weight))
         reason = f"the reference is being learned, {left} more cycles"
         signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
         return SignatureTracked(learned(state, seen, settings, None), signature, None, judged=False)
@@ -158,14 +165,16 @@ def learned(
 ) -> SignatureState:
     """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
     if verdict is None:
-        return replace(state, reference=references.learn(state.reference, seen), deviant_run=0)
+        return replace(
+            state, reference=references.learn(state.reference, seen, settings.settled), deviant_run=0
+        )
     if verdict.p_value < 1.0 / settings.false_alarm_cycles:
         run = state.deviant_run + 1
         if run < GIVEN_UP:
             return replace(state, deviant_run=run)
-        fresh = references.learn(references.restart(state.reference), seen)
+        fresh = references.learn(references.restart(state.reference), seen, settings.settled)
         return replace(state, reference=fresh, deviant_run=0)
-    fresh = references.learn(state.reference, seen)
+    fresh = references.learn(state.reference, seen, settings.settled)
     if verdict.spe_freedom > 0:
         ratio = verdict.spe / verdict.spe_freedom
         fresh = replace(fresh, spe_sum=fresh.spe_sum + ratio, spe_count=fresh.spe_count + 1)

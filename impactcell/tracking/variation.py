@@ -9,8 +9,8 @@ the equations::
 
 are linear in Lambda and right in the mean (C. R. Rao 1971, J. Multivariate Analysis 1:257, with the first
 guess as weights), so that two sums are all that is kept, and slides may end in different places. Eigenvalues
-that come out negative in units of the noise are zero, which is the most likely Lambda where all slides are
-alike (Anderson, Anderson & Olkin 1986, Biometrika 73:405). What no slide has reached keeps the first guess.
+that noise alone could have made, in units of the noise, are zero: else the modes swallow what they should
+tell apart. What no slide has reached keeps the first guess.
 """
 
 import math
@@ -99,7 +99,9 @@ def _solved(weights: Samples, moments: Samples, information: Samples, cycles: in
     # in units of the noise of one cycle
     root = np.linalg.cholesky(information / cycles + np.eye(MODES))
     values, vectors = linear.eigen(root.T @ found @ root)
-    back = np.linalg.solve(root.T, vectors * np.sqrt(np.maximum(values, 0.0)))
+    # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
+    edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0
+    back = np.linalg.solve(root.T, vectors * np.sqrt(np.where(values > edge, values, 0.0)))
     return np.asarray(back @ back.T + np.linalg.inv(information + np.eye(MODES)))
 
 

@@ -100,21 +100,21 @@ def false_alarm_table(*, quick: bool) -> Table:
     """
     settings = signature.SignatureSettings()
     truth = Normality(settings)
-    draws, references_tried = (150, 4) if quick else (1000, 16)
+    draws, references_tried = (150, 2) if quick else (1000, 16)
     alpha, push = 1.0 / settings.false_alarm_cycles, 5.0
     found: dict[int, list[float]] = {n: [] for n in LEARNED}
     ordinary = judged = 0
     for trial in range(references_tried):
         rng = np.random.default_rng([11, trial])
         state = signature.initial_state(settings)
-        vectors = truth.vectors(rng, LEARNED[-1] + 2) + truth.G @ truth.mean
-        for n, vector in enumerate(vectors):
+        vectors = truth.vectors(rng, LEARNED[-1] + 10) + truth.G @ truth.mean
+        for vector in vectors:
             known = state.reference
             if known.variation.cycles in found and len(found[known.variation.cycles]) == trial:
                 found[known.variation.cycles].append(_tail(truth, settings, known, rng, draws, alpha, push))
             seen = replace(truth.seen, vector=vector)
             verdict = None
-            if n > settings.learned_cycles:
+            if known.variation.cycles >= settings.learned_cycles:
                 verdict = deviation.judge(known, seen, truth.grid, FRICTION)
                 ordinary += verdict.p_value < 100.0 * alpha
                 judged += 1
