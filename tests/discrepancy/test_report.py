@@ -1,0 +1,125 @@
+"""The report is whole, stands alone, and says the same as the findings."""
+
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+import pytest
+
+from impactcell.discrepancy.report import content, verdict_sentence, words, write_report
+from impactcell.discrepancy.workflow import Findings, investigate
+from impactcell.physics.effects import LIBRARY
+from tests.discrepancy.test_workflow import make
+
+SECTIONS = ["Where they disagree", "Held-out shots", "Evidence for every candidate", "Parameters"]
+VOID = {"meta", "br", "path", "use"}
+
+
+class Page(HTMLParser):
+    """Headings, links and text of a page whose tags have to match."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.headings: list[str] = []
+        self.targets: list[str] = []
+        self.text = ""
+        self.pictures = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.pictures += tag == "svg"
+        self.targets += [value or "" for name, value in attrs if name in {"src", "href", "xlink:href"}]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def outside(self) -> list[str]:
+        """Whatever is not inside the page itself."""
+        return [target for target in self.targets if not target.startswith(("#", "data:"))]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+        if self.open and self.open[-1] == "h2":
+            self.headings.append(data)
+
+
+def page_of(found: Findings, directory: Path) -> Page:
+    write_report(found, "a campaign", directory / "report.html")
+    page = Page()
+    page.feed((directory / "report.html").read_text(encoding="utf-8"))
+    assert page.open == []
+    return page
+
+
+@pytest.fixture(scope="module")
+def tied() -> Findings:
+    return investigate(make("mass_error", shots=18))
+
+
+@pytest.fixture(scope="module")
+def unknown() -> Findings:
+    return investigate(make("actuator_vibration", shots=18))
+
+
+def test_the_page_is_whole_and_fetches_nothing(tied: Findings, tmp_path: Path) -> None:
+    page = page_of(tied, tmp_path)
+    assert page.headings == [*SECTIONS, "What to measure next", "How it was computed"]
+    assert page.outside() == []
+    assert page.pictures == 4  # two maps, the traces, the friction factors
+    assert all(words(effect) in page.text for effect in LIBRARY)
+    assert "weigh the part" in page.text
+
+
+def test_a_tie_is_told_in_the_sentence(tied: Findings) -> None:
+    first, second = (words(one) for one in (tied.added[0], *tied.search.ties[tied.added[0]]))
+    assert {first, second} == {"mass error", "force sensor gain"}
+    sentence = verdict_sentence(tied)
+    assert sentence.startswith(f"Missing: {first} or {second}, which these shots cannot tell apart; the held")
+
+
+def test_an_unknown_gap_leads_to_the_guide(unknown: Findings, tmp_path: Path) -> None:
+    page = page_of(unknown, tmp_path)
+    (link,) = page.outside()
+    guide = urlparse(link)
+    assert guide.scheme == "file"
+    assert "## A new effect" in Path(unquote(guide.path)).read_text(encoding="utf-8")
+    assert unknown.unexplained is not None
+    assert f"largest in phase {words(unknown.unexplained.phase)}" in page.text
+    assert "→" not in page.text
+    assert verdict_sentence(unknown).startswith("No known effect explains a held-out gap of")
+
+
+def test_what_was_named_before_an_unknown_gap_stays_in_the_sentence(
+    tied: Findings, unknown: Findings
+) -> None:
+    both = replace(tied, verdict="unknown", unexplained=unknown.unexplained)
+    sentence = verdict_sentence(both)
+    assert sentence.startswith(
+        f"Missing: {words(tied.added[0])}, and something that no known effect explains"
+    )
+    assert f"falls from {tied.proof.before.whole:.2f} to {tied.proof.after.whole:.2f}" in sentence
+
+
+def test_parameters_have_their_units_and_regions_their_place(tied: Findings) -> None:
+    shown = content(tied, "a campaign")
+    units = {row["name"]: row["unit"] for row in shown["parameters"]}
+    assert units["stiffness_n_per_m"] == "N/m"
+    assert units["damping_n_s_per_m"] == "N s/m"
+    assert units["mu_k"] == units["relative_error"] == ""
+    channels = shown["regions"]["channels"]
+    cells = {
+        (phase, channel, *cell)
+        for phase, row in shown["regions"]["rows"]
+        for channel, cell in zip(channels, row, strict=True)
+        if cell is not None
+    }
+    assert cells == set(tied.proof.regions)
