@@ -15,7 +15,7 @@ from simulator.effects import LIBRARY as LAWS
 from simulator.effects import UNLISTED, check
 from tests.benchmarks import _discrepancy_judge as judge
 from tests.benchmarks._discrepancy_plan import CONFOUNDED, calibrated, jobs
-from tests.benchmarks._discrepancy_rivals import answered, generous
+from tests.benchmarks._discrepancy_rivals import answered, generous, subset
 from tests.benchmarks._discrepancy_run import covered, rows, study
 from tests.benchmarks._discrepancy_sindy import selected
 from tests.discrepancy.study import Job, scenario, strengths
@@ -193,3 +193,12 @@ def _only_key(job: Job) -> dict[str, Any]:
     if job.seed == 2:
         raise ZeroDivisionError("of this campaign")
     return {"key": job.key}
+
+
+def test_rivals_get_every_third_campaign_of_each_kind_with_its_strengths() -> None:
+    plan = jobs(single=1, subtle=1, removed=1, outside=1, two=6, none=9)
+    found = [{"key": job.key, "multiples": [0.5] * len(job.hidden)} for job in plan if job.seed != 60_003]
+    tasks = subset(plan, found)
+    kinds = Counter(task.job.kind for task in tasks)
+    assert kinds == {"single": 8, "subtle": 8, "removed": 8, "outside": 3, "two": 2, "none": 2}
+    assert all(task.multiples == (0.5,) * len(task.job.hidden) for task in tasks)
