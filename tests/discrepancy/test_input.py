@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from impactcell import campaign as campaigns
+from impactcell import values
 from impactcell.campaign import Campaign
 from impactcell.commands import discrepancy as command
 from impactcell.commands.discrepancy import discrepancy
@@ -62,6 +63,18 @@ def test_captures_of_a_journal_are_as_good_as_a_campaign(tmp_path: Path) -> None
     assert [effect["effect"] for effect in two["effects"]] == ["viscous_friction"]
     fitted = [run["effects"][0]["parameters"]["viscous_coefficient_n_s_per_m"] for run in (one, two)]
     assert fitted[1]["value"] == pytest.approx(fitted[0]["value"], rel=1e-3)
+
+
+def test_the_model_that_a_journal_was_recorded_with_is_the_nominal_one(tmp_path: Path) -> None:
+    model = read_model(Path("config/models/prototype.yaml"))
+    with Journal(tmp_path / "j", "press-1") as journal:
+        journal.keep_model(values.dumps(model).decode())
+        for capture in make("viscous_friction", shots=18).shots:
+            journal.append(capture, make_snapshot(capture), b"state")
+    discrepancy(None, tmp_path / "out", journal=tmp_path / "j")
+    outcome = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert outcome["verdict"] == "no_gap"
+    assert read_model(tmp_path / "out" / "model.extended.yaml").name == model.name
 
 
 @pytest.mark.parametrize("both", [True, False])
