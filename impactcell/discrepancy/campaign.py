@@ -106,7 +106,7 @@ def prepare(campaign: Campaign) -> Material:
         campaign.stroke_m,
         tuple(shots),
         tuple(batches),
-        _varying(shots),
+        _varying(shots, campaign.excitation),
         stated,
         tuple(notes),
     )
@@ -220,11 +220,14 @@ def _of_each(channels: list[Channel | None], what: str) -> tuple[Samples, Sample
     return force, position, actuator
 
 
-def _varying(shots: list[Shot]) -> tuple[str, ...]:
+def _varying(shots: list[Shot], excitation: Excitation) -> tuple[str, ...]:
+    """Covariates that vary; from block to block of a driven record, as its friction is one draw for all."""
+    record = np.array([shot.place if excitation is Excitation.DRIVEN else 0 for shot in shots])
     names: list[str] = []
     for name in shots[0].covariates:
         values = np.array([shot.covariates.get(name, math.nan) for shot in shots])
-        if np.isfinite(values).all() and np.ptp(values) > 1e-12 * np.abs(values).max():
+        least = 1e-12 * np.abs(values).max()
+        if np.isfinite(values).all() and any(np.ptp(values[record == one]) > least for one in set(record)):
             names.append(name)
     return tuple(names)
 
