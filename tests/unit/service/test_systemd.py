@@ -1,13 +1,19 @@
-"""The service manager's protocol, with a socket in the manager's place."""
+"""The service manager's protocol, with a socket in the manager's place, and the unit file."""
 
+import asyncio
 import os
+import shutil
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from impactcell.errors import SettingsError
 from impactcell.service import systemd
+from impactcell.service.process import Service
+from tests.integration.processes import CONFIG
 
 
 @pytest.mark.parametrize("abstract", [False, True])
@@ -48,3 +54,35 @@ def test_watchdog_interval(
         if value is not None:
             monkeypatch.setenv(name, value)
     assert systemd.watchdog_interval_s() == expected
+
+
+async def test_a_service_says_when_it_is_ready_alive_and_stopping(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.setblocking(False)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        monkeypatch.setenv("WATCHDOG_USEC", "20000000")
+        monkeypatch.delenv("WATCHDOG_PID", raising=False)
+        service, stop, loop = Service([]), asyncio.Event(), asyncio.get_running_loop()
+        running = asyncio.create_task(service.run(stop))
+        said = [await loop.sock_recv(manager, 64) for _ in range(2)]
+        await service.reload()
+        said += [await loop.sock_recv(manager, 64) for _ in range(2)]
+        stop.set()
+        await running
+        said.append(await loop.sock_recv(manager, 64))
+    assert said[:2] == [b"READY=1", b"WATCHDOG=1"]
+    assert said[2].startswith(b"RELOADING=1\nMONOTONIC_USEC=")
+    assert said[3:] == [b"READY=1", b"STOPPING=1"]
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed")
+def test_the_unit_file_is_one(tmp_path: Path) -> None:
+    unit = (CONFIG / "service" / "impactcell.service").read_text()
+    assert "ExecStart=/opt/impactcell/.venv/bin/impactcell run " in unit
+    here = tmp_path / "impactcell.service"
+    here.write_text(unit.replace("/opt/impactcell/.venv/bin/impactcell", sys.executable))
+    done = subprocess.run(["systemd-analyze", "verify", here], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
