@@ -6,9 +6,10 @@ from typing import TypeVar
 
 from impactcell.alarms.lifecycle import Event, Occurrence, Transition, expire, transition
 from impactcell.alarms.rules import AlarmSettings, Delay, Finding, delayed, occurrence
-from impactcell.records import Alarm, AlarmName
+from impactcell.records import Alarm, AlarmName, Shelving
 
 T = TypeVar("T")
+_PLACES = {name: place for place, name in enumerate(AlarmName)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,8 @@ def after_cycle(
         event = Event.SUPPRESS if announced else Event.UNSUPPRESS
         state, done = act(state, AlarmName.BATCH_SHIFT, Occurrence(event, cycle, time_ns))
         moved = (*moved, *([done] if done.effects else []))
-    state = replace(state, announced=left)
+    if left != state.announced:
+        state = replace(state, announced=left)
     for finding in findings:
         state, done = find(settings, state, finding, cycle, time_ns)
         moved = (*moved, *([done] if done.effects else []))
@@ -79,7 +81,8 @@ def find(
     place = _place(finding.name)
     alarm, rule = state.alarms[place], settings.rule(finding.name)
     delay, event = delayed(rule, alarm, state.delays[place], finding)
-    state = replace(state, delays=_with(state.delays, place, delay))
+    if delay != state.delays[place]:
+        state = replace(state, delays=_with(state.delays, place, delay))
     if event is None:
         if alarm.active and finding.holds and finding.evidence != alarm.evidence:
             newer = replace(alarm, message=finding.message or alarm.message, evidence=finding.evidence)
@@ -99,12 +102,14 @@ def act(state: AlarmState, name: AlarmName, happened: Occurrence) -> tuple[Alarm
 
 def at_time(state: AlarmState, cycle: int, time_ns: int) -> tuple[AlarmState, tuple[Transition, ...]]:
     """End every shelving whose time is over."""
+    if all(alarm.shelving is Shelving.UNSHELVED for alarm in state.alarms):
+        return state, ()
     done = [expire(alarm, cycle, time_ns) for alarm in state.alarms]
     return replace(state, alarms=tuple(t.alarm for t in done)), tuple(t for t in done if t.effects)
 
 
 def _place(name: AlarmName) -> int:
-    return list(AlarmName).index(name)
+    return _PLACES[name]
 
 
 def _with(items: tuple[T, ...], place: int, item: T) -> tuple[T, ...]:
