@@ -9,19 +9,20 @@ A `Journal` is used from one thread at a time; `impactcell.service.worker` gives
 import math
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from impactcell import values
-from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
+from impactcell.errors import JournalError
 from impactcell.journal.blobs import decode_capture, encode_capture
+from impactcell.journal.file import errors, opened
 from impactcell.journal.history import Page, PastValue, Question, past_alarms, past_values
 from impactcell.journal.lock import locked
 from impactcell.journal.retention import Retention, thin
-from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, TABLES
+from impactcell.journal.schema import COLUMNS
 from impactcell.records import Alarm, Capture, Snapshot
 
 _INSERT_CYCLE = (
@@ -78,29 +79,11 @@ class Journal:
             raise JournalError(
                 f"{path}: cannot be opened ({error.strerror}); check its directory and owner"
             ) from error
-        mode = "ro" if read_only else "rwc"
         try:
-            self._db = sqlite3.connect(
-                f"{path.absolute().as_uri()}?mode={mode}",
-                uri=True,
-                isolation_level=None,
-                check_same_thread=False,
-            )
-        except sqlite3.Error as error:
-            raise JournalError(
-                f"{path}: cannot be opened ({error}); check its directory and owner"
-            ) from error
-        try:
-            self._check_readable()
-            if not read_only and self._pragma("page_count") == 0:
-                self._create(cell or "")
-            self._check(cell)
-            if not read_only:
-                with self._errors():
-                    self._db.execute("PRAGMA journal_mode = WAL")
-                    self._db.execute("PRAGMA synchronous = FULL")
+            self._db = opened(path, cell, read_only=read_only)
         except BaseException:
-            self.close()
+            if self._lock is not None:
+                self._lock.close()
             raise
 
     def __enter__(self) -> Self:
@@ -219,46 +202,6 @@ class Journal:
             rows = self._db.execute("SELECT time_ns, user, action, arguments, result FROM audit ORDER BY id")
             return tuple(AuditEntry(*row) for row in rows)
 
-    def _create(self, cell: str) -> None:
-        self._db.execute("PRAGMA auto_vacuum = INCREMENTAL")
-        with self._transaction():
-            for statement in TABLES.split(";"):
-                self._db.execute(statement)
-            self._db.execute("INSERT INTO meta VALUES ('cell', ?)", (cell,))
-            self._db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-            self._db.execute(f"PRAGMA user_version = {FORMAT}")
-
-    def _check_readable(self) -> None:
-        try:
-            self._pragma("page_count")
-        except sqlite3.DatabaseError as error:
-            if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
-                raise ForeignJournalError(
-                    f"{self.path}: not a journal ({error}); it is left as it is"
-                ) from error
-            raise JournalError(
-                f"{self.path}: cannot be opened ({error}); check its owner and directory"
-            ) from error
-
-    def _pragma(self, name: str) -> int:
-        return int(self._db.execute(f"PRAGMA {name}").fetchone()[0])
-
-    def _check(self, cell: str | None) -> None:
-        application_id, version = self._pragma("application_id"), self._pragma("user_version")
-        if application_id != APPLICATION_ID:
-            raise ForeignJournalError(
-                f"{self.path}: a database, but no journal of impactcell; it is left as it is"
-            )
-        if version != FORMAT:
-            raise ForeignJournalError(
-                f"{self.path}: journal format {version}, this program writes {FORMAT}; it is left as it is: "
-                "name another file"
-            )
-        if cell is not None and self.cell != cell:
-            raise ForeignJournalError(
-                f"{self.path}: the journal of cell '{self.cell}', not of '{cell}'; name another file"
-            )
-
     def _meta(self, key: str) -> str:
         with self._errors():
             row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
@@ -282,20 +225,8 @@ class Journal:
                     self._db.execute("ROLLBACK")
                 raise
 
-    @contextmanager
-    def _errors(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-                raise JournalFullError(
-                    f"{self.path}: the disk or its quota is full ({error}); make room"
-                ) from error
-            raise JournalFullError(
-                f"{self.path}: cannot be written now ({error}); check its disk, directory and owner"
-            ) from error
-        except (sqlite3.DatabaseError, OverflowError) as error:
-            raise JournalError(f"{self.path}: cannot be used ({error})") from error
+    def _errors(self) -> AbstractContextManager[None]:
+        return errors(self.path)
 
 
 def _sql(value: float | str) -> float | str | None:
