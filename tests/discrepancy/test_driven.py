@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.blocks import blocks, velocity
-from impactcell.discrepancy.campaign import prepare
+from impactcell.discrepancy.campaign import laid_out, prepare
 from impactcell.discrepancy.drives import Drive, carried, smooth, weighed
 from impactcell.discrepancy.result import result
 from impactcell.discrepancy.workflow import investigate
@@ -116,3 +116,15 @@ def test_the_motion_weighs_the_part() -> None:
         prepare(replace(given, shots=(heavy,)))
     unknown = prepare(replace(given, shots=(replace(capture, mass_kg=float("nan")),)))
     assert any("mass of shot 1 is not stated" in note for note in unknown.notes)
+
+
+def test_whitened_and_back() -> None:
+    material = prepare(record(Job("", 7302, coloured=True)))
+    shots = laid_out(material, np.arange(4), (float("nan"), 2e-6, float("nan")))
+    change = 1e-5 * np.random.default_rng(6).standard_normal(shots.values.size)
+    np.testing.assert_allclose(shots.unwhitened(shots.whitened(change)), change, rtol=0.0, atol=1e-12)
+    # One position alone is as uncertain as its sensor at the start of a block, and more so later on.
+    spread = np.linalg.inv(shots.items[0].whitener)
+    deviation = np.sqrt((spread**2).sum(axis=1))
+    assert deviation[0] == pytest.approx(2e-6)
+    assert deviation[-1] > 2.0 * deviation[0]
