@@ -24,6 +24,8 @@ SOURCES = (
     *("bank", "batch", "commissioning", "honesty", "hypotheses", "noise", "screening"),
     *("settings", "tracker", "wear"),
 )
+DIRECTORY = Path(tracking.__file__).parent
+CODE = hashlib.sha256(b"".join((DIRECTORY / f"{name}.py").read_bytes() for name in SOURCES)).hexdigest()[:12]
 
 
 def known_table(*, quick: bool) -> Table:
@@ -135,9 +137,7 @@ def starts_table(*, quick: bool) -> Table:
 
 def _run(seed: int, knowledge: BatchKnowledge, sizes: tuple[float, ...] = ()) -> dict:
     """Outcome of one stream, from bench-results/ if this code has run it before."""
-    directory = Path(tracking.__file__).parent
-    code = hashlib.sha256(b"".join((directory / f"{name}.py").read_bytes() for name in SOURCES)).hexdigest()
-    kept = Path(f"bench-results/tracking-{code[:12]}.jsonl")
+    kept = Path(f"bench-results/tracking-{CODE}.jsonl")
     key = f"{knowledge.value} {seed}"
     if kept.exists():
         for line in kept.read_text().splitlines():
