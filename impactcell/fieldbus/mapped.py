@@ -49,6 +49,7 @@ class MappedDevice:
     def __init__(self, client: ModbusClient, registers: RegisterMap) -> None:
         self.client = client
         self.registers = registers
+        self._header = registers.header()
         self._plans: dict[tuple[str, ...], tuple[Block, ...]] = {}
         self._merged: dict[tuple[str, ...], tuple[list[dict[str, Value]], dict[str, Value]]] = {}
         self._last: dict[Block, tuple[bytes, dict[str, Value]]] = {}
@@ -86,7 +87,7 @@ class MappedDevice:
 
     async def header(self) -> tuple[dict[str, Value], Words]:
         """Read the window's header: its values, and its words from `window_sequence` to the first array."""
-        fields = self.registers.header()
+        fields = self._header
         blocks = self._blocks(tuple(register.name for register in fields))
         first = fields[0].address
         words = np.zeros(fields[-1].end - first, dtype=">u2")

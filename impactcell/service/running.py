@@ -171,8 +171,6 @@ class RunningCell:
         processed = await self.worker.process(capture, positioning, self._announcement(), reception.faults)
         if task is not None:
             await self.worker.run(partial(task.learn, processed.stepped.snapshot))
-        if processed.durable is not None:
-            await self._module.acknowledge(processed.durable)
         for note in processed.stepped.notes:
             self.log.info("%s", note, cycle=capture.cycle)
         snapshot = processed.stepped.snapshot
@@ -180,6 +178,8 @@ class RunningCell:
         if self.server is not None:
             self.server.publish(self.cell.name, snapshot)
             self._show_module(self.server)
+        if processed.durable is not None:
+            await self._module.acknowledge(processed.durable)
         await self._look_at_journal()
         if self._observe is not None:
             self._observe(self.cell.name, snapshot)

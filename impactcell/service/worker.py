@@ -18,7 +18,7 @@ from impactcell.intake import Announcement
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.positioning import Belief
-from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Snapshot
+from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Shelving, Snapshot
 from impactcell.service.keeping import Keeper
 from impactcell.service.rehearsal import rehearse
 
@@ -129,6 +129,8 @@ class Worker:
 
     async def pass_time(self, time_ns: int) -> tuple[Alarm, ...]:
         """End every shelving whose time is over; the alarms that moved."""
+        if all(alarm.shelving is Shelving.UNSHELVED for alarm in self.alarms):
+            return ()
         return await self.run(lambda: self._pass_time(time_ns))
 
     async def act(self, name: AlarmName, occurrence: Occurrence, audit: AuditEntry) -> Transition:

@@ -10,7 +10,7 @@ from tests.integration.watched import serving
 
 pytestmark = pytest.mark.timeout(240)
 # The ring holds 16 cycles: a start of the service must not take longer than they last.
-STRIKES = {"period_s": 1.0}
+STRIKES = {"period_s": 2.0}
 
 
 def stored(directory: Path) -> list[tuple[int, int]]:

@@ -77,7 +77,7 @@ async def test_every_cycle_once_and_right(tmp_path: Path, users: str) -> None:
 async def test_a_module_that_is_not_there_is_said_and_the_service_ends_cleanly(tmp_path: Path) -> None:
     path = write_cell(tmp_path, 1)
     async with started("impactcell", "run", str(path)) as service:
-        await service.line(r"press-1: .*127\.0\.0\.1:1")
+        await service.line(r"cell=press-1 127\.0\.0\.1:1.*no connection")
         await service.line(r"cell=press-1 at (\S+)")
         service.process.terminate()
         async with asyncio.timeout(2):
