@@ -12,7 +12,16 @@ from impactcell.discrepancy.evidence import Evidence, Scan, scan
 from impactcell.discrepancy.fit import Fit
 from impactcell.discrepancy.problem import Problem
 from impactcell.discrepancy.ties import Alternative, Contender, alternatives, by_likelihood, is_tied, total
-from impactcell.discrepancy.trials import REFITS, Setup, backward, finalists, finish, race
+from impactcell.discrepancy.trials import (
+    REFITS,
+    Setup,
+    at_an_end,
+    backward,
+    finalists,
+    finish,
+    inside_first,
+    race,
+)
 
 SEEDS_OF_PAIRS = 4
 SECONDS = 5
@@ -60,7 +69,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     rough = finish(setup, race(setup, first.scan, REFITS))
     if not rough:
         return Search(first, first, None, (), {}, {})
-    singles = setup.polished(finalists(setup, rough))
+    singles = inside_first(setup.problem, setup.polished(finalists(setup, rough)))
     against = setup.look(singles[0].fit)
     if setup.closes(against):
         return _accept_single(setup.problem, first, against, singles)
@@ -72,7 +81,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     rough_pairs = _pairs(setup, sources)
     if not rough_pairs:
         return Search(first, against, None, (), {}, {}, alternatives(singles))
-    pairs = setup.polished(finalists(setup, rough_pairs))
+    pairs = inside_first(setup.problem, setup.polished(finalists(setup, rough_pairs)))
     if not setup.follows(pairs[0].fit):
         return Search(first, against, None, (), {}, {}, alternatives([*pairs, *singles]))
     again = setup.polished(backward(nominal, pairs[0].fit))
@@ -87,7 +96,7 @@ def search(setup: Setup, nominal: Fit) -> Search:
     if not setup.material_gain(singles[0].fit, pairs[0].fit) and setup.follows(singles[0].fit):
         return _accept_single(setup.problem, first, against, singles)
     last = setup.look(pairs[0].fit)
-    if not setup.suffices(last):
+    if not setup.suffices(last) or at_an_end(pairs[0].fit):
         return Search(first, last, None, (), {}, {}, everything)
     return _accept_pair(setup.problem, first, last, pairs, rough, sources, everything)
 
@@ -139,6 +148,8 @@ def _plausible(
 
 def _accept_single(problem: Problem, first: Evidence, against: Evidence, singles: list[Contender]) -> Search:
     best = singles[0].fit
+    if at_an_end(best):
+        return Search(first, against, None, (), {}, {}, alternatives(singles))
     effect = best.effects[-1]
     tied = tuple(other.fit.effects[-1] for other in singles[1:] if is_tied(problem, singles[0], other))
     return Search(

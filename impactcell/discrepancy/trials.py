@@ -36,6 +36,8 @@ MATERIAL = 30.0
 """Log-likelihood that a second effect has to add; an effect that is worth less has no visible gap."""
 NARROWER = 0.85
 """Or by which factor it has to lower the spread of the friction factors, if it acts between shots."""
+END = 0.01
+"""Share of the (logarithmic) range of a shape that counts as its end."""
 
 Mapper = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
 
@@ -59,6 +61,27 @@ def _try(problem: Problem, effects: tuple[str, ...], at: Samples, base: Fit, ste
         return fit(problem, effects, at, base.local, spread=base.spread, most_steps=steps)
     except DiscrepancyError:
         return None
+
+
+def at_an_end(model: Fit) -> bool:
+    """Whether the shape of an effect was fitted to the end of its range.
+
+    It is then used for something that it is not: a patch wider than any slide is a gradient of friction.
+    """
+    return any(
+        one.effect
+        and one.form == "log"
+        and min(float(at) - one.lower, one.upper - float(at)) < END * (one.upper - one.lower)
+        for one, at in zip(model.coordinates, model.at, strict=True)
+    )
+
+
+def inside_first(problem: Problem, ranking: list[Contender]) -> list[Contender]:
+    """Put what is tied with the likeliest, and fitted inside its range, before a likeliest that is not."""
+    if not ranking or not at_an_end(ranking[0].fit):
+        return ranking
+    inside = [one for one in ranking[1:] if not at_an_end(one.fit) and is_tied(problem, ranking[0], one)]
+    return [*inside, *(one for one in ranking if one not in inside)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
