@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import logging
 import signal
 import sys
@@ -132,7 +133,10 @@ def run(cells: Sequence[Cell]) -> None:
     """
     logs.configure()
     sys.setswitchinterval(SWITCH_S)
-    interrupted = asyncio.run(_until_signalled(Service(cells)))
+    try:
+        interrupted = asyncio.run(_until_signalled(Service(cells)))
+    finally:
+        gc.freeze()  # the interpreter's end would look through everything once more, for most of a second
     if interrupted:
         raise KeyboardInterrupt
 

@@ -1,5 +1,6 @@
 """A few cycles of the cell's own model before the first real one, so that all is compiled when it comes."""
 
+import gc
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,6 +30,10 @@ def rehearse(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> No
     with _one_at_a_time:
         if kind not in _rehearsed and _rehearse(design, stop):
             _rehearsed.add(kind)
+            # What has been loaded and compiled by now stays: looking through all of it for garbage would hold
+            # up a cycle for a tenth of a second now and then.
+            gc.collect()
+            gc.freeze()
 
 
 def _rehearse(design: CellDesign, stop: Callable[[], bool]) -> bool:
