@@ -119,10 +119,15 @@ def _take(
     """Take the reading into the bank, and into the filter where the batch is known."""
     before = state
     state, shift, innovation = batches.find_shift(settings, state, reading, variance, where, announced)
-    said = reading.batch_id
-    if settings.batch is not BatchKnowledge.KNOWN or said is None:
+    said, current = reading.batch_id, before.filter
+    if settings.batch is not BatchKnowledge.KNOWN:
         return state, shift, innovation
-    current = before.filter
+    if said is None:
+        if current is None or where.lag > 0:
+            return state, shift, innovation
+        # nobody says of which batch the cycle was: its time passes, and after a change the bank knows better
+        passed = wear.pass_cycles(current, where.passed, state.level_variance, state.slope_variance)
+        return replace(state, filter=passed if shift is None else None), shift, innovation
     if current is None:
         mean, covariance = banks.moments(state.bank)
         return replace(state, filter=wear.resume(mean, covariance, said)), shift, innovation

@@ -200,6 +200,18 @@ def test_ids_may_come_late_and_go_away():
     assert not any(o.shift for o in outcomes)
 
 
+@pytest.mark.parametrize("step", [0.0, 4.0], ids=["no change", "a change"])
+def test_cycles_without_an_id_still_wear(step):
+    readings = series(500, slope=4e-5, step=step, at=330, batch="A")
+    readings = [replace(r, batch_id=None) if 300 <= r.cycle < 380 else r for r in readings]
+    outcomes = run(KNOWN, readings)
+    assert sum(o.shift is not None for o in outcomes) == (step > 0.0)
+    back = outcomes[380].wear
+    total = outcomes[380].batch.offset + back.level
+    assert abs(total - (0.2 + step * STD + 4e-5 * 380)) < 4.0 * back.level_std
+    assert abs(outcomes[-1].wear.rate_per_cycle - 4e-5) < 3.0 * outcomes[-1].wear.rate_std
+
+
 def test_a_known_batch_that_comes_back_is_recognised():
     readings = [replace(r, batch_id="ABA"[min(r.cycle // 200, 2)]) for r in series(600)]
     readings = [replace(r, mu_s=r.mu_s + 4.0 * STD) if r.batch_id == "B" else r for r in readings]
