@@ -18,11 +18,12 @@ def slide(
     noise: float,
     seed: int,
     rest_s: float = 0.02,
+    viscous_per_mass: float = 0.0,
 ) -> tuple[Capture, float]:
     """Capture of a slide from `speed` to rest, and the distance slid."""
 
     def motion(_: float, y: np.ndarray) -> list[float]:
-        return [y[1], -GRAVITY * friction(y[0])]
+        return [y[1], -GRAVITY * friction(y[0]) - viscous_per_mass * y[1]]
 
     def stopped(_: float, y: np.ndarray) -> float:
         return y[1]

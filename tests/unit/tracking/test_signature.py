@@ -9,6 +9,7 @@ import pytest
 from impactcell import values
 from impactcell.records import Channel, Quality
 from impactcell.tracking import gap, profile, signature
+from impactcell.tracking.reference import VISCOUS_STD
 from tests.benchmarks._slides import slide
 
 SETTINGS = signature.SignatureSettings()
@@ -89,6 +90,50 @@ def test_normal_cycles_are_not_deviant_and_a_bump_is_with_its_place(learned):
     assert odd.signature.deviates_at_m == pytest.approx(1e-3, abs=0.3e-3)
     # a deviant cycle is not learned from
     assert values.dumps(odd.state.reference) == values.dumps(state.reference)
+
+
+def varying(cycle):
+    """Level, tilt and bend of the friction all vary, the latter most where short slides do not get."""
+    a, b, c = 0.005 * np.random.default_rng([8, cycle]).normal(size=3) * (2.0, 1.0, 1.0)
+
+    def friction(x):
+        shape = a + b * (x / 1e-3 - 1.0) + c * np.cos(np.pi * x / 2e-3)
+        return 0.2 * (1.0 + 0.03 * np.sin(2.0 * np.pi * x / 1.3e-3) + shape)
+
+    return friction
+
+
+def alarmed(speeds, plant_viscous=0.0, model_viscous=0.0):
+    """Which of the cycles at these speeds are thought deviant, and the signature of the last."""
+    state, odd = signature.initial_state(SETTINGS), []
+    for cycle, speed in enumerate(speeds):
+        capture, _ = slide(varying(cycle), speed, 2e3, NOISE, cycle, viscous_per_mass=plant_viscous)
+        done = signature.update(SETTINGS, state, capture, viscous_per_mass=model_viscous)
+        state = done.state
+        if done.deviation is not None:
+            odd.append(cycle)
+    return odd, state
+
+
+def test_slides_longer_than_all_before_are_no_alarm():
+    odd, _ = alarmed([0.07] * 120 + [0.07, 0.08, 0.09, 0.1] * 10)
+    assert odd == []
+
+
+@pytest.mark.parametrize("plant", [0.0, 4.5])
+@pytest.mark.parametrize("model", [0.0, 4.5])
+def test_another_velocity_is_no_alarm_whatever_viscous_friction_the_model_knows(plant, model):
+    odd, state = alarmed([0.09] * 70 + [0.06] * 20, plant, model)
+    assert odd == []
+    known = state.reference
+    # what is left of it shows once velocity has changed
+    assert known.viscous_seen / known.viscous_known == pytest.approx(plant - model, abs=0.8)
+
+
+def test_one_velocity_says_nothing_of_viscous_friction():
+    _, state = alarmed([0.09] * 70, 4.5)
+    known = state.reference
+    assert known.viscous_known == pytest.approx(VISCOUS_STD**-2, rel=0.2)
 
 
 def test_t_squared_is_about_its_three_degrees_of_freedom(learned):
