@@ -119,7 +119,7 @@ def along_stroke(figure: "Figure") -> None:
     """Figure 8: friction along single strokes, and one that deviates among those that do not."""
     settings = signature.SignatureSettings()
     state = signature.initial_state(settings)
-    judged, deviant = [], None
+    judged, deviant = {}, None
     for cycle in range(120):
         rng = np.random.default_rng([8, cycle])
         capture = _slide(rng, cycle, bump=0.12 if cycle == 100 else 0.0)
@@ -128,10 +128,10 @@ def along_stroke(figure: "Figure") -> None:
         if cycle == 100:
             deviant = done
         elif done.judged:
-            judged.append(done)
+            judged[cycle] = done
     axes = figure.subplots(1, 2)
     grid = settings.grid_m * 1e3
-    for done in judged[:20]:
+    for done in list(judged.values())[:20]:
         axes[0].plot(grid, done.signature.friction, color="#bbbbbb", linewidth=0.6)
     if deviant is not None:
         s = deviant.signature
@@ -149,12 +149,9 @@ def along_stroke(figure: "Figure") -> None:
     axes[0].plot([], [], color="#bbbbbb", label="normal cycles")
     axes[0].set(xlabel="distance slid, mm", ylabel="kinetic friction coefficient", title="along the stroke")
     axes[0].legend(fontsize=7)
-    normal = [d for d in judged if d.deviation is None]
-    numbers = range(len(normal))
-    axes[1].plot([50 + n for n in numbers], [d.signature.spe for d in normal], ".", color=BLUE, label="SPE")
-    axes[1].plot(
-        [50 + n for n in numbers], [d.signature.t_squared for d in normal], ".", color=GREEN, label="T²"
-    )
+    normal = {cycle: d.signature for cycle, d in judged.items() if d.deviation is None}
+    axes[1].plot(list(normal), [s.spe for s in normal.values()], ".", color=BLUE, label="SPE")
+    axes[1].plot(list(normal), [s.t_squared for s in normal.values()], ".", color=GREEN, label="T²")
     axes[1].set(xlabel="cycle", ylabel="statistic", yscale="log", title="judging each cycle")
     axes[1].legend(fontsize=7)
 
