@@ -7,7 +7,7 @@ A cycle's deviation from its material's mean is a mixed model (Laird & Ware 1982
 Lambda: see `impactcell.tracking.variation`; it outlives a change of material. The mean is the generalised
 least-squares one under a roughness penalty, slowly forgetting, so that wear does not pass for deviance.
 
-Viscous friction that the model does not know looks like mu(x) as long as the velocity stays, and makes a cycle
+Viscous friction that the model does not know looks like mu(x) while the velocity stays, and makes a cycle
 of another velocity look deviant. How far k_v / m is off is learned from cycles of different velocities.
 """
 
