@@ -119,3 +119,25 @@ async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, desig
     assert again.durable == Mark(1, 2)
     await process(again, make_capture(3))
     await again.close()
+
+
+async def test_a_state_with_other_field_names_is_refused_with_a_message_and_learned_anew(
+    tmp_path: Path, design: core.CellDesign, caplog: pytest.LogCaptureFixture
+) -> None:
+    worker = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    await process(worker, make_capture(1))
+    await worker.close()
+    with Journal(tmp_path / "j", "c") as journal:
+        stored = journal.state()
+        assert stored is not None
+        assert b'"viscous_known"' in stored
+        older = stored.replace(b'"viscous_known"', b'"forgotten_name"')
+        assert worker.snapshot is not None
+        journal.append(make_capture(2), replace(worker.snapshot, cycle=2), older)
+    again = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    assert "forgotten_name" in caplog.text
+    assert "tracking begins anew" in caplog.text
+    assert again.durable == Mark(1, 2)  # cycles go on
+    await process(again, make_capture(3))
+    await again.close()
+    assert cycles(tmp_path / "j") == [1, 2, 3]
