@@ -19,6 +19,7 @@ from impactcell.discrepancy.ties import folds, is_tied, out_of_shot
 from impactcell.discrepancy.workflow import Findings, investigate
 from impactcell.errors import CampaignError
 from impactcell.modelfile import read_model
+from impactcell.physics.effects import LIBRARY
 from impactcell.records import Channel
 from tests.discrepancy import study
 
@@ -105,6 +106,13 @@ def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
     assert found.verdict == "tied"
     assert answer(found)[1] == {"mass_error", "force_sensor_gain"}
     assert "weigh the part" in found.proposals[0].setting
+
+
+def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
+    hidden = "position_dependent_friction"
+    found = investigate(make(hidden, seed=920030), library=[one for one in LIBRARY if one != hidden])
+    assert found.search.alternatives[0].effects == ("friction_patch",)
+    assert answer(found) == ("unknown", set())
 
 
 def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
