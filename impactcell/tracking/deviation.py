@@ -1,8 +1,7 @@
 """Is a cycle deviant? T^2 on the principal components, noise-whitened SPE, and a scan over shapes.
 
 A cycle's information vector y = h - G m, m the material's mean known to a covariance V, has covariance
-G + G (V + C C') G when normal: sensor noise, the mean's own error and the components C, the last of which is
-what viscous friction that the model does not know makes of another velocity. With
+G + G (V + C C') G when normal: sensor noise, the mean's own error and the components C. With
 P = (G^-1 + V + C C')^-1 and u = P G^-1 y a shape s in friction is seen with the score s' u / sqrt(s' P s).
 T^2 and SPE find what was not thought of; the scan over bumps, ripples, level and tilt comes close to the
 oracle that knows the shape. Each gets a share of the false alarms.
@@ -67,10 +66,11 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
     usual : float
         Usual friction, which scales what is worth looking for.
     """
-    cycles, n = float(reference.variation.cycles), slide.seen
-    G, y, viscous = references.difference(reference, slide)
-    doubt = viscous[:, 0] / math.sqrt(reference.viscous_known)
-    G, y, C = G[:n, :n], y[:n], np.column_stack([reference.components, doubt])[:n]
+    C, cycles = reference.components, float(reference.variation.cycles)
+    G, y = references.within(reference, slide.matrix, slide.vector - slide.matrix @ reference.mean)
+    n = min(slide.seen, int(np.count_nonzero(G.diagonal())))
+    G, y = _with_mean_error(G, y, references.precision(reference))
+    G, y, C = G[:n, :n], y[:n], C[:n]
     # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
     lesser = references.without_variation(C[:, COMPONENTS:], G, y)
     t_squared, spe, freedom = _squares(*lesser, C[:, :COMPONENTS])
@@ -92,6 +92,12 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
     _, size, std = best.get(kind, best["bump"])
     at = float(grid_m[row % len(grid_m)]) if row >= 0 else math.nan
     return Verdict(p_value, t_squared, spe, freedom, kind, at, size, std)
+
+
+def _with_mean_error(G: Samples, y: Samples, precision: Samples) -> tuple[Samples, Samples]:
+    """Information (G^-1 + V)^-1 and its vector, V the inverse of `precision`."""
+    lost = G @ linear.solved(G + precision, np.column_stack([G, y]))
+    return G - lost[:, :-1], y - lost[:, -1]
 
 
 def _squares(P: Samples, y: Samples, C: Samples) -> tuple[float, float, int]:

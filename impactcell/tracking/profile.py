@@ -37,20 +37,12 @@ class Information:
         How far the part slid.
     seen : int
         Coefficients of the splines it met; rows of G and h beyond are zero.
-    launch_m_s : float
-        Speed at loss of contact, positive.
-    spacing_m : float
-        Of the grid.
-    gravity_m_s2 : float
     """
 
     matrix: Samples
     vector: Samples
     reached_m: float
     seen: int
-    launch_m_s: float
-    spacing_m: float
-    gravity_m_s2: float
 
 
 def information(
@@ -80,14 +72,7 @@ def information(
     seen = integrals.shape[1]
     matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
     matrix[:seen, :seen], vector[:seen] = products[:seen, :seen], products[:seen, seen]
-    return Information(matrix, vector, float(x[-1]), seen, _launch(t, x), spacing, gravity_m_s2)
-
-
-def _launch(t: Samples, x: Samples) -> float:
-    """Speed at loss of contact, of the parabola nearest to the whole slide."""
-    part = t / t[-1]
-    powers = np.column_stack([np.ones(len(t)), part, part**2])
-    return max(float(linear.solved(powers.T @ powers, powers.T @ x)[1] / t[-1]), 1e-6)
+    return Information(matrix, vector, float(x[-1]), seen)
 
 
 def _orthonormal(first: Samples, second: Samples) -> Samples:
@@ -148,26 +133,6 @@ def smooth(seen: Information) -> tuple[Samples, Samples, float]:
     within = (spread.T * share_of) @ spread
     within.flat[:: n + 1] += share_of @ (1.0 / diagonal)
     return vectors @ (share_of @ means), vectors @ within @ vectors.T, float(STRENGTHS[best] * scale)
-
-
-def viscous(seen: Information, friction: Samples) -> Samples:
-    """Friction by 1/s of k_v / m, v / g, along a slide launched as this one was, shape (j, 2).
-
-    The first column is along the slide as far as it went; the second along one over `friction` itself, so
-    that it does not depend on what friction this cycle met.
-
-    Parameters
-    ----------
-    friction : ndarray, shape (j,)
-        What friction usually is.
-    """
-    work = seen.spacing_m * (np.cumsum(friction) - friction[0] - friction / 2.0 - friction[1] / 2.0)
-    places = seen.spacing_m * np.arange(-1.0, len(friction) - 1.0)
-    height = seen.launch_m_s**2 / (2.0 * seen.gravity_m_s2)
-    done = np.column_stack(
-        [work / max(float(np.interp(seen.reached_m, places, work)), 1e-300), work / height]
-    )
-    return np.asarray(seen.launch_m_s / seen.gravity_m_s2 * np.sqrt(np.maximum(1.0 - done, 0.0)))
 
 
 @compiled

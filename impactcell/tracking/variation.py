@@ -1,7 +1,7 @@
 """How cycles of one material differ from its mean: a covariance in few modes, learned without bias.
 
 A cycle deviates from the mean m of its material by B a, a ~ N(0, Lambda), B the lowest cosines along the
-grid. From a cycle with information G, (G^-1 + V)^-1 with the mean known to V, is seen d = B' (h - G m): its
+grid. From a cycle with information G is seen d = B' (h - G m) sqrt(w / (w + 1)), m resting on w cycles: its
 covariance is K Lambda K + K, K = B' G B. With T = (I + K)^-1, W = T K, in units of the first guess of a,
 the equations::
 
@@ -10,9 +10,7 @@ the equations::
 are linear in Lambda and right in the mean (C. R. Rao 1971, J. Multivariate Analysis 1:257, with the first
 guess as weights), so that two sums are all that is kept, and slides may end in different places. Eigenvalues
 that noise alone could have made, in units of the noise, are zero: else the modes swallow what they should
-tell apart. They are not known to be zero, though: Lambda is learned from n cycles to sqrt(2 / n) of their
-noise, which is added. A slide longer than all before it sees directions that were mostly noise before; what
-no slide has reached keeps the first guess.
+tell apart. What no slide has reached keeps the first guess.
 """
 
 import math
@@ -68,22 +66,24 @@ def guess(friction: float) -> Variation:
     return Variation(scale=scale, weights=weights, moments=moments)
 
 
-def learn(variation: Variation, matrix: Samples, vector: Samples) -> Variation:
+def learn(variation: Variation, matrix: Samples, vector: Samples, weight: float) -> Variation:
     """Take one cycle in.
 
     Parameters
     ----------
     matrix : ndarray, shape (j, j)
-        Information G of the cycle on how it differs from the mean.
+        Information G of the cycle.
     vector : ndarray, shape (j,)
         h - G m.
+    weight : float
+        Cycles that m rests on.
     """
     basis = cosines(len(vector)) * variation.scale
     weights, moments = variation.weights.copy(), variation.moments.copy()
     K = basis.T @ matrix @ basis
     K = (K + K.T) / 2.0
     T = np.linalg.inv(np.eye(MODES) + K)
-    r = T @ (basis.T @ vector)
+    r = T @ (basis.T @ vector) * math.sqrt(weight / (weight + 1.0))
     W = T @ K
     W = (W + W.T) / 2.0
     _add(W, np.outer(r, r) - W @ T.T, 1.0, weights, moments)
@@ -102,7 +102,7 @@ def _solved(weights: Samples, moments: Samples, information: Samples, cycles: in
     # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
     edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0
     back = np.linalg.solve(root.T, vectors * np.sqrt(np.where(values > edge, values, 0.0)))
-    return np.asarray(back @ back.T + np.linalg.inv(information / math.sqrt(2.0 * cycles) + np.eye(MODES)))
+    return np.asarray(back @ back.T + np.linalg.inv(information + np.eye(MODES)))
 
 
 def components(variation: Variation, coefficients: int) -> Samples:

@@ -130,8 +130,8 @@ async def test_a_state_with_other_field_names_is_refused_with_a_message_and_lear
     with Journal(tmp_path / "j", "c") as journal:
         stored = journal.state()
         assert stored is not None
-        assert b'"viscous_known"' in stored
-        older = stored.replace(b'"viscous_known"', b'"forgotten_name"')
+        assert b'"deviant_run"' in stored
+        older = stored.replace(b'"deviant_run"', b'"forgotten_name"')
         assert worker.snapshot is not None
         journal.append(make_capture(2), replace(worker.snapshot, cycle=2), older)
     again = Worker(design, Journal(tmp_path / "j", "c"), Retention())

@@ -23,7 +23,7 @@ def learned(true_sizes, cycles, seed):
     for _ in range(cycles):
         deviation = basis @ (np.array(true_sizes) * rng.normal(size=variation.MODES))
         vector = G @ deviation + 1e4 * rng.normal(size=COEFFICIENTS)
-        found = variation.learn(found, G, vector)
+        found = variation.learn(found, G, vector, 1e12)
     return found
 
 
@@ -43,7 +43,7 @@ def test_modes_that_do_not_vary_are_zero():
 def test_what_was_never_seen_keeps_the_first_guess():
     found = variation.guess(0.2)
     for _ in range(50):
-        found = variation.learn(found, information(0.0), np.zeros(COEFFICIENTS))
+        found = variation.learn(found, information(0.0), np.zeros(COEFFICIENTS), 100.0)
     assert found.spread == pytest.approx(np.eye(variation.MODES))
 
 
