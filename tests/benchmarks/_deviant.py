@@ -217,7 +217,7 @@ def power_table(*, quick: bool) -> Table:
         state = done.state
         young = state if k < LEARNED[2] else young
     limits = _limits(truth, alpha)
-    rows = [["false alarms while learning", "", f"{false} of {judged}", *[""] * 7]]
+    rows = [["false alarms while learning", "", f"{false} of {judged}", *[""] * 8]]
     for name, make in DEVIATIONS.items():
         ours, early, plain, off = ({oracle: [] for oracle in ORACLE} for _ in range(4))
         amplitudes = []
