@@ -18,7 +18,7 @@ from impactcell.tracking.variation import MODES, Variation
 
 MEMORY = 300.0  # cycles the mean remembers
 SMOOTHED_AT = (0.0, 4.0, 16.0, 64.0)  # weights at which the mean's smoothing is settled anew
-FEWEST = 5.0  # cycles that have met a place before the mean is known there
+FEWEST = 8.0  # cycles that have met a place before the mean is known there
 VAGUE = 1.0  # information on each coefficient beforehand: friction is known to about 1
 
 
@@ -129,7 +129,7 @@ def learn(reference: Reference, slide: profile.Information, settled: float) -> R
         strength=strength,
         variation=varied,
         components=components,
-        met=reference.met * kept + (np.arange(len(vector)) < slide.seen - 2),
+        met=reference.met * kept + (np.arange(len(vector)) < slide.seen - 1),
     )
     return replace(fresh, mean=linear.solved(precision(fresh), vector))
 
