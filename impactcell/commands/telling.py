@@ -1,4 +1,4 @@
-"""What a verb says beside its result: `-q` silences it, `-v` adds to it."""
+"""What a verb says beside its result; `-q` silences it."""
 
 import logging
 import sys

@@ -68,7 +68,7 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
     """
     C, cycles = reference.components, float(reference.variation.cycles)
     G, y = references.within(reference, slide.matrix, slide.vector - slide.matrix @ reference.mean)
-    n = min(slide.seen, int(np.count_nonzero(G.diagonal())))
+    n = min(slide.seen, references.reach(reference))
     G, y = _with_mean_error(G, y, references.precision(reference))
     G, y, C = G[:n, :n], y[:n], C[:n]
     # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones

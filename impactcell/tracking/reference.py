@@ -70,6 +70,11 @@ def restart(reference: Reference) -> Reference:
     return replace(reference, weight=0.0, matrix=square, vector=line, met=line)
 
 
+def reach(reference: Reference) -> int:
+    """Coefficients, from the first on, that enough cycles have met for the mean to be known there."""
+    return int(np.count_nonzero(reference.met >= min(reference.weight, FEWEST)))
+
+
 def within(reference: Reference, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
     """Leave of a cycle what it says where the mean is known, with friction beyond that free.
 
@@ -78,10 +83,9 @@ def within(reference: Reference, matrix: Samples, vector: Samples) -> tuple[Samp
     Returns
     -------
     matrix, vector : ndarray
-        G11 - G12 G22^-1 G21 and its vector, of the first coefficients, which enough cycles have met; zero
-        beyond.
+        G11 - G12 G22^-1 G21 and its vector, of the coefficients within `reach`; zero beyond.
     """
-    n = int(np.count_nonzero(reference.met >= min(reference.weight, FEWEST)))
+    n = reach(reference)
     if n == len(vector):
         return matrix, vector
     beyond = matrix[n:, n:].copy()

@@ -46,17 +46,23 @@ def finite(tracked):
     return all(map(math.isfinite, figures))
 
 
+def the_shift(readings, outcomes):
+    """The cycle of the only shift that was reported, and its evidence."""
+    found = [(r.cycle, o.shift) for r, o in zip(readings, outcomes, strict=True) if o.shift]
+    assert len(found) == 1
+    cycle, evidence = found[0]
+    assert evidence.statistic > evidence.threshold
+    return cycle, evidence
+
+
 @pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
 def test_a_shift_is_found_with_cycle_size_and_rate(config):
     readings = series(400, step=3.0, at=250)
     if config is KNOWN:
         readings = [replace(r, batch_id="A" if r.cycle < 250 else "B") for r in readings]
     outcomes = run(config, readings)
-    found = [(r.cycle, o.shift) for r, o in zip(readings, outcomes, strict=True) if o.shift]
-    assert len(found) == 1
-    cycle, evidence = found[0]
+    cycle, evidence = the_shift(readings, outcomes)
     assert 250 <= cycle <= 258
-    assert evidence.statistic > evidence.threshold
     assert evidence.false_alarm_cycles == 100_000.0
     assert evidence.false_alarm_days == pytest.approx(100_000.0 / 86_400.0, rel=1e-3)
     last = outcomes[-1]
@@ -224,11 +230,8 @@ def test_a_change_within_a_known_batch_is_found_and_is_no_wear(name):
     readings = [replace(r, batch_id="A" if r.cycle < 200 else name) for r in series(700, slope=2e-6)]
     readings = [replace(r, mu_s=r.mu_s + 3.0 * STD) if r.cycle >= 450 else r for r in readings]
     outcomes = run(KNOWN, readings)
-    found = [(r.cycle, o.shift) for r, o in zip(readings, outcomes, strict=True) if o.shift]
-    assert len(found) == 1
-    cycle, evidence = found[0]
+    cycle, _ = the_shift(readings, outcomes)
     assert 450 <= cycle <= 460
-    assert evidence.statistic > evidence.threshold
     last = outcomes[-1]
     assert abs(last.batch.last_shift_cycle - 450) <= 2
     assert abs(last.batch.offset - 3.0 * STD) < 3.0 * last.batch.offset_std + 0.5 * STD
