@@ -113,11 +113,13 @@ class Ensemble:
         self._channels: list[slice] = []
         total = 0
         for channel, given in enumerate((force_time_s, position_time_s, actuator_time_s, velocity_time_s)):
-            begin = total
+            begin, checked = total, NONE
             for i in range(len(taps)):
                 times = NONE if given is None else np.asarray(given[i], dtype=np.float64)
-                if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
-                    raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
+                if times is not checked:  # taps may share theirs
+                    if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
+                        raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
+                    checked = times
                 pieces.append(times)
                 self._cursors[i, channel] = total
                 total += times.size

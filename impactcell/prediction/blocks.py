@@ -105,25 +105,25 @@ def blocks(
         if high > low:
             pieces.append(np.arange(low, high + fine_s, fine_s))
     pieces.append(np.asarray(edges, dtype=np.float64))
-    limits = np.unique(np.concatenate(pieces))
-    starts = np.unique(np.searchsorted(times, limits, "left"))
-    starts = starts[starts < count]
-    if len(starts) == 0 or starts[0] != 0:
-        starts = np.concatenate([[0], starts])
     sigma = noise_std(channel)
-    table = _gathered(times, values, starts)
+    table = _gathered(times, values, np.searchsorted(times, np.sort(np.concatenate(pieces)), "left"))
     scatter = Scatter(table[0], table[3], table[4], table[5], sigma)
     return Blocks(table[1], table[2], sigma / np.sqrt(table[0]), scatter)
 
 
 @compiled
-def _gathered(times: Samples, values: Samples, starts: Wholes) -> Samples:
-    """Count, means and sums about the means of each block, shape (6, n)."""
-    table = np.zeros((6, len(starts)))
-    for block in range(len(starts)):
-        first = starts[block]
-        end = starts[block + 1] if block + 1 < len(starts) else len(times)
+def _gathered(times: Samples, values: Samples, limits: Wholes) -> Samples:
+    """Count, means and sums about the means of each block that holds samples, shape (6, n).
+
+    A block begins with the first sample and at each of the ascending `limits`.
+    """
+    table = np.zeros((6, len(limits) + 1))
+    block, first = 0, 0
+    for limit in range(len(limits) + 1):
+        end = limits[limit] if limit < len(limits) else len(times)
         size = end - first
+        if size == 0:
+            continue
         t0, y0 = times[first], values[first]  # sums of what is left keep their digits
         t, y, tt, yy, ty = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(first, end):
@@ -139,4 +139,5 @@ def _gathered(times: Samples, values: Samples, starts: Wholes) -> Samples:
         table[3, block] = tt - t * t / size
         table[4, block] = yy - y * y / size
         table[5, block] = ty - t * y / size
-    return table
+        block, first = block + 1, end
+    return table[:, :block].copy()

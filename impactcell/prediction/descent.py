@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from impactcell.compiled import compiled
 from impactcell.errors import PhysicsError
 from impactcell.prediction.posterior import Side
 from impactcell.prediction.response import JUST_STICKING, PARAMETERS, RATIO, Response
@@ -78,19 +79,52 @@ class Minimum:
 
     def as_side(self, known: Belief, misfit: float = 1.0) -> Side:
         """Give the quadratic about the minimum, the data's weight divided by `misfit` squared."""
-        free, prior = known.free, known.weight[known.free] ** 2
-        curvature = self.normal / misfit**2 + np.diag(prior)
-        away = (self.theta - known.mean)[free]
-        gradient = self.slope / misfit**2 + prior * away
-        inverse = np.linalg.inv(curvature)
-        step = -inverse @ gradient
+        free = known.free
+        inverse, step, beyond, log_determinant = _completed(
+            self.normal, self.slope, known.weight[free] ** 2, (self.theta - known.mean)[free], misfit
+        )
         mean = self.theta.copy()
         mean[free] += step
         covariance = np.zeros((PARAMETERS, PARAMETERS))
         covariance[free[:, None], free] = inverse
-        cost = 0.5 * (self.chi2 / misfit**2 + float(prior @ away**2) + float(gradient @ step))
-        _, log_determinant = np.linalg.slogdet(curvature)
-        return Side(mean, covariance, cost, -float(log_determinant), self.side)
+        return Side(mean, covariance, 0.5 * (self.chi2 / misfit**2 + beyond), -log_determinant, self.side)
+
+
+@compiled
+def _completed(
+    normal: Samples, slope: Samples, prior: Samples, away: Samples, misfit: float
+) -> tuple[Samples, Samples, float, float]:
+    """Complete the square about a point that lies `away` from the prior's mean.
+
+    Returns
+    -------
+    inverse : ndarray, shape (p, p)
+        Of the curvature of data and prior.
+    step : ndarray, shape (p,)
+        To the quadratic's minimum.
+    beyond : float
+        Twice the cost there, without what the data cost here.
+    log_determinant : float
+        Of the curvature.
+    """
+    curvature = normal / misfit**2 + np.diag(prior)
+    gradient = slope / misfit**2 + prior * away
+    inverse = np.linalg.inv(curvature).astype(np.float64)
+    step = -(inverse @ gradient)
+    beyond = np.sum(prior * away**2) + np.sum(gradient * step)
+    _, log_determinant = np.linalg.slogdet(curvature)
+    return inverse, step, float(beyond), float(log_determinant)
+
+
+@compiled
+def _step(
+    normal: Samples, slope: Samples, prior: Samples, away: Samples, damping: float
+) -> tuple[Samples, float]:
+    """Gauss-Newton step, its diagonal damped after Levenberg and Marquardt, and its length in variances."""
+    curvature = normal + np.diag(prior)
+    damped = curvature + damping * np.diag(np.diag(curvature))
+    step = -np.linalg.solve(damped, slope + prior * away).astype(np.float64)
+    return step, float(np.sum(step * (curvature @ step)))
 
 
 def descend(response: Response, known: Belief, start: Samples, side: int) -> Minimum:
@@ -104,13 +138,11 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
     best = _at(response, known, start, side)
     damping = 0.0
     for _ in range(MOST_STEPS):
-        curvature = best.normal + np.diag(prior)
-        gradient = best.slope + prior * (best.theta - known.mean)[free]
-        step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
-        if not np.isfinite(step).all():
+        step, length = _step(best.normal, best.slope, prior, (best.theta - known.mean)[free], damping)
+        if not math.isfinite(length):
             break
         noise = max(2.0 * best.cost / response.size, 1.0)
-        if float(step @ curvature @ step) < SETTLED**2 * noise and damping <= 1e-3:
+        if length < SETTLED**2 * noise and damping <= 1e-3:
             return best
         moved = best.theta.copy()
         moved[free] += np.minimum(np.maximum(step, -longest), longest)

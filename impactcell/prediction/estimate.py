@@ -1,6 +1,7 @@
 """One capture in, one `FrictionEstimate` out: every predictor, and the one that is published."""
 
 import math
+from dataclasses import replace
 
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
 from impactcell.prediction.doubt import DOUBTED
@@ -13,7 +14,7 @@ from impactcell.prediction.equations import (
     out_of_range,
 )
 from impactcell.prediction.model import Model
-from impactcell.prediction.reading import Reading, peak_force
+from impactcell.prediction.reading import Reading, peak_force, sensed
 from impactcell.prediction.sliding import Slide, slide
 from impactcell.prediction.waveform import Waveform, braking_friction, fit
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
@@ -37,6 +38,9 @@ def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEst
         bends mu_s even in a tap that it seems to fit: then mu_s comes from the equations, whose few
         coefficients bend less.
     """
+    capture = replace(
+        capture, force=sensed(capture.force, "force"), position=sensed(capture.position, "position")
+    )
     peak, force_fault = _peak(capture)
     slid, slide_fault = _slide(capture)
     distance = slid.distance if slid is not None else _reported_distance(capture)

@@ -33,6 +33,30 @@ class Reading:
     std: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensed(Channel):
+    """A channel that has been checked, and its noise found: several readings of one capture need both.
+
+    Attributes
+    ----------
+    sigma : float
+        What `noise_std` gives.
+    """
+
+    sigma: float = math.nan
+
+
+def sensed(channel: Channel | None, name: str) -> Channel | None:
+    """Check a channel and find its noise, once for all; one that nothing can be read from stays as it is."""
+    try:
+        given = checked(channel, name)
+    except CaptureError:
+        return channel
+    return Sensed(
+        given.time_s, given.values, given.noise_std, given.full_scale, given.resolution, noise_std(given)
+    )
+
+
 def checked(channel: Channel | None, name: str) -> Channel:
     """Refuse a channel nothing can be read from.
 
@@ -41,6 +65,8 @@ def checked(channel: Channel | None, name: str) -> Channel:
     CaptureError
         It is missing, empty, not finite, not ordered in time or constant.
     """
+    if isinstance(channel, Sensed):
+        return channel
     if channel is None:
         raise CaptureError(f"no {name} was recorded")
     if len(channel.values) == 0:
@@ -84,6 +110,8 @@ def noise_std(channel: Channel) -> float:
 
     Where the sensor's noise is not known it is taken from second differences, by their median.
     """
+    if isinstance(channel, Sensed):
+        return channel.sigma
     raster = (channel.resolution or 0.0) / math.sqrt(12.0)
     if channel.noise_std is not None:
         return math.hypot(channel.noise_std, raster)

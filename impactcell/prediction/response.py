@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from impactcell.compiled import compiled
 from impactcell.errors import PhysicsError
 from impactcell.physics import Ensemble, EventKind, Plant, Strike, strike
 from impactcell.prediction.blocks import (
@@ -30,6 +31,7 @@ JUST_STICKING = 1e-7
 AWAY = np.array([1.0, -1.0, 1.0, -1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
 STEP = 1e-5
+STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(AWAY * STEP)])
 KINK_SPAN_S = 1.5e-4
 
 
@@ -137,29 +139,20 @@ class Response:
         PhysicsError
             The motion is not finite with these parameters.
         """
-        rows = np.tile(theta, (PARAMETERS + 1, 1))
-        for index, sign in enumerate(AWAY):
-            rows[index + 1, index] += sign * STEP
-        model = self._model(rows, side)
-        residual = (self._values - model[0]) * self._weights
-        jacobian = ((model[0] - model[1:]) * self._weights).T / (AWAY * STEP)
-        return residual, jacobian
-
-    def _model(self, rows: Samples, side: int) -> Samples:
-        """Blocks of the model for each row of parameters, shape (rows, n)."""
-        mu_k, ratio, stiffness, damping = np.exp(rows).T
-        mu_s = mu_k / ratio
+        rows = np.exp(theta + STEPS)
+        mu_k, damping = rows[:, MU_K], rows[:, DAMPING]
+        mu_s = mu_k / rows[:, RATIO]
         if side < 0:
             mu_s = np.minimum(mu_s, damping * self.tap.velocity_m_s / self._weight_n * (1.0 - 1e-7))
         table = self._table.copy()
-        table[:, :PARAMETERS] = np.column_stack([stiffness, damping, mu_s, mu_k])
+        table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
         traces = self._ensemble.traces(table)
-        model = np.concatenate(
-            [traces.force_n.reshape(len(rows), -1), traces.position_m.reshape(len(rows), -1)], axis=1
+        residual, jacobian = _compared(
+            traces.force_n, traces.position_m, self._values, self._weights, AWAY * STEP
         )
-        if not np.isfinite(model).all():
+        if not math.isfinite(residual.sum() + jacobian.sum()):
             raise PhysicsError("the motion is not finite with these parameters")
-        return model
+        return residual, jacobian
 
 
 def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
@@ -191,15 +184,44 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
     return Response(plant, tap, force, position)
 
 
+@compiled
+def _compared(
+    force: Samples, position: Samples, values: Samples, weights: Samples, steps: Samples
+) -> tuple[Samples, Samples]:
+    """Residuals and their derivative from blocks of the model at theta and, one after the other, beside it.
+
+    Parameters
+    ----------
+    force, position : ndarray, shape ((p + 1) force blocks,), ((p + 1) position blocks,)
+    values, weights : ndarray, shape (n,)
+    steps : ndarray, shape (p,)
+        Which way, and how far, each parameter was moved.
+    """
+    split, size = len(force) // (len(steps) + 1), len(values)
+    rest = size - split
+    residual, jacobian = np.empty(size), np.empty((size, len(steps)))
+    for i in range(size):
+        at = force[i] if i < split else position[i - split]
+        residual[i] = (values[i] - at) * weights[i]
+        for k in range(len(steps)):
+            moved = force[(k + 1) * split + i] if i < split else position[(k + 1) * rest + i - split]
+            jacobian[i, k] = (at - moved) * weights[i] / steps[k]
+    return residual, jacobian
+
+
+@compiled
 def _slopes(times: Samples, values: Samples) -> Samples:
     """Slope of the model in each block from its neighbours; beside a jump from the one this side of it."""
-    step = np.diff(values) / np.diff(times)
-    left, right = np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])
-    across = np.empty_like(values)
-    across[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])
-    across[0], across[-1] = step[0], step[-1]
-    least = 2.0 * np.minimum(np.abs(left), np.abs(right))
-    slope: Samples = np.where(left * right > 0.0, np.clip(across, -least, least), 0.0)
+    last = len(values) - 1
+    slope = np.zeros(last + 1)
+    for i in range(last + 1):
+        before, after = max(i - 1, 0), min(i + 1, last)
+        left = (values[before + 1] - values[before]) / (times[before + 1] - times[before])
+        right = (values[after] - values[after - 1]) / (times[after] - times[after - 1])
+        across = (values[after] - values[before]) / (times[after] - times[before])
+        least = 2.0 * min(abs(left), abs(right))
+        if left * right > 0.0:
+            slope[i] = min(max(across, -least), least)
     return slope
 
 

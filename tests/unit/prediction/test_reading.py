@@ -15,7 +15,14 @@ from impactcell.errors import (
     PhysicsError,
     PredictionError,
 )
-from impactcell.prediction.reading import checked, displacement, loss_of_contact, noise_std, peak_force
+from impactcell.prediction.reading import (
+    checked,
+    displacement,
+    loss_of_contact,
+    noise_std,
+    peak_force,
+    sensed,
+)
 from impactcell.prediction.sliding import slide
 from impactcell.records import Channel
 from tests.taps import Tap
@@ -177,3 +184,26 @@ def test_positions_are_counted_from_where_the_part_lay() -> None:
     for from_table_zero in (True, False):
         capture = tap.capture(from_table_zero=from_table_zero)
         assert displacement(capture).values[0] == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("known_n", [None, 0.4])
+def test_a_channel_whose_noise_was_found_before_is_read_alike(known_n: float | None) -> None:
+    force = Tap(0.07).capture(force_hz=1e5).force
+    assert force is not None
+    noisy = replace(
+        force,
+        values=force.values + np.random.default_rng(3).normal(0.0, 0.4, len(force.values)),
+        noise_std=known_n,
+    )
+    once = sensed(noisy, "force")
+    assert once is not None
+    assert noise_std(once) == noise_std(noisy)
+    assert peak_force(once) == peak_force(noisy)
+    assert loss_of_contact(once) == loss_of_contact(noisy)
+
+
+def test_a_channel_that_cannot_be_used_is_still_refused_after_its_noise_was_asked_for() -> None:
+    flat = Channel(np.arange(20) * 1e-3, np.ones(20))
+    with pytest.raises(CaptureError, match="constant"):
+        checked(sensed(flat, "force"), "force")
+    assert sensed(None, "force") is None
