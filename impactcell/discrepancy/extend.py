@@ -125,7 +125,7 @@ def _plausible(
     What is left then may be noise that nobody stated. It also may be what separates the best effect from its
     rivals: whoever is behind by less than that is tied.
     """
-    if setup.certain:
+    if setup.certain or at_an_end(best):
         return None
     size = setup.problem.shots.values.size
     before = float(first.fit.misfit(setup.problem.shots).sum()) - size

@@ -154,11 +154,11 @@ def _rescued(
     """Start the stuck shots again, at shared parameters to which only the other shots are fitted.
 
     A few shots whose events come in another order hold up the fit of all: every step that helps the others
-    makes them worse.
+    makes them worse. Shots that are far off are left out with them.
     """
     point = _begun_again(problem, effects, point, spread, stuck)
     misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
-    good = np.flatnonzero(misfit <= FAR * float(np.median(misfit)))
+    good = np.setdiff1d(np.flatnonzero(misfit <= FAR * float(np.median(misfit))), stuck)
     if len(good) == problem.count or len(good) < 0.6 * problem.count:
         return point
     part = Problem(problem.shots.chosen(good), problem.forward.batches)

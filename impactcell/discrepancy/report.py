@@ -64,6 +64,17 @@ def verdict_sentence(findings: Findings) -> str:
     return f"No known effect explains a held-out gap of {before} noise floors, largest in phase {phase}."
 
 
+def apart(findings: Findings) -> str:
+    """How far contact and slide of taps stay from the floor when each is fitted alone; empty if unknown."""
+    alone = findings.unexplained.alone if findings.unexplained else None
+    if alone is None or math.isnan(alone.contact + alone.slide):
+        return ""
+    return (
+        f" Fitted apart from each other, the contacts stay at {alone.contact:.2f} noise floors, "
+        f"the slides after them at {alone.slide:.2f}."
+    )
+
+
 def content(findings: Findings, source: str) -> dict[str, Any]:
     """Everything the template shows."""
     search = findings.search
@@ -83,6 +94,7 @@ def content(findings: Findings, source: str) -> dict[str, Any]:
         "factors": figures.factors(findings),
         "shape": figures.shape(findings),
         "unexplained": findings.unexplained,
+        "apart": apart(findings),
         "candidates": _candidates(findings),
         "alternatives": [
             {

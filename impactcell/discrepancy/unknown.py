@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.campaign import Excitation
+from impactcell.discrepancy.alone import Alone, alone
 from impactcell.discrepancy.evidence import ALPHA, Evidence
 from impactcell.discrepancy.locate import ALL
 from impactcell.discrepancy.phases import BETWEEN_SHOTS, PHASES, course_of, phases
@@ -13,6 +15,7 @@ from impactcell.records import Samples
 
 STRONG_SHARE = 0.25
 SMALL = 1.1
+AFTER = frozenset({"free_slide", "stop", "driven"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,12 +49,15 @@ class Unexplained:
         In words.
     shapes : tuple of Shape
         To be drawn.
+    alone : Alone, optional
+        Contact and slide fitted alone, of taps.
     """
 
     phase: str
     depends_on: tuple[str, ...]
     shape: str
     shapes: tuple[Shape, ...]
+    alone: Alone | None
 
 
 def by_phase(evidence: Evidence) -> dict[str, float]:
@@ -69,34 +75,46 @@ def by_phase(evidence: Evidence) -> dict[str, float]:
     return made
 
 
-def phase_of_gap(problem: Problem, evidence: Evidence) -> str:
-    """Phase in which a gap arises: contact, or the slide and the stop after it, whichever holds more of it.
+def phase_of_gap(problem: Problem, evidence: Evidence, parts: Alone | None) -> str:
+    """Phase in which a gap arises.
 
-    What goes wrong in the contact is carried on into the slide, and a fit spreads what goes wrong there
-    over the contact; the larger share of the squared residuals tells which of the two it was.
+    A gap that shows in the friction factors only is where the map is strongest. Of a tap, contact and slide
+    are fitted alone: the one that stays farther above the floor is where something is missing, and its phase
+    with the largest share of the squared residuals is named. Where neither does, the whole shots' residuals
+    decide.
     """
     if evidence.fit.misfit(problem.shots).sum() <= SMALL * problem.shots.values.size:
-        strength = by_phase(evidence)
-        return max(strength, key=lambda name: strength[name])
+        return _strongest(evidence)
     phase = phases(problem, course_of(problem, evidence.fit))
     excess = {
         name: float((evidence.fit.residual[phase == number] ** 2 - 1.0).sum())
         for number, name in enumerate(PHASES)
         if (phase == number).any()
     }
-    after = {name: value for name, value in excess.items() if name in {"free_slide", "stop", "driven"}}
-    contact = {name: value for name, value in excess.items() if name not in after}
-    side = contact if sum(contact.values()) > sum(after.values()) else after
+    after = {name: value for name, value in excess.items() if name in AFTER}
+    contact = {name: value for name, value in excess.items() if name not in AFTER}
+    in_contact = sum(contact.values()) > sum(after.values())
+    if parts is not None:
+        found = np.nan_to_num([parts.contact, parts.slide], nan=1.0)
+        if found.max() > SMALL:
+            in_contact = bool(found[0] > found[1])
+    side = contact if (in_contact and contact) or not after else after
     return max(side, key=lambda name: side[name])
+
+
+def _strongest(evidence: Evidence) -> str:
+    strength = by_phase(evidence)
+    return max(strength, key=lambda name: strength[name])
 
 
 def describe(problem: Problem, evidence: Evidence) -> Unexplained:
     """Describe what a fitted model leaves."""
     chart, tests, made = evidence.map, evidence.map_tests, evidence.map_scores
-    phase = phase_of_gap(problem, evidence)
+    taps = problem.shots.excitation is Excitation.TAP
+    parts = alone(problem, evidence.fit) if taps else None
+    phase = phase_of_gap(problem, evidence, parts)
     if phase not in chart.rows:
-        strength = by_phase(evidence)
-        phase = max(strength, key=lambda name: strength[name])
+        phase = _strongest(evidence)
     row = chart.rows.index(phase)
     p = np.ones(len(chart.columns))
     for column in range(len(chart.columns)):
@@ -117,6 +135,7 @@ def describe(problem: Problem, evidence: Evidence) -> Unexplained:
         depends,
         _in_words(phase, shapes, made.gain, chart.cell, row * len(chart.columns)),
         tuple(shapes),
+        parts,
     )
 
 

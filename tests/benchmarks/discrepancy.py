@@ -80,11 +80,12 @@ def bars(found: list[Row]) -> Table:
     bar("removed from the library: a wrong name", "<= 5 %", removed, among({judge.WRONG, judge.FALSE}))
     made += closed([row for row in visible if judged(row) in NAMED])
     right = [row for row in found if row["job"]["hidden"] and judged(row) in NAMED]
-    for what, limit, key in (
-        ("parameters of effects inside their 95 % intervals", "90-98 %", "effects"),
-        ("parameters of the plant beside them", "-", "nominal"),
+    true = [row for row in right if set(row["named"]) == set(row["job"]["hidden"])]
+    for what, limit, key, counted in (
+        ("parameters of effects inside their 95 % intervals", "90-98 %", "effects", right),
+        ("parameters of the plant beside them, the true model named", "-", "nominal", true),
     ):
-        inside = [one for row in right for one in row["covered"][key]]
+        inside = [one for row in counted for one in row["covered"][key]]
         made.append([what, limit, *judge.share(sum(inside), len(inside))])
     seconds = [row["seconds"] for row in found if row["job"]["shots"] == 60 and "seconds" in row]
     if seconds:

@@ -1,0 +1,48 @@
+"""Contact and slide fitted apart: only the one in which the simulator hides something stays off the floor."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from impactcell.discrepancy import noise
+from impactcell.discrepancy.alone import Alone, alone
+from impactcell.discrepancy.campaign import laid_out, prepare
+from impactcell.discrepancy.problem import Problem
+from impactcell.discrepancy.start import fit_nominal
+from tests.discrepancy.study import Job, campaign
+
+ON_THE_FLOOR = 1.05
+
+
+def apart(hidden: str, multiple: float, *, blind: bool = False) -> Alone:
+    given = campaign(Job("outside", (hidden,), 5, target=3.0, shots=24), [multiple])
+    if blind:
+        given = replace(given, shots=tuple(replace(shot, position=None) for shot in given.shots))
+    material = prepare(given)
+    shots = laid_out(material, np.arange(len(material.shots)), noise.sensors(material).noise_std)
+    problem = Problem(shots, len(material.batches))
+    return alone(problem, fit_nominal(problem))
+
+
+@pytest.mark.parametrize("law", ["bilinear_contact", "relaxing_contact", "actuator_vibration"])
+def test_a_law_of_the_contact_leaves_the_slide_on_the_floor(law: str) -> None:
+    found = apart(law, 0.3)
+    assert found.contact > 1.5
+    assert found.slide < ON_THE_FLOOR
+
+
+@pytest.mark.parametrize(
+    ("law", "multiple"), [("late_friction", 0.3), ("gap_suction", 1.0), ("magnetic_pull", 0.3)]
+)
+def test_a_law_of_the_slide_leaves_the_contact_on_the_floor(law: str, multiple: float) -> None:
+    found = apart(law, multiple)
+    assert found.slide > 1.5
+    assert found.contact < ON_THE_FLOOR
+
+
+def test_without_positions_there_is_no_slide_to_fit() -> None:
+    found = apart("bilinear_contact", 0.3, blind=True)
+    assert found.contact > 1.5
+    assert math.isnan(found.slide)
