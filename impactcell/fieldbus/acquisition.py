@@ -163,6 +163,8 @@ class Module:
             reception = Reception(capture, want.mark, want.missed, want.restarted, read.faults)
             self._count(reception, readable=read.readable)
             yield reception
+            if last == newest:  # nothing waits behind it
+                await asyncio.sleep(schedule.delay_s(loop.time(), self._client.round_trip_s))
 
     async def _connect(self) -> None:
         """Connect and check who answers."""

@@ -152,11 +152,8 @@ class CaptureReader:
         blocks = {}
         for name, count in decoding.used_counts(registers, header).items():
             register = registers[name]
-            blocks[name] = PartialBlock(
-                register.address,
-                count * register.words_per_value,
-                register.table,
-                device.client.link.max_registers,
+            blocks[name] = device.client.block(
+                register.address, count * register.words_per_value, register.table
             )
         self._reading = _Reading(want, header, words, blocks)
         self._least = self._reading.lacking
@@ -172,8 +169,7 @@ class CaptureReader:
         if shown != (want.slot, want.mark.session, want.mark.cycle):
             address = registers["window_slot"].address
             return f"register window_slot ({address}) shows {shown[0]} instead of {want.slot}"
-        for block in reading.blocks.values():
-            await self._device.client.complete(block)
+        await self._device.client.complete(*reading.blocks.values())
         after = (await self._device.values(("window_sequence_after",)))["window_sequence_after"]
         if before != after:
             return f"register window_sequence changed from {before} to {after} meanwhile"

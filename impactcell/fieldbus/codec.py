@@ -78,6 +78,8 @@ class Request:
         The request's frame after its transaction.
     reply_head : bytes
         A good reply's frame after its transaction, as far as it is known beforehand: up to its data.
+    data_length : int
+        Bytes of data of a good reply.
     """
 
     pdu: bytes
@@ -86,16 +88,12 @@ class Request:
     what: str
     tail: bytes
     reply_head: bytes
-
-    @property
-    def data_length(self) -> int:
-        """Bytes of data of a good reply."""
-        return self.reply_length - len(self.reply_prefix)
+    data_length: int
 
 
 def _request(unit: int, pdu: bytes, reply_length: int, reply_prefix: bytes, what: str) -> Request:
     tail, head = frame(0, unit, pdu)[2:], HEADER.pack(0, 0, reply_length + 1, unit)[2:] + reply_prefix
-    return Request(pdu, reply_length, reply_prefix, what, tail, head)
+    return Request(pdu, reply_length, reply_prefix, what, tail, head, reply_length - len(reply_prefix))
 
 
 @lru_cache(maxsize=4096)

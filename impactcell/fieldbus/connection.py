@@ -189,13 +189,12 @@ class Connection(asyncio.Protocol):
         it and need no taking apart.
         """
         flying, at, size = self._flying, 0, len(data)
-        while (part := flying.get(data[at : at + 2])) is not None:
-            head = part.request.reply_head
-            start = at + 2 + len(head)
-            end = start + part.request.data_length
+        while (part := flying.get(transaction := data[at : at + 2])) is not None:
+            head, length = part.request.reply_head, part.request.data_length
+            end = at + 2 + len(head) + length
             if end > size or not data.startswith(head, at + 2):
                 break
-            self._use(data[at : at + 2], part, data[start:end])
+            self._use(transaction, part, data[end - length : end])
             at = end
         return data[at:]
 

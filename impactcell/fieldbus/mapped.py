@@ -92,9 +92,10 @@ class MappedDevice:
         first = fields[0].address
         words = np.zeros(fields[-1].end - first, dtype=">u2")
         found: dict[str, Value] = {}
-        for block in blocks:
-            part = await self.client.read(block.address, block.count, block.table)
-            words[block.address - first : block.address - first + block.count] = part
+        parts = [self.client.block(block.address, block.count, block.table) for block in blocks]
+        await self.client.complete(*parts)
+        for part in parts:
+            words[part.address - first : part.address - first + part.count] = part.words()
         for register in fields:
             at = register.address - first
             found[register.name] = register.decode(words[at : at + register.words])

@@ -8,8 +8,10 @@ COARSE_S: Final = 0.008
 """The same, where it is not known so well."""
 QUIET_S: Final = 0.015
 """Between polls before it is due: what an early cycle may have to wait."""
+REGULAR_S: Final = 0.25
+"""The same, where cycles come so regularly that none is early."""
 IDLE_S: Final = 0.1
-"""The same, where cycles come so regularly that none is early, and once they have stopped coming."""
+"""The same, once they have stopped coming."""
 _GAIN: Final = 0.25
 _LONGEST: Final = 3.0
 """A longer time between cycles, in periods, is a pause or a clock that was set, and counts as this."""
@@ -55,7 +57,7 @@ class PollSchedule:
         until_due_s = self._period_s - margin_s - age_s
         if until_due_s > 0.0:
             regular = 10.0 * margin_s < self._period_s
-            return max(least_s, min(until_due_s, IDLE_S if regular else QUIET_S))
+            return max(least_s, min(until_due_s, REGULAR_S if regular else QUIET_S))
         if age_s < self._period_s + margin_s:
             return least_s
         overdue_s = age_s - self._period_s

@@ -64,7 +64,7 @@ def next_wanted(
     skip : int
         Leave out so many of the oldest, because they are overwritten faster than they are read.
     """
-    if counter == 0:
+    if counter == 0 or last == Mark(session, counter):
         return None
     ages = {distance(cycle, counter): slot for slot, cycle in enumerate(ring) if cycle != 0}
     restarted = last is not None and (last.session != session or distance(last.cycle, counter) > PERIOD // 2)

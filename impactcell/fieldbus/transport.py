@@ -136,19 +136,32 @@ class ModbusClient:
         ModbusExceptionError
             If the device refuses; the connection stays.
         """
-        return await self.complete(PartialBlock(address, count, table, self.link.max_registers))
-
-    async def complete(self, block: "PartialBlock") -> Words:
-        """Read what `block` still lacks; after an error it keeps what did arrive. Raises as `read` does."""
-        missing = block.missing
-        if missing:
-            exchange = Exchange(block.data, missing)
-            requests = _requests(block.table, block.address, block.count, block.step, self.link.device_id)
-            self._open().submit(
-                [Part(exchange, request, offset) for offset, request in requests if offset in missing]
-            )
-            await exchange.done
+        block = self.block(address, count, table)
+        await self.complete(block)
         return block.words()
+
+    def block(self, address: int, count: int, table: str = "holding") -> PartialBlock:
+        """Give a block of registers that is still to be read, by `complete`."""
+        return PartialBlock(address, count, table, self.link.max_registers)
+
+    async def complete(self, *blocks: PartialBlock) -> None:
+        """Read what `blocks` still lack; after an error they keep what did arrive. Raises as `read` does."""
+        exchanges: list[Exchange] = []
+        parts: list[Part] = []
+        for block in blocks:
+            if missing := block.missing:
+                exchange = Exchange(block.data, missing)
+                requests = _requests(block.table, block.address, block.count, block.step, self.link.device_id)
+                parts += [
+                    Part(exchange, request, offset) for offset, request in requests if offset in missing
+                ]
+                exchanges.append(exchange)
+        if len(exchanges) == 1:
+            self._open().submit(parts)
+            await exchanges[0].done
+        elif exchanges:
+            self._open().submit(parts)
+            await asyncio.gather(*(exchange.done for exchange in exchanges))
 
     async def write(self, address: int, words: Words) -> None:
         """Write holding registers in one request, before any read that waits; raises as `read` does."""

@@ -101,6 +101,8 @@ class Condition:
 
     def update(self, alarm: Alarm) -> Event | None:
         """Take a new state; the event that tells it, None where nothing has changed."""
+        if alarm is self.alarm:  # as it is from cycle to cycle, nearly always
+            return None
         new = event_id(self.cell, alarm)
         if new == event_id(self.cell, self.alarm):
             return None

@@ -43,18 +43,18 @@ class CellValues:
 
     def publish(self, snapshot: Snapshot) -> None:
         """Write all that one cycle has to say."""
-        time = moment(snapshot.time_ns)
+        time, now = moment(snapshot.time_ns), datetime.now(UTC)
         for path, row in CYCLE.items():
             value, quality = row.read(snapshot)
-            self._write(path, value, quality, time)
+            self._write(path, value, quality, time, now)
 
     def module(self, state: ModuleState, time_ns: int) -> None:
         """Write the state of the link."""
-        time = moment(time_ns)
+        time, now = moment(time_ns), datetime.now(UTC)
         for path, pick in MODULE.items():
             value = pick(state)
             missing = isinstance(value, float) and math.isnan(value)
-            self._write(path, value, Quality.BAD if missing else Quality.GOOD, time)
+            self._write(path, value, Quality.BAD if missing else Quality.GOOD, time, now)
 
     def lost(self, time_ns: int) -> None:
         """No communication: every figure of a cycle becomes Bad and keeps its last value."""
@@ -70,14 +70,14 @@ class CellValues:
             if path in self._seen:
                 self._values.restate(self._nodes[path][0], status, time)
 
-    def _write(self, path: str, value: NodeValue, quality: Quality, time: datetime) -> None:
+    def _write(self, path: str, value: NodeValue, quality: Quality, time: datetime, now: datetime) -> None:
         node, kind, is_array = self._nodes[path]
         if quality is Quality.BAD or (isinstance(value, float) and math.isnan(value)):
             # A Bad value is the last one that could be believed; there is none before the first.
             held = self._values.read(node)
             status = BAD if path in self._seen else WAITING
-            self._values.write(node, ua.DataValue(held.Value, status, time, datetime.now(UTC)))
+            self._values.write(node, ua.DataValue(held.Value, status, time, now))
             return
         self._seen.add(path)
         variant = ua.Variant(value, kind, is_array=is_array)
-        self._values.write(node, ua.DataValue(variant, STATUS[quality], time, datetime.now(UTC)))
+        self._values.write(node, ua.DataValue(variant, STATUS[quality], time, now))
