@@ -192,8 +192,10 @@ def shape(findings: Findings) -> str | None:
         for number, one in enumerate(left.shapes):
             axes = figure.add_subplot(1, len(left.shapes), number + 1)
             axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
-            axes.plot(one.place, one.mean, "o-", color=BEFORE, markersize=4)
+            axes.plot(one.place, one.size, "o-", color=BEFORE, markersize=4)
             axes.set_title(f"{one.channel}, {one.phase.replace('_', ' ')}", fontsize=9)
             axes.set_xlabel("place within the phase, 0 = start, 1 = end")
-            axes.set_ylabel("mean residual [noise std]")
+            axes.set_ylabel(
+                f"residual, times {one.times} [noise std]" if one.times else "mean residual [noise std]"
+            )
         return _svg(figure)

@@ -4,10 +4,10 @@ import json
 import math
 from typing import Any
 
+from impactcell.discrepancy.evidence import Evidence
 from impactcell.discrepancy.intervals import Estimate
 from impactcell.discrepancy.phases import BETWEEN_SHOTS
 from impactcell.discrepancy.prove import Gap
-from impactcell.discrepancy.unknown import by_phase
 from impactcell.discrepancy.workflow import Findings
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
@@ -96,7 +96,7 @@ def where(findings: Findings, effect: str) -> dict[str, Any]:
     """Phase in which the nominal model's residuals showed the effect, and what they changed with."""
     evidence = findings.search.nominal
     known = LIBRARY[effect]
-    strength = by_phase(evidence)
+    strength = _by_phase(evidence)
     possible = [phase.value for phase in known.phases if phase.value in strength]
     if known.kind is Kind.BETWEEN_SHOTS and BETWEEN_SHOTS in possible:
         possible = [BETWEEN_SHOTS] if len(known.phases) == 1 else possible
@@ -115,6 +115,21 @@ def where(findings: Findings, effect: str) -> dict[str, Any]:
         and evidence.map_tests.adjusted[row * len(chart.columns) + column] <= SHOWN
     ]
     return {"phase": phase, "depends_on": depends}
+
+
+def _by_phase(evidence: Evidence) -> dict[str, float]:
+    """First-order gain of each row of the map, the largest over its cells."""
+    chart = evidence.map
+    gain = evidence.map_scores.gain
+    made = {}
+    for row, phase in enumerate(chart.rows):
+        mine = chart.cell // len(chart.columns) == row
+        per_column = [
+            float(gain[mine & (chart.cell % len(chart.columns) == column)].sum())
+            for column in range(len(chart.columns))
+        ]
+        made[phase] = max(per_column)
+    return made
 
 
 def _parameters(found: list[Estimate]) -> dict[str, Any]:

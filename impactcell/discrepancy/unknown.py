@@ -10,7 +10,7 @@ from impactcell.discrepancy.evidence import ALPHA, Evidence
 from impactcell.discrepancy.locate import ALL
 from impactcell.discrepancy.phases import BETWEEN_SHOTS, PHASES, course_of, phases
 from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.shots import CHANNELS, Index
+from impactcell.discrepancy.shots import CHANNELS
 from impactcell.records import Samples
 
 STRONG_SHARE = 0.25
@@ -24,15 +24,18 @@ class Shape:
 
     Attributes
     ----------
+    times : str
+        Covariate (centred, over its standard deviation) that multiplies the shape; empty for the mean.
     place : ndarray, shape (k,)
         Place within the phase, 0 to 1.
-    mean : ndarray, shape (k,)
+    size : ndarray, shape (k,)
     """
 
     phase: str
     channel: str
+    times: str
     place: Samples
-    mean: Samples
+    size: Samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,21 +61,6 @@ class Unexplained:
     shape: str
     shapes: tuple[Shape, ...]
     alone: Alone | None
-
-
-def by_phase(evidence: Evidence) -> dict[str, float]:
-    """First-order gain of each row of the map, the largest over its cells."""
-    chart = evidence.map
-    gain = evidence.map_scores.gain
-    made = {}
-    for row, phase in enumerate(chart.rows):
-        mine = chart.cell // len(chart.columns) == row
-        per_column = [
-            float(gain[mine & (chart.cell % len(chart.columns) == column)].sum())
-            for column in range(len(chart.columns))
-        ]
-        made[phase] = max(per_column)
-    return made
 
 
 def phase_of_gap(problem: Problem, evidence: Evidence, parts: Alone | None) -> str:
@@ -103,13 +91,19 @@ def phase_of_gap(problem: Problem, evidence: Evidence, parts: Alone | None) -> s
 
 
 def _strongest(evidence: Evidence) -> str:
-    strength = by_phase(evidence)
-    return max(strength, key=lambda name: strength[name])
+    """Row of the map with the most significant cell; of equals the one that promises most."""
+    chart, gain = evidence.map, evidence.map_scores.gain
+    cells = range(len(evidence.map_tests.adjusted))
+    best = min(
+        cells,
+        key=lambda cell: (evidence.map_tests.adjusted[cell], -gain[chart.cell == cell].max(initial=0.0)),
+    )
+    return chart.rows[best // len(chart.columns)]
 
 
 def describe(problem: Problem, evidence: Evidence) -> Unexplained:
     """Describe what a fitted model leaves."""
-    chart, tests, made = evidence.map, evidence.map_tests, evidence.map_scores
+    chart, tests = evidence.map, evidence.map_tests
     taps = problem.shots.excitation is Excitation.TAP
     parts = alone(problem, evidence.fit) if taps else None
     phase = phase_of_gap(problem, evidence, parts)
@@ -124,31 +118,40 @@ def describe(problem: Problem, evidence: Evidence) -> Unexplained:
     depends = tuple(
         name for column, name in enumerate(chart.columns) if name != ALL and p[column] <= ALPHA * 5.0
     )
+    shapes = _shapes(evidence, row, depends) if phase != BETWEEN_SHOTS else ()
+    return Unexplained(phase, depends, _in_words(phase, shapes), shapes, parts)
+
+
+def _shapes(evidence: Evidence, row: int, depends: tuple[str, ...]) -> tuple[Shape, ...]:
+    """Free-form shape in each channel: its mean, or what changes with the covariate that shows more of it."""
+    chart, made = evidence.map, evidence.map_scores
     shapes = []
-    if phase != BETWEEN_SHOTS:
-        for channel, sensor in enumerate(CHANNELS):
-            mine = (chart.cell == row * len(chart.columns)) & (chart.channel == channel)
-            if mine.any():
-                shapes.append(Shape(phase, sensor, chart.place[mine], made.amplitude[mine]))
-    return Unexplained(
-        phase,
-        depends,
-        _in_words(phase, shapes, made.gain, chart.cell, row * len(chart.columns)),
-        tuple(shapes),
-        parts,
-    )
+    for channel, sensor in enumerate(CHANNELS):
+        best, most = None, 0.0
+        for covariate in (ALL, *depends):
+            cell = row * len(chart.columns) + chart.columns.index(covariate)
+            mine = (chart.cell == cell) & (chart.channel == channel)
+            gain = float(made.gain[mine].max(initial=0.0))
+            if gain > most:
+                times = "" if covariate == ALL else covariate
+                best = Shape(chart.rows[row], sensor, times, chart.place[mine], made.amplitude[mine])
+                most = gain
+        if best is not None:
+            shapes.append(best)
+    return tuple(shapes)
 
 
-def _in_words(phase: str, shapes: list[Shape], gain: Samples, cell: Index, whole: int) -> str:
+def _in_words(phase: str, shapes: tuple[Shape, ...]) -> str:
     if phase == BETWEEN_SHOTS:
         return "the friction factors change from shot to shot with the covariates named"
-    strongest = max(shapes, key=lambda shape: float(np.abs(shape.mean).max()), default=None)
-    if strongest is None or not float(gain[cell == whole].max(initial=0.0)) > 0.0:
-        return "no mean shape: it changes with the covariates only"
-    mean = strongest.mean
-    signs = np.sign(mean[np.abs(mean) > STRONG_SHARE * np.abs(mean).max()])
+    if not shapes:
+        return "no smooth shape along the phase"
+    strongest = max(shapes, key=lambda shape: float(np.abs(shape.size).max()))
+    size = strongest.size
+    signs = np.sign(size[np.abs(size) > STRONG_SHARE * np.abs(size).max()])
     turns = int(np.sum(signs[1:] != signs[:-1]))
     kind = {0: "one-sided", 1: "S-shaped", 2: "bowed"}.get(turns, f"oscillating ({turns} changes of sign)")
-    where = float(strongest.place[int(np.argmax(np.abs(mean)))])
+    where = float(strongest.place[int(np.argmax(np.abs(size)))])
     part = "early" if where < 1 / 3 else "in the middle" if where < 2 / 3 else "late"
-    return f"{kind} in {strongest.channel}, largest {part} in the phase"
+    times = f", times {strongest.times}" if strongest.times else ""
+    return f"{kind} in {strongest.channel}{times}, largest {part} in the phase"

@@ -123,6 +123,15 @@ def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
     assert outcome["unexplained"]["phase"] in {"preload", "loading", "unloading"}
 
 
+def test_a_gap_between_shots_is_unknown_with_the_covariate_that_it_goes_with() -> None:
+    rivals = {"surface_tilt", "direction_asymmetry"}
+    found = investigate(make("surface_tilt"), library=[one for one in LIBRARY if one not in rivals])
+    assert answer(found) == ("unknown", set())
+    assert found.unexplained is not None
+    assert found.unexplained.phase == "between_shots"
+    assert found.unexplained.depends_on == ("direction",)
+
+
 def test_files_are_whole_and_the_same_to_the_byte(tmp_path: Path) -> None:
     given = make("viscous_friction", shots=24)
     campaigns.write(given, tmp_path / "campaign")
