@@ -3,7 +3,8 @@
 Every hypothesis is a Kalman filter with state [total, slope, offset, shift]: the friction of the present
 batch, its wear a cycle, its offset from the first batch and the last shift (offset minus the offset before).
 Bayesian online change-point detection (Adams & MacKay 2007, arXiv:0710.3742) with wear shared by all
-batches, a prior of steps up, down and large, and measurements from a contaminated normal (Huber 1964).
+batches, a prior of steps up and down, small and large, and measurements from a contaminated normal
+(Huber 1964).
 
 The bank is one array, a row a hypothesis, oldest change first::
 
@@ -20,11 +21,11 @@ from impactcell.records import Samples
 from impactcell.tracking import hypotheses
 
 WEIGHT, CHANGE, MEAN, COVARIANCE, WIDTH = 0, 1, 2, 6, 22
-CAPACITY = 76
+CAPACITY = 100
 ROWS = CAPACITY + len(hypotheses.STEPS) + 1
-CALIBRATION = 0.6
+CALIBRATION = 0.52
 WINDOW = 1000.0  # cycles within which a change must be to be reported
-RECENT = 12  # change cycles this recent are each kept
+RECENT = 10  # change cycles this recent are each kept
 EXPECTED_CYCLES = 100.0  # cycles that the prior probability of an outlier counts for
 MEMORY = 5000.0  # cycles after which outliers are forgotten
 MOST_OUTLIERS = 0.1  # where there seem to be more, they are no outliers

@@ -11,9 +11,15 @@ from impactcell.compiled import compiled
 from impactcell.records import Samples
 
 OUTLIER_SCALE = 10.0  # an outlier's standard deviation in units of a good measurement's
-# mean, standard deviation and probability of a step up, down, and a large one either way, in units of the
-# prior's standard deviation, which is that of all three together
-STEPS = ((0.36, 0.4, 0.475), (-0.36, 0.4, 0.475), (0.0, 3.81, 0.05))
+# mean, standard deviation and probability of a step up, down, a small one up, down, and a large one either
+# way, in units of the prior's standard deviation, which is that of all of them together
+STEPS = (
+    (0.55, 0.25, 0.31),
+    (-0.55, 0.25, 0.31),
+    (0.11, 0.05, 0.165),
+    (-0.11, 0.05, 0.165),
+    (0.0, 3.92, 0.05),
+)
 DROPPED_NATS = 30.0  # a hypothesis this far below the best is given up
 
 
@@ -78,8 +84,9 @@ def merge(bank: Samples, first: int, last: int, into: Samples) -> None:
 def spawn(bank: Samples, count: int, cycle: float, hazard: float, step_variance: float) -> int:
     """Add the hypotheses that a batch change came just before `cycle`; with `hazard` 1 there are no others.
 
-    One for a step up, one for a step down and one for a large step: the prior is nearly flat over the
-    sizes that take several cycles to find, and its tails are wide: none waits long for its likelihood.
+    One for each of `STEPS`: steps of half a standard deviation of an estimate, which take the most cycles
+    to find, have a share of their own, for a prior that is flat in size leaves them nearly nothing; its
+    tails are wide, so that none waits long for its likelihood.
     """
     fresh = np.empty(22)
     merge(bank, 0, count, fresh)
