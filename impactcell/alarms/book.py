@@ -82,7 +82,7 @@ def find(
     alarm, rule = state.alarms[place], settings.rule(finding.name)
     delay, event = delayed(rule, alarm, state.delays[place], finding)
     if delay != state.delays[place]:
-        state = replace(state, delays=_with(state.delays, place, delay))
+        state = AlarmState(state.alarms, _with(state.delays, place, delay), state.announced)
     if event is None:
         if alarm.active and finding.holds and finding.evidence != alarm.evidence:
             newer = replace(alarm, message=finding.message or alarm.message, evidence=finding.evidence)

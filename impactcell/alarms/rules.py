@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from impactcell.alarms.lifecycle import Event, Occurrence
@@ -128,20 +128,17 @@ def delayed(rule: RuleSettings, alarm: Alarm, delay: Delay, finding: Finding) ->
     """Count cycles and say which event, if any, the finding gives to its alarm."""
     if finding.holds is None or not alarm.enabled:
         return (delay if finding.holds is None else Delay()), None
-    if finding.holds:
-        counted = replace(delay, held=delay.held + 1, missed=0)
-    else:
-        counted = replace(delay, held=0, missed=delay.missed + 1)
+    held, missed = (delay.held + 1, 0) if finding.holds else (0, delay.missed + 1)
     if not alarm.active:
-        if counted.held > rule.on_delay:
-            return replace(counted, called=0), Event.ACTIVATE
-        return counted, None
-    if counted.missed > rule.off_delay:
-        return replace(counted, called=0), Event.CLEAR
-    counted = replace(counted, called=counted.called + 1)
-    if rule.realarm and counted.called >= rule.realarm:
-        return replace(counted, called=0), Event.REALARM
-    return counted, None
+        if held > rule.on_delay:
+            return Delay(held, missed), Event.ACTIVATE
+        return Delay(held, missed, delay.called), None
+    if missed > rule.off_delay:
+        return Delay(held, missed), Event.CLEAR
+    called = delay.called + 1
+    if rule.realarm and called >= rule.realarm:
+        return Delay(held, missed), Event.REALARM
+    return Delay(held, missed, called), None
 
 
 def occurrence(event: Event, finding: Finding, severity: int, cycle: int, time_ns: int) -> Occurrence:

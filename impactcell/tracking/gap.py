@@ -5,6 +5,7 @@ deviation of those before, is turned into an exactly standard normal score by St
 so that the false-alarm rate holds from the first captures on, whatever level is usual for the cell.
 """
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -76,6 +77,7 @@ def follow(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
     return GapTracked(fresh, excess > limit, evidence)
 
 
+@functools.cache
 def threshold(false_alarm_cycles: float) -> float:
     """Threshold of a one-sided CUSUM of standard normal scores for a mean time between false alarms.
 
