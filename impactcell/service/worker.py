@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -23,6 +24,11 @@ from impactcell.service.keeping import Keeper
 from impactcell.service.rehearsal import rehearse
 
 T = TypeVar("T")
+
+_CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+_computing = threading.BoundedSemaphore(_CORES)
+"""As many cells compute at a time as there are cores, in the order in which they came: more would finish
+later, all of them, and keep the event loop waiting for the interpreter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,7 +207,8 @@ class Worker:
         announcement: Announcement | None,
         faults: tuple[str, ...],
     ) -> Processed:
-        stepped = self._stepped(capture, positioning, announcement, faults)
+        with _computing:
+            stepped = self._stepped(capture, positioning, announcement, faults)
         self.last = Mark(capture.session, capture.cycle)
         self._state, self._snapshot = stepped.state, stepped.snapshot
         if self._keeper.journal is None:

@@ -97,6 +97,26 @@ async def test_blocks_arrive_whole(window: int, count: int, max_registers: int) 
         assert server.requests == -(-count // max_registers)
 
 
+@pytest.mark.parametrize("window", [1, 16])
+async def test_several_blocks_arrive_in_one_exchange(window: int) -> None:
+    async with ModbusServer(Image()) as server, linked(server, window) as client:
+        blocks = [client.block(100, 300), client.block(5_000, 7, "input"), client.block(9_000, 126)]
+        await client.complete(*blocks)
+        for block in blocks:
+            assert np.array_equal(block.words(), np.arange(block.address, block.address + block.count))
+        await client.complete(*blocks)  # nothing is missing any more
+        assert server.requests == 3 + 1 + 2
+
+
+async def test_a_refused_block_fails_all_that_were_asked_for_with_it() -> None:
+    async with ModbusServer(Image()) as server, linked(server, 16) as client:
+        good, refused = client.block(100, 300), client.block(65_100, 10)
+        with pytest.raises(ModbusExceptionError, match="illegal data address"):
+            await client.complete(good, refused)
+        await client.complete(good)
+        assert np.array_equal(good.words(), np.arange(100, 400))
+
+
 async def test_many_readers_share_one_window() -> None:
     async with ModbusServer(Image()) as server, linked(server, 4) as client:
         blocks = await asyncio.gather(*(client.read(i * 100, 90 + i) for i in range(50)))

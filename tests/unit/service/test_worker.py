@@ -1,5 +1,8 @@
 """A worker stores what can be stored, in order, and survives what nobody foresaw."""
 
+import asyncio
+import contextlib
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -141,3 +144,32 @@ async def test_a_state_with_other_field_names_is_refused_with_a_message_and_lear
     await process(again, make_capture(3))
     await again.close()
     assert cycles(tmp_path / "j") == [1, 2, 3]
+
+
+async def test_no_more_cells_compute_at_a_time_than_there_are_cores(
+    design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step, lock = core.step, threading.Lock()
+    at_work, most = 0, 0
+    met = threading.Barrier(3)
+
+    def counted(*arguments: object) -> core.Stepped:
+        nonlocal at_work, most
+        with lock:
+            at_work += 1
+            most = max(most, at_work)
+        with contextlib.suppress(threading.BrokenBarrierError):
+            met.wait(0.1)  # as long as another could come
+        try:
+            return step(*arguments)  # type: ignore[arg-type]
+        finally:
+            with lock:
+                at_work -= 1
+
+    monkeypatch.setattr("impactcell.service.worker._computing", threading.BoundedSemaphore(2))
+    monkeypatch.setattr(core, "step", counted)
+    cells = [Worker(design, None, Retention()) for _ in range(5)]
+    await asyncio.gather(*(process(cell, make_capture(1)) for cell in cells))
+    for cell in cells:
+        await cell.close()
+    assert most <= 2
