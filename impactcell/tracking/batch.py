@@ -24,20 +24,13 @@ def find_shift(
     variance: float,
     where: Place,
     announced: float,
-) -> tuple[TrackerState, Shift | None, float]:
+) -> tuple[TrackerState, Shift | None]:
     """Take a reading into the bank; report the shift that it makes certain enough.
 
     Parameters
     ----------
     announced : float
         1: a batch change came with this cycle, -1: surely none, 0: nobody says.
-
-    Returns
-    -------
-    state : TrackerState
-    shift : Shift or None
-    innovation : float
-        Reading minus the bank's prediction, in standard deviations.
     """
     table = np.zeros((banks.ROWS, banks.WIDTH))
     table[: len(state.bank)] = state.bank
@@ -49,11 +42,6 @@ def find_shift(
         settings.outlier_probability,
     )
     values = np.array([reading.mu_s, variance, where.passed, where.lag, where.index, announced])
-    before, spread = banks.moments(state.bank)
-    ahead = where.passed - where.lag
-    predicted = before[0] + ahead * before[1]
-    width = spread[0, 0] + 2.0 * ahead * spread[0, 1] + ahead**2 * spread[1, 1] + variance
-    innovation = float((reading.mu_s - predicted) / math.sqrt(width))
     outliers = np.array(state.outliers)
     count, _, statistic = banks.run_cycle(
         table, len(state.bank), design, values, outliers, float(state.accepted)
@@ -61,18 +49,27 @@ def find_shift(
     fresh = replace(state, bank=table[:count].copy(), outliers=(float(outliers[0]), float(outliers[1])))
     if announced > 0.0:
         # an announced change is no finding, and what came before it has been settled by it
-        return replace(fresh, accepted_before=where.index - 1, accepted=where.index), None, innovation
+        return replace(fresh, accepted_before=where.index - 1, accepted=where.index), None
     # with known batches, false alarms are shared out to changes within a batch and between batches
     known = settings.batch is BatchKnowledge.KNOWN and reading.batch_id is not None
     ways = BOTH if known else 1.0
     threshold = banks.threshold(ways * settings.false_alarm_cycles)
     certain = statistic > threshold and _settled(state)
     if announced < 0.0 or where.lag > 0 or not certain:
-        return fresh, None, innovation
+        return fresh, None
     fresh = replace(fresh, accepted_before=state.accepted, accepted=where.index)
     cycle, size, std = banks.last_shift(fresh.bank, fresh.accepted_before, fresh.accepted)
     shift = Shift(cycle, size, std, where.index, statistic, threshold)
-    return replace(fresh, shift=shift), shift, innovation
+    return replace(fresh, shift=shift), shift
+
+
+def innovation(state: TrackerState, reading: Reading, variance: float, where: Place) -> float:
+    """Give the reading minus what the bank predicts before it is taken in, in standard deviations."""
+    mean, spread = banks.moments(state.bank)
+    ahead = where.passed - where.lag
+    predicted = mean[0] + ahead * mean[1]
+    width = spread[0, 0] + 2.0 * ahead * spread[0, 1] + ahead**2 * spread[1, 1] + variance
+    return float((reading.mu_s - predicted) / math.sqrt(width))
 
 
 def compare_batch(

@@ -118,9 +118,16 @@ def _take(
 ) -> tuple[TrackerState, Shift | None, float]:
     """Take the reading into the bank, and into the filter where the batch is known."""
     before = state
-    state, shift, innovation = batches.find_shift(settings, state, reading, variance, where, announced)
+    state, shift = batches.find_shift(settings, state, reading, variance, where, announced)
     said, current = reading.batch_id, before.filter
-    if settings.batch is not BatchKnowledge.KNOWN:
+    known = settings.batch is BatchKnowledge.KNOWN
+    if known and said is not None and current is not None and shift is None:
+        # a late cycle of a batch that the filter has forgotten goes into the bank only
+        if where.lag == 0 or said in current.batches:
+            return _take_known(settings, state, reading, said, current, variance, where)
+        return state, None, batches.innovation(before, reading, variance, where)
+    innovation = batches.innovation(before, reading, variance, where)
+    if not known:
         return state, shift, innovation
     if said is None:
         if current is None or where.lag > 0:
@@ -131,16 +138,25 @@ def _take(
     if current is None:
         mean, covariance = banks.moments(state.bank)
         return replace(state, filter=wear.resume(mean, covariance, said)), shift, innovation
-    if shift is not None:
-        # what was learned of the noise from here on would be learned from a mix of two materials
-        changed = wear.change_within(current, *banks.moments(state.bank))
-        return replace(state, filter=changed, tested=True, history=None), shift, innovation
+    # what was learned of the noise from here on would be learned from a mix of two materials
+    changed = wear.change_within(current, *banks.moments(state.bank))
+    return replace(state, filter=changed, tested=True, history=None), shift, innovation
+
+
+def _take_known(
+    settings: TrackerSettings,
+    state: TrackerState,
+    reading: Reading,
+    said: str,
+    current: wear.WearFilter,
+    variance: float,
+    where: screening.Place,
+) -> tuple[TrackerState, Shift | None, float]:
+    """Take a reading of a known batch into the filter, and test the batch against the one before."""
     if where.lag == 0:
         current = wear.pass_cycles(current, where.passed, state.level_variance, state.slope_variance)
         if said != current.current:
             current = wear.change_batch(current, said, settings.step_std**2 * variance)
-    elif said not in current.batches:
-        return state, shift, innovation
     current, error = wear.measure(
         current, reading.mu_s, variance, settings.outlier_threshold, where.lag, said
     )
