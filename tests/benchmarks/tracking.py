@@ -3,6 +3,7 @@
 import statistics
 import sys
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -14,24 +15,26 @@ from tests.benchmarks import _inside, _signatures, _slides, _steps, _tracker
 from tests.benchmarks.table import Table
 
 
-def tables(*, quick: bool = False) -> list[Table]:
-    made: list[Table] = []
+def tables(*, quick: bool = False) -> Iterator[Table]:
+    """Give table by table, so that what is done is printed though a later one is interrupted."""
     for make in (
         cost_table,
+        _inside.steps_table,
+        _inside.wear_table,
+        _tracker.unknown_table,
+        _tracker.starts_table,
+        _tracker.known_table,
+        _steps.table,
         _signatures.speed_table,
         _signatures.error_table,
         _signatures.power_table,
-        _steps.table,
-        _inside.steps_table,
-        _inside.wear_table,
-        _tracker.known_table,
-        _tracker.unknown_table,
-        _tracker.starts_table,
     ):
-        print(f"  {make.__module__}.{make.__name__} ...", file=sys.stderr, flush=True)
+        name, started = f"{make.__module__}.{make.__name__}", time.process_time()
+        print(f"  {name} ...", file=sys.stderr, flush=True)
         found = make(quick=quick)
-        made.extend(found if isinstance(found, list) else [found])
-    return made
+        minutes = (time.process_time() - started) / 60.0
+        print(f"  {name}: {minutes:.1f} CPU minutes", file=sys.stderr, flush=True)
+        yield from found if isinstance(found, list) else [found]
 
 
 def cost_table(*, quick: bool) -> Table:
