@@ -4,7 +4,9 @@ A cycle's information vector y = h - G m, m the material's mean known to a covar
 G + G (V + C C') G when normal: sensor noise, the mean's own error and the components C. With
 P = (G^-1 + V + C C')^-1 and u = P G^-1 y a shape s in friction is seen with the score s' u / sqrt(s' P s).
 T^2 and SPE find what was not thought of; the scan over bumps, ripples, level and tilt comes close to the
-oracle that knows the shape. Each gets a share of the false alarms.
+oracle that knows the shape. Each gets a share w of the false alarms; together their p-value is the weighted
+harmonic mean 1 / sum(w / p) (Wilson 2019, PNAS 116:1195), which for small ones is the averaged likelihood
+ratio, the best that can be done without knowing which of them it will be.
 
 The variation is itself learned from n cycles. What is tested against a covariance of k learned dimensions
 varies 1 + 2 k / n times as much as it says (Reed, Mallett & Brennan 1974, IEEE Trans. AES 10:853), and the
@@ -17,15 +19,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from impactcell.compiled import compiled
 from impactcell.records import Samples
-from impactcell.tracking import linear, profile, shapes
+from impactcell.tracking import linear, profile, scan, shapes
 from impactcell.tracking import reference as references
 from impactcell.tracking.reference import Reference
 from impactcell.tracking.variation import MODES
 
 COMPONENTS = 3  # principal components of T^2
-SHARES = {"t_squared": 0.02, "spe": 0.02, "level": 0.11, "tilt": 0.13, "bump": 0.42, "ripple": 0.3}
+SHARES = {"t_squared": 0.02, "spe": 0.02, "level": 0.08, "tilt": 0.08, "bump": 0.42, "ripple": 0.38}
 LEAST_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
+INVISIBLE = 1e-9  # components smaller than this against the noise
+SMALLEST = 1e-300  # p-value
 LARGEST = 0.5  # shapes that even half of the friction would not show are not looked for
 
 
@@ -58,22 +63,13 @@ class Verdict:
     size_std: float
 
 
-def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usual: float) -> Verdict:
-    """Test one cycle against its material's reference.
-
-    Parameters
-    ----------
-    usual : float
-        Usual friction, which scales what is worth looking for.
-    """
-    C, cycles = reference.components, float(reference.variation.cycles)
-    G, y = references.within(reference, slide.matrix, slide.vector - slide.matrix @ reference.mean)
-    n = min(slide.seen, references.reach(reference))
-    G, y = _with_mean_error(G, y, references.precision(reference))
-    G, y, C = G[:n, :n], y[:n], C[:n]
-    # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
-    lesser = references.without_variation(C[:, COMPONENTS:], G, y)
-    t_squared, spe, freedom = _squares(*lesser, C[:, :COMPONENTS])
+def judge(reference: Reference, slide: profile.Information, grid_m: Samples) -> Verdict:
+    """Test one cycle against its material's reference."""
+    cycles = float(reference.variation.cycles)
+    n = min(slide.seen, references.judged(reference))
+    G, y = references.unsure(reference, *references.deviating(reference, slide, n))
+    C = reference.components[:n].copy()
+    t_squared, spe, freedom = _squares(G, y, C, COMPONENTS)
     # variation beyond the modes, or noise that was declared too low, widens everything once it is certain
     count = max(reference.spe_count, 1)
     usual_spe = reference.spe_sum / count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * count))
@@ -82,39 +78,56 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples, usu
         "t_squared": _hotelling(t_squared, int(cycles)),
         "spe": float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0,
     }
-    P, u = references.without_variation(C, G, y)
+    P, u = linear.varied(C, G, y)
     scale *= 1.0 + 2.0 * MODES / cycles
+    least = 30.0 / (LARGEST * references.usual(reference.mean, n)) ** 2
     looked = shapes.shapes(float(grid_m[-1]), len(grid_m))
-    best, row = shapes.scan(looked, P, u, C, slide.reached_m, 30.0 / (LARGEST * usual) ** 2, scale, cycles)
+    best, centre = scan.scan(looked, P, u, C, slide.reached_m, least, scale, cycles)
     found.update({name: b[0] for name, b in best.items()})
-    kind = min(found, key=lambda name: found[name] / SHARES[name])
-    p_value = min(1.0, found[kind] / SHARES[kind])
+    odds = {name: share / max(found[name], SMALLEST) for name, share in SHARES.items()}
+    kind = max(odds, key=lambda name: odds[name])
     _, size, std = best.get(kind, best["bump"])
-    at = float(grid_m[row % len(grid_m)]) if row >= 0 else math.nan
-    return Verdict(p_value, t_squared, spe, freedom, kind, at, size, std)
+    at = float(grid_m[centre]) if centre >= 0 else math.nan
+    return Verdict(1.0 / sum(odds.values()), t_squared, spe, freedom, kind, at, size, std)
 
 
-def _with_mean_error(G: Samples, y: Samples, precision: Samples) -> tuple[Samples, Samples]:
-    """Information (G^-1 + V)^-1 and its vector, V the inverse of `precision`."""
-    lost = G @ linear.solved(G + precision, np.column_stack([G, y]))
-    return G - lost[:, :-1], y - lost[:, -1]
+@compiled
+def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, float, int]:
+    """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom.
 
-
-def _squares(P: Samples, y: Samples, C: Samples) -> tuple[float, float, int]:
-    """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom."""
-    values, vectors = linear.eigen(P)
-    seen = slice(int(values.searchsorted(LEAST_INFORMATION)), None)
-    root, axes = np.sqrt(values[seen]), vectors[:, seen].T
-    whitened = (axes @ y) / root
-    inside = (axes @ C) * root[:, np.newaxis]
+    Whitened by a Cholesky factor that takes the best known direction next and ends where nothing is known.
+    """
+    # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
+    left, rest = linear.varied(C[:, leading:].copy(), G, y)
+    image = left @ C[:, :leading].copy()
+    n = len(rest)
+    whitened, inside, freedom = np.zeros(n), np.zeros((n, leading)), 0
+    for k in range(n):
+        best = 0
+        for i in range(n):
+            if left[i, i] > left[best, best]:
+                best = i
+        if left[best, best] < LEAST_INFORMATION:
+            break
+        column = left[:, best] / math.sqrt(left[best, best])
+        whitened[k] = rest[best] / column[best]
+        inside[k] = image[best] / column[best]
+        for i in range(n):
+            rest[i] -= column[i] * whitened[k]
+            for j in range(n):
+                left[i, j] -= column[i] * column[j]
+            for j in range(leading):
+                image[i, j] -= column[i] * inside[k, j]
+        freedom += 1
+    whole = (whitened**2).sum()
     sizes = np.sqrt((inside**2).sum(axis=0))
-    whole, freedom = float(whitened @ whitened), len(root) - COMPONENTS
-    if freedom <= 0 or sizes.min() < 1e-9:
-        return 0.0, whole, len(root)
+    if freedom <= leading or sizes.min() < INVISIBLE:
+        return 0.0, whole, freedom
     inside /= sizes
     gram, along = inside.T @ inside, inside.T @ whitened
-    t_squared = float(along @ linear.solved(gram + (gram * sizes**2) @ gram, along))
-    return t_squared, max(whole - float(along @ linear.solved(gram, along)), 0.0), freedom
+    t_squared = (along * linear.solved(gram + (gram * sizes**2) @ gram, along)).sum()
+    left_over = whole - (along * linear.solved(gram, along)).sum()
+    return t_squared, max(left_over, 0.0), freedom - leading
 
 
 def _hotelling(t_squared: float, cycles: int) -> float:

@@ -1,30 +1,119 @@
-"""Small symmetric problems straight through LAPACK: for matrices of tens of rows all else costs more."""
+"""Small symmetric problems, compiled: for tens of rows a library call costs more than the work."""
+
+import math
 
 import numpy as np
-from scipy.linalg import lapack
 
+from impactcell.compiled import compiled
 from impactcell.records import Samples
 
+ROUNDING = 1e-14  # of a diagonal element: what is left of it below this is rounding
 
+
+@compiled
+def factor(matrix: Samples) -> Samples:
+    """Lower Cholesky factor of a positive semidefinite matrix.
+
+    A pivot of which only rounding is left is infinite: its unknown is solved as zero.
+    """
+    n = len(matrix)
+    lower = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            left = matrix[i, j]
+            for k in range(j):
+                left -= lower[i, k] * lower[j, k]
+            if i == j:
+                lower[i, i] = math.sqrt(left) if left > ROUNDING * matrix[i, i] else math.inf
+            else:
+                lower[i, j] = left / lower[j, j]
+    return lower
+
+
+@compiled
+def forward(lower: Samples, right: Samples) -> Samples:
+    """Solve L X = R, shapes (n, n) and (n, k)."""
+    n, width = right.shape
+    found = right.copy()
+    for i in range(n):
+        for k in range(i):
+            part = lower[i, k]
+            for c in range(width):
+                found[i, c] -= part * found[k, c]
+        for c in range(width):
+            found[i, c] /= lower[i, i]
+    return found
+
+
+@compiled
+def backward(lower: Samples, right: Samples) -> Samples:
+    """Solve L' X = R, shapes (n, n) and (n, k)."""
+    n, width = right.shape
+    found = right.copy()
+    for i in range(n - 1, -1, -1):
+        for c in range(width):
+            found[i, c] /= lower[i, i]
+        for k in range(i):
+            part = lower[i, k]
+            for c in range(width):
+                found[k, c] -= part * found[i, c]
+    return found
+
+
+@compiled
 def solved(matrix: Samples, right: Samples) -> Samples:
-    """Solve for a symmetric positive definite matrix; the least solution where rounding says it is not."""
-    _, found, info = lapack.dposv(matrix, right)
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-14)[0] if info else found)
+    """Solve M x = r for a symmetric positive definite matrix, shapes (n, n) and (n,)."""
+    lower = factor(matrix)
+    return backward(lower, forward(lower, right.reshape((len(right), 1)))).reshape(len(right))
 
 
-def eigen(matrix: Samples) -> tuple[Samples, Samples]:
-    """Eigenvalues of a symmetric matrix in ascending order, and its eigenvectors as columns."""
-    values, vectors, info = lapack.dsyevd(matrix)
-    if info:
-        raise np.linalg.LinAlgError("the eigenvalues of a symmetric matrix did not converge")
-    return values, vectors
+@compiled
+def marginal(
+    matrix: Samples, vector: Samples, inner: Samples, cross: Samples, along: Samples
+) -> tuple[Samples, Samples]:
+    """Information on some unknowns with others, of which `inner`, `cross` and `along` tell, integrated out.
+
+    Parameters
+    ----------
+    matrix, vector : ndarray, shapes (n, n), (n,)
+        Information on the unknowns kept.
+    inner, cross, along : ndarray, shapes (k, k), (k, n), (k,)
+        Information on the others, that which both share, and its vector.
+
+    Returns
+    -------
+    matrix, vector : ndarray
+        M - X' N^-1 X and h - X' N^-1 a.
+    """
+    n, k = len(vector), len(along)
+    right = np.empty((k, n + 1))
+    right[:, :n], right[:, n] = cross, along
+    half = forward(factor(inner), right)
+    left, rest = matrix.copy(), vector.copy()
+    for c in range(k):
+        for i in range(n):
+            part = half[c, i]
+            rest[i] -= part * half[c, n]
+            for j in range(n):
+                left[i, j] -= part * half[c, j]
+    return left, rest
 
 
-def both_diagonal(first: Samples, second: Samples) -> tuple[Samples, Samples]:
-    """Values e and columns V with V' second V = 1, V' first V = diag(e); `second` positive definite."""
-    values, vectors, info = lapack.dsygvd(first, second)
-    if info:
-        raise np.linalg.LinAlgError(
-            "two symmetric matrices have no common axes: one is not positive definite"
-        )
-    return values, vectors
+@compiled
+def varied(components: Samples, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
+    """Information (G^-1 + C C')^-1 and its vector: what is left of G when the unknowns vary by C.
+
+    Shapes (n, k), (n, n) and (n,).
+    """
+    n, k = components.shape
+    cross, inner, along = np.zeros((k, n)), np.eye(k), np.zeros(k)
+    for c in range(k):
+        for i in range(n):
+            part = components[i, c]
+            along[c] += part * vector[i]
+            for j in range(n):
+                cross[c, j] += part * matrix[i, j]
+        for d in range(k):
+            for i in range(n):
+                inner[c, d] += cross[c, i] * components[i, d]
+    return marginal(matrix, vector, inner, cross, along)

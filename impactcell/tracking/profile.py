@@ -21,7 +21,8 @@ from impactcell.records import Samples
 from impactcell.tracking import linear
 from impactcell.tracking.slide import Slide
 
-FINE_STEPS = 500  # of the double integral over a slide
+FINE_STEPS = 300  # of the double integral over a slide, at least
+NEGLIGIBLE = 1e-12  # share of a smoothing that is left out
 STRENGTHS = np.logspace(-9.0, 9.0, 37)  # of the smoothing searched, over that which weighs like the data
 
 
@@ -58,28 +59,13 @@ def information(
         k_v / m where the model knows it, 1/s.
     """
     t, x = slide.time_s, slide.distance_m
-    fine = np.linspace(min(t[0], 0.0), t[-1], FINE_STEPS)
-    # between blocks the path bends by less than a micrometre, which friction does not notice
-    path = np.interp(fine, t, x)
-    points, spacing = len(grid_m), float(grid_m[1] - grid_m[0])
-    integrals = _double_integrals(path, float(fine[1] - fine[0]), float(grid_m[0]), spacing, points)
-    weight = 1.0 / np.sqrt(slide.variance)
-    columns = _columns(t, x, weight, fine, path, integrals, gravity_m_s2, viscous_per_mass)
-    # integrating x_0 and v_0 out projects their two columns away
-    q = _orthonormal(weight, weight * t)
-    columns -= q @ (q.T @ columns)
-    products = columns.T @ columns
-    seen = integrals.shape[1]
+    points, first = len(grid_m), float(grid_m[0])
+    columns = _columns(t, x, first, float(grid_m[1]) - first, points, gravity_m_s2, viscous_per_mass)
+    products = columns.T @ columns / slide.variance
+    seen = len(products) - 1
     matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
     matrix[:seen, :seen], vector[:seen] = products[:seen, :seen], products[:seen, seen]
     return Information(matrix, vector, float(x[-1]), seen)
-
-
-def _orthonormal(first: Samples, second: Samples) -> Samples:
-    """Orthonormal basis of two columns, shape (n, 2)."""
-    one = first / np.sqrt(first @ first)
-    other = second - (one @ second) * one
-    return np.column_stack([one, other / np.sqrt(other @ other)])
 
 
 @lru_cache(maxsize=64)
@@ -92,12 +78,15 @@ def on_grid(points: int) -> Samples:
     return matrix
 
 
-@lru_cache(maxsize=64)
+@compiled
 def roughness(coefficients: int) -> Samples:
     """Penalty D of second differences, shape (j, j)."""
-    second = np.diff(np.eye(coefficients), 2, axis=0)
-    penalty: Samples = second.T @ second
-    penalty.flags.writeable = False
+    penalty = np.zeros((coefficients, coefficients))
+    difference = (1.0, -2.0, 1.0)
+    for k in range(coefficients - 2):
+        for i in range(3):
+            for j in range(3):
+                penalty[k + i, k + j] += difference[i] * difference[j]
     return penalty
 
 
@@ -114,83 +103,136 @@ def smooth(seen: Information) -> tuple[Samples, Samples, float]:
     strength : float
         The lambda of largest likelihood.
     """
-    n = seen.seen
-    matrix, penalty = seen.matrix[:n, :n], roughness(n)
-    scale = float(np.trace(matrix)) / float(np.trace(penalty))
-    # both matrices diagonal at once: base = V^-T V^-1, scale D = V^-T diag(e) V^-1, matrix has 1 - e
-    share, vectors = linear.both_diagonal(scale * penalty, matrix + scale * penalty)
+    return _smoothed(seen.matrix, seen.vector, seen.seen, STRENGTHS)
+
+
+def friction(seen: Information, points: int) -> tuple[Samples, Samples]:
+    """Friction and its standard deviation on the grid of so many points; nan where no spline was met."""
+    mean, covariance, _ = smooth(seen)
+    return _on_grid(mean, covariance, points)
+
+
+@compiled
+def _on_grid(mean: Samples, covariance: Samples, points: int) -> tuple[Samples, Samples]:
+    value, std = np.full(points, np.nan), np.full(points, np.nan)
+    weight = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+    for k in range(len(mean) - 2):
+        total, variance = 0.0, 0.0
+        for i in range(3):
+            total += weight[i] * mean[k + i]
+            for j in range(3):
+                variance += weight[i] * weight[j] * covariance[k + i, k + j]
+        value[k], std[k] = total, np.sqrt(max(variance, 0.0))
+    return value, std
+
+
+@compiled
+def _smoothed(matrix: Samples, vector: Samples, n: int, strengths: Samples) -> tuple[Samples, Samples, float]:
+    penalty, within = roughness(n), matrix[:n, :n].copy()
+    scale = np.trace(within) / np.trace(penalty)
+    # both matrices diagonal at once: base = L L', scale D = L Q diag(e) Q' L', matrix has 1 - e
+    lower = linear.factor(within + scale * penalty)
+    half = linear.forward(lower, scale * penalty)
+    share, axes = np.linalg.eigh(linear.forward(lower, half.T.copy()))
     share = np.minimum(np.maximum(share, 0.0), 1.0)
     share[:2] = 0.0  # level and slope are not penalised; rounding must not say otherwise
-    inner = vectors.T @ seen.vector[:n]
-    diagonal = np.maximum((1.0 - share) + STRENGTHS[:, np.newaxis] * share, 1e-300)
-    fit = (inner**2 / diagonal - np.log(diagonal)).sum(axis=1) + (n - 2) * np.log(STRENGTHS)
+    vectors = linear.backward(lower, axes)
+    inner = vectors.T @ vector[:n].copy()
+    fit = np.empty(len(strengths))
+    for k in range(len(strengths)):
+        fit[k] = (n - 2) * np.log(strengths[k])
+        for i in range(n):
+            diagonal = max((1.0 - share[i]) + strengths[k] * share[i], 1e-300)
+            fit[k] += inner[i] ** 2 / diagonal - np.log(diagonal)
     best = int(fit.argmax())
     # averaged over what lambda may be: the most likely one alone smooths away features it should doubt
     share_of = np.exp(0.5 * (fit - fit[best]))
     share_of /= share_of.sum()
-    means = inner / diagonal
-    spread = means - share_of @ means
-    within = (spread.T * share_of) @ spread
-    within.flat[:: n + 1] += share_of @ (1.0 / diagonal)
-    return vectors @ (share_of @ means), vectors @ within @ vectors.T, float(STRENGTHS[best] * scale)
+    mean, spread, inverse = np.zeros(n), np.zeros((n, n)), np.zeros(n)
+    means = np.empty((len(strengths), n))
+    for k in range(len(strengths)):
+        for i in range(n):
+            diagonal = max((1.0 - share[i]) + strengths[k] * share[i], 1e-300)
+            means[k, i] = inner[i] / diagonal
+            mean[i] += share_of[k] * means[k, i]
+            inverse[i] += share_of[k] / diagonal
+    for k in range(len(strengths)):
+        if share_of[k] > NEGLIGIBLE:
+            for i in range(n):
+                part = share_of[k] * (means[k, i] - mean[i])
+                for j in range(n):
+                    spread[i, j] += part * (means[k, j] - mean[j])
+    for i in range(n):
+        spread[i, i] += inverse[i]
+    return vectors @ mean, vectors @ spread @ vectors.T, strengths[best] * scale
 
 
 @compiled
 def _columns(
-    t: Samples,
-    x: Samples,
-    weight: Samples,
-    fine: Samples,
-    path: Samples,
-    integrals: Samples,
-    gravity: float,
-    viscous_per_mass: float,
+    t: Samples, x: Samples, first: float, spacing: float, points: int, gravity: float, viscous_per_mass: float
 ) -> Samples:
-    """Weighted columns of the coefficients, and position last, at the blocks, shape (n, s + 1)."""
-    seen, step = integrals.shape[1], fine[1] - fine[0]
-    travelled = np.zeros(len(fine))
-    for k in range(1, len(fine)):
-        travelled[k] = travelled[k - 1] + (path[k] + path[k - 1]) / 2.0 * step
-    columns = np.empty((len(t), seen + 1))
-    for k in range(len(t)):
-        place = (t[k] - fine[0]) / step
-        low = min(int(place), len(fine) - 2)
-        part = place - low
+    """Columns of the coefficients met, and position last, at the blocks, shape (n, s + 1).
+
+    Every B-spline is integrated twice along the path: trapezium, then the exact second integral of it.
+    x_0 and v_0 are integrated out, which projects the columns 1 and t away; so the integrals may start
+    anywhere.
+    """
+    n, furthest = len(t), 0.0
+    for k in range(n):
+        furthest = max(furthest, (x[k] - first) / spacing)
+    seen = min(int(furthest), points - 2) + 4
+    columns = np.empty((n, seen + 1))
+    now, speed = np.zeros(seen), np.zeros(seen)
+    before, place = np.zeros(seen), np.zeros(seen)
+    parts = max(1, FINE_STEPS // n)
+    travelled = 0.0
+    met = _splines(x[0], first, spacing, points, before) + 4
+    for k in range(n):
+        if k > 0:
+            step = (t[k] - t[k - 1]) / parts
+            for part in range(parts):
+                # between blocks the path bends by less than a micrometre, which friction does not notice
+                at = x[k - 1] + (x[k] - x[k - 1]) * (part + 1.0) / parts
+                met = max(met, _splines(at, first, spacing, points, now) + 4)
+                for i in range(met):
+                    place[i] += step * speed[i] + step**2 * (2.0 * before[i] + now[i]) / 6.0
+                    speed[i] += step * (before[i] + now[i]) / 2.0
+                    before[i] = now[i]
+            travelled += (x[k] + x[k - 1]) / 2.0 * (t[k] - t[k - 1])
         for i in range(seen):
-            at_block = integrals[low, i] * (1.0 - part) + integrals[low + 1, i] * part
-            columns[k, i] = -gravity * at_block * weight[k]
-        drag = travelled[low] * (1.0 - part) + travelled[low + 1] * part
-        columns[k, seen] = (x[k] + viscous_per_mass * drag) * weight[k]
+            columns[k, i] = -gravity * place[i]
+        columns[k, seen] = x[k] + viscous_per_mass * travelled
+    _project(t, columns)
     return columns
 
 
 @compiled
-def _double_integrals(path: Samples, step: float, first: float, spacing: float, points: int) -> Samples:
-    """Integrate every B-spline met twice along the path; trapezium, then the exact second integral of it."""
-    n = len(path)
-    furthest = 0.0
+def _splines(x: float, first: float, spacing: float, points: int, out: Samples) -> int:
+    """Values of all B-splines at a place; gives the first of the four that are not zero."""
+    place = min(max((x - first) / spacing, 0.0), points - 1.0)
+    cell = min(int(place), points - 2)
+    u = place - cell
+    out[:] = 0.0
+    out[cell] = (1.0 - u) ** 3 / 6.0
+    out[cell + 1] = (3.0 * u**3 - 6.0 * u**2 + 4.0) / 6.0
+    out[cell + 2] = (-3.0 * u**3 + 3.0 * u**2 + 3.0 * u + 1.0) / 6.0
+    out[cell + 3] = u**3 / 6.0
+    return cell
+
+
+@compiled
+def _project(t: Samples, columns: Samples) -> None:
+    """Take mean and slope over time out of every column, in place."""
+    n, width = columns.shape
+    centre, square = t.mean(), 0.0
+    mean, slope = np.zeros(width), np.zeros(width)
     for k in range(n):
-        furthest = max(furthest, (path[k] - first) / spacing)
-    j = min(int(furthest), points - 2) + 4
-    out = np.zeros((n, j))
-    speed = np.zeros(j)
-    before = np.zeros(j)
-    now = np.zeros(j)
+        square += (t[k] - centre) ** 2
+        for i in range(width):
+            mean[i] += columns[k, i]
+            slope[i] += (t[k] - centre) * columns[k, i]
+    mean /= n
+    slope /= square
     for k in range(n):
-        place = (path[k] - first) / spacing
-        place = min(max(place, 0.0), points - 1.0)
-        cell = min(int(place), points - 2)
-        u = place - cell
-        for i in range(j):
-            now[i] = 0.0
-        now[cell] = (1.0 - u) ** 3 / 6.0
-        now[cell + 1] = (3.0 * u**3 - 6.0 * u**2 + 4.0) / 6.0
-        now[cell + 2] = (-3.0 * u**3 + 3.0 * u**2 + 3.0 * u + 1.0) / 6.0
-        now[cell + 3] = u**3 / 6.0
-        if k > 0:
-            for i in range(j):
-                out[k, i] = out[k - 1, i] + step * speed[i] + step**2 * (2.0 * before[i] + now[i]) / 6.0
-                speed[i] += step * (before[i] + now[i]) / 2.0
-        for i in range(j):
-            before[i] = now[i]
-    return out
+        for i in range(width):
+            columns[k, i] -= mean[i] + slope[i] * (t[k] - centre)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from impactcell.compiled import compiled
 from impactcell.records import Samples
 from impactcell.tracking import linear, profile, variation
 from impactcell.tracking.variation import MODES, Variation
@@ -19,6 +20,9 @@ from impactcell.tracking.variation import MODES, Variation
 MEMORY = 300.0  # cycles the mean remembers
 SMOOTHED_AT = (0.0, 4.0, 16.0, 64.0)  # weights at which the mean's smoothing is settled anew
 FEWEST = 8.0  # cycles that have met a place before the mean is known there
+FEWEST_VARIED = 25.0  # cycles from which variation was learned at a place before cycles are judged there
+CONTINUES = 0.15  # of the friction itself: its steps from coefficient to coefficient where it is unknown
+LEAST = 1e-3  # friction below this is none
 VAGUE = 1.0  # information on each coefficient beforehand: friction is known to about 1
 
 
@@ -40,6 +44,8 @@ class Reference:
         Principal components of the variation as columns, largest first, scaled to their standard deviations.
     met : ndarray, shape (j,)
         Cycles of this material that slid over each coefficient.
+    varied : ndarray, shape (j,)
+        Cycles of any material from which variation was learned there.
     spe_sum : float
         Summed SPE over its degrees of freedom, of judged normal cycles.
     spe_count : int
@@ -53,6 +59,7 @@ class Reference:
     variation: Variation = field(default_factory=Variation)
     components: Samples = field(default_factory=lambda: np.zeros((0, MODES)))
     met: Samples = field(default_factory=lambda: np.zeros(0))
+    varied: Samples = field(default_factory=lambda: np.zeros(0))
     spe_sum: float = 0.0
     spe_count: int = 0
 
@@ -61,7 +68,7 @@ def empty(coefficients: int) -> Reference:
     """Before the first cycle."""
     square, line = np.zeros((coefficients, coefficients)), np.zeros(coefficients)
     components = np.zeros((coefficients, MODES))
-    return Reference(matrix=square, vector=line, mean=line, met=line, components=components)
+    return Reference(matrix=square, vector=line, mean=line, met=line, varied=line, components=components)
 
 
 def restart(reference: Reference) -> Reference:
@@ -75,31 +82,69 @@ def reach(reference: Reference) -> int:
     return int(np.count_nonzero(reference.met >= min(reference.weight, FEWEST)))
 
 
-def within(reference: Reference, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
-    """Leave of a cycle what it says where the mean is known, with friction beyond that free.
+def judged(reference: Reference) -> int:
+    """Coefficients, from the first on, where cycles can be judged: mean and variation are known."""
+    enough = min(float(reference.variation.cycles), FEWEST_VARIED)
+    return min(reach(reference), int(np.count_nonzero(reference.varied >= enough)))
 
-    Beyond the slides learned from, a longer one tells neither deviance nor how cycles vary.
 
-    Returns
-    -------
-    matrix, vector : ndarray
-        G11 - G12 G22^-1 G21 and its vector, of the coefficients within `reach`; zero beyond.
+def deviating(reference: Reference, slide: profile.Information, n: int) -> tuple[Samples, Samples]:
+    """Leave of a cycle what it says of its first n coefficients: information, and h - G m.
+
+    Friction beyond is no better known than that it goes on from where it was, in steps of a share `CONTINUES`
+    of itself: a longer slide tells neither deviance nor how cycles vary.
     """
-    n = reach(reference)
-    if n == len(vector):
-        return matrix, vector
-    beyond = matrix[n:, n:].copy()
-    beyond.flat[:: len(beyond) + 1] += VAGUE
-    crossed = matrix[:n, n:] @ linear.solved(beyond, np.column_stack([matrix[n:, :n], vector[n:]]))
-    inner, outer = np.zeros_like(matrix), np.zeros_like(vector)
-    inner[:n, :n], outer[:n] = matrix[:n, :n] - crossed[:, :-1], vector[:n] - crossed[:, -1]
-    return inner, outer
+    return _deviating(slide.matrix, slide.vector, reference.mean, n, slide.seen)
 
 
-def precision(reference: Reference) -> Samples:
-    """Inverse covariance of the mean's coefficients, shape (j, j)."""
-    n = len(reference.vector)
-    return reference.matrix + reference.strength * profile.roughness(n) + VAGUE * np.eye(n)
+def unsure(reference: Reference, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
+    """Information (G^-1 + V)^-1 and its vector, V the covariance of the mean's error."""
+    return _unsure(matrix, vector, reference.matrix, reference.strength)
+
+
+@compiled
+def usual(mean: Samples, n: int) -> float:
+    """Friction of the material over its first n coefficients."""
+    return max(abs(float(mean[:n].mean())), LEAST)
+
+
+@compiled
+def _deviating(matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int) -> tuple[Samples, Samples]:
+    own = vector[:seen].copy()
+    for i in range(seen):
+        for j in range(seen):
+            own[i] -= matrix[i, j] * mean[j]
+    known = matrix[:n, :n].copy()
+    if seen <= n:
+        return known, own[:n].copy()
+    continues = 1.0 / (CONTINUES * usual(mean, n)) ** 2
+    inner, cross = matrix[n:seen, n:seen].copy(), matrix[n:seen, :n].copy()
+    known[n - 1, n - 1] += continues
+    cross[0, n - 1] -= continues
+    for i in range(seen - n):
+        inner[i, i] += continues
+        if i > 0:
+            inner[i - 1, i - 1] += continues
+            inner[i, i - 1] -= continues
+            inner[i - 1, i] -= continues
+    return linear.marginal(known, own[:n].copy(), inner, cross, own[n:].copy())
+
+
+@compiled
+def _unsure(matrix: Samples, vector: Samples, pooled: Samples, strength: float) -> tuple[Samples, Samples]:
+    n, precise = len(vector), precision(pooled, strength)
+    beyond = np.zeros(len(precise) - n)
+    known, _ = linear.marginal(
+        precise[:n, :n].copy(), vector, precise[n:, n:].copy(), precise[n:, :n].copy(), beyond
+    )
+    return linear.marginal(matrix, vector, matrix + known, matrix, vector)
+
+
+@compiled
+def precision(pooled: Samples, strength: float) -> Samples:
+    """Inverse covariance of the mean's coefficients from their pooled information, shape (j, j)."""
+    n = len(pooled)
+    return pooled + strength * profile.roughness(n) + VAGUE * np.eye(n)
 
 
 def learn(reference: Reference, slide: profile.Information, settled: float) -> Reference:
@@ -110,38 +155,52 @@ def learn(reference: Reference, slide: profile.Information, settled: float) -> R
     settled : float
         Cycles, at least 1, before which the mean is too rough to show how a cycle differs from it.
     """
-    varied, components = reference.variation, reference.components
+    varied, components, met = reference.variation, reference.components, reference.varied
+    total = len(slide.vector)
     if reference.weight >= settled:
-        known, own = within(reference, slide.matrix, slide.vector - slide.matrix @ reference.mean)
-        varied = variation.learn(varied, known, own, reference.weight)
-        components = variation.components(varied, len(own))
+        n = min(reach(reference), slide.seen)
+        varied = variation.learn(varied, *deviating(reference, slide, n), reference.weight, total)
+        components = variation.components(varied, total)
+        met = met + (np.arange(total) < min(n, slide.seen - 1))
     elif reference.weight == 0.0 and varied.cycles == 0:
         first, _, _ = profile.smooth(slide)
         varied = variation.guess(float(np.median(first)))
-        components = variation.components(varied, len(slide.vector))
+        components = variation.components(varied, total)
     kept = 1.0 - 1.0 / MEMORY if reference.weight >= MEMORY else 1.0
-    own_matrix, own_vector = without_variation(components, slide.matrix, slide.vector)
-    matrix, vector = reference.matrix * kept + own_matrix, reference.vector * kept + own_vector
     strength = reference.strength
+    matrix, vector = _pooled(
+        reference.matrix, reference.vector, kept, components, slide.matrix, slide.vector, slide.seen
+    )
     if reference.weight in SMOOTHED_AT:
-        _, _, strength = profile.smooth(profile.Information(matrix, vector, slide.reached_m, len(vector)))
-    fresh = replace(
+        _, _, strength = profile.smooth(profile.Information(matrix, vector, slide.reached_m, total))
+    return replace(
         reference,
         weight=min(reference.weight + 1.0, MEMORY),
         matrix=matrix,
         vector=vector,
+        mean=linear.solved(precision(matrix, strength), vector),
         strength=strength,
         variation=varied,
         components=components,
-        met=reference.met * kept + (np.arange(len(vector)) < slide.seen - 1),
+        met=reference.met * kept + (np.arange(total) < slide.seen - 1),
+        varied=met,
     )
-    return replace(fresh, mean=linear.solved(precision(fresh), vector))
 
 
-def without_variation(components: Samples, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
-    """Information on the mean rather than on one cycle: (G^-1 + C C')^-1, and its vector."""
-    image = matrix @ components
-    inner = components.T @ image
-    inner.flat[:: len(inner) + 1] += 1.0
-    along = image @ linear.solved(inner, np.column_stack([image.T, components.T @ vector]))
-    return matrix - along[:, :-1], vector - along[:, -1]
+@compiled
+def _pooled(
+    matrix: Samples,
+    vector: Samples,
+    kept: float,
+    components: Samples,
+    own_matrix: Samples,
+    own_vector: Samples,
+    seen: int,
+) -> tuple[Samples, Samples]:
+    """Information on the mean with one cycle more, which says less of it the more cycles vary."""
+    pooled, summed = matrix * kept, vector * kept
+    own = own_matrix[:seen, :seen].copy()
+    left, rest = linear.varied(components[:seen].copy(), own, own_vector[:seen].copy())
+    pooled[:seen, :seen] += left
+    summed[:seen] += rest
+    return pooled, summed

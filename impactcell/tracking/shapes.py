@@ -1,283 +1,70 @@
-"""Shapes that a deviant cycle may have, looked for all at once: bumps, ripples, level and tilt.
+"""Shapes that a deviant cycle may have: bumps, ripples, level and tilt."""
 
-A shape s in friction is seen with the score z = s' u / sqrt(s' P s), standard normal when the cycle is normal
-and the Neyman-Pearson statistic for s when it is not. The largest score of a family of shapes that fills a
-surface M on the sphere exceeds a high c about as often as the Euler characteristic of what exceeds it is
-expected to be (Adler & Taylor 2007, Random Fields and Geometry, theorem 12.4.1)::
-
-    P(max z > c) = chi(M) Phi(-c) + L_1(M) exp(-c^2/2) / (2 pi) + L_2(M) c exp(-c^2/2) / (2 pi)^(3/2)
-
-with L_1 half the length of the edge of M and L_2 its area, arc lengths being arccos of correlations.
-"""
-
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from impactcell.compiled import compiled
 from impactcell.records import Samples
 from impactcell.tracking import profile
 
 BUMP_WIDTHS_M = (0.2e-3, 0.3e-3, 0.45e-3, 0.7e-3)
 SHORTEST_WAVE_M = 0.4e-3
-NOTHING = (1.0, 0.0, math.inf)  # p-value, size and standard deviation of what cannot be seen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shapes:
-    """Spline coefficients of the shapes looked for, as rows.
+    """Spline coefficients of the shapes looked for, in the last axis.
 
     Attributes
     ----------
-    rows : ndarray, shape (4 g + 2 q + 2, j)
-        Bumps of every width in turn at every grid point, cosine and sine of every wave in turn, the longest
-        first, level, tilt.
-    centres : int
-        Grid points g.
+    bumps : ndarray, shape (4, g, j)
+        Of every width at every grid point.
+    ripples : ndarray, shape (q, 2, j)
+        Cosine and sine of every wave, the longest first.
+    plain : ndarray, shape (2, j)
+        Level and tilt.
+    spacing_m : float
+        Of the grid.
     waves_m : ndarray, shape (q,)
     """
 
-    rows: Samples
-    centres: int
+    bumps: Samples
+    ripples: Samples
+    plain: Samples
+    spacing_m: float
     waves_m: Samples
+
+    @lru_cache(maxsize=64)  # noqa: B019  # few shapes are ever made, and they are kept anyway
+    def among(self, across: int, first: int, coefficients: int) -> Samples:
+        """Rows of the shapes with bumps at the first places and without the first waves."""
+        parts = self.bumps[:, :across], self.ripples[first:], self.plain
+        return np.concatenate([part[..., :coefficients].reshape(-1, coefficients) for part in parts])
+
+    def within(self, reached_m: float, coefficients: int) -> tuple[Samples, int, int]:
+        """Shapes that a slide can show: bumps on its way, no wave longer than that.
+
+        Returns
+        -------
+        rows : ndarray, shape (m, coefficients)
+            Bumps of every width in turn at every place, cosine and sine of every wave in turn, level, tilt.
+        across : int
+            Places of bumps.
+        waves : int
+        """
+        across = min(max(int(reached_m / self.spacing_m), 1) + 1, self.bumps.shape[1])
+        first = int(np.searchsorted(-self.waves_m, -reached_m))
+        return self.among(across, first, coefficients), across, len(self.waves_m) - first
 
 
 @lru_cache(maxsize=8)
 def shapes(length_m: float, points: int) -> Shapes:
     """Make the shapes for a grid of `points` from 0 to `length_m`."""
     grid = np.linspace(0.0, length_m, points)
-    to_coefficients = np.linalg.pinv(profile.on_grid(points))
-    bumps = [np.exp(-0.5 * ((grid - c) / w) ** 2) for w in BUMP_WIDTHS_M for c in grid]
-    shortest = max(4.0 * (grid[1] - grid[0]), SHORTEST_WAVE_M)
-    waves = length_m / np.arange(1.0, length_m / shortest + 0.5, 0.5)
-    ripples = [f(2.0 * math.pi * grid / w) for w in waves for f in (np.cos, np.sin)]
-    every = np.array([*bumps, *ripples, np.ones(points), grid / length_m])
-    return Shapes(every @ to_coefficients.T, points, waves)
-
-
-def scan(
-    looked: Shapes,
-    P: Samples,
-    u: Samples,
-    C: Samples,
-    reached_m: float,
-    least: float,
-    scale: float,
-    cycles: float,
-) -> tuple[dict[str, tuple[float, float, float]], int]:
-    """Look for every family of shapes in one cycle.
-
-    Parameters
-    ----------
-    P, u, C : ndarray, shapes (s, s), (s,), (s, k)
-        Information, scores and components of the variation, of the coefficients that were seen.
-    reached_m : float
-        How far the part slid: no wave longer than this is looked for.
-    least : float
-        Information on its size that a shape must have to be looked for.
-    scale : float
-        Variance of a score of a normal cycle.
-    cycles : float
-        From which the variation was learned.
-
-    Returns
-    -------
-    found : dict
-        Of every family p-value, size and its standard deviation, of the most telling shape of either sign.
-    row : int
-        The most telling bump; -1 if none can be seen.
-    """
-    s = len(u)
-    rows = looked.rows[:, :s]
-    image = rows @ P
-    along, score, known = image @ C, rows @ u, (rows * image).sum(axis=1)
-    bumps, waves = len(looked.rows) - 2 * len(looked.waves_m) - 2, len(looked.waves_m)
-    first = bumps + 2 * int(np.searchsorted(-looked.waves_m, -reached_m))
-    p_bump, row = _largest_bump(rows, image, along, score, known, bumps, looked.centres, least, scale, cycles)
-    bump = (p_bump, score[row] / known[row], math.sqrt(scale / known[row])) if row >= 0 else NOTHING
-    end = bumps + 2 * waves
-    ripple = _largest_ripple(rows, image, along, score, first, end, least, scale, cycles)
-    level, tilt = end, end + 1
-    # slope about the point where it does not depend on the level, so that the two are looked for apart
-    turn = (rows[tilt] @ image[level]) / known[level]
-    own = along[tilt] - turn * along[level]
-    tilted = score[tilt] - turn * score[level], known[tilt] - turn**2 * known[level]
-    found = {
-        "level": _one(score[level], known[level], along[level] @ along[level], least, scale, cycles),
-        "tilt": _one(*tilted, own @ own, least, scale, cycles),
-        "bump": bump,
-        "ripple": ripple,
-    }
-    return found, row
-
-
-def _one(
-    score: float, known: float, varied: float, least: float, scale: float, cycles: float
-) -> tuple[float, float, float]:
-    """Find p-value, size and its standard deviation of a single shape, of either sign."""
-    if known < least:
-        return NOTHING
-    z = _normal(score**2 / (known * scale), varied / known, cycles)
-    return math.erfc(z / math.sqrt(2.0)), score / known, math.sqrt(scale / known)
-
-
-@compiled
-def _normal(squared: float, learned_share: float, cycles: float) -> float:
-    """Make the square of a score, a share of whose variance was learned, into a normal score as rare.
-
-    Student's t with nu = cycles / share^2 degrees of freedom (Satterthwaite 1946, Biometrics Bulletin 2:110),
-    g^2 = nu log(1 + z^2 / nu).
-    """
-    freedom = cycles / max(learned_share, 1e-6) ** 2
-    return math.sqrt(freedom * math.log1p(squared / freedom))
-
-
-@compiled
-def _dot(a: Samples, b: Samples) -> float:
-    total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total
-
-
-@compiled
-def _largest_bump(
-    rows: Samples,
-    image: Samples,
-    along: Samples,
-    score: Samples,
-    known: Samples,
-    bumps: int,
-    centres: int,
-    least: float,
-    scale: float,
-    cycles: float,
-) -> tuple[float, int]:
-    """Find p-value and row of the most telling bump."""
-    best, c = -1, 0.0
-    for i in range(bumps):
-        if known[i] >= least:
-            share = _dot(along[i], along[i]) / known[i]
-            z = _normal(score[i] ** 2 / (known[i] * scale), share, cycles)
-            if best < 0 or z > c:
-                best, c = i, z
-    if best < 0:
-        return 1.0, -1
-    euler, edge, area = _surface(rows, image, known, least, centres, bumps // centres)
-    high = math.exp(-0.5 * c * c)
-    tail = euler * 0.5 * math.erfc(c / math.sqrt(2.0)) + edge * high / (2.0 * math.pi)
-    tail += area * c * high / (2.0 * math.pi) ** 1.5
-    return min(1.0, 2.0 * tail), best
-
-
-@compiled
-def _surface(
-    rows: Samples, image: Samples, known: Samples, least: float, across: int, down: int
-) -> tuple[float, float, float]:
-    """Euler characteristic, half the edge and area of the triangulated surface of visible shapes."""
-    euler, edge, area = 0.0, 0.0, 0.0
-    # of every edge: right, down, and diagonal from the right one to the lower one; and triangles beside it
-    length = np.full((3, across * down), np.nan)
-    beside = np.zeros((3, across * down))
-    for i in range(down):
-        for k in range(across):
-            a = i * across + k
-            euler += 1.0 if known[a] >= least else 0.0
-            for kind in range(3):
-                if (kind != 1 and k + 1 == across) or (kind != 0 and i + 1 == down):
-                    continue
-                p = a + 1 if kind == 2 else a
-                q = a + 1 if kind == 0 else a + across
-                if known[p] >= least and known[q] >= least:
-                    near = _dot(rows[p], image[q]) / math.sqrt(known[p] * known[q])
-                    length[kind, a] = math.acos(min(max(near, -1.0), 1.0))
-                    euler -= 1.0
-    for i in range(down - 1):
-        for k in range(across - 1):
-            a = i * across + k
-            upper = _triangle(length[0, a], length[1, a], length[2, a])
-            if upper == upper:
-                euler, area = euler + 1.0, area + upper
-                beside[0, a] += 1.0
-                beside[1, a] += 1.0
-                beside[2, a] += 1.0
-            lower = _triangle(length[0, a + across], length[1, a + 1], length[2, a])
-            if lower == lower:
-                euler, area = euler + 1.0, area + lower
-                beside[0, a + across] += 1.0
-                beside[1, a + 1] += 1.0
-                beside[2, a] += 1.0
-    for kind in range(3):
-        for a in range(across * down):
-            if length[kind, a] == length[kind, a]:
-                edge += length[kind, a] * (1.0 - beside[kind, a] / 2.0)
-    return euler, edge, area
-
-
-@compiled
-def _triangle(a: float, b: float, c: float) -> float:
-    """Area from the sides (Heron); nan if one is missing."""
-    half = (a + b + c) / 2.0
-    inside = half * (half - a) * (half - b) * (half - c)
-    return math.sqrt(max(inside, 0.0)) if inside == inside else inside
-
-
-@compiled
-def _largest_ripple(
-    rows: Samples,
-    image: Samples,
-    along: Samples,
-    score: Samples,
-    first: int,
-    end: int,
-    least: float,
-    scale: float,
-    cycles: float,
-) -> tuple[float, float, float]:
-    """Find p-value, size and its standard deviation of the most telling ripple.
-
-    The phase goes round, so that the edge of the surface is two circles. Between neighbouring waves it is as
-    wide as the root mean square of the two angles between their planes.
-    """
-    c, size, std, area, before = -1.0, 0.0, math.inf, 0.0, -1
-    for i in range(first, end, 2):
-        j = i + 1
-        cc, ss, cs = _dot(rows[i], image[i]), _dot(rows[j], image[j]), _dot(rows[i], image[j])
-        if (cc + ss) / 2.0 - math.sqrt(((cc - ss) / 2.0) ** 2 + cs * cs) < least:
-            continue
-        solid = cc * ss - cs * cs
-        a, b = (ss * score[i] - cs * score[j]) / solid, (cc * score[j] - cs * score[i]) / solid
-        squared, varied = score[i] * a + score[j] * b, 0.0
-        for k in range(along.shape[1]):
-            varied += (a * along[i, k] + b * along[j, k]) ** 2
-        z = _normal(max(squared, 0.0) / scale, varied / max(squared, 1e-300), cycles)
-        if z > c:
-            c, size, std = z, math.hypot(a, b), math.sqrt(2.0 * scale / (cc + ss))
-        if before == i - 2:
-            area += 2.0 * math.pi * _between(rows, image, i - 2, i)
-        before = i
-    if c < 0.0:
-        return 1.0, 0.0, math.inf
-    high = math.exp(-0.5 * c * c)
-    return min(1.0, high + area * c * high / (2.0 * math.pi) ** 1.5), size, std
-
-
-@compiled
-def _between(rows: Samples, image: Samples, one: int, other: int) -> float:
-    """Root mean square angle between the planes that two waves span with their cosines and sines."""
-    shared = 0.0
-    a, b = math.sqrt(_dot(rows[one], image[one])), _dot(rows[one], image[one + 1])
-    c = math.sqrt(_dot(rows[one + 1], image[one + 1]) - (b / a) ** 2)
-    d, e = math.sqrt(_dot(rows[other], image[other])), _dot(rows[other], image[other + 1])
-    f = math.sqrt(_dot(rows[other + 1], image[other + 1]) - (e / d) ** 2)
-    for k in range(2):
-        first = _dot(rows[one], image[other + k]) / a
-        second = (_dot(rows[one + 1], image[other + k]) - b / a * first) / c
-        if k == 0:
-            x, y = first / d, second / d
-        else:
-            first, second = (first - e / d * x) / f, (second - e / d * y) / f
-            shared += x * x + y * y + first * first + second * second
-    return math.asin(math.sqrt(min(max(1.0 - shared / 2.0, 0.0), 1.0)))
+    to_coefficients = np.linalg.pinv(profile.on_grid(points)).T
+    spacing = float(grid[1] - grid[0])
+    bumps = np.array([[np.exp(-0.5 * ((grid - c) / w) ** 2) for c in grid] for w in BUMP_WIDTHS_M])
+    waves = length_m / np.arange(1.0, length_m / max(4.0 * spacing, SHORTEST_WAVE_M) + 0.5, 0.5)
+    ripples = np.array([[f(2.0 * np.pi * grid / w) for f in (np.cos, np.sin)] for w in waves])
+    plain = np.array([np.ones(points), grid / length_m])
+    return Shapes(bumps @ to_coefficients, ripples @ to_coefficients, plain @ to_coefficients, spacing, waves)

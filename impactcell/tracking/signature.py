@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,6 +14,13 @@ from impactcell.tracking.slide import NoSlideError, find_slide
 
 FEWEST_OF_MATERIAL = 5  # cycles of a new material before its cycles are judged
 GIVEN_UP = 10  # deviant cycles in a row that are rather another material
+
+
+@lru_cache(maxsize=64)
+def _grid(length_m: float, points: int) -> Samples:
+    grid = np.linspace(0.0, length_m, points)
+    grid.flags.writeable = False
+    return grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +46,8 @@ class SignatureSettings:
 
     @property
     def grid_m(self) -> Samples:
-        """Grid points, shape (points,)."""
-        return np.linspace(0.0, self.length_m, self.points)
+        """Grid points, shape (points,); not to be written to."""
+        return _grid(self.length_m, self.points)
 
     @property
     def settled(self) -> float:
@@ -127,8 +135,7 @@ def update(
         reason = f"the reference is being learned, {left} more cycles"
         signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
         return SignatureTracked(learned(state, seen, settings, None), signature, None, judged=False)
-    usual = float(np.nanmean(friction))
-    verdict = deviation.judge(known, seen, grid, usual)
+    verdict = deviation.judge(known, seen, grid)
     limit = 1.0 / settings.false_alarm_cycles
     deviant = verdict.p_value < limit
     signature = Signature(
@@ -146,14 +153,9 @@ def update(
 
 def _published(seen: profile.Information, settings: SignatureSettings) -> tuple[Samples, Samples]:
     """Friction and its standard deviation on the grid, nan where the part did not get."""
-    mean, covariance, _ = profile.smooth(seen)
-    met = seen.seen - 2
-    on_grid = profile.on_grid(met)
-    friction, std = np.full(settings.points, math.nan), np.full(settings.points, math.nan)
-    friction[:met] = on_grid @ mean
-    std[:met] = np.sqrt(np.maximum(((on_grid @ covariance) * on_grid).sum(axis=1), 0.0))
-    beyond = settings.grid_m > seen.reached_m
-    friction[beyond] = std[beyond] = math.nan
+    friction, std = profile.friction(seen, settings.points)
+    beyond = int(settings.grid_m.searchsorted(seen.reached_m, side="right"))
+    friction[beyond:] = std[beyond:] = math.nan
     return friction, std
 
 

@@ -10,7 +10,8 @@ the equations::
 are linear in Lambda and right in the mean (C. R. Rao 1971, J. Multivariate Analysis 1:257, with the first
 guess as weights), so that two sums are all that is kept, and slides may end in different places. Eigenvalues
 that noise alone could have made, in units of the noise, are zero: else the modes swallow what they should
-tell apart. What no slide has reached keeps the first guess.
+tell apart. Added is what the cycles could not have seen, the standard error of a variation of none; where no
+slide has reached that is the first guess.
 """
 
 import math
@@ -25,7 +26,6 @@ from impactcell.tracking import linear
 
 MODES = 6
 PAIRS = MODES * (MODES + 1) // 2
-UPPER = np.triu_indices(MODES)
 FIRST_SPREAD = 0.05  # of the friction itself: how much cycles vary before anything is known
 RIDGE = 0.5  # cycles' worth of weight on no variation at all, where nothing was seen
 
@@ -66,50 +66,92 @@ def guess(friction: float) -> Variation:
     return Variation(scale=scale, weights=weights, moments=moments)
 
 
-def learn(variation: Variation, matrix: Samples, vector: Samples, weight: float) -> Variation:
+def learn(
+    variation: Variation, matrix: Samples, vector: Samples, weight: float, coefficients: int
+) -> Variation:
     """Take one cycle in.
 
     Parameters
     ----------
-    matrix : ndarray, shape (j, j)
-        Information G of the cycle.
-    vector : ndarray, shape (j,)
+    matrix : ndarray, shape (s, s)
+        Information G of the cycle on the first s coefficients.
+    vector : ndarray, shape (s,)
         h - G m.
     weight : float
         Cycles that m rests on.
+    coefficients : int
+        All of them, j.
     """
-    basis = cosines(len(vector)) * variation.scale
-    weights, moments = variation.weights.copy(), variation.moments.copy()
-    K = basis.T @ matrix @ basis
+    sums = _taken(
+        basis(variation, coefficients)[: len(vector)].copy(),
+        matrix,
+        vector,
+        weight / (weight + 1.0),
+        variation.weights,
+        variation.moments,
+        variation.information,
+        variation.cycles + 1,
+    )
+    return Variation(variation.cycles + 1, variation.scale, *sums)
+
+
+def basis(variation: Variation, coefficients: int) -> Samples:
+    """Modes in units of their first guess, as columns, shape (j, 6)."""
+    return cosines(coefficients) * variation.scale
+
+
+@compiled
+def _taken(
+    B: Samples,
+    matrix: Samples,
+    vector: Samples,
+    share: float,
+    weights: Samples,
+    moments: Samples,
+    information: Samples,
+    cycles: int,
+) -> tuple[Samples, Samples, Samples, Samples]:
+    """All sums with one cycle more, and Lambda."""
+    K = B.T @ (matrix @ B)
     K = (K + K.T) / 2.0
     T = np.linalg.inv(np.eye(MODES) + K)
-    r = T @ (basis.T @ vector) * math.sqrt(weight / (weight + 1.0))
+    r = T @ (B.T @ vector)
     W = T @ K
     W = (W + W.T) / 2.0
-    _add(W, np.outer(r, r) - W @ T.T, 1.0, weights, moments)
-    information, cycles = variation.information + K, variation.cycles + 1
-    spread = _solved(weights, moments, information, cycles)
-    return Variation(cycles, variation.scale, weights, moments, information, spread)
+    weights, moments, information = weights.copy(), moments.copy(), information + K
+    _add(W, share * np.outer(r, r) - W @ T.T, 1.0, weights, moments)
+    return weights, moments, information, _spread(weights, moments, information, cycles)
 
 
-def _solved(weights: Samples, moments: Samples, information: Samples, cycles: int) -> Samples:
-    found = np.empty((MODES, MODES))
-    found[UPPER] = linear.solved(weights, moments)
-    found.T[UPPER] = found[UPPER]
+@compiled
+def _spread(weights: Samples, moments: Samples, information: Samples, cycles: int) -> Samples:
+    found, upper, p = np.empty((MODES, MODES)), linear.solved(weights, moments), 0
+    for i in range(MODES):
+        for j in range(i, MODES):
+            found[i, j] = found[j, i] = upper[p]
+            p += 1
     # in units of the noise of one cycle
-    root = np.linalg.cholesky(information / cycles + np.eye(MODES))
-    values, vectors = linear.eigen(root.T @ found @ root)
+    root = linear.factor((information + np.eye(MODES)) / cycles)
+    values, vectors = np.linalg.eigh(root.T @ found @ root)
     # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
     edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0
-    back = np.linalg.solve(root.T, vectors * np.sqrt(np.where(values > edge, values, 0.0)))
-    return np.asarray(back @ back.T + np.linalg.inv(information + np.eye(MODES)))
+    back = linear.backward(root, vectors * np.sqrt(np.where(values > edge, values, 0.0)))
+    # noise in n cycles hides a variance of sqrt(2 / n) of its own
+    spread: Samples = back @ back.T + np.linalg.inv(information / math.sqrt(2.0 * cycles) + np.eye(MODES))
+    return spread
 
 
 def components(variation: Variation, coefficients: int) -> Samples:
     """Principal components as columns, largest first, scaled to their standard deviations, shape (j, 6)."""
-    values, vectors = linear.eigen(variation.spread)
-    scaled = vectors[:, ::-1] * np.sqrt(np.maximum(values[::-1], 0.0))
-    return np.asarray((cosines(coefficients) * variation.scale) @ scaled)
+    return _scaled(variation.spread, basis(variation, coefficients))
+
+
+@compiled
+def _scaled(spread: Samples, B: Samples) -> Samples:
+    values, vectors = np.linalg.eigh(spread)
+    scaled = vectors * np.sqrt(np.maximum(values, 0.0))
+    largest_first: Samples = B @ scaled[:, ::-1].copy()
+    return largest_first
 
 
 @lru_cache(maxsize=8)

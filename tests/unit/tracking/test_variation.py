@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from impactcell.tracking import shapes, variation
+from impactcell.tracking import scan, shapes, variation
 
 COEFFICIENTS = 35
 
@@ -23,7 +23,7 @@ def learned(true_sizes, cycles, seed):
     for _ in range(cycles):
         deviation = basis @ (np.array(true_sizes) * rng.normal(size=variation.MODES))
         vector = G @ deviation + 1e4 * rng.normal(size=COEFFICIENTS)
-        found = variation.learn(found, G, vector, 1e12)
+        found = variation.learn(found, G, vector, 1e12, COEFFICIENTS)
     return found
 
 
@@ -43,7 +43,7 @@ def test_modes_that_do_not_vary_are_zero():
 def test_what_was_never_seen_keeps_the_first_guess():
     found = variation.guess(0.2)
     for _ in range(50):
-        found = variation.learn(found, information(0.0), np.zeros(COEFFICIENTS), 100.0)
+        found = variation.learn(found, information(0.0), np.zeros(COEFFICIENTS), 100.0, COEFFICIENTS)
     assert found.spread == pytest.approx(np.eye(variation.MODES))
 
 
@@ -57,7 +57,7 @@ def test_tail_of_every_family_against_drawn_normal_scores():
     n, level = 3000, 0.02
     counts = dict.fromkeys(("level", "tilt", "bump", "ripple"), 0)
     for _ in range(n):
-        found, _ = shapes.scan(looked, P, root @ rng.normal(size=20), C, 4e-3, 3000.0, 1.0, 1e9)
+        found, _ = scan.scan(looked, P, root @ rng.normal(size=20), C, 4e-3, 3000.0, 1.0, 1e9)
         for name, (p_value, _, _) in found.items():
             counts[name] += p_value < level
     spread = 4.0 * math.sqrt(level / n)
