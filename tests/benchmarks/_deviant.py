@@ -279,9 +279,9 @@ def power_table(*, quick: bool) -> Table:
         "phase and sign of the deviation, the mean, and how cycles vary (level, tilt and half a cosine of 1, "
         "0.5 and 0.5 % sd). The deviation is as large as gives it its power in that very slide, and its "
         "power is the exact one in the slides judged. Bumps lie anywhere from 0.2 to 1.85 mm, 0.2 to "
-        "0.6 mm wide (one sd), ripples of 0.5 to 1.5 mm at any phase. Best possible: the averaged likelihood ratio over "
-        "the four families, knowing all but family, place, width, phase and sign: no test with as few false "
-        "alarms finds more on average."
+        "0.6 mm wide (one sd), ripples of 0.5 to 1.5 mm at any phase. Best possible: the averaged likelihood "
+        "ratio over the four families, knowing all but family, place, width, phase and sign: no test with as "
+        "few false alarms finds more on average."
     )
     return Table("Deviant cycle at 1e-5 false alarms", columns, rows, note)
 

@@ -1,0 +1,47 @@
+"""Small compiled algebra against numpy's."""
+
+import numpy as np
+import pytest
+
+from impactcell.tracking import linear
+
+RNG = np.random.default_rng(4)
+ROOT = RNG.normal(size=(9, 9))
+MATRIX = ROOT @ ROOT.T
+VECTOR = RNG.normal(size=9)
+
+
+def test_solution_of_a_definite_matrix():
+    assert linear.solved(MATRIX, VECTOR) == pytest.approx(np.linalg.solve(MATRIX, VECTOR), rel=1e-9)
+
+
+def test_an_unknown_of_which_nothing_is_known_is_zero():
+    matrix = MATRIX.copy()
+    matrix[4] = matrix[:, 4] = 0.0
+    others = np.arange(9) != 4
+    found = linear.solved(matrix, VECTOR)
+    assert found[4] == 0.0
+    expected = np.linalg.solve(MATRIX[np.ix_(others, others)], VECTOR[others])
+    assert found[others] == pytest.approx(expected, rel=1e-9)
+
+
+def test_integrating_unknowns_out_leaves_the_marginal_of_a_normal_distribution():
+    kept, rest = slice(0, 5), slice(5, 9)
+    information, vector = linear.marginal(
+        MATRIX[kept, kept].copy(),
+        VECTOR[kept].copy(),
+        MATRIX[rest, rest].copy(),
+        MATRIX[rest, kept].copy(),
+        VECTOR[rest].copy(),
+    )
+    covariance, mean = np.linalg.inv(MATRIX), np.linalg.solve(MATRIX, VECTOR)
+    assert np.linalg.inv(information) == pytest.approx(covariance[kept, kept], rel=1e-7)
+    assert np.linalg.solve(information, vector) == pytest.approx(mean[kept], rel=1e-7)
+
+
+def test_unknowns_that_vary_are_known_less():
+    components = RNG.normal(size=(9, 3))
+    information, vector = linear.varied(components, MATRIX, VECTOR)
+    expected = np.linalg.inv(np.linalg.inv(MATRIX) + components @ components.T)
+    assert information == pytest.approx(expected, rel=1e-7)
+    assert vector == pytest.approx(expected @ np.linalg.solve(MATRIX, VECTOR), rel=1e-7)
