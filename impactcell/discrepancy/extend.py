@@ -76,7 +76,9 @@ def search(setup: Setup, nominal: Fit) -> Search:
     plausible = _plausible(setup, first, against, singles[0].fit, rough, alternatives(singles))
     if plausible is not None:
         return plausible
-    tasks = [(setup.coarse, one, setup.library, (setup.seed, 1)) for one in rough[1:SEEDS_OF_PAIRS]]
+    # The likeliest on all samples need not have been so on few.
+    others = [one for one in rough if one.effects != singles[0].fit.effects]
+    tasks = [(setup.coarse, one, setup.library, (setup.seed, 1)) for one in others[: SEEDS_OF_PAIRS - 1]]
     sources = [against.scan, *setup.mapper(_scan, tasks)]
     rough_pairs = _pairs(setup, sources)
     if not rough_pairs:

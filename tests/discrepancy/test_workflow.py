@@ -108,6 +108,15 @@ def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
     assert "weigh the part" in found.proposals[0].setting
 
 
+def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
+    hidden = ("batch_shift", "force_sensor_gain")
+    job = study.Job("two", hidden, 50_028, target=4.108, actuator=False)
+    found = investigate(study.campaign(job, [1.0751, 0.7086]), seed=job.seed)
+    gain = next(one for one in found.added if one != "batch_shift")
+    assert {gain, *found.search.ties[gain]} == {"mass_error", "force_sensor_gain"}
+    assert "batch_shift" in found.added
+
+
 def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
     hidden = "position_dependent_friction"
     found = investigate(make(hidden, seed=920030), library=[one for one in LIBRARY if one != hidden])
