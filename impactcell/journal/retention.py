@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 _CHUNK = 64
 _NS_PER_DAY = 86_400 * 10**9
+ROOM = 0.05
+"""Share of the size that is left free, for what comes until thinning is due again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +18,7 @@ class Retention:
     days, captures_days : float
         Cycles, and captures, older than this are dropped.
     max_size_bytes : int
-        Above this, captures are dropped oldest first, then cycles with their alarms.
+        When less than `ROOM` of it is left, captures are dropped oldest first, then cycles with their alarms.
     """
 
     days: float = 365.0
@@ -39,7 +41,7 @@ def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> None:
     )
     database.execute("DELETE FROM alarms WHERE time_ns < ?", (oldest_ns,))
     database.execute("DELETE FROM audit WHERE time_ns < ?", (oldest_ns,))
-    while _size(database) > keep.max_size_bytes and _drop_oldest(database):
+    while _size(database) > (1.0 - ROOM) * keep.max_size_bytes and _drop_oldest(database):
         pass
     # execute() steps this statement once and gives back a single page; executescript() runs it to its end.
     database.executescript("PRAGMA incremental_vacuum")
