@@ -32,11 +32,11 @@ def users(tmp_path: Path) -> str:
     return password
 
 
-async def connected(endpoint: str, password: str) -> Client:
+def engineer(endpoint: str, password: str) -> Client:
+    """Client of an engineer, not connected yet."""
     client = Client(endpoint)
     client.set_user("eve")
     client.set_password(password)
-    await client.connect()
     return client
 
 
@@ -52,8 +52,7 @@ async def test_every_cycle_once_and_right(tmp_path: Path, users: str) -> None:
         path = write_cell(tmp_path, module["port"])
         async with started("impactcell", "run", str(path)) as service:
             endpoint = (await service.line(r"cell=press-1 at (\S+)"))[1]
-            client = await connected(endpoint, users)
-            async with client:
+            async with engineer(endpoint, users) as client:
                 changes = Changes()
                 subscription = await client.create_subscription(50, changes)
                 static = await node(client, "press-1", "Friction/StaticFriction")
