@@ -23,7 +23,7 @@ from impactcell.tracking import hypotheses
 WEIGHT, CHANGE, MEAN, COVARIANCE, WIDTH = 0, 1, 2, 6, 22
 CAPACITY = 100
 ROWS = CAPACITY + len(hypotheses.STEPS) + 1
-CALIBRATION = 0.52
+CALIBRATION = 0.60
 WINDOW = 1000.0  # cycles within which a change must be to be reported
 RECENT = 10  # change cycles this recent are each kept
 EXPECTED_CYCLES = 100.0  # cycles that the prior probability of an outlier counts for
@@ -48,7 +48,7 @@ def run_cycle(
     bank : ndarray, shape (ROWS, 22)
     design : ndarray
         hazard a cycle, step variance, level and slope process variance a cycle, prior probability of
-        an outlier.
+        an outlier, prior variance of the slope.
     reading : ndarray
         value, variance, cycles passed (0 for one that came late), lag of a late one, its own cycle,
         1 if a batch change was announced just before it (0 if not, -1 if there is surely none).
@@ -65,7 +65,7 @@ def run_cycle(
     statistic : float
         Shiryaev-Roberts log statistic of a change after `accepted`.
     """
-    hazard, step, level_q, slope_q, prior = design
+    hazard, step, level_q, slope_q, prior, slope = design
     value, variance, cycles, lag, cycle, announced = reading
     if cycles > 0.0:
         hypotheses.predict(bank, count, cycles, level_q, slope_q)
@@ -80,7 +80,7 @@ def run_cycle(
     count = hypotheses.prune(bank, count, CAPACITY, RECENT, cycle + lag, accepted)
     # only changes within the window count: over very long spans some tiny change is all but certain
     since = max(accepted, cycle + lag - WINDOW)
-    return count, density, hypotheses.odds(bank, count, since, hazard)
+    return count, density, hypotheses.odds(bank, count, since, hazard, slope)
 
 
 @compiled
@@ -120,10 +120,15 @@ def moments(bank: Samples) -> tuple[Samples, Samples]:
 
 
 def design(
-    hazard: float, step_variance: float, level_variance: float, slope_variance: float, outliers: float
+    hazard: float,
+    step_variance: float,
+    level_variance: float,
+    slope_variance: float,
+    outliers: float,
+    slope_prior: float,
 ) -> Samples:
     """Make the `design` of `run_cycle`."""
-    return np.array([hazard, step_variance, level_variance, slope_variance, outliers])
+    return np.array([hazard, step_variance, level_variance, slope_variance, outliers, slope_prior])
 
 
 def threshold(false_alarm_cycles: float) -> float:

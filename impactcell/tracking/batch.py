@@ -40,6 +40,7 @@ def find_shift(
         state.level_variance,
         state.slope_variance,
         settings.outlier_probability,
+        settings.slope_std**2 * variance,
     )
     values = np.array([reading.mu_s, variance, where.passed, where.lag, where.index, announced])
     outliers = np.array(state.outliers)

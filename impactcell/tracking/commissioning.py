@@ -101,6 +101,7 @@ def replay(
         level_walk**2 * unit,
         slope_walk**2 * unit,
         settings.outlier_probability,
+        slope_std**2,
     )
     outliers = np.zeros(2)
     count, likelihood = banks.run_series(table, len(first), design, readings, outliers, rows[0, INDEX])

@@ -14,12 +14,15 @@ OUTLIER_SCALE = 10.0  # an outlier's standard deviation in units of a good measu
 # mean, standard deviation and probability of a step up, down, a small one up, down, and a large one either
 # way, in units of the prior's standard deviation, which is that of all of them together
 STEPS = (
-    (0.55, 0.25, 0.31),
-    (-0.55, 0.25, 0.31),
-    (0.11, 0.05, 0.165),
-    (-0.11, 0.05, 0.165),
-    (0.0, 3.92, 0.05),
+    (0.6, 0.25, 0.25),
+    (-0.6, 0.25, 0.25),
+    (0.12, 0.035, 0.22),
+    (-0.12, 0.035, 0.22),
+    (0.0, 3.61, 0.06),
 )
+# scales on which wear may go on, all as likely, in units of the slope's prior standard deviation: one normal
+# prior wide enough for the fastest would let a small step pass for wear until there have been many cycles
+SLOPES = (1.0, 0.3, 0.03, 0.003)
 DROPPED_NATS = 30.0  # a hypothesis this far below the best is given up
 
 
@@ -205,11 +208,33 @@ def prune(bank: Samples, count: int, capacity: int, recent: int, cycle: float, a
 
 
 @compiled
-def odds(bank: Samples, count: int, since: float, hazard: float) -> float:
+def slope_evidence(mean: float, variance: float, prior: float) -> float:
+    """Log factor by which the evidence of a row grows when its slope's prior is the mixture over `SLOPES`.
+
+    The row was filtered with N(0, `prior`) and has its slope at N(`mean`, `variance`); what the data alone say
+    is their ratio, and its integral over each scale is in closed form.
+    """
+    if variance >= 0.99 * prior:
+        return 0.0
+    own = 1.0 / (1.0 / variance - 1.0 / prior)
+    square = (mean * own / variance) ** 2
+    flat = own + prior
+    total = 0.0
+    for scale in SLOPES:
+        wide = own + scale**2 * prior
+        total += math.exp(-0.5 * square * (1.0 / wide - 1.0 / flat)) * math.sqrt(flat / wide)
+    return math.log(total / len(SLOPES))
+
+
+@compiled
+def odds(bank: Samples, count: int, since: float, hazard: float, slope_prior: float) -> float:
     """Shiryaev-Roberts log statistic: changed after `since` against not, the prior odds taken out."""
     split = 0
     while split < count and bank[split, 1] <= since:
         split += 1
     if split == 0 or split == count:
         return -np.inf if split == count else np.inf
-    return log_sum(bank, split, count) - log_sum(bank, 0, split) - math.log(hazard)
+    weighed = np.empty((count, 1))
+    for i in range(count):
+        weighed[i, 0] = bank[i, 0] + slope_evidence(bank[i, 3], bank[i, 11], slope_prior)
+    return log_sum(weighed, split, count) - log_sum(weighed, 0, split) - math.log(hazard)

@@ -100,7 +100,7 @@ def wear_table(*, quick: bool) -> list[Table]:
 
 def steps_table(*, quick: bool) -> Table:
     """Delays inside the stream, beside classical charts told wear and level, at the same false alarms."""
-    runs = 30 if quick else 300
+    runs = 30 if quick else 1000
     delays: dict[float, list[float]] = {size: [] for size in SIZES}
     later: list[float] = []
     false = 0

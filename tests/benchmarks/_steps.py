@@ -75,7 +75,7 @@ class Run:
         table = np.zeros((bank.ROWS, bank.WIDTH))
         first = bank.seed(value, 1.0, settings.slope_std, 0, prior)
         table[: len(first)] = first
-        made = bank.design(settings.hazard, settings.step_std**2, 0.0, 0.0, prior)
+        made = bank.design(settings.hazard, settings.step_std**2, 0.0, 0.0, prior, settings.slope_std**2)
         return cls(table, len(first), made, np.zeros(2), 0.0, 1)
 
     def copy(self) -> "Run":

@@ -70,7 +70,7 @@ def test_last_change_and_slope_against_enumeration(shift):
     values = 0.03 * np.arange(6) + rng.normal(size=6)
     values[3:] += shift
     hazard, step_std, slope_std = 0.02, 3.0, 0.1
-    design = bank.design(hazard, step_std**2, 0.0, 0.0, 1e-12)
+    design = bank.design(hazard, step_std**2, 0.0, 0.0, 1e-12, slope_std**2)
     table, densities, _ = run(values, design, slope_std=slope_std)
     last, slope, total = exact_posterior(values, hazard, step_std, slope_std)
     ours = np.zeros(6)
@@ -82,11 +82,30 @@ def test_last_change_and_slope_against_enumeration(shift):
     assert densities.sum() == pytest.approx(total, abs=0.05)
 
 
+@pytest.mark.parametrize("shift", [0.0, 1.5, 4.0])
+def test_the_statistic_against_enumeration_over_every_scale_of_the_wear(shift):
+    rng = np.random.default_rng(8)
+    values = 0.2 * np.arange(6) + rng.normal(size=6)
+    values[3:] += shift
+    hazard, step_std, slope_std = 0.02, 3.0, 2.0
+    design = bank.design(hazard, step_std**2, 0.0, 0.0, 1e-12, slope_std**2)
+    _, _, statistics = run(values, design, slope_std=slope_std)
+    changed, unchanged = [], []
+    for scale in hypotheses.SLOPES:
+        last, _, total = exact_posterior(values, hazard, step_std, scale * slope_std)
+        changed.append(math.exp(total) * last[1:].sum())
+        unchanged.append(math.exp(total) * last[0])
+    exact = math.log(sum(changed) / sum(unchanged) / hazard)
+    # one normal prior for the slope, as wide as the widest, would give another
+    assert abs(math.log(changed[0] / unchanged[0] / hazard) - exact) > 0.05
+    assert statistics[-1] == pytest.approx(exact, abs=0.01)
+
+
 def test_one_hypothesis_is_filterpys_kalman_filter():
     rng = np.random.default_rng(1)
     values = 0.2 + 0.002 * rng.normal(size=300) + 1e-5 * np.arange(300)
     variance, level_q, slope_q = 4e-6, 1e-9, 1e-13
-    design = bank.design(1e-3, 1e-4, level_q, slope_q, 0.0)
+    design = bank.design(1e-3, 1e-4, level_q, slope_q, 0.0, 1e-8)
     table = np.zeros((bank.ROWS, bank.WIDTH))
     table[0] = bank.seed(values[0], variance, 1e-4, 0, 0.01)[0]
     table[0, bank.WEIGHT] = 0.0
@@ -112,7 +131,7 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
 def test_a_late_reading_gives_the_same_state_as_in_time():
     rng = np.random.default_rng(2)
     values = rng.normal(size=60)
-    design = bank.design(1e-3, 16.0, 0.0, 0.0, 1e-12)
+    design = bank.design(1e-3, 16.0, 0.0, 0.0, 1e-12, 0.01)
 
     def take(order):
         table = np.zeros((bank.ROWS, bank.WIDTH))
@@ -136,7 +155,7 @@ def test_an_announced_change_leaves_one_history_and_knows_its_size():
     values = rng.normal(size=400)
     values[200:] += 2.0
     told = np.where(np.arange(400) == 200, 1.0, -1.0)
-    table, _, _ = run(values, bank.design(1e-3, 16.0, 0.0, 0.0, 0.003), announced=told)
+    table, _, _ = run(values, bank.design(1e-3, 16.0, 0.0, 0.0, 0.003, 0.01), announced=told)
     assert {int(row[bank.CHANGE]) for row in table} == {200}
     cycle, size, std = bank.last_shift(table, 199, 200)
     assert cycle == 200
@@ -149,7 +168,7 @@ def test_the_bank_stays_small_and_normalised_over_a_long_run():
     rng = np.random.default_rng(5)
     values = rng.normal(size=3000)
     values[::97] += 12.0
-    table, _, statistics = run(values, bank.design(3e-3, 16.0, 0.0, 0.0, 0.003))
+    table, _, statistics = run(values, bank.design(3e-3, 16.0, 0.0, 0.0, 0.003, 0.01))
     assert len(table) <= bank.CAPACITY
     assert np.exp(table[:, bank.WEIGHT]).sum() == pytest.approx(1.0, abs=1e-9)
     assert np.all(np.diff(table[:, bank.CHANGE]) >= 0)
@@ -172,7 +191,7 @@ def test_how_many_outliers_there_are_is_learned(share):
     table = np.zeros((bank.ROWS, bank.WIDTH))
     first = bank.seed(values[0], 1.0, 0.1, 0, prior)
     table[: len(first)] = first
-    count, outliers, made = len(first), np.zeros(2), bank.design(3e-3, 16.0, 0.0, 0.0, prior)
+    count, outliers, made = len(first), np.zeros(2), bank.design(3e-3, 16.0, 0.0, 0.0, prior, 0.01)
     for t, value in enumerate(values[1:], start=1):
         reading = np.array([value, 1.0, 1.0, 0.0, t, 0.0])
         count, _, _ = bank.run_cycle(table, count, made, reading, outliers, 0.0)
@@ -195,7 +214,9 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
         if done.shift is not None:
             ours.append((i, done.shift.change_cycle, done.shift.size / std))
     # the bank, told what the tracker has to learn: the scale of the noise
-    made = bank.design(config.hazard, config.step_std**2, 0.0, 0.0, config.outlier_probability)
+    made = bank.design(
+        config.hazard, config.step_std**2, 0.0, 0.0, config.outlier_probability, config.slope_std**2
+    )
     table, outliers = np.zeros((bank.ROWS, bank.WIDTH)), np.zeros(2)
     first = bank.seed(z[0], 1.0, config.slope_std, 0, config.outlier_probability)
     table[: len(first)] = first
