@@ -8,50 +8,22 @@ taken for an answer. A disconnect fails all that is pending at once.
 import asyncio
 import socket
 from collections import deque
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
-from impactcell.fieldbus.codec import BUSY, FrameReader, Request, check_reply
+from impactcell.fieldbus.codec import BUSY, FrameReader, check_reply
+from impactcell.fieldbus.exchange import Batch, Exchange, Flight
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.transactions import Transactions
 
 BUSY_PAUSE_S: Final = 0.02
 """How long a device that said busy is left alone; it is asked again until the timeout has passed."""
 _QUICKACK: Final[int | None] = getattr(socket, "TCP_QUICKACK", None)
+_RECEIVED_AT_ONCE: Final = 65_536
 
 
-class Exchange:
-    """Requests that are answered together: what a block still lacks, or one write.
-
-    `data` receives registers at `Part.offset`; `missing` holds the offsets not answered yet.
-    """
-
-    __slots__ = ("data", "done", "missing")
-
-    def __init__(self, data: bytearray, missing: set[int]) -> None:
-        self.data = data
-        self.missing = missing
-        self.done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-
-    def fail(self, error: FieldbusError) -> None:
-        """End it with an error, unless it has ended already."""
-        if not self.done.done():
-            self.done.set_exception(error)
-
-
-@dataclass(slots=True, eq=False)
-class Part:
-    """One request of an exchange, where its registers go, and when it was first and last sent."""
-
-    exchange: Exchange
-    request: Request
-    offset: int
-    first_sent_s: float = 0.0
-    sent_s: float = 0.0
-
-
-class Connection(asyncio.Protocol):
+class Connection(asyncio.BufferedProtocol):
     """One connection, from its making to its loss; it is never used again after that.
 
     Attributes
@@ -62,7 +34,7 @@ class Connection(asyncio.Protocol):
         Set once the socket is gone.
     """
 
-    def __init__(self, link: ModuleLink, transactions: Iterator[bytes]) -> None:
+    def __init__(self, link: ModuleLink, transactions: Transactions) -> None:
         self.link = link
         self.round_trip_s = float("nan")
         self.lost = asyncio.Event()
@@ -70,10 +42,12 @@ class Connection(asyncio.Protocol):
         self._transactions = transactions
         self._transport: asyncio.Transport | None = None
         self._socket: socket.socket | None = None
+        self._received = memoryview(bytearray(_RECEIVED_AT_ONCE))
         self._reader = FrameReader()
-        self._waiting: deque[Part] = deque()
-        self._flying: dict[bytes, Part] = {}
-        self._busy: dict[asyncio.TimerHandle, Part] = {}
+        self._waiting: deque[Batch] = deque()
+        self._flying: list[Flight] = []
+        self._in_flight = 0
+        self._busy: dict[asyncio.TimerHandle, Batch] = {}
         self._unconfirmed: list[Exchange] = []
         self._timer: asyncio.TimerHandle | None = None
         self._resting: asyncio.TimerHandle | None = None
@@ -83,14 +57,16 @@ class Connection(asyncio.Protocol):
         """Whether requests can be sent."""
         return self._transport is not None
 
-    def submit(self, parts: Iterable[Part], *, first: bool = False) -> None:
-        """Send `parts` as the window allows; `first`: before all that waits."""
+    def submit(self, batches: Sequence[Batch], *, first: bool = False) -> None:
+        """Send `batches` as the window allows; `first`: before all that waits."""
         if self._transport is None:
             raise LinkError(f"{self.link}: not connected")
+        for batch in batches:
+            batch.exchange.unanswered += len(batch.requests)
         if first:
-            self._waiting.extendleft(parts)
+            self._waiting.extendleft(batches)
         else:
-            self._waiting.extend(parts)
+            self._waiting.extend(batches)
         self._pump()
 
     def give_up(self, error: FieldbusError) -> None:
@@ -98,15 +74,16 @@ class Connection(asyncio.Protocol):
         for handle in (self._timer, self._resting, *self._busy):
             if handle is not None:
                 handle.cancel()
-        pending = [*self._flying.values(), *self._busy.values(), *self._waiting]
+        pending = [*(flight.batch for flight in self._flying), *self._busy.values(), *self._waiting]
         self._timer = self._resting = None
         self._busy.clear()
         self._flying.clear()
+        self._in_flight = 0
         self._waiting.clear()
         transport, self._transport = self._transport, None
         if transport is not None:
             transport.abort()
-        for exchange in (*self._unconfirmed, *(part.exchange for part in pending)):
+        for exchange in (*self._unconfirmed, *(batch.exchange for batch in pending)):
             exchange.fail(error)
         self._unconfirmed.clear()
 
@@ -117,17 +94,19 @@ class Connection(asyncio.Protocol):
         if _QUICKACK is not None:
             self._socket = transport.get_extra_info("socket")
 
-    def data_received(self, data: bytes) -> None:
+    def get_buffer(self, sizehint: int) -> memoryview:  # noqa: ARG002 - asyncio's signature
+        """Return where to receive (called by asyncio)."""
+        return self._received
+
+    def buffer_updated(self, nbytes: int) -> None:
         """Match replies with requests and send the next ones (called by asyncio)."""
         if self._transport is None:
             return
-        if self._socket is not None and _QUICKACK is not None:
-            # The system falls back to delayed acknowledgements by itself, so this is set anew on each read.
-            self._socket.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
         try:
-            rest = self._take_good(self._reader.take(data))
-            for transaction, unit, pdu in self._reader.feed(rest):
-                self._answer(transaction, unit, pdu)
+            rest = self._take_good(self._reader.take(bytes(self._received[:nbytes])))
+            if rest:
+                for transaction, unit, pdu in self._reader.feed(rest):
+                    self._answer(transaction, unit, pdu)
             if not self._reader.pending and not self._flying:
                 self._confirm()
         except ProtocolError as error:
@@ -138,8 +117,10 @@ class Connection(asyncio.Protocol):
             return
         if self.link.pause_s and self._resting is None:
             self._resting = self._loop.call_later(self.link.pause_s, self._rested)
-        else:
-            self._pump()
+        if not self._pump() and self._flying and self._socket is not None and _QUICKACK is not None:
+            # A peer that holds back small replies waits for this; else the next request says it as well. The
+            # system falls back to delayed acknowledgements by itself, so it is set anew each time.
+            self._socket.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail what is pending (called by asyncio)."""
@@ -147,85 +128,106 @@ class Connection(asyncio.Protocol):
         if self._transport is not None:
             self.give_up(LinkError(f"{self.link}: connection lost{f': {exc}' if exc else ''}"))
 
-    def _pump(self) -> None:
-        """Send what the window allows, in one write."""
+    def _pump(self) -> bool:
+        """Send what the window allows, in one write; return whether there was anything."""
         if self._transport is None or self._resting is not None:
-            return
+            return False
         frames: list[bytes] = []
         now = self._loop.time()
-        while self._waiting and len(self._flying) < self.link.window:
-            part = self._waiting.popleft()
-            if part.exchange.done.done():  # its block has failed, or nobody waits for it any more
+        while self._waiting and (room := self.link.window - self._in_flight) > 0:
+            batch = self._waiting[0]
+            if batch.exchange.done.done():  # its block has failed, or nobody waits for it any more
+                self._waiting.popleft()
                 continue
-            part.sent_s = now
-            part.first_sent_s = part.first_sent_s or now
-            transaction = next(self._transactions)
-            while transaction in self._flying:
-                transaction = next(self._transactions)
-            self._flying[transaction] = part
-            frames += (transaction, part.request.tail)
+            if len(batch.requests) > room:
+                batch = batch.split(room)
+            else:
+                self._waiting.popleft()
+            flight = Flight(batch, self._fresh_transactions(len(batch.requests)), now)
+            self._flying.append(flight)
+            self._in_flight += len(batch.requests)
+            frames += flight.frames()
         if frames:
             self._transport.write(b"".join(frames))
             if self._timer is None:
                 self._timer = self._loop.call_later(self.link.timeout_s, self._check_time)
+        return bool(frames)
+
+    def _fresh_transactions(self, count: int) -> tuple[bytes, ...]:
+        """Draw transaction ids, none of which is in flight."""
+        drawn = self._transactions.draw(count)
+        for flight in self._flying:
+            if not set(drawn).isdisjoint(flight.transactions):
+                return self._fresh_transactions(count)
+        return drawn
 
     def _check_time(self) -> None:
         """Give up if the oldest request has waited too long; else look again when it will have."""
         self._timer = None
         if not self._flying:
             return
-        oldest = next(iter(self._flying.values()))  # a dictionary keeps the order of sending
+        oldest = self._flying[0]  # they stay in the order of sending
         left_s = oldest.sent_s + self.link.timeout_s - self._loop.time()
         if left_s > 0.0:
             self._timer = self._loop.call_later(left_s, self._check_time)
             return
         timeout = f"within {self.link.timeout_s:g} s"
-        self.give_up(LinkError(f"{self.link}: no answer to {oldest.request.what} {timeout}"))
+        self.give_up(LinkError(f"{self.link}: no answer to {oldest.batch.requests[0].what} {timeout}"))
 
-    def _take_good(self, data: bytes) -> bytes:
-        """Use the good replies at the front of `data` up to the first that is not, or not whole; the rest.
-
-        Nearly all are good, and of those everything but the data is known beforehand: they are compared with
-        it and need no taking apart.
-        """
-        flying, at, size = self._flying, 0, len(data)
-        while (part := flying.get(transaction := data[at : at + 2])) is not None:
-            head, length = part.request.reply_head, part.request.data_length
-            end = at + 2 + len(head) + length
-            if end > size or not data.startswith(head, at + 2):
+    def _take_good(self, stream: bytes) -> bytes:
+        """Use the good replies at the front of `stream`, up to anything unusual; return the rest."""
+        at = 0
+        while self._flying:
+            flight = self._flying[0]
+            count, at, data = flight.good_replies(stream, at)
+            if not count:
                 break
-            self._use(transaction, part, data[end - length : end])
-            at = end
-        return data[at:]
-
-    def _use(self, transaction: bytes, part: Part, data: bytes) -> None:
-        """Take the data of a good reply."""
-        if self._unconfirmed:
-            self._confirm()
-        del self._flying[transaction]
-        exchange, offset = part.exchange, part.offset
-        exchange.data[offset : offset + len(data)] = data
-        exchange.missing.discard(offset)
-        if not exchange.missing:
-            self.round_trip_s = self._loop.time() - part.sent_s
-            self._unconfirmed.append(exchange)
+            self._use(self._land(flight, 0, count), data)
+        return stream[at:]
 
     def _answer(self, number: int, unit: int, pdu: bytes) -> None:
         """Use one reply; raises ProtocolError, with the request still open, where it is not a good one."""
         transaction = number.to_bytes(2, "big")
-        part = self._flying.get(transaction)
-        if part is None:
+        flight = next((each for each in self._flying if transaction in each.transactions), None)
+        if flight is None:
             raise ProtocolError(f"an answer to transaction {number}, which is not open")
+        at = flight.transactions.index(transaction)
+        request = flight.batch.requests[at]
         if unit != self.link.device_id:
-            raise ProtocolError(f"an answer from device {unit} to {part.request.what}")
+            raise ProtocolError(f"an answer from device {unit} to {request.what}")
         try:
-            data = check_reply(part.request, pdu)
+            data = check_reply(request, pdu)
         except ModbusExceptionError as refused:
             self._confirm()
-            del self._flying[transaction]
-            self._refused(part, refused)
+            self._refused(self._land(flight, at, 1), refused)
             return
-        self._use(transaction, part, data)
+        self._use(self._land(flight, at, 1), data)
+
+    def _land(self, flight: Flight, first: int, count: int) -> Flight:
+        """Take `count` requests of `flight`, from `first` on, out of what is in flight."""
+        self._in_flight -= count
+        at = self._flying.index(flight)
+        if first:
+            self._flying.insert(at, flight.split(first))
+            at += 1
+        if count < len(flight.transactions):
+            return flight.split(count)
+        return self._flying.pop(at)
+
+    def _use(self, landed: Flight, data: bytes) -> None:
+        """Take the data of good replies."""
+        if self._unconfirmed:
+            self._confirm()
+        batch = landed.batch
+        exchange, count = batch.exchange, len(batch.requests)
+        if exchange.done.done():  # it has ended, and what came until then may be in use
+            return
+        if batch.block is not None:
+            batch.block.fill(batch.first, count, data)
+        exchange.unanswered -= count
+        if not exchange.unanswered:
+            self.round_trip_s = self._loop.time() - landed.sent_s
+            self._unconfirmed.append(exchange)
 
     def _confirm(self) -> None:
         """Hand over what is complete, now that the stream is known to be in step.
@@ -239,21 +241,22 @@ class Connection(asyncio.Protocol):
                 exchange.done.set_result(None)
         self._unconfirmed.clear()
 
-    def _refused(self, part: Part, refused: ModbusExceptionError) -> None:
-        if (
-            refused.code == BUSY
-            and self._loop.time() + BUSY_PAUSE_S < part.first_sent_s + self.link.timeout_s
-        ):
+    def _refused(self, landed: Flight, refused: ModbusExceptionError) -> None:
+        """Ask a busy device again for the one request that it refused; else end its exchange."""
+        batch = landed.batch
+        exchange = batch.exchange
+        first_sent_s = exchange.first_sent_s.setdefault(batch.requests[0], landed.sent_s)
+        if refused.code == BUSY and self._loop.time() + BUSY_PAUSE_S < first_sent_s + self.link.timeout_s:
 
             def again() -> None:
                 del self._busy[handle]
-                self._waiting.appendleft(part)
+                self._waiting.appendleft(batch)
                 self._pump()
 
             handle = self._loop.call_later(BUSY_PAUSE_S, again)
-            self._busy[handle] = part
+            self._busy[handle] = batch
             return
-        part.exchange.fail(ModbusExceptionError(f"{self.link}: {refused}", refused.code))
+        exchange.fail(ModbusExceptionError(f"{self.link}: {refused}", refused.code))
 
     def _rested(self) -> None:
         self._resting = None

@@ -250,19 +250,22 @@ def _channel(
     values = np.asarray(register.decode(words), dtype=np.float64)
     time_s = uniform_times(start_s, rate_hz, values.size)
     full_scale = register.full_scale
-    if full_scale is not None:
-        clipped = int(np.count_nonzero((values <= full_scale[0]) | (values >= full_scale[1])))
+    least, most = values.min(), values.max()  # nan where one of the samples is
+    if full_scale is not None and not (full_scale[0] < least and most < full_scale[1]):
+        low, high = full_scale
+        clipped = np.count_nonzero((values <= low) | (values >= high))
         if clipped:
-            low, high = full_scale
             faults.append(f"{where}: {clipped} samples at full scale ({low:g} to {high:g})")
-    known = np.isfinite(values)
-    gaps = int(values.size - np.count_nonzero(known))
-    if gaps:
-        faults.append(f"{where}: {gaps} of {values.size} samples are not a number")
+    if not (math.isfinite(least) and math.isfinite(most)):
+        known = np.isfinite(values)
+        faults.append(
+            f"{where}: {known.size - np.count_nonzero(known)} of {known.size} samples are not a number"
+        )
         time_s, values = time_s[known], values[known]
-    if not values.size:
-        return None
-    if values.size > 1 and values.min() == values.max():
-        faults.append(f"{where}: constant at {values[0]:g}")
+        if not values.size:
+            return None
+        least, most = values.min(), values.max()
+    if values.size > 1 and least == most:
+        faults.append(f"{where}: constant at {least:g}")
     resolution = None if register.kind in ("f32", "f64") else register.si_factor
     return Channel(time_s, values, full_scale=full_scale, resolution=resolution)

@@ -1,15 +1,16 @@
 """Registers by name, over a client: neighbouring registers are read in as few requests as may be."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from impactcell.errors import ProtocolError
 from impactcell.fieldbus.codec import MAX_WRITE
-from impactcell.fieldbus.registers import Register, RegisterMap, Value, Words
+from impactcell.fieldbus.exchange import PartialBlock
+from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Words
 from impactcell.fieldbus.transport import ModbusClient
 
 _TORN_READS: Final = 8
@@ -22,7 +23,18 @@ class Block:
     table: str
     address: int
     count: int
-    registers: tuple[Register, ...]
+    fields: tuple[tuple[Register, slice], ...]
+
+    @classmethod
+    def of(cls, registers: Sequence[Register]) -> Self:
+        """Make the block from the first to the last of `registers`, which are in the order of addresses."""
+        first = registers[0].address
+        fields = tuple((each, slice(each.address - first, each.end - first)) for each in registers)
+        return cls(registers[0].table, first, registers[-1].end - first, fields)
+
+    def decode(self, words: Words) -> dict[str, Value]:
+        """Values in its words, by name."""
+        return {register.name: register.decode(words[where]) for register, where in self.fields}
 
 
 def plan(registers: Iterable[Register], max_registers: int) -> tuple[Block, ...]:
@@ -37,10 +49,7 @@ def plan(registers: Iterable[Register], max_registers: int) -> tuple[Block, ...]
             last.append(register)
         else:
             blocks.append([register])
-    return tuple(
-        Block(group[0].table, group[0].address, group[-1].end - group[0].address, tuple(group))
-        for group in blocks
-    )
+    return tuple(Block.of(group) for group in blocks)
 
 
 class MappedDevice:
@@ -49,57 +58,51 @@ class MappedDevice:
     def __init__(self, client: ModbusClient, registers: RegisterMap) -> None:
         self.client = client
         self.registers = registers
-        self._header = registers.header()
+        self._header = Block.of(registers.header())
         self._plans: dict[tuple[str, ...], tuple[Block, ...]] = {}
-        self._merged: dict[tuple[str, ...], tuple[list[dict[str, Value]], dict[str, Value]]] = {}
-        self._last: dict[Block, tuple[bytes, dict[str, Value]]] = {}
+        self._last: dict[tuple[str, ...], tuple[list[bytes], dict[str, Value]]] = {}
 
     async def values(self, names: tuple[str, ...]) -> Mapping[str, Value]:
         """Read registers and decode them, in SI; those that the map does not have are left out.
 
         What shows the same words as before comes back as the very same mapping.
         """
-        parts = [self._decoded(block, await self._block(block)) for block in self._blocks(names)]
-        last = self._merged.get(names)
-        if last is None or any(part is not before for part, before in zip(parts, last[0], strict=True)):
-            last = self._merged[names] = (parts, {key: part[key] for part in parts for key in part})
+        blocks = self._blocks(names)
+        raw = [words.tobytes() for words in await self._read(blocks)]
+        last = self._last.get(names)
+        if last is None or last[0] != raw:  # nearly always a poll finds all unchanged
+            found: dict[str, Value] = {}
+            for i, block in enumerate(blocks):
+                if block.count > self.client.link.max_registers:
+                    raw[i] = await self._settled(block, raw[i])
+                found |= block.decode(np.frombuffer(raw[i], WIRE))
+            last = self._last[names] = (raw, found)
         return last[1]
 
-    def _decoded(self, block: Block, words: Words) -> dict[str, Value]:
-        """Decode a block; what a poll finds unchanged, which is nearly always, is not decoded again."""
-        raw = words.tobytes()
-        last = self._last.get(block)
-        if last is None or last[0] != raw:
-            found = {
-                register.name: register.decode(
-                    words[register.address - block.address : register.end - block.address]
-                )
-                for register in block.registers
-            }
-            last = self._last[block] = (raw, found)
-        return last[1]
+    def part(self, name: str, values: int) -> PartialBlock:
+        """Give the first `values` values of a register as a block that is still to be read."""
+        register = self.registers[name]
+        return self.client.block(register.address, values * register.words_per_value, register.table)
 
     async def words(self, name: str, values: int) -> Words:
-        """Read the words of the first `values` values of an array."""
-        register = self.registers[name]
-        count = values * register.words_per_value
-        return await self.client.read(register.address, count, register.table)
+        """Read the words of the first `values` values of a register."""
+        part = self.part(name, values)
+        await self.client.complete(part)
+        return part.words()
 
-    async def header(self) -> tuple[dict[str, Value], Words]:
-        """Read the window's header: its values, and its words from `window_sequence` to the first array."""
-        fields = self._header
-        blocks = self._blocks(tuple(register.name for register in fields))
-        first = fields[0].address
-        words = np.zeros(fields[-1].end - first, dtype=">u2")
-        found: dict[str, Value] = {}
-        parts = [self.client.block(block.address, block.count, block.table) for block in blocks]
-        await self.client.complete(*parts)
-        for part in parts:
-            words[part.address - first : part.address - first + part.count] = part.words()
-        for register in fields:
-            at = register.address - first
-            found[register.name] = register.decode(words[at : at + register.words])
-        return found, words
+    async def header(self, slot: int | None = None) -> tuple[dict[str, Value], Words]:
+        """Read the window's header: its values, and its words from `window_sequence` to the first array.
+
+        With `slot` that is selected right before; a device that is busy meanwhile may still show another.
+        """
+        header = self._header
+        words = np.zeros(header.count, dtype=WIRE)
+        blocks = self._blocks(tuple(register.name for register, _ in header.fields))
+        select = self.registers["slot_select"]
+        write = None if slot is None else (select.address, select.encode(slot))
+        for block, part in zip(blocks, await self._read(blocks, write), strict=True):
+            words[block.address - header.address :][: block.count] = part
+        return header.decode(words), words
 
     async def write(self, values: Mapping[str, ArrayLike | str]) -> None:
         """Write registers; neighbours go out in one request, so that the device takes them together."""
@@ -115,16 +118,17 @@ class MappedDevice:
             blocks = self._plans[names] = plan(present, self.client.link.max_registers)
         return blocks
 
-    async def _block(self, block: Block) -> Words:
-        """Read a block; one that takes several requests is read until two readings agree."""
-        words = await self.client.read(block.address, block.count, block.table)
-        if block.count <= self.client.link.max_registers:
-            return words
+    async def _read(self, blocks: Iterable[Block], write: tuple[int, Words] | None = None) -> list[Words]:
+        parts = [self.client.block(block.address, block.count, block.table) for block in blocks]
+        await self.client.complete(*parts, write=write)
+        return [part.words() for part in parts]
+
+    async def _settled(self, block: Block, raw: bytes) -> bytes:
+        """Read a block that takes several requests until two readings agree; `raw` is the first."""
         for _ in range(_TORN_READS):
-            again = await self.client.read(block.address, block.count, block.table)
-            if np.array_equal(words, again):
-                return words
-            words = again
+            before, raw = raw, (await self._read([block]))[0].tobytes()
+            if before == raw:
+                return raw
         raise ProtocolError(
             f"{self.client.link}: {block.count} registers from {block.address} "
             "change faster than they can be read"

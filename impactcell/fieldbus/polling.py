@@ -15,13 +15,16 @@ IDLE_S: Final = 0.1
 _GAIN: Final = 0.25
 _LONGEST: Final = 3.0
 """A longer time between cycles, in periods, is a pause or a clock that was set, and counts as this."""
+_DRIFT: Final = 5e-4
+"""The most by which the module's clock can be slow or fast."""
 
 
 class PollSchedule:
     """Learns the cycle period and how much it varies.
 
     Both come from the cycles' own times: those at which a busy service sees them vary with its load, and
-    would make it poll the more the less time it has.
+    would make it poll the more the less time it has. So does when the next one is due: a cycle seen late must
+    not make the next one late as well. What the module's clock shows is known from the cycle seen soonest.
     """
 
     def __init__(self) -> None:
@@ -29,6 +32,8 @@ class PollSchedule:
         self._made_s: float | None = None
         self._period_s: float | None = None
         self._spread_s = 0.0
+        self._offset_s = 0.0
+        self._due_s = 0.0
 
     def saw_cycle(self, now_s: float) -> None:
         """Take note that a poll showed a new cycle."""
@@ -45,6 +50,12 @@ class PollSchedule:
                 self._period_s += _GAIN * error_s
                 self._spread_s += _GAIN * (abs(error_s) - self._spread_s)
         self._made_s = made_s
+        if self._seen_s is not None and self._period_s is not None:
+            self._offset_s += _DRIFT * self._period_s
+            late_s = self._seen_s - made_s - self._offset_s
+            if not 0.0 <= late_s < self._period_s:  # seen sooner than any, or a clock was set
+                self._offset_s += late_s
+            self._due_s = made_s + self._offset_s + self._period_s
 
     def delay_s(self, now_s: float, round_trip_s: float) -> float:
         """Return the wait before the next poll; at least three round trips, so that a slow line has rest."""
@@ -52,13 +63,11 @@ class PollSchedule:
         least_s = max(fine_s, 3.0 * round_trip_s if round_trip_s == round_trip_s else 0.0)
         if self._seen_s is None or self._period_s is None:
             return max(least_s, QUIET_S)
-        age_s = now_s - self._seen_s
-        margin_s = 3.0 * self._spread_s + FINE_S
-        until_due_s = self._period_s - margin_s - age_s
-        if until_due_s > 0.0:
+        margin_s = 2.0 * self._spread_s + FINE_S
+        overdue_s = now_s - self._due_s
+        if overdue_s < -margin_s:
             regular = 10.0 * margin_s < self._period_s
-            return max(least_s, min(until_due_s, REGULAR_S if regular else QUIET_S))
-        if age_s < self._period_s + margin_s:
+            return max(least_s, min(-margin_s - overdue_s, REGULAR_S if regular else QUIET_S))
+        if overdue_s < margin_s:
             return least_s
-        overdue_s = age_s - self._period_s
         return max(least_s, min(IDLE_S, QUIET_S if overdue_s < 3.0 * self._period_s else 0.1 * overdue_s))

@@ -7,6 +7,7 @@ block becomes an array of samples by a view, not register by register.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from struct import Struct
 from typing import Any, Final
 
 import numpy as np
@@ -53,6 +54,8 @@ KINDS: Final[Mapping[str, np.dtype[Any]]] = {
     "f64": np.dtype(">f8"),
 }
 """Numeric types of a register; `string` is the other one."""
+_NUMBERS: Final = {kind: Struct(f">{code}") for kind, code in zip(KINDS, "HhIiQfd", strict=True)}
+"""The same for a single number, without the detour over an array."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,19 +172,26 @@ class Register:
         if self.kind == "string":
             text = np.ascontiguousarray(words, dtype=WIRE).tobytes().split(b"\0", 1)[0]
             return text.decode("utf-8", errors="replace").rstrip()
-        raw = self.raw(words)
         if self.count == 1:
-            if raw.size != 1:
-                raise MapError(f"register {self.name} takes {self.words} words, not {words.size}")
-            if self.is_code:
-                return int(raw[0])
-            return math.nan if raw[0] == self.not_a_number else float(raw[0]) * self.si_factor
+            return self._number(words)
+        raw = self.raw(words)
         if self.is_code:
             return raw.astype(np.int64)
-        values = raw.astype(np.float64) * self.si_factor
+        codes = raw.astype(raw.dtype.newbyteorder("="))
+        values: NDArray[np.float64] = np.multiply(codes, self.si_factor, dtype=np.float64)
         if self.not_a_number is not None:
-            values[raw == self.not_a_number] = np.nan
+            values[codes == self.not_a_number] = np.nan
         return values
+
+    def _number(self, words: Words) -> int | float:
+        if words.size != self.words:
+            raise MapError(f"register {self.name} takes {self.words} words, not {words.size}")
+        wire = words[::-1] if self.word_order == "little" else words
+        code: int | float
+        (code,) = _NUMBERS[self.kind].unpack(wire.astype(WIRE, copy=False).tobytes())
+        if self.is_code:
+            return code
+        return math.nan if code == self.not_a_number else float(code) * self.si_factor
 
     def encode(self, value: ArrayLike | str) -> Words:
         """Words of `value` (SI, text, or an array of at most `count` values), dtype `WIRE`.

@@ -95,7 +95,7 @@ def capture_crc32(header: Words, *arrays: Words) -> int:
     """
     crc = 0
     for words in (header, *arrays):
-        crc = zlib.crc32(np.ascontiguousarray(words, dtype=WIRE).tobytes(), crc)
+        crc = zlib.crc32(np.ascontiguousarray(words, dtype=WIRE).data, crc)
     return crc
 
 

@@ -2,69 +2,14 @@
 
 import asyncio
 import contextlib
-import itertools
-import random
-from collections.abc import Iterator
-from functools import lru_cache
-from typing import Final
-
-import numpy as np
 
 from impactcell.errors import LinkError
-from impactcell.fieldbus.codec import Function, Request, read_request, write_request
-from impactcell.fieldbus.connection import Connection, Exchange, Part
+from impactcell.fieldbus.codec import write_request
+from impactcell.fieldbus.connection import Connection
+from impactcell.fieldbus.exchange import Batch, Exchange, PartialBlock
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.registers import WIRE, Words
-
-_STRIDE: Final = 40_503
-"""Odd, so that it visits all 16-bit numbers; 2^16 over the golden ratio, so that neighbours lie far apart."""
-_READ_FUNCTION: Final = {"holding": Function.READ_HOLDING, "input": Function.READ_INPUT}
-
-
-def _transactions() -> Iterator[bytes]:
-    """Yield transaction ids: each of the 65 536 once before any comes again.
-
-    They start anywhere, so that a gateway's late reply to an earlier client is not for one of ours, and lie
-    far apart, so that a peer that is off by a little never hits another request in flight.
-    """
-    start = random.getrandbits(16)
-    return (((start + number * _STRIDE) & 0xFFFF).to_bytes(2, "big") for number in itertools.count())
-
-
-@lru_cache(maxsize=256)
-def _requests(table: str, address: int, count: int, step: int, unit: int) -> tuple[tuple[int, Request], ...]:
-    """Cut a block into requests, each with where in its bytes the reply goes."""
-    function = _READ_FUNCTION[table]
-    return tuple(
-        (2 * first, read_request(function, address + first, min(step, count - first), unit))
-        for first in range(0, count, step)
-    )
-
-
-class PartialBlock:
-    """A block of registers, as far as it has been read.
-
-    Attributes
-    ----------
-    data : bytearray
-        The registers, big-endian; zero where they are missing.
-    missing : set of int
-        Where in `data` the requests go that have not been answered.
-    """
-
-    __slots__ = ("address", "count", "data", "missing", "step", "table")
-
-    def __init__(self, address: int, count: int, table: str, step: int) -> None:
-        self.address = address
-        self.count = count
-        self.table = table
-        self.step = step
-        self.data = bytearray(2 * count)
-        self.missing = set(range(0, 2 * count, 2 * step))
-
-    def words(self) -> Words:
-        """Return the registers, shape (count,), dtype `WIRE`."""
-        return np.frombuffer(self.data, dtype=WIRE)
+from impactcell.fieldbus.registers import Words
+from impactcell.fieldbus.transactions import Transactions
 
 
 class ModbusClient:
@@ -77,7 +22,7 @@ class ModbusClient:
     def __init__(self, link: ModuleLink) -> None:
         self.link = link
         self._connection: Connection | None = None
-        self._transactions = _transactions()
+        self._transactions = Transactions()
 
     @property
     def connected(self) -> bool:
@@ -144,31 +89,29 @@ class ModbusClient:
         """Give a block of registers that is still to be read, by `complete`."""
         return PartialBlock(address, count, table, self.link.max_registers)
 
-    async def complete(self, *blocks: PartialBlock) -> None:
-        """Read what `blocks` still lack; after an error they keep what did arrive. Raises as `read` does."""
-        exchanges: list[Exchange] = []
-        parts: list[Part] = []
+    async def complete(self, *blocks: PartialBlock, write: tuple[int, Words] | None = None) -> None:
+        """Read what `blocks` still lack; after an error they keep what did arrive. Raises as `read` does.
+
+        Parameters
+        ----------
+        *blocks : PartialBlock
+            What is read, in this order.
+        write : tuple of int and array, optional
+            Address and words of holding registers that are written right before, in one request.
+        """
+        exchange, unit = Exchange(), self.link.device_id
+        batches = [] if write is None else [Batch(exchange, None, 0, (write_request(*write, unit),))]
         for block in blocks:
-            if missing := block.missing:
-                exchange = Exchange(block.data, missing)
-                requests = _requests(block.table, block.address, block.count, block.step, self.link.device_id)
-                parts += [
-                    Part(exchange, request, offset) for offset, request in requests if offset in missing
-                ]
-                exchanges.append(exchange)
-        if len(exchanges) == 1:
-            self._open().submit(parts)
-            await exchanges[0].done
-        elif exchanges:
-            self._open().submit(parts)
-            await asyncio.gather(*(exchange.done for exchange in exchanges))
+            batches += block.batches(exchange, unit)
+        if batches:
+            self._open().submit(batches)
+            await exchange.done
 
     async def write(self, address: int, words: Words) -> None:
         """Write holding registers in one request, before any read that waits; raises as `read` does."""
-        exchange = Exchange(bytearray(), {0})
-        self._open().submit(
-            [Part(exchange, write_request(address, words, self.link.device_id), 0)], first=True
-        )
+        exchange = Exchange()
+        request = write_request(address, words, self.link.device_id)
+        self._open().submit([Batch(exchange, None, 0, (request,))], first=True)
         await exchange.done
 
     def _open(self) -> Connection:

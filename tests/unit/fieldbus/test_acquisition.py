@@ -12,7 +12,7 @@ import pytest
 
 from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.registers import RegisterMap, Words
 from impactcell.fieldbus.ring import PERIOD, Mark
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
@@ -198,6 +198,26 @@ async def test_another_client_that_selects_slots_does_not_mix_captures(fpga: Reg
         for reception in await take(receptions, 3):
             assert_whole(reception)
         assert module.status.discarded >= 1
+
+
+async def test_a_module_that_is_busy_for_the_selection_of_a_slot_is_asked_again(fpga: RegisterMap) -> None:
+    """Meanwhile its window shows another slot."""
+    device = ScriptedDevice(fpga)
+    make(device, 3)
+    write, refused = device.write, []
+
+    def busy(address: int, words: Words) -> None:
+        if len(refused) < 2:
+            refused.append(address)
+            raise BlockingIOError
+        write(address, words)
+
+    device.write = busy  # type: ignore[method-assign]
+    async with running(fpga, device) as (_, module, receptions):
+        for reception in await take(receptions, 3):
+            assert_whole(reception)
+        assert module.status.discarded == 0
+    assert refused == [fpga["slot_select"].address] * 2
 
 
 async def test_a_wrong_crc_is_read_again(fpga: RegisterMap) -> None:

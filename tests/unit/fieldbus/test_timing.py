@@ -2,6 +2,7 @@
 
 import math
 import random
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,11 +12,14 @@ from impactcell.fieldbus.polling import FINE_S, IDLE_S, QUIET_S, PollSchedule
 
 
 def follow(
-    periods_s: list[float], round_trip_s: float = 1e-4, busy_s: float = 0.0
+    periods_s: list[float],
+    round_trip_s: float = 1e-4,
+    busy_s: float = 0.0,
+    clock: Callable[[float], float] = lambda now_s: now_s,
 ) -> tuple[list[float], float]:
     """Poll through cycles with these periods; returns how late each was seen, and polls per cycle.
 
-    The poller is held up before each poll for a random time of mean `busy_s`.
+    The poller is held up before each poll for a random time of mean `busy_s`; `clock` is the module's.
     """
     schedule, now_s, due_s = PollSchedule(), 0.0, 0.0
     late, polls = [], 0
@@ -27,7 +31,7 @@ def follow(
             polls += 1
         late.append(now_s - due_s)
         schedule.saw_cycle(now_s)
-        schedule.learn(due_s)
+        schedule.learn(clock(due_s))
     return late, polls / len(periods_s)
 
 
@@ -41,6 +45,24 @@ def test_regular_cycles_are_seen_soon_with_few_polls() -> None:
 def test_a_busy_service_polls_no_more_for_it() -> None:
     periods = list(np.random.default_rng(1).normal(0.5, 0.002, 300))
     assert follow(periods, busy_s=0.02)[1] <= follow(periods)[1]
+
+
+def test_a_cycle_seen_late_does_not_make_the_next_one_late() -> None:
+    """A held-up poller is late by the time it was held up: 99 of 100 draws are below 4.6 means."""
+    late, _ = follow([0.5] * 600, busy_s=0.01)
+    assert np.quantile(late[20:], 0.99) < 1.5 * 0.046
+    assert np.median(late[20:]) < 0.015
+
+
+@pytest.mark.parametrize("rate", [1.0 - 1e-4, 1.0, 1.0 + 1e-4])
+def test_the_clock_of_the_module_may_drift_and_be_set(rate: float) -> None:
+    def clock(now_s: float) -> float:
+        return 1.7e9 + rate * now_s + (3600.0 if now_s > 100.0 else 0.0) - (7200.0 if now_s > 200.0 else 0.0)
+
+    jitter = np.random.default_rng(1).normal(0.5, 0.002, 600)
+    late, polls = follow(list(jitter), clock=clock)
+    assert np.quantile(late[20:], 0.99) < 2 * FINE_S
+    assert polls < 15
 
 
 def test_after_a_pause_the_rhythm_is_soon_known_again() -> None:

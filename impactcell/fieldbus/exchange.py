@@ -1,0 +1,164 @@
+"""What is asked for and what is in flight: requests alike and side by side go through together.
+
+Of a good reply everything but its data is known beforehand, and nearly all replies are good and come in
+order. So the replies to a flight of requests are compared with what they must be, and their data copied, in
+one go.
+"""
+
+import asyncio
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from operator import add
+from typing import Any, Final
+
+import numpy as np
+
+from impactcell.errors import FieldbusError
+from impactcell.fieldbus.codec import Function, Request, read_request
+from impactcell.fieldbus.registers import WIRE, Words
+
+_READ_FUNCTION: Final = {"holding": Function.READ_HOLDING, "input": Function.READ_INPUT}
+
+
+class Exchange:
+    """Requests that are answered together.
+
+    Attributes
+    ----------
+    done : Future
+        Resolved once all are answered.
+    unanswered : int
+        Requests still without a good reply.
+    first_sent_s : dict
+        When a request that the device was too busy for was first sent.
+    """
+
+    __slots__ = ("done", "first_sent_s", "unanswered")
+
+    def __init__(self) -> None:
+        self.unanswered = 0
+        self.first_sent_s: dict[Request, float] = {}
+        self.done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+    def fail(self, error: FieldbusError) -> None:
+        """End it with an error, unless it has ended already."""
+        if not self.done.done():
+            self.done.set_exception(error)
+
+
+@lru_cache(maxsize=256)
+def _requests(table: str, address: int, count: int, step: int, unit: int) -> tuple[Request, ...]:
+    function = _READ_FUNCTION[table]
+    return tuple(
+        read_request(function, address + first, min(step, count - first), unit)
+        for first in range(0, count, step)
+    )
+
+
+class PartialBlock:
+    """A block of registers, as far as it has been read, `step` registers a request."""
+
+    __slots__ = ("_answered", "_data", "address", "count", "step", "table")
+
+    def __init__(self, address: int, count: int, table: str, step: int) -> None:
+        self.address = address
+        self.count = count
+        self.table = table
+        self.step = step
+        self._data = bytearray(2 * count)
+        self._answered = bytearray(-(-count // step))
+
+    @property
+    def missing(self) -> int:
+        """Number of requests that have not been answered."""
+        return self._answered.count(0)
+
+    def words(self) -> Words:
+        """Return the registers, shape (count,), dtype `WIRE`; zero where they are missing."""
+        return np.frombuffer(self._data, dtype=WIRE)
+
+    def batches(self, exchange: Exchange, unit: int) -> Iterator["Batch"]:
+        """Yield the requests that have not been answered, those together that are alike and side by side."""
+        requests = _requests(self.table, self.address, self.count, self.step, unit)
+        alike = self.count // self.step
+        end = 0
+        while (first := self._answered.find(0, end)) >= 0:
+            limit = alike if first < alike else len(requests)
+            end = self._answered.find(1, first, limit)
+            end = limit if end < 0 else end
+            yield Batch(exchange, self, first, requests[first:end])
+
+    def fill(self, first: int, count: int, data: bytes) -> None:
+        """Put in the data of the replies to `count` requests from number `first` on."""
+        at = 2 * self.step * first
+        self._data[at : at + len(data)] = data
+        self._answered[first : first + count] = b"\1" * count
+
+
+@dataclass(slots=True, eq=False)
+class Batch:
+    """Requests alike but for their address, from number `first` of `block` on; a write has no block."""
+
+    exchange: Exchange
+    block: PartialBlock | None
+    first: int
+    requests: tuple[Request, ...]
+
+    def split(self, count: int) -> "Batch":
+        """Keep all but the first `count` requests, and return those."""
+        front = Batch(self.exchange, self.block, self.first, self.requests[:count])
+        self.first += count
+        self.requests = self.requests[count:]
+        return front
+
+
+@lru_cache(maxsize=512)
+def _layout(head: int, data: int) -> np.dtype[Any]:
+    """Layout of a reply: as many bytes that are known beforehand, and of data."""
+    return np.dtype([("head", f"V{head}"), ("data", f"V{data}")])
+
+
+@dataclass(slots=True, eq=False)
+class Flight:
+    """A batch in flight, or what is left of it, sent at `sent_s` under `transactions`."""
+
+    batch: Batch
+    transactions: tuple[bytes, ...]
+    sent_s: float
+
+    def frames(self) -> Iterator[bytes]:
+        """Yield the requests as they go out."""
+        return map(add, self.transactions, [request.tail for request in self.batch.requests])
+
+    def good_replies(self, stream: bytes, at: int) -> tuple[int, int, bytes]:
+        """Look whether `stream` goes on, from `at`, with good replies to the first requests.
+
+        Returns
+        -------
+        int
+            How many; none at all if there is anything unusual among as many as are there.
+        int
+            Where they end.
+        bytes
+            Their data.
+        """
+        request = self.batch.requests[0]
+        head = request.reply_head
+        size = 2 + len(head) + request.data_length
+        count = min(len(self.transactions), (len(stream) - at) // size)
+        end = at + count * size
+        if count == 1:
+            if stream.startswith(self.transactions[0] + head, at):
+                return 1, end, stream[end - request.data_length : end]
+        elif count:
+            replies = np.frombuffer(stream, _layout(2 + len(head), request.data_length), count, at)
+            if replies["head"].tobytes() == head.join(self.transactions[:count]) + head:
+                return count, end, replies["data"].tobytes()
+        return 0, at, b""
+
+    def split(self, count: int) -> "Flight":
+        """Keep all but the first `count` requests, and return those."""
+        front = Flight(self.batch.split(count), self.transactions[:count], self.sent_s)
+        self.transactions = self.transactions[count:]
+        return front
