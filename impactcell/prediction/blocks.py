@@ -5,12 +5,13 @@ smooth, so a mean over 0.1 ms of force is the force at the block's centre to 1 p
 noise. About each event, where the slope jumps, blocks are as short as the samples allow.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.compiled import Wholes, compiled
+from impactcell.compiled import compiled
 from impactcell.prediction.reading import noise_std
 from impactcell.records import Channel, Samples
 
@@ -39,11 +40,6 @@ class Scatter:
     values: Samples
     both: Samples
     noise_std: float
-
-    def squares(self, slope: Samples) -> Samples:
-        """Sum of squares about straight lines of that slope through each block's means, in noise."""
-        within: Samples = self.values - 2.0 * slope * self.both + slope**2 * self.times
-        return within / self.noise_std**2
 
 
 NONE = np.empty(0)
@@ -98,46 +94,57 @@ def blocks(
     if count == 0:
         return NOTHING
     times, values = times[:count], channel.values[:count]
-    end = float(times[-1])
-    pieces = [np.arange(min(0.0, float(times[0])), end + coarse_s, coarse_s)]
+    begin, end = float(times[0]), float(times[-1])
+    rulers = [_ruler(min(0.0, begin), end + coarse_s, coarse_s)]
     for first, last in fine:
-        low, high = max(first, float(times[0]) - fine_s), min(last, end + fine_s)
+        low, high = max(first, begin - fine_s), min(last, end + fine_s)
         if high > low:
-            pieces.append(np.arange(low, high + fine_s, fine_s))
-    pieces.append(np.asarray(edges, dtype=np.float64))
+            rulers.append(_ruler(low, high + fine_s, fine_s))
+    rulers += [(edge, 0.0, 1.0) for edge in edges]
     sigma = noise_std(channel)
-    table = _gathered(times, values, np.searchsorted(times, np.sort(np.concatenate(pieces)), "left"))
-    scatter = Scatter(table[0], table[3], table[4], table[5], sigma)
-    return Blocks(table[1], table[2], sigma / np.sqrt(table[0]), scatter)
+    table = _gathered(times, values, np.array(rulers), sigma)
+    return Blocks(table[1], table[2], table[6], Scatter(table[0], table[3], table[4], table[5], sigma))
+
+
+def _ruler(start: float, stop: float, step: float) -> tuple[float, float, float]:
+    """First mark, distance and number of the marks that `numpy.arange` makes."""
+    return start, (start + step) - start, math.ceil((stop - start) / step)
 
 
 @compiled
-def _gathered(times: Samples, values: Samples, limits: Wholes) -> Samples:
-    """Count, means and sums about the means of each block that holds samples, shape (6, n).
+def _gathered(times: Samples, values: Samples, rulers: Samples, sigma: float) -> Samples:
+    """Count, means, sums about the means and standard deviation of each block with samples, shape (7, n).
 
-    A block begins with the first sample and at each of the ascending `limits`.
+    A block begins with the first sample and at each mark of the `rulers`, shape (m, 3).
     """
-    table = np.zeros((6, len(limits) + 1))
-    block, first = 0, 0
-    for limit in range(len(limits) + 1):
-        end = limits[limit] if limit < len(limits) else len(times)
-        size = end - first
-        if size == 0:
-            continue
+    table = np.zeros((7, 1 + int(np.sum(rulers[:, 2]))))
+    mark = np.zeros(len(rulers))
+    block, end = 0, 0
+    while end < len(times):
+        first, until = end, np.inf
+        for k in range(len(rulers)):
+            start, step, count = rulers[k]
+            while mark[k] < count and start + mark[k] * step <= times[first]:
+                mark[k] += 1.0
+            if mark[k] < count:
+                until = min(until, start + mark[k] * step)
         t0, y0 = times[first], values[first]  # sums of what is left keep their digits
         t, y, tt, yy, ty = 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(first, end):
-            dt, dy = times[i] - t0, values[i] - y0
+        while end < len(times) and times[end] < until:
+            dt, dy = times[end] - t0, values[end] - y0
             t += dt
             y += dy
             tt += dt * dt
             yy += dy * dy
             ty += dt * dy
+            end += 1
+        size = end - first
         table[0, block] = size
         table[1, block] = t0 + t / size
         table[2, block] = y0 + y / size
         table[3, block] = tt - t * t / size
         table[4, block] = yy - y * y / size
         table[5, block] = ty - t * y / size
-        block, first = block + 1, end
+        table[6, block] = sigma / math.sqrt(size)
+        block += 1
     return table[:, :block].copy()

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.compiled import compiled
+from impactcell.compiled import Wholes, compiled
 from impactcell.errors import PhysicsError
 from impactcell.prediction.posterior import Side
-from impactcell.prediction.response import JUST_STICKING, PARAMETERS, RATIO, Response
+from impactcell.prediction.response import JUST_STICKING, PARAMETERS, RATIO, Linear, Response
 from impactcell.records import Samples
 
 Indices = NDArray[np.intp]
@@ -33,7 +33,7 @@ class Belief:
     ----------
     mean, weight : ndarray, shape (4,)
     free : ndarray of int
-        Indices of what is fitted.
+        Indices of what is fitted; all else stays at its mean.
     """
 
     mean: Samples
@@ -42,7 +42,8 @@ class Belief:
 
     def cost(self, theta: Samples) -> float:
         """Half the sum of squares of the prior."""
-        return 0.5 * float(np.sum((self.weight[self.free] * (theta - self.mean)[self.free]) ** 2))
+        away = self.weight * (theta - self.mean)
+        return 0.5 * float(away @ away)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,11 +54,7 @@ class Minimum:
     ----------
     theta : ndarray, shape (4,)
     side : int
-    residual : ndarray, shape (n,)
-    normal : ndarray, shape (p, p)
-        Product of the derivative by what is fitted with itself.
-    slope : ndarray, shape (p,)
-        Product of that derivative with the residual.
+    linear : Linear
     cost : float
         Half the sum of squares, data and prior.
     settled : bool
@@ -66,65 +63,98 @@ class Minimum:
 
     theta: Samples
     side: int
-    residual: Samples
-    normal: Samples
-    slope: Samples
+    linear: Linear
     cost: float
     settled: bool = True
 
     @property
+    def residual(self) -> Samples:
+        """The data's residuals, shape (n,)."""
+        return self.linear.residual
+
+    @property
     def chi2(self) -> float:
         """Sum of squares of the data's residuals."""
-        return float(self.residual @ self.residual)
+        return self.linear.chi2
 
     def as_side(self, known: Belief, misfit: float = 1.0) -> Side:
-        """Give the quadratic about the minimum, the data's weight divided by `misfit` squared."""
-        free = known.free
-        inverse, step, beyond, log_determinant = _completed(
-            self.normal, self.slope, known.weight[free] ** 2, (self.theta - known.mean)[free], misfit
+        """Give the quadratic about the minimum, the data's weight divided by `misfit` squared.
+
+        Raises
+        ------
+        LinAlgError
+            The data and the prior do not determine it.
+        """
+        away = self.theta - known.mean
+        step, covariance, length, log_determinant = _solved(
+            self.linear.normal, self.linear.slope, known.weight, away, known.free, misfit, 0.0
         )
-        mean = self.theta.copy()
-        mean[free] += step
-        covariance = np.zeros((PARAMETERS, PARAMETERS))
-        covariance[free[:, None], free] = inverse
-        return Side(mean, covariance, 0.5 * (self.chi2 / misfit**2 + beyond), -log_determinant, self.side)
+        if not math.isfinite(log_determinant):
+            raise np.linalg.LinAlgError("the curvature is not positive")
+        cost = 0.5 * (self.chi2 / misfit**2 - length) + known.cost(self.theta)
+        return Side(self.theta + step, covariance, cost, -log_determinant, self.side)
 
 
 @compiled
-def _completed(
-    normal: Samples, slope: Samples, prior: Samples, away: Samples, misfit: float
+def _solved(
+    normal: Samples,
+    slope: Samples,
+    weight: Samples,
+    away: Samples,
+    free: Wholes,
+    misfit: float,
+    damping: float,
 ) -> tuple[Samples, Samples, float, float]:
-    """Complete the square about a point that lies `away` from the prior's mean.
+    """Gauss-Newton step from a point that lies `away` from the prior's mean.
+
+    The diagonal is damped after Levenberg and Marquardt, the data's weight divided by `misfit` squared.
 
     Returns
     -------
-    inverse : ndarray, shape (p, p)
-        Of the curvature of data and prior.
-    step : ndarray, shape (p,)
-        To the quadratic's minimum.
-    beyond : float
-        Twice the cost there, without what the data cost here.
+    step : ndarray, shape (4,)
+        To the quadratic's minimum where nothing is damped.
+    inverse : ndarray, shape (4, 4)
+        Of the damped curvature; 0 for what is not fitted.
+    length : float
+        Of the step, in variances. Without damping also twice what the cost falls by.
     log_determinant : float
-        Of the curvature.
+        Of the damped curvature; nan where it is not positive.
     """
-    curvature = normal / misfit**2 + np.diag(prior)
-    gradient = slope / misfit**2 + prior * away
-    inverse = np.linalg.inv(curvature).astype(np.float64)
-    step = -(inverse @ gradient)
-    beyond = np.sum(prior * away**2) + np.sum(gradient * step)
-    _, log_determinant = np.linalg.slogdet(curvature)
-    return inverse, step, float(beyond), float(log_determinant)
-
-
-@compiled
-def _step(
-    normal: Samples, slope: Samples, prior: Samples, away: Samples, damping: float
-) -> tuple[Samples, float]:
-    """Gauss-Newton step, its diagonal damped after Levenberg and Marquardt, and its length in variances."""
-    curvature = normal + np.diag(prior)
-    damped = curvature + damping * np.diag(np.diag(curvature))
-    step = -np.linalg.solve(damped, slope + prior * away).astype(np.float64)
-    return step, float(np.sum(step * (curvature @ step)))
+    size = len(free)
+    curvature, factor = np.empty((size, size)), np.zeros((size, size))
+    gradient = np.empty(size)
+    log_determinant = 0.0
+    for j in range(size):
+        row = free[j]
+        gradient[j] = slope[row] / misfit**2 + weight[row] ** 2 * away[row]
+        for k in range(size):
+            curvature[j, k] = normal[row, free[k]] / misfit**2
+        curvature[j, j] += weight[row] ** 2
+    for j in range(size):  # Cholesky's factor L
+        for k in range(j + 1):
+            left = curvature[j, k] * (1.0 + damping if j == k else 1.0)
+            for m in range(k):
+                left -= factor[j, m] * factor[k, m]
+            factor[j, k] = math.sqrt(left) if j == k else left / factor[k, k]
+        log_determinant += 2.0 * math.log(factor[j, j])
+    columns = np.zeros((size, size))
+    for j in range(size):  # of the inverse of L
+        columns[j, j] = 1.0 / factor[j, j]
+        for k in range(j + 1, size):
+            for m in range(j, k):
+                columns[k, j] -= factor[k, m] * columns[m, j]
+            columns[k, j] /= factor[k, k]
+    inverse, step = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    for j in range(size):
+        for k in range(size):
+            for m in range(max(j, k), size):
+                inverse[free[j], free[k]] += columns[m, j] * columns[m, k]
+            step[free[j]] -= inverse[free[j], free[k]] * gradient[k]
+    length = 0.0
+    for j in range(size):
+        for k in range(size):
+            length += step[free[j]] * curvature[j, k] * step[free[k]]
+    return step, inverse, length, log_determinant
 
 
 def descend(response: Response, known: Belief, start: Samples, side: int) -> Minimum:
@@ -133,19 +163,18 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
     Below the kink (`side` -1) the model is that of immediate breakaway. Above it (`side` +1) the residuals
     are continued linearly along mu_k/mu_s from the kink.
     """
-    free, prior = known.free, known.weight[known.free] ** 2
-    longest = np.minimum(0.5, LONGEST_IN_STD / np.maximum(known.weight[free], 1e-12))
+    longest = np.minimum(0.5, LONGEST_IN_STD / np.maximum(known.weight, 1e-12))
     best = _at(response, known, start, side)
     damping = 0.0
     for _ in range(MOST_STEPS):
-        step, length = _step(best.normal, best.slope, prior, (best.theta - known.mean)[free], damping)
+        found, away = best.linear, best.theta - known.mean
+        step, _, length, _ = _solved(found.normal, found.slope, known.weight, away, known.free, 1.0, damping)
         if not math.isfinite(length):
             break
         noise = max(2.0 * best.cost / response.size, 1.0)
         if length < SETTLED**2 * noise and damping <= 1e-3:
             return best
-        moved = best.theta.copy()
-        moved[free] += np.minimum(np.maximum(step, -longest), longest)
+        moved = best.theta + np.minimum(np.maximum(step, -longest), longest)
         try:
             tried = _at(response, known, moved, side)
         except PhysicsError:
@@ -164,18 +193,10 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
 
 
 def _at(response: Response, known: Belief, theta: Samples, side: int) -> Minimum:
-    """Give the linear model at `theta`."""
-    residual, jacobian = _linear(response, theta, side)
-    by_free = jacobian[:, known.free]
-    cost = 0.5 * float(residual @ residual) + known.cost(theta)
-    return Minimum(theta, side, residual, by_free.T @ by_free, by_free.T @ residual, cost)
-
-
-def _linear(response: Response, theta: Samples, side: int) -> tuple[Samples, Samples]:
-    """Residuals and their derivative, those above the kink continued linearly below it."""
-    at = theta
+    """Give the linear model at `theta`, that above the kink continued linearly below it."""
+    at, beyond = theta, 0.0
     if side > 0 and (below := response.kink(theta) - JUST_STICKING) < 0.0:
-        at = theta.copy()
+        at, beyond = theta.copy(), -below
         at[RATIO] += below
-    residual, jacobian = response.linear(at, side)
-    return residual + jacobian[:, RATIO] * (theta[RATIO] - at[RATIO]), jacobian
+    found = response.linear(at, side, beyond)
+    return Minimum(theta, side, found, 0.5 * found.chi2 + known.cost(theta))

@@ -5,6 +5,7 @@ a mass; between two masses coefficients of the force and distances go with power
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -26,9 +27,9 @@ class Mix:
     parts: tuple[tuple[float, Predictor], ...]
     inside: bool
 
-    def mean(self, name: str) -> float:
+    def mean(self, of: Callable[[Predictor], float]) -> float:
         """Interpolate a figure that is not a power of the mass, such as an error or a sensitivity."""
-        return sum(share * _deep(predictor, name) for share, predictor in self.parts)
+        return sum(share * of(predictor) for share, predictor in self.parts)
 
     @property
     def friction_n(self) -> float:
@@ -40,7 +41,7 @@ class Mix:
         """Coefficient of v in equation (4); between masses it goes with a power of the mass."""
         slopes = [one.force.velocity_n_s_per_m for _, one in self.parts]
         if min(slopes) <= 0.0:
-            return self.mean("force.velocity_n_s_per_m")
+            return self.mean(lambda one: one.force.velocity_n_s_per_m)
         return math.exp(
             sum(share * math.log(slope) for (share, _), slope in zip(self.parts, slopes, strict=True))
         )
@@ -128,8 +129,8 @@ def by_force(model: Model, mixed: Mix, velocity_m_s: float, peak: Reading) -> Co
         raise PredictionError(
             f"peak force {peak.value:.4g} N is below that of a part without friction; check mass and velocity"
         )
-    sensitivity = _sensitivity(mixed, "force_sensitivity")
-    std = math.hypot(peak.std / slope, mixed.mean("force.rms"), value * _known_to(model, sensitivity))
+    known = _known_to(model, _sensitivity(mixed, lambda one: one.force_sensitivity))
+    std = math.hypot(peak.std / slope, mixed.mean(lambda one: one.force.rms), value * known)
     return _in_range(model, mixed, velocity_m_s, value, std)
 
 
@@ -155,16 +156,19 @@ def by_distance(model: Model, mixed: Mix, velocity_m_s: float, slid: Reading) ->
             f"sliding distance {1e6 * slid.value:.4g} µm is that of a part without friction; "
             "check mass and velocity"
         )
-    value = float(
-        brentq(
-            lambda mu_s: mixed.sliding_distance(mu_s, velocity_m_s) - slid.value, LOWEST_MU, limit, xtol=1e-15
-        )
-    )
+    if len(mixed.parts) == 1:
+        value = mixed.parts[0][1].distance.root(slid.value, velocity_m_s)
+    else:
+        value = float(
+            brentq(
+                lambda mu_s: mixed.sliding_distance(mu_s, velocity_m_s) - slid.value,
+                LOWEST_MU, limit, xtol=1e-15,
+            )
+        )  # fmt: skip
     slope = abs(mixed.slope_of_distance(value, velocity_m_s))
-    sensitivity = _sensitivity(mixed, "distance_sensitivity")
-    std = math.hypot(
-        slid.std / max(slope, 1e-12), mixed.mean("distance.rms"), value * _known_to(model, sensitivity)
-    )
+    known = _known_to(model, _sensitivity(mixed, lambda one: one.distance_sensitivity))
+    rms = mixed.mean(lambda one: one.distance.rms)
+    std = math.hypot(slid.std / max(slope, 1e-12), rms, value * known)
     return _in_range(model, mixed, velocity_m_s, value, std)
 
 
@@ -183,19 +187,20 @@ def combined(
     (mu_force, peak), (mu_dist, distance_read) = force, slid
     weight = force_weight(mixed, 0.5 * (mu_force.value + mu_dist.value), velocity_m_s)
     value = weight * mu_force.value + (1.0 - weight) * mu_dist.value
-    one, two = _sensitivity(mixed, "force_sensitivity"), _sensitivity(mixed, "distance_sensitivity")
+    one = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
+    two = _sensitivity(mixed, lambda predictor: predictor.distance_sensitivity)
+    rest = 1.0 - weight
     both = Sensitivity(
-        *(
-            weight * getattr(one, name) + (1.0 - weight) * getattr(two, name)
-            for name in ("stiffness", "damping", "ratio")
-        )
+        weight * one.stiffness + rest * two.stiffness,
+        weight * one.damping + rest * two.damping,
+        weight * one.ratio + rest * two.ratio,
     )
     slope = abs(mixed.slope_of_distance(mu_dist.value, velocity_m_s))
     std = math.hypot(
         weight * peak.std / mixed.friction_n,
-        weight * mixed.mean("force.rms"),
-        (1.0 - weight) * distance_read.std / max(slope, 1e-12),
-        (1.0 - weight) * mixed.mean("distance.rms"),
+        weight * mixed.mean(lambda one: one.force.rms),
+        rest * distance_read.std / max(slope, 1e-12),
+        rest * mixed.mean(lambda one: one.distance.rms),
         value * _known_to(model, both),
     )
     return _in_range(model, mixed, velocity_m_s, value, std)
@@ -278,13 +283,12 @@ def _known_to(model: Model, sensitivity: Sensitivity) -> float:
     )
 
 
-def _sensitivity(mixed: Mix, which: str) -> Sensitivity:
-    return Sensitivity(*(mixed.mean(f"{which}.{name}") for name in ("stiffness", "damping", "ratio")))
-
-
-def _deep(predictor: Predictor, name: str) -> float:
-    first, second = name.split(".")
-    return float(getattr(getattr(predictor, first), second))
+def _sensitivity(mixed: Mix, of: Callable[[Predictor], Sensitivity]) -> Sensitivity:
+    return Sensitivity(
+        mixed.mean(lambda one: of(one).stiffness),
+        mixed.mean(lambda one: of(one).damping),
+        mixed.mean(lambda one: of(one).ratio),
+    )
 
 
 def _millimetres(stroke_m: float) -> str:

@@ -39,7 +39,9 @@ def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEst
         coefficients bend less.
     """
     capture = replace(
-        capture, force=sensed(capture.force, "force"), position=sensed(capture.position, "position")
+        capture,
+        force=sensed(capture.force, "force", smoothed=True),
+        position=sensed(capture.position, "position"),
     )
     peak, force_fault = _peak(capture)
     slid, slide_fault = _slide(capture)

@@ -63,6 +63,12 @@ class DistanceForm:
     offset_power: float
     rms: float = 0.0
 
+    def root(self, distance_m: float, velocity_m_s: float) -> float:
+        """mu_s at which a part slides so far, no less than the form allows at this velocity."""
+        u = velocity_m_s / REFERENCE_VELOCITY
+        beyond = max(distance_m - self.offset_m * u**self.offset_power, 0.0)
+        return self.limit - math.sqrt(beyond / (self.square_m * u**self.square_power))
+
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:

@@ -15,12 +15,21 @@ from impactcell.physics import Plant
 from impactcell.prediction.doubt import DOUBTED, LATER, Indices, doubt, phases
 from impactcell.prediction.model import Model, Prior
 from impactcell.prediction.reading import checked, displacement, peak_force
-from impactcell.prediction.response import DAMPING, MU_K, RATIO, STIFFNESS, Response, parameters, respond
+from impactcell.prediction.response import (
+    DAMPING,
+    MU_K,
+    RATIO,
+    STIFFNESS,
+    Linear,
+    Response,
+    parameters,
+    respond,
+)
 from impactcell.prediction.sliding import Slide, slide
 from impactcell.prediction.waveform import fit
 from impactcell.records import Capture, Samples
 
-SHARED = [RATIO, STIFFNESS, DAMPING]
+SHARED = slice(RATIO, DAMPING + 1)
 USUAL_RATIO = 0.76
 WEAKLY = np.array([0.3, 1.0, 1.0])
 """Standard deviations of ln(mu_k/mu_s, k, b) about the start: they only hold what no tap shows."""
@@ -177,11 +186,10 @@ def _joint(
     for _ in range(MOST_STEPS):
         curvature, gradient = prior.copy(), prior @ (thetas[0, SHARED] - anchor)
         own = []
-        for residual, slope in linear:
-            mine, common = slope[:, MU_K], slope[:, SHARED]
-            h, cross, g = float(mine @ mine), common.T @ mine, float(mine @ residual)
-            curvature += common.T @ common - np.outer(cross, cross) / h
-            gradient += common.T @ residual - cross * (g / h)
+        for one in linear:
+            h, cross, g = float(one.normal[MU_K, MU_K]), one.normal[SHARED, MU_K], float(one.slope[MU_K])
+            curvature += one.normal[SHARED, SHARED] - np.outer(cross, cross) / h
+            gradient += one.slope[SHARED] - cross * (g / h)
             own.append((h, cross, g))
         step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
         if float(step @ curvature @ step) < SETTLED**2:
@@ -220,15 +228,13 @@ def _doubting(
     for _ in range(ROUNDS):
         linear, _ = _all_linear(responses, thetas)
         doubted = [
-            response.doubted(doubt(residual, phase) * LATER[phase])
-            for response, (residual, _), phase in zip(responses, linear, parts, strict=True)
+            response.doubted(doubt(one.residual, phase) * LATER[phase])
+            for response, one, phase in zip(responses, linear, parts, strict=True)
         ]
         thetas, covariance, _ = _joint(doubted, thetas, anchor, BY_CONTACT)
     return thetas, covariance
 
 
-def _all_linear(
-    responses: Sequence[Response], thetas: Samples
-) -> tuple[list[tuple[Samples, Samples]], float]:
+def _all_linear(responses: Sequence[Response], thetas: Samples) -> tuple[list[Linear], float]:
     linear = [response.linear(theta) for response, theta in zip(responses, thetas, strict=True)]
-    return linear, 0.5 * sum(float(residual @ residual) for residual, _ in linear)
+    return linear, 0.5 * sum(one.chi2 for one in linear)

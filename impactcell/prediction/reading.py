@@ -14,7 +14,14 @@ from impactcell.errors import (
     ClippedForceError,
     NoSeparationError,
 )
-from impactcell.prediction.local import longest_run, polynomial, running_mean, spread, survey, widest_cubic
+from impactcell.prediction.local import (
+    median,
+    polynomial,
+    running_mean,
+    spread,
+    survey,
+    widest_cubic,
+)
 from impactcell.records import Capture, Channel, Samples
 
 CONTACT_SMOOTHING_S = 2e-4
@@ -35,29 +42,35 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensed(Channel):
-    """A channel that has been checked, and its noise found: several readings of one capture need both.
+    """A channel that has been checked, and what all readings of it need, found once.
 
     Attributes
     ----------
     sigma : float
         What `noise_std` gives.
+    highest : float
+    plateau : int
+        The most samples in a row that stand exactly at `highest`.
+    smooth : ndarray, shape (n,), or None
+        Running mean over `CONTACT_SMOOTHING_S`, where it was asked for.
     """
 
     sigma: float = math.nan
+    highest: float = math.nan
+    plateau: int = 0
+    smooth: Samples | None = None
 
 
-def sensed(channel: Channel | None, name: str) -> Channel | None:
-    """Check a channel and find its noise, once for all; one that nothing can be read from stays as it is."""
+def sensed(channel: Channel | None, name: str, *, smoothed: bool = False) -> Channel | None:
+    """Check a channel once for all readings; one that nothing can be read from stays as it is."""
     try:
         given = checked(channel, name)
     except CaptureError:
         return channel
-    return Sensed(
-        given.time_s, given.values, given.noise_std, given.full_scale, given.resolution, noise_std(given)
-    )
+    return replace(given, smooth=_smooth(given)) if smoothed else given
 
 
-def checked(channel: Channel | None, name: str) -> Channel:
+def checked(channel: Channel | None, name: str) -> Sensed:
     """Refuse a channel nothing can be read from.
 
     Raises
@@ -75,7 +88,7 @@ def checked(channel: Channel | None, name: str) -> Channel:
         raise CaptureError(
             f"the {name} record has {len(channel.values)} samples at {len(channel.time_s)} times"
         )
-    bad, ascending, lowest, highest = survey(channel.time_s, channel.values)
+    bad, ascending, lowest, highest, plateau = survey(channel.time_s, channel.values)
     if bad:
         raise CaptureError(f"{bad} of {len(channel.values)} {name} samples are not numbers")
     if len(channel.values) < 8:
@@ -84,10 +97,13 @@ def checked(channel: Channel | None, name: str) -> Channel:
         raise CaptureError(f"the times of the {name} record do not increase")
     if highest == lowest:
         raise CaptureError(f"the {name} is constant at {channel.values[0]:.6g}")
-    return channel
+    return Sensed(
+        channel.time_s, channel.values, channel.noise_std, channel.full_scale, channel.resolution,
+        noise_std(channel), highest, plateau,
+    )  # fmt: skip
 
 
-def displacement(capture: Capture) -> Channel:
+def displacement(capture: Capture) -> Sensed:
     """Position of a capture counted from where the part lay, positive along +1.
 
     Recorders differ in where they count from: that place, or the table's zero. The first samples, taken
@@ -101,7 +117,8 @@ def displacement(capture: Capture) -> Channel:
     position = checked(capture.position, "position")
     first = sorted(position.values[:5].tolist())[2]
     if abs(first - capture.start_m) < abs(first):
-        return replace(position, values=position.values - capture.start_m)
+        values = position.values - capture.start_m
+        return replace(position, values=values, highest=position.highest - capture.start_m)
     return position
 
 
@@ -145,15 +162,15 @@ def peak_force(channel: Channel) -> Reading:
     return found or Reading(float(smooth[top]), sigma)
 
 
-def refuse_clipped(force: Channel) -> None:
+def refuse_clipped(force: Sensed) -> None:
     """Raise `ClippedForceError` where the force stands at its full scale or on a plateau of equal samples."""
-    highest = float(force.values.max())
-    if force.full_scale is not None and highest >= force.full_scale[1]:
+    if force.full_scale is not None and force.highest >= force.full_scale[1]:
         count = int((force.values >= force.full_scale[1]).sum())
         raise ClippedForceError(f"{count} force samples are at full scale, {force.full_scale[1]:.6g} N")
-    longest = longest_run(force.values, highest)
-    if longest >= CLIPPED_RUN and (force.resolution or 0.0) < 2.0 * (force.noise_std or 0.0):
-        raise ClippedForceError(f"{longest} force samples in a row stand at {highest:.6g} N: clipped")
+    if force.plateau >= CLIPPED_RUN and (force.resolution or 0.0) < 2.0 * (force.noise_std or 0.0):
+        raise ClippedForceError(
+            f"{force.plateau} force samples in a row stand at {force.highest:.6g} N: clipped"
+        )
 
 
 def loss_of_contact(force: Channel) -> Reading:
@@ -173,7 +190,7 @@ def loss_of_contact(force: Channel) -> Reading:
         raise CaptureError(f"no contact: the force stays below {highest:.3g} N, noise is {sigma:.3g} N")
     width = _smoothing_width(force)
     threshold = max(7.0 * sigma / math.sqrt(width), 0.005 * highest)
-    last = int(np.flatnonzero(smooth > threshold)[-1])
+    last = len(smooth) - 1 - int(np.argmax(smooth[::-1] > threshold))
     if last >= len(smooth) - max(2, width):
         raise NoSeparationError(f"the force was still {smooth[-1]:.3g} N when its record ended")
     times, values = force.time_s, force.values
@@ -193,7 +210,7 @@ def loss_of_contact(force: Channel) -> Reading:
             error = sigma * spread(factor, root)
             return Reading(end_s + window * root, window * min(error / max(slope, 1e-300), 1.0))
         window /= 1.6
-    step = float(np.median(np.diff(times[max(0, last - 50) : last + 2])))
+    step = median(np.diff(times[max(0, last - 50) : last + 2]))
     return Reading(float(times[last] + 0.5 * step * width), step * width)
 
 
@@ -203,6 +220,8 @@ def _smoothing_width(channel: Channel) -> int:
 
 
 def _smooth(channel: Channel) -> Samples:
+    if isinstance(channel, Sensed) and channel.smooth is not None:
+        return channel.smooth
     width = _smoothing_width(channel)
     if width == 1:
         return channel.values
@@ -224,7 +243,7 @@ def _widest_fit(
     times: Samples, values: Samples, sigma: float, at_s: float, left: float, right: float
 ) -> Reading | None:
     """Maximum of a cubic about `at_s`; what bias stays is of the size of the noise: hence `BIASED`."""
-    step = float(np.median(np.diff(times[:100])))
+    step = median(np.diff(times[:100]))
     narrowest_s = max(2.5e-4, 4.0 * step)
     found, value, std = widest_cubic(
         times, values, sigma, at_s, left, right, narrowest_s, WIDEST_WINDOW_S, step

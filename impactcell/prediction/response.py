@@ -5,7 +5,7 @@ theta = ln(mu_k, mu_k / mu_s, k, b). Relative steps in it are of one size whatev
 
 import math
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,8 @@ JUST_STICKING = 1e-7
 AWAY = np.array([1.0, -1.0, 1.0, -1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
 STEP = 1e-5
-STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(AWAY * STEP)])
+STEPS_OUT = AWAY * STEP
+STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT)])
 KINK_SPAN_S = 1.5e-4
 
 
@@ -61,6 +62,27 @@ def parameters(plant: Plant) -> Samples:
     return np.log(
         [plant.mu_k, plant.mu_k / plant.mu_s, plant.stiffness_n_per_m, max(plant.damping_n_s_per_m, 1e-6)]
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linear:
+    """Normalised residuals, data minus model, and what their derivative by theta makes of them.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (n,)
+    normal : ndarray, shape (4, 4)
+        Product of the derivative with itself.
+    slope : ndarray, shape (4,)
+        Product of the derivative with the residuals.
+    chi2 : float
+        Sum of squares of the residuals.
+    """
+
+    residual: Samples
+    normal: Samples
+    slope: Samples
+    chi2: float
 
 
 class Response:
@@ -112,10 +134,12 @@ class Response:
             (self.position_time_s, self._scatters[1], slice(split, None)),
         ):
             if len(times) > 2:
-                used = self._weights[part] * scatter.noise_std > 0.5 * np.sqrt(scatter.count)
-                squares = residual[part] ** 2 + scatter.squares(_slopes(times, model[part]))
-                total += float(squares[used].sum())
-                count += float(scatter.count[used].sum())
+                squares, used = _squares(
+                    times, model[part], residual[part], self._weights[part], scatter.count, scatter.times,
+                    scatter.values, scatter.both, scatter.noise_std,
+                )  # fmt: skip
+                total += squares
+                count += used
         return math.sqrt(total / count)
 
     def kink(self, theta: Samples) -> float:
@@ -123,8 +147,8 @@ class Response:
         ahead = float(theta[MU_K] - theta[RATIO] - theta[DAMPING])
         return ahead + math.log(self._weight_n / self.tap.velocity_m_s)
 
-    def linear(self, theta: Samples, side: int = 0) -> tuple[Samples, Samples]:
-        """Normalised residuals, data minus model, shape (n,), and their derivative, shape (n, 4).
+    def linear(self, theta: Samples, side: int = 0, beyond: float = 0.0) -> Linear:
+        """Residuals and their normal equations at `theta`.
 
         The derivative is that of a step which leads away from the kink into the side that sticks.
 
@@ -133,6 +157,8 @@ class Response:
         theta : ndarray, shape (4,)
         side : int
             -1: as if breakaway were immediate, whatever mu_s. 0 or +1: as the parameters say.
+        beyond : float
+            How far mu_k/mu_s is to lie beyond `theta`: the residuals are continued linearly.
 
         Raises
         ------
@@ -147,12 +173,10 @@ class Response:
         table = self._table.copy()
         table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
         traces = self._ensemble.traces(table)
-        residual, jacobian = _compared(
-            traces.force_n, traces.position_m, self._values, self._weights, AWAY * STEP
-        )
-        if not math.isfinite(residual.sum() + jacobian.sum()):
+        found = _compared(traces.force_n, traces.position_m, self._values, self._weights, STEPS_OUT, beyond)
+        if not math.isfinite(found[3]):
             raise PhysicsError("the motion is not finite with these parameters")
-        return residual, jacobian
+        return Linear(*found)
 
 
 def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
@@ -186,9 +210,9 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
 
 @compiled
 def _compared(
-    force: Samples, position: Samples, values: Samples, weights: Samples, steps: Samples
-) -> tuple[Samples, Samples]:
-    """Residuals and their derivative from blocks of the model at theta and, one after the other, beside it.
+    force: Samples, position: Samples, values: Samples, weights: Samples, steps: Samples, beyond: float
+) -> tuple[Samples, Samples, Samples, float]:
+    """Fields of `Linear` from blocks of the model at theta and, one after the other, beside it.
 
     Parameters
     ----------
@@ -196,33 +220,63 @@ def _compared(
     values, weights : ndarray, shape (n,)
     steps : ndarray, shape (p,)
         Which way, and how far, each parameter was moved.
+    beyond : float
+        How far to continue along the ratio.
     """
-    split, size = len(force) // (len(steps) + 1), len(values)
-    rest = size - split
-    residual, jacobian = np.empty(size), np.empty((size, len(steps)))
+    split, size = len(force) // (PARAMETERS + 1), len(values)
+    residual, derivative = np.empty(size), np.empty(PARAMETERS)
+    normal, slope = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    chi2 = 0.0
     for i in range(size):
-        at = force[i] if i < split else position[i - split]
-        residual[i] = (values[i] - at) * weights[i]
-        for k in range(len(steps)):
-            moved = force[(k + 1) * split + i] if i < split else position[(k + 1) * rest + i - split]
-            jacobian[i, k] = (at - moved) * weights[i] / steps[k]
-    return residual, jacobian
+        model, row, width = (force, i, split) if i < split else (position, i - split, size - split)
+        at = model[row]
+        for k in range(PARAMETERS):
+            derivative[k] = (at - model[(k + 1) * width + row]) * weights[i] / steps[k]
+        miss = (values[i] - at) * weights[i] + derivative[RATIO] * beyond
+        residual[i] = miss
+        chi2 += miss * miss
+        for k in range(PARAMETERS):
+            slope[k] += derivative[k] * miss
+            for m in range(k + 1):
+                normal[k, m] += derivative[k] * derivative[m]
+    for k in range(PARAMETERS):
+        for m in range(k):
+            normal[m, k] = normal[k, m]
+    return residual, normal, slope, chi2
 
 
 @compiled
-def _slopes(times: Samples, values: Samples) -> Samples:
-    """Slope of the model in each block from its neighbours; beside a jump from the one this side of it."""
-    last = len(values) - 1
-    slope = np.zeros(last + 1)
+def _squares(
+    times: Samples,
+    model: Samples,
+    residual: Samples,
+    weights: Samples,
+    count: Samples,
+    spread: Samples,
+    scatter: Samples,
+    both: Samples,
+    noise_std: float,
+) -> tuple[float, float]:
+    """Sum of squares of single samples over their noise, and their number, blocks about a jump left out.
+
+    The model's slope in a block comes from its neighbours; beside a jump from the one this side of it.
+    `spread`, `scatter` and `both` are the sums of `Scatter`.
+    """
+    last = len(model) - 1
+    total, used = 0.0, 0.0
     for i in range(last + 1):
+        if not weights[i] * noise_std > 0.5 * math.sqrt(count[i]):
+            continue
         before, after = max(i - 1, 0), min(i + 1, last)
-        left = (values[before + 1] - values[before]) / (times[before + 1] - times[before])
-        right = (values[after] - values[after - 1]) / (times[after] - times[after - 1])
-        across = (values[after] - values[before]) / (times[after] - times[before])
+        left = (model[before + 1] - model[before]) / (times[before + 1] - times[before])
+        right = (model[after] - model[after - 1]) / (times[after] - times[after - 1])
+        across = (model[after] - model[before]) / (times[after] - times[before])
         least = 2.0 * min(abs(left), abs(right))
-        if left * right > 0.0:
-            slope[i] = min(max(across, -least), least)
-    return slope
+        slope = min(max(across, -least), least) if left * right > 0.0 else 0.0
+        within = scatter[i] - 2.0 * slope * both[i] + slope * slope * spread[i]
+        total += residual[i] * residual[i] + within / noise_std**2
+        used += count[i]
+    return total, used
 
 
 def _straddling(times: Samples, jumps: list[float]) -> Samples:

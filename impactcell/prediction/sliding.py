@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
-from impactcell.prediction.local import polynomial, spread, value_at
+from impactcell.prediction.local import median, polynomial, spread, value_at
 from impactcell.prediction.reading import Reading, checked, displacement, loss_of_contact, noise_std
 from impactcell.records import Capture, Samples
 
@@ -64,15 +64,13 @@ def _rest(
 ) -> tuple[Reading, float, Reading]:
     """Level at rest, time of rest, mean deceleration; a parabola through the slide tells when it stopped."""
     tail = max(5, len(moved) // 50)
-    final = float(np.median(moved[-tail:]))
-    sliding = np.flatnonzero((times > separation_s) & (final - moved > 8.0 * sigma))
-    if len(sliding) < 8:
-        raise NoStopError("the slide is too short for its position samples")
-    last = int(sliding[-1])
+    final = median(moved[-tail:])
     first = int(np.searchsorted(times, separation_s, "right"))
-    inside = slice(first, last + 1)
-    if last + 1 - first < 8:
+    sliding = final - moved[first:] > 8.0 * sigma
+    if np.count_nonzero(sliding) < 8:
         raise NoStopError("the slide is too short for its position samples")
+    last = len(times) - 1 - int(np.argmax(sliding[::-1]))
+    inside = slice(first, last + 1)
     origin, span = separation_s, float(times[last] - separation_s)
     cubic, factor, _ = polynomial(times[inside], moved[inside], origin, span, 3)
     _, c1, c2, c3 = cubic.tolist()
@@ -90,7 +88,7 @@ def _rest(
         left = 1e3 * last_speed / span
         raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
     stop_s = min(stop_s, float(times[-1]))
-    after = moved[times > stop_s] if stop_s < times[-1] else moved[quiet:]
+    after = moved[np.searchsorted(times, stop_s, "right") if stop_s < times[-1] else quiet :]
     if len(after) >= 3:
         rest = Reading(float(after.mean()), sigma / math.sqrt(len(after)))
     else:

@@ -141,18 +141,17 @@ def _fit(capture: Capture, plant: Plant, known: Belief, start: Samples, slid: Sl
         response = respond(capture, with_parameters(plant, plain.theta), slid.separation_s)
         fits = _both_sides(response, known, plain.theta)
         plain, misfit = _likelier(fits, known, offset)
-    widening = max(misfit, 1.0)
+    widening, best = max(misfit, 1.0), plain
     if misfit > DOUBTED:
         widening = 1.0
-        phase, best = phases(response, slid.separation_s, slid.stop_s), plain
+        phase = phases(response, slid.separation_s, slid.stop_s)
         for _ in range(ROUNDS):
-            residual, _ = response.linear(best.theta, best.side)
+            residual = response.linear(best.theta, best.side).residual
             fits = _both_sides(response.doubted(doubt(residual, phase) * LATER[phase]), known, best.theta)
             best, _ = _likelier(fits, known, offset)
     gap = response.gap(plain.residual)
     if misfit > MISSED:
         raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
-    best, _ = _likelier(fits, known, offset)
     if not best.settled:
         raise NotConvergedError("the waveform fit did not settle", gap)
     sides = tuple(one.as_side(known, widening) for one in fits)

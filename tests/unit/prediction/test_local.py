@@ -1,6 +1,7 @@
 """Polynomials and means by compiled code, against numpy's and against closed forms."""
 
 import math
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from impactcell.prediction.blocks import blocks
 from impactcell.prediction.local import (
-    longest_run,
+    median,
     polynomial,
     running_mean,
     spread,
@@ -61,10 +62,20 @@ def test_a_running_mean_is_that_of_the_values_about_each(count: int, width: int,
 
 def test_a_survey_counts_what_is_wrong() -> None:
     times, values = np.array([0.0, 1.0, 1.0, 3.0]), np.array([2.0, -5.0, math.nan, 7.0])
-    assert survey(times, values) == (1, False, -5.0, 7.0)
-    assert survey(times[:2], values[:2]) == (0, True, -5.0, 2.0)
-    assert longest_run(np.array([1.0, 7.0, 7.0, 2.0, 7.0, 7.0, 7.0]), 7.0) == 3
-    assert longest_run(np.array([1.0, 2.0]), 7.0) == 0
+    assert survey(times, values)[:4] == (1, False, -5.0, 7.0)
+    assert survey(times[:2], values[:2])[:4] == (0, True, -5.0, 2.0)
+
+
+@given(st.lists(st.integers(0, 3), min_size=1, max_size=30))
+def test_a_plateau_is_the_longest_run_at_the_highest(values: list[int]) -> None:
+    highest = max(values)
+    runs = [len(list(run)) for value, run in groupby(values) if value == highest]
+    assert survey(np.arange(30.0), np.array(values, dtype=float))[3:] == (highest, max(runs))
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30))
+def test_the_median_is_numpys(values: list[float]) -> None:
+    assert median(np.array(values)) == np.median(values)
 
 
 def test_the_widest_cubic_stops_where_the_record_bends_away() -> None:
@@ -89,5 +100,6 @@ def test_scatter_and_means_of_blocks_hold_all_squares() -> None:
     line = 990.0 + 1.5e4 * made.time_s
     direct = float(np.square((values - 990.0 - 1.5e4 * times) / 0.3).sum())
     between = float(np.square((made.values - line) / made.std).sum())
-    within = float(made.scatter.squares(np.full(len(line), 1.5e4)).sum())
+    sums = made.scatter
+    within = float((sums.values - 3e4 * sums.both + 1.5e4**2 * sums.times).sum()) / 0.3**2
     assert between + within == pytest.approx(direct, rel=1e-9)
