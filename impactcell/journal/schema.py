@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from impactcell.records import Capture, Coefficient, Snapshot
 
 APPLICATION_ID = 0x49435243  # "ICRC"
-FORMAT = 2
+FORMAT = 3
 
 Value = float | int | str
 

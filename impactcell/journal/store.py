@@ -71,6 +71,7 @@ class Journal:
 
     def __init__(self, path: Path, cell: str | None, *, read_only: bool = False) -> None:
         self.path = path
+        self._appended: Position | None = None
         try:
             if read_only and not path.is_file():
                 raise JournalError(f"{path}: there is no such journal")
@@ -139,6 +140,7 @@ class Journal:
             self._db.execute("INSERT INTO captures VALUES (?, ?)", (row, encode_capture(capture)))
             self._put_alarms(changed)
             self._db.execute("INSERT OR REPLACE INTO state VALUES (1, ?, ?)", (row, state))
+        self._appended = Position(capture.session, capture.cycle)
 
     def record(self, state: bytes, changed: Sequence[Alarm] = (), audit: AuditEntry | None = None) -> None:
         """Store what happened between cycles: alarms, a person's action and the state they led to."""
@@ -162,6 +164,8 @@ class Journal:
 
     def position(self) -> Position | None:
         """Return the last durable cycle; None in a new journal."""
+        if self._appended is not None:
+            return self._appended
         with self._errors():
             row = self._db.execute("SELECT session, cycle FROM cycles ORDER BY seq DESC LIMIT 1").fetchone()
         return None if row is None else Position(*row)
@@ -185,6 +189,11 @@ class Journal:
         """Return the states that each transition of an alarm led to."""
         with self._errors():
             return past_alarms(self._db, question)
+
+    def checkpoint(self) -> None:
+        """Move what has been committed from the log into the file; it is as durable before as after."""
+        with self._errors():
+            self._db.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
     def thin(self, keep: Retention, now_ns: int) -> None:
         """Drop what `keep` does not keep; see `impactcell.journal.retention`."""

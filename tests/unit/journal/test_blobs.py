@@ -1,5 +1,9 @@
 """A capture comes back from the journal with the same bits, whatever it holds."""
 
+import math
+import struct
+import zlib
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +12,9 @@ from hypothesis.extra import numpy as hnp
 
 from impactcell.errors import JournalError
 from impactcell.journal.blobs import decode_capture, encode_capture
+from impactcell.journal.codes import BLOCK, packed, unpacked
 from impactcell.records import Capture, Channel, Summary, uniform_times
+from tests.snapshots import make_capture
 
 floats = st.floats(allow_nan=True, allow_infinity=True)
 
@@ -78,16 +84,50 @@ def test_same_bits_come_back(
     assert np.isnan(back.mass_kg)
 
 
-def test_integer_codes_are_kept_small() -> None:
-    rng = np.random.default_rng(0)
-    codes = np.rint(rng.normal(0, 20, 20_000) + 5000 * np.sin(np.linspace(0, 3, 20_000)))
+@given(
+    st.lists(st.integers(-(2**27), 2**27) | st.integers(-300, 300), max_size=3 * BLOCK),
+    st.sampled_from([1e-9, 0.02, 0.025, 1.0]),
+)
+def test_codes_come_back_whatever_their_steps(codes: list[int], resolution: float) -> None:
+    values = np.array(codes, dtype=np.float64) * resolution
+    done, shifts, words = packed(values, resolution)
+    assert done
+    assert unpacked(shifts, words, len(values), resolution).tobytes() == values.tobytes()
+
+
+@pytest.mark.parametrize("odd", [0.013, float("nan"), float("inf"), -0.0, 1e300, 0.02 * 2**40])
+def test_what_is_no_near_multiple_is_not_packed(odd: float) -> None:
+    done, _, _ = packed(np.array([0.02, odd]), 0.02)
+    assert not done
+
+
+def test_words_that_end_too_soon_give_no_values() -> None:
+    done, shifts, words = packed(np.arange(300.0) % 7, 1.0)
+    assert done
+    short = unpacked(shifts, words[:-3], 300, 1.0)
+    assert np.isnan(short[-1])
+    assert (short[:200] == np.arange(200) % 7).all()
+
+
+def test_white_noise_takes_little_more_than_its_entropy() -> None:
+    codes = np.rint(np.random.default_rng(0).normal(0, 20, 20_000)).astype(np.int64)
     coded = Capture(
         1, 0.05, 18.9, Channel(uniform_times(0.0, 1e6, 20_000), codes * 0.02, resolution=0.02), None
     )
-    assert len(encode_capture(coded)) < 2 * 20_000
+    entropy_bits = 20_000 * np.log2(math.sqrt(2.0) * 20.0 * math.sqrt(2.0 * math.pi * math.e))
+    assert entropy_bits < 8 * len(encode_capture(coded)) < 1.06 * entropy_bits
 
 
-@given(st.binary(max_size=200), st.booleans())
-def test_foreign_bytes_are_refused(noise: bytes, prefixed: bool) -> None:
+@given(st.binary(max_size=200), st.sampled_from(["", "prefixed", "checked"]))
+def test_foreign_bytes_are_refused(noise: bytes, dress: str) -> None:
+    check = struct.pack("<I", zlib.crc32(noise)) if dress == "checked" else b""
     with pytest.raises(JournalError):
-        decode_capture((b"ICC2" if prefixed else b"") + noise)
+        decode_capture((b"ICC3" if dress else b"") + check + noise)
+
+
+@given(st.data())
+def test_a_changed_byte_is_noticed(data: st.DataObject) -> None:
+    blob = bytearray(encode_capture(make_capture()))
+    blob[data.draw(st.integers(0, len(blob) - 1))] ^= data.draw(st.integers(1, 255))
+    with pytest.raises(JournalError):
+        decode_capture(bytes(blob))
