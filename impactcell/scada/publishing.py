@@ -12,7 +12,16 @@ from impactcell.scada.instances import read
 from impactcell.scada.nodes import CYCLE, MODULE
 from impactcell.scada.nodes import Value as NodeValue
 from impactcell.scada.space import CellSpace
-from impactcell.scada.values import BAD, LAST_USABLE, NO_COMMUNICATION, STATUS, WAITING, Values, moment
+from impactcell.scada.values import (
+    BAD,
+    LAST_USABLE,
+    NO_COMMUNICATION,
+    STATUS,
+    WAITING,
+    Values,
+    Variable,
+    moment,
+)
 
 _EMPTY: Final[dict[ua.VariantType, object]] = {
     ua.VariantType.Double: math.nan,
@@ -30,16 +39,16 @@ class CellValues:
     """
 
     def __init__(self, cell: CellSpace, values: Values, space: object, now: datetime) -> None:
-        self._values = values
-        self._nodes: dict[str, tuple[ua.NodeId, ua.VariantType, bool]] = {}
+        self._variables: dict[str, tuple[Variable, ua.VariantType, bool]] = {}
         self._seen: set[str] = set()
         for path in (*CYCLE, *MODULE):
             node = cell.path(path)
             kind = ua.VariantType(read(space, node, ua.AttributeIds.DataType).Identifier)
             is_array = read(space, node, ua.AttributeIds.ValueRank) == 1
-            self._nodes[path] = node, kind, is_array
+            variable = values.variable(node)
+            self._variables[path] = variable, kind, is_array
             empty = [] if is_array else _EMPTY[kind]
-            values.write(node, ua.DataValue(ua.Variant(empty, kind, is_array=is_array), WAITING, now, now))
+            variable.write(ua.DataValue(ua.Variant(empty, kind, None, is_array), WAITING, now, now))
 
     def publish(self, snapshot: Snapshot) -> None:
         """Write all that one cycle has to say."""
@@ -68,16 +77,14 @@ class CellValues:
         time = moment(time_ns)
         for path in CYCLE:
             if path in self._seen:
-                self._values.restate(self._nodes[path][0], status, time)
+                self._variables[path][0].restate(status, time)
 
     def _write(self, path: str, value: NodeValue, quality: Quality, time: datetime, now: datetime) -> None:
-        node, kind, is_array = self._nodes[path]
+        variable, kind, is_array = self._variables[path]
         if quality is Quality.BAD or (isinstance(value, float) and math.isnan(value)):
             # A Bad value is the last one that could be believed; there is none before the first.
-            held = self._values.read(node)
             status = BAD if path in self._seen else WAITING
-            self._values.write(node, ua.DataValue(held.Value, status, time, now))
+            variable.write(ua.DataValue(variable.data.Value, status, time, now))
             return
         self._seen.add(path)
-        variant = ua.Variant(value, kind, is_array=is_array)
-        self._values.write(node, ua.DataValue(variant, STATUS[quality], time, now))
+        variable.write(ua.DataValue(ua.Variant(value, kind, None, is_array), STATUS[quality], time, now))

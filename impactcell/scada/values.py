@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
+from asyncua.server.address_space import AddressSpace, AttributeValue
 from asyncua.ua.ua_binary import struct_to_binary
 
 from impactcell.records import Quality
@@ -68,6 +68,35 @@ def with_timestamps(data: ua.DataValue, timestamps: ua.TimestampsToReturn) -> ua
 Watcher = Callable[[Sample], None]
 
 
+class Variable:
+    """A variable that is written often: its place in the address space need not be looked up each time."""
+
+    __slots__ = ("_attribute", "watchers")
+
+    def __init__(self, attribute: AttributeValue) -> None:
+        self._attribute = attribute
+        self.watchers: list[Watcher] = []
+
+    @property
+    def data(self) -> ua.DataValue:
+        """Present value."""
+        return self._attribute.value
+
+    def write(self, data: ua.DataValue) -> None:
+        """Replace the value and tell all who watch it."""
+        self._attribute.value = data
+        if self.watchers:
+            sample = Sample(data)
+            for watcher in tuple(self.watchers):
+                watcher(sample)
+
+    def restate(self, status: ua.StatusCode, time: datetime) -> None:
+        """Replace the status and keep the last value; do nothing where the status is the same."""
+        data = self.data
+        if data.StatusCode != status:
+            self.write(ua.DataValue(data.Value, status, time, datetime.now(UTC)))
+
+
 class Values:
     """The one way a variable is written once the server runs.
 
@@ -77,20 +106,19 @@ class Values:
 
     def __init__(self, space: AddressSpace) -> None:
         self._space = space
-        self._watchers: dict[ua.NodeId, list[Watcher]] = {}
+        self._variables: dict[ua.NodeId, Variable] = {}
 
-    def read(self, node: ua.NodeId) -> ua.DataValue:
-        """Present value of a variable."""
-        return self._space.read_attribute_value(node, ua.AttributeIds.Value)
+    def variable(self, node: ua.NodeId) -> Variable:
+        """Find a variable."""
+        found = self._variables.get(node)
+        if found is None:
+            found = Variable(self._space[node].attributes[ua.AttributeIds.Value])
+            self._variables[node] = found
+        return found
 
     def write(self, node: ua.NodeId, data: ua.DataValue) -> None:
         """Replace the value and tell all who watch it."""
-        self._space[node].attributes[ua.AttributeIds.Value].value = data
-        watchers = self._watchers.get(node)
-        if watchers:
-            sample = Sample(data)
-            for watcher in tuple(watchers):
-                watcher(sample)
+        self.variable(node).write(data)
 
     def put(
         self,
@@ -103,20 +131,12 @@ class Values:
         """Replace value, status and source timestamp."""
         self.write(node, ua.DataValue(ua.Variant(value, kind), status, time, datetime.now(UTC)))
 
-    def restate(self, node: ua.NodeId, status: ua.StatusCode, time: datetime) -> None:
-        """Replace the status and keep the last value; do nothing where the status is the same."""
-        data = self.read(node)
-        if data.StatusCode != status:
-            self.write(node, ua.DataValue(data.Value, status, time, datetime.now(UTC)))
-
     def watch(self, node: ua.NodeId, watcher: Watcher) -> None:
         """Call `watcher` with every value written from now on."""
-        self._watchers.setdefault(node, []).append(watcher)
+        self.variable(node).watchers.append(watcher)
 
     def unwatch(self, node: ua.NodeId, watcher: Watcher) -> None:
         """Undo `watch`."""
-        watchers = self._watchers.get(node, [])
+        watchers = self.variable(node).watchers
         if watcher in watchers:
             watchers.remove(watcher)
-        if not watchers:
-            self._watchers.pop(node, None)

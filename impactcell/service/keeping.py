@@ -13,6 +13,9 @@ from impactcell.journal.store import Journal
 
 BACKLOG = 64
 """Entries kept in memory while the journal cannot be written."""
+CHECKPOINT_EVERY = 32
+"""Cycles after which the journal's log goes into its file: before SQLite, at 1000 pages, would make a cycle
+wait for that."""
 THIN_EVERY = 256
 """Cycles between two looks at what the journal may drop."""
 
@@ -41,7 +44,7 @@ class Keeper:
         self._keep = keep
         self._log = CellLogger(logging.getLogger(__name__), cell)
         self._waiting: deque[Entry] = deque()
-        self._since_thinned = THIN_EVERY
+        self._since_thinned, self._since_checkpoint = THIN_EVERY, CHECKPOINT_EVERY
 
     @property
     def durable(self) -> Mark | None:
@@ -54,17 +57,31 @@ class Keeper:
         """Whether something could not be written yet."""
         return bool(self._waiting)
 
-    def cycle(self, entry: Entry, time_ns: int) -> None:
-        """Write a cycle of that time, and now and then drop what has become too old or too much."""
+    @property
+    def untidy(self) -> bool:
+        """Whether `tidy` is due."""
+        return self.journal is not None and self._since_checkpoint >= CHECKPOINT_EVERY and not self._waiting
+
+    def cycle(self, entry: Entry) -> None:
+        """Write a cycle."""
         self._since_thinned += 1
+        self._since_checkpoint += 1
         self.store(entry)
-        if self.journal is not None and self._since_thinned >= THIN_EVERY and not self._waiting:
-            self._since_thinned = 0
-            try:
+
+    def tidy(self, time_ns: int) -> None:
+        """Do what no cycle has to wait for: empty the log, and drop what has become too old or too much."""
+        if self.journal is None:
+            return
+        self._since_checkpoint = 0
+        try:
+            if self._since_thinned >= THIN_EVERY:
+                self._since_thinned = 0
                 # A module's clock that runs ahead must not make everything look old.
                 self.journal.thin(self._keep, min(time_ns, time.time_ns()))
-            except JournalError as error:
-                self.fault = str(error)
+            else:
+                self.journal.checkpoint()
+        except JournalError as error:
+            self.fault = str(error)
 
     def store(self, entry: Entry) -> None:
         """Write `entry` after all that could not be written before: no state may be ahead of its cycles."""

@@ -127,7 +127,10 @@ class Worker:
         faults: tuple[str, ...] = (),
     ) -> Processed:
         """Take one cycle through the pipeline and store it."""
-        return await self.run(lambda: self._process(capture, positioning, announcement, faults))
+        processed = await self.run(lambda: self._process(capture, positioning, announcement, faults))
+        if self._keeper.untidy:
+            self._thread.submit(self._tidy, capture.time_ns)  # what is shown need not wait for it
+        return processed
 
     async def find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
         """Take what a rule beside the cycles says; the alarms that moved."""
@@ -214,10 +217,14 @@ class Worker:
         if self._keeper.journal is None:
             return Processed(stepped, self.last)
         blob = self._blob()
-        self._keeper.cycle(
-            lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed), capture.time_ns
-        )
+        self._keeper.cycle(lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed))
         return Processed(stepped, self.durable)
+
+    def _tidy(self, time_ns: int) -> None:
+        try:
+            self._keeper.tidy(time_ns)
+        except Exception:
+            self.log.exception("the journal could not be tidied")
 
     def _stepped(
         self,

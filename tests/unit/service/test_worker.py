@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,6 +49,32 @@ async def test_an_entry_that_can_never_be_stored_blocks_nothing(
     assert worker.journal_fault == ""
     await worker.close()
     assert cycles(tmp_path / "j") == [1, 3]
+
+
+async def test_no_cycle_waits_for_the_journal_to_be_tidied(
+    tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("impactcell.service.keeping.CHECKPOINT_EVERY", 2)
+    journal = Journal(tmp_path / "j", "c")
+    worker = Worker(design, journal, Retention())
+    shown, done = threading.Event(), []
+
+    def late(name: str) -> Callable[..., None]:
+        def work(*_: object) -> None:
+            assert shown.wait(10.0)
+            done.append(name)
+
+        return work
+
+    monkeypatch.setattr(journal, "thin", late("thin"))
+    monkeypatch.setattr(journal, "checkpoint", late("checkpoint"))
+    for cycle in range(1, 6):
+        shown.clear()
+        assert await process(worker, make_capture(cycle)) == Mark(1, cycle)
+        shown.set()
+        await worker.run(lambda: None)
+    await worker.close()
+    assert done == ["thin", "checkpoint", "checkpoint"]
 
 
 async def test_what_cannot_be_stored_now_is_stored_later_in_order(
