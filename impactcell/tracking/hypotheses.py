@@ -211,8 +211,8 @@ def prune(bank: Samples, count: int, capacity: int, recent: int, cycle: float, a
 def slope_evidence(mean: float, variance: float, prior: float) -> float:
     """Log factor on the evidence of a row when its slope's prior is the mixture over `SLOPES`.
 
-    The row was filtered with N(0, `prior`) and has its slope at N(`mean`, `variance`); what the data alone say
-    is their ratio, and its integral over each scale is in closed form.
+    The row was filtered with N(0, `prior`) and has its slope at N(`mean`, `variance`); what the data
+    alone say is their ratio, and its integral over each scale is in closed form.
     """
     if variance >= 0.99 * prior:
         return 0.0
