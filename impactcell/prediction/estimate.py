@@ -77,12 +77,14 @@ def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEst
     except PredictionError as fault:
         mu_force = mu_distance = mu_combined = _coefficient(str(fault))
     mu_s, estimator = _published(capture, mu_combined, mu_force, mu_distance)
-    mu_k = _mu_k(model, slid, mu_s, capture.mass_kg)
     gap = math.nan
-    if not force_fault and slid is not None:
+    if force_fault or slid is None:
+        mu_k = _mu_k(model, slid, mu_s, capture.mass_kg)
+    else:
         try:
             found = fit(capture, model, slid)
         except PredictionError as fault:
+            mu_k = _mu_k(model, slid, mu_s, capture.mass_kg)
             mu_s = _warned(mu_s, f"no waveform estimate: {fault}")
             gap = fault.gap if isinstance(fault, NotConvergedError) else math.nan
         else:

@@ -70,9 +70,15 @@ def running_mean(values: Samples, width: int) -> Samples:
     return mean
 
 
+def mean(values: Samples) -> float:
+    """Give numpy's mean of a few values, in less time."""
+    return float(np.add.reduce(values)) / len(values)
+
+
 def median(values: Samples) -> float:
-    """Give the median of a few values; numpy's own takes ten times as long over them."""
-    ordered, half = np.sort(values), len(values) // 2
+    """Give numpy's median of a few values, in less time."""
+    ordered, half = values.copy(), len(values) // 2
+    ordered.sort()
     return float(ordered[half] if len(values) % 2 else 0.5 * (ordered[half - 1] + ordered[half]))
 
 

@@ -152,7 +152,7 @@ def peak_force(channel: Channel) -> Reading:
     sigma = noise_std(force)
     times, values = force.time_s, force.values
     smooth = _smooth(force)
-    top = int(np.argmax(smooth))
+    top = int(smooth.argmax())
     if smooth[top] < 8.0 * sigma:
         raise CaptureError(f"no contact: the force stays below {smooth[top]:.3g} N, noise is {sigma:.3g} N")
     found = _widest_fit(times, values, sigma, times[top], 1.0, 1.0)
@@ -190,13 +190,13 @@ def loss_of_contact(force: Channel) -> Reading:
         raise CaptureError(f"no contact: the force stays below {highest:.3g} N, noise is {sigma:.3g} N")
     width = _smoothing_width(force)
     threshold = max(7.0 * sigma / math.sqrt(width), 0.005 * highest)
-    last = len(smooth) - 1 - int(np.argmax(smooth[::-1] > threshold))
+    last = len(smooth) - 1 - int((smooth[::-1] > threshold).argmax())
     if last >= len(smooth) - max(2, width):
         raise NoSeparationError(f"the force was still {smooth[-1]:.3g} N when its record ended")
     times, values = force.time_s, force.values
     window, end_s = 1.5e-3, float(times[last])
     for _ in range(5):
-        first = int(np.searchsorted(times, end_s - window, "right"))
+        first = int(times.searchsorted(end_s - window, "right"))
         pressed = values[first : last + 1] > 3.0 * sigma
         falling = values[first : last + 1][pressed]
         freedom = len(falling) - 3
@@ -210,7 +210,8 @@ def loss_of_contact(force: Channel) -> Reading:
             error = sigma * spread(factor, root)
             return Reading(end_s + window * root, window * min(error / max(slope, 1e-300), 1.0))
         window /= 1.6
-    step = median(np.diff(times[max(0, last - 50) : last + 2]))
+    near = times[max(0, last - 50) : last + 2]
+    step = median(near[1:] - near[:-1])
     return Reading(float(times[last] + 0.5 * step * width), step * width)
 
 
@@ -243,7 +244,7 @@ def _widest_fit(
     times: Samples, values: Samples, sigma: float, at_s: float, left: float, right: float
 ) -> Reading | None:
     """Maximum of a cubic about `at_s`; what bias stays is of the size of the noise: hence `BIASED`."""
-    step = median(np.diff(times[:100]))
+    step = median(times[1:100] - times[: min(len(times), 100) - 1])
     narrowest_s = max(2.5e-4, 4.0 * step)
     found, value, std = widest_cubic(
         times, values, sigma, at_s, left, right, narrowest_s, WIDEST_WINDOW_S, step

@@ -203,7 +203,8 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
     if capture.force is not None:
         force = blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
         jumps = [event.time_s for event in motion.events if event.kind is EventKind.CONTACT]
-        force = replace(force, std=force.std * _straddling(force.time_s, jumps))
+        if jumps:
+            force = replace(force, std=force.std * _straddling(force.time_s, jumps))
     position = blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return Response(plant, tap, force, position)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
-from impactcell.prediction.local import median, polynomial, spread, value_at
+from impactcell.prediction.local import mean, median, polynomial, spread, value_at
 from impactcell.prediction.reading import Reading, checked, displacement, loss_of_contact, noise_std
 from impactcell.records import Capture, Samples
 
@@ -46,7 +46,7 @@ def slide(capture: Capture) -> Slide:
     times = position.time_s
     moved = capture.direction * position.values
     tail = max(5, len(moved) // 50)
-    if abs(float(moved[-tail:].mean() - moved[:tail].mean())) < 6.0 * sigma:
+    if abs(mean(moved[-tail:]) - mean(moved[:tail])) < 6.0 * sigma:
         raise NoBreakawayError(f"the part moved less than {6.0 * sigma:.3g} m")
     separation = loss_of_contact(checked(capture.force, "force"))
     separation_s = separation.value
@@ -65,11 +65,11 @@ def _rest(
     """Level at rest, time of rest, mean deceleration; a parabola through the slide tells when it stopped."""
     tail = max(5, len(moved) // 50)
     final = median(moved[-tail:])
-    first = int(np.searchsorted(times, separation_s, "right"))
+    first = int(times.searchsorted(separation_s, "right"))
     sliding = final - moved[first:] > 8.0 * sigma
     if np.count_nonzero(sliding) < 8:
         raise NoStopError("the slide is too short for its position samples")
-    last = len(times) - 1 - int(np.argmax(sliding[::-1]))
+    last = len(times) - 1 - int(sliding[::-1].argmax())
     inside = slice(first, last + 1)
     origin, span = separation_s, float(times[last] - separation_s)
     cubic, factor, _ = polynomial(times[inside], moved[inside], origin, span, 3)
@@ -88,9 +88,9 @@ def _rest(
         left = 1e3 * last_speed / span
         raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
     stop_s = min(stop_s, float(times[-1]))
-    after = moved[np.searchsorted(times, stop_s, "right") if stop_s < times[-1] else quiet :]
+    after = moved[times.searchsorted(stop_s, "right") if stop_s < times[-1] else quiet :]
     if len(after) >= 3:
-        rest = Reading(float(after.mean()), sigma / math.sqrt(len(after)))
+        rest = Reading(mean(after), sigma / math.sqrt(len(after)))
     else:
         rest = Reading(value_at(cubic, stop), sigma * spread(factor, 1.0))
     parabola, factor, _ = polynomial(times[inside], moved[inside], origin, span, 2)
@@ -118,8 +118,8 @@ def _still(times: Samples, moved: Samples, sigma: float) -> bool:
 def _level(times: Samples, values: Samples, at_s: float, sigma: float) -> Reading:
     """Value of a smooth channel at a time, from a cubic through its neighbourhood."""
     for half in (2e-3, 4e-3, 8e-3):
-        first = int(np.searchsorted(times, at_s - half, "left"))
-        last = int(np.searchsorted(times, at_s + half, "right"))
+        first = int(times.searchsorted(at_s - half, "left"))
+        last = int(times.searchsorted(at_s + half, "right"))
         if last - first >= 8:
             scale = max(at_s - float(times[first]), float(times[last - 1]) - at_s)
             cubic, factor, _ = polynomial(times[first:last], values[first:last], at_s, scale, 3)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from impactcell.prediction.blocks import blocks
 from impactcell.prediction.local import (
+    mean,
     median,
     polynomial,
     running_mean,
@@ -74,8 +75,9 @@ def test_a_plateau_is_the_longest_run_at_the_highest(values: list[int]) -> None:
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30))
-def test_the_median_is_numpys(values: list[float]) -> None:
+def test_mean_and_median_are_numpys(values: list[float]) -> None:
     assert median(np.array(values)) == np.median(values)
+    assert mean(np.array(values)) == np.mean(values)
 
 
 def test_the_widest_cubic_stops_where_the_record_bends_away() -> None:
