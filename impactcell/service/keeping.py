@@ -13,7 +13,7 @@ from impactcell.journal.store import Journal
 
 BACKLOG = 64
 """Entries kept in memory while the journal cannot be written."""
-CHECKPOINT_EVERY = 32
+CHECKPOINT_EVERY = 24
 """Cycles after which the journal's log goes into its file: before SQLite, at 1000 pages, would make a cycle
 wait for that."""
 THIN_EVERY = 256

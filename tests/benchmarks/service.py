@@ -23,6 +23,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
+from tests.benchmarks._cycle_parts import parts
 from tests.benchmarks.table import Table
 from tests.integration.processes import CONFIG, ROOT
 
@@ -227,9 +228,11 @@ def load(number: int, seconds: float) -> Load:
 
 
 def tables(quick: bool = False) -> list[Table]:
-    """Cells on one core, and the delay of one of them."""
+    """Cells on one core, the delay of one of them, and what its cycle costs by part."""
     numbers = (1, 4) if quick else (1, 4, 8, 16, 24)
     seconds = 10.0 if quick else 30.0
+    with tempfile.TemporaryDirectory() as directory:
+        by_part = parts(cell_file(Path(directory), "cell", 1, 0, journal=True), 60 if quick else 240)
     os.sched_setaffinity(0, OTHERS)
     loads = []
     for number in numbers:
@@ -270,4 +273,5 @@ def tables(quick: bool = False) -> list[Table]:
                 ),
             ],
         ),
+        by_part,
     ]
