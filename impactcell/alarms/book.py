@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from impactcell.alarms.lifecycle import Event, Occurrence, Transition, expire, transition
-from impactcell.alarms.rules import AlarmSettings, Delay, Finding, delayed, occurrence
+from impactcell.alarms.rules import RESTED, AlarmSettings, Delay, Finding, delayed, occurrence
 from impactcell.records import Alarm, AlarmName, Shelving
 
 T = TypeVar("T")
@@ -28,14 +28,14 @@ class AlarmState:
 
     def alarm(self, name: AlarmName) -> Alarm:
         """One alarm by its name."""
-        return self.alarms[_place(name)]
+        return self.alarms[_PLACES[name]]
 
 
 def initial_state(settings: AlarmSettings) -> AlarmState:
     """All conditions normal."""
     rules = [(name, settings.rule(name)) for name in AlarmName]
     alarms = tuple(Alarm(name, enabled=rule.enabled, severity=rule.severity) for name, rule in rules)
-    return AlarmState(alarms, tuple(Delay() for _ in alarms))
+    return AlarmState(alarms, tuple(RESTED for _ in alarms))
 
 
 def after_cycle(
@@ -69,8 +69,11 @@ def after_cycle(
     if left != state.announced:
         state = replace(state, announced=left)
     for finding in findings:
-        state, done = find(settings, state, finding, cycle, time_ns)
-        moved = (*moved, *([done] if done.effects else []))
+        place = _PLACES[finding.name]
+        # nearly always there is nothing to do
+        if finding.holds or state.alarms[place].active or state.delays[place] is not RESTED:
+            state, done = find(settings, state, finding, cycle, time_ns)
+            moved = (*moved, *([done] if done.effects else []))
     return state, moved
 
 
@@ -78,10 +81,10 @@ def find(
     settings: AlarmSettings, state: AlarmState, finding: Finding, cycle: int, time_ns: int
 ) -> tuple[AlarmState, Transition]:
     """Move one alarm by one finding: of a cycle, or of what happens beside the cycles."""
-    place = _place(finding.name)
+    place = _PLACES[finding.name]
     alarm, rule = state.alarms[place], settings.rule(finding.name)
     delay, event = delayed(rule, alarm, state.delays[place], finding)
-    if delay != state.delays[place]:
+    if delay is not state.delays[place]:
         state = AlarmState(state.alarms, _with(state.delays, place, delay), state.announced)
     if event is None:
         if alarm.active and finding.holds and finding.evidence != alarm.evidence:
@@ -93,10 +96,10 @@ def find(
 
 def act(state: AlarmState, name: AlarmName, happened: Occurrence) -> tuple[AlarmState, Transition]:
     """Move one alarm by an event: a person's action, or the outside's suppression."""
-    place = _place(name)
+    place = _PLACES[name]
     done = transition(state.alarms[place], happened)
     if happened.event in (Event.ENABLE, Event.DISABLE) and done.refusal is None:
-        state = replace(state, delays=_with(state.delays, place, Delay()))
+        state = replace(state, delays=_with(state.delays, place, RESTED))
     return replace(state, alarms=_with(state.alarms, place, done.alarm)), done
 
 
@@ -106,10 +109,6 @@ def at_time(state: AlarmState, cycle: int, time_ns: int) -> tuple[AlarmState, tu
         return state, ()
     done = [expire(alarm, cycle, time_ns) for alarm in state.alarms]
     return replace(state, alarms=tuple(t.alarm for t in done)), tuple(t for t in done if t.effects)
-
-
-def _place(name: AlarmName) -> int:
-    return _PLACES[name]
 
 
 def _with(items: tuple[T, ...], place: int, item: T) -> tuple[T, ...]:

@@ -70,6 +70,9 @@ class AlarmSettings:
         return self.rules.get(name, DEFAULT_RULES[name])
 
 
+NOTHING = Evidence()
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     """What a rule says of one condition now; `holds` None where it cannot tell, and all stays as it is."""
@@ -77,16 +80,27 @@ class Finding:
     name: AlarmName
     holds: bool | None
     message: str = ""
-    evidence: Evidence = field(default_factory=Evidence)
+    evidence: Evidence = NOTHING
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """Cycles for which a condition's rule has held, or not held, and since it last called."""
+    """Cycles that are counted for one condition.
+
+    Attributes
+    ----------
+    held : int
+        For which the rule has held, while the condition is inactive.
+    missed, called : int
+        For which the rule has not held, and since the last call, while it is active.
+    """
 
     held: int = 0
     missed: int = 0
     called: int = 0
+
+
+RESTED = Delay()
 
 
 def wear_limit(settings: AlarmSettings, wear: WearState, cycle: int, *, active: bool) -> Finding:
@@ -95,13 +109,15 @@ def wear_limit(settings: AlarmSettings, wear: WearState, cycle: int, *, active: 
     threshold = settings.wear_off if active else settings.wear_on
     if wear.quality is Quality.BAD or probability != probability:
         return Finding(AlarmName.WEAR_LIMIT, None)
+    if probability <= threshold:
+        return Finding(AlarmName.WEAR_LIMIT, holds=False)
     above = wear.level - wear.limit
     since = cycle - round(above / wear.rate_per_cycle) if wear.rate_per_cycle > 0.0 < above else cycle
     evidence = Evidence(probability, settings.wear_on, max(since, 0), above, wear.level_std)
     message = (
         f"mu_s {wear.level:.4f} ± {wear.level_std:.4f}, limit {wear.limit:.4f}, P(above) {probability:.3f}"
     )
-    return Finding(AlarmName.WEAR_LIMIT, probability > threshold, message, evidence)
+    return Finding(AlarmName.WEAR_LIMIT, holds=True, message=message, evidence=evidence)
 
 
 def batch_shift(shift: Evidence | None) -> Finding:
@@ -126,24 +142,27 @@ def deviant_cycle(deviation: Evidence | None, at_m: float, *, judged: bool) -> F
 
 def delayed(rule: RuleSettings, alarm: Alarm, delay: Delay, finding: Finding) -> tuple[Delay, Event | None]:
     """Count cycles and say which event, if any, the finding gives to its alarm."""
-    if finding.holds is None or not alarm.enabled:
-        return (delay if finding.holds is None else Delay()), None
-    held, missed = (delay.held + 1, 0) if finding.holds else (0, delay.missed + 1)
+    if finding.holds is None:
+        return delay, None
+    if not alarm.enabled:
+        return RESTED, None
     if not alarm.active:
-        if held > rule.on_delay:
-            return Delay(held, missed), Event.ACTIVATE
-        return Delay(held, missed, delay.called), None
+        if not finding.holds:
+            return RESTED, None
+        if delay.held < rule.on_delay:
+            return Delay(delay.held + 1), None
+        return RESTED, Event.ACTIVATE
+    missed, called = 0 if finding.holds else delay.missed + 1, delay.called + 1
     if missed > rule.off_delay:
-        return Delay(held, missed), Event.CLEAR
-    called = delay.called + 1
+        return RESTED, Event.CLEAR
     if rule.realarm and called >= rule.realarm:
-        return Delay(held, missed), Event.REALARM
-    return Delay(held, missed, called), None
+        return Delay(0, missed), Event.REALARM
+    return Delay(0, missed, called), None
 
 
 def occurrence(event: Event, finding: Finding, severity: int, cycle: int, time_ns: int) -> Occurrence:
-    """Make the event that carries a finding's message and evidence."""
-    if event is Event.CLEAR:
+    """Make the event that carries a finding's message and evidence, where it has any."""
+    if not finding.holds:
         return Occurrence(event, cycle, time_ns)
     return Occurrence(
         event, cycle, time_ns, message=finding.message, severity=severity, evidence=finding.evidence

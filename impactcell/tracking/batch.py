@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from impactcell.records import Samples
 from impactcell.tracking import bank as banks
 from impactcell.tracking import wear
+from impactcell.tracking.noise import Noise
 from impactcell.tracking.screening import Place
 from impactcell.tracking.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.state import Reading, Shift, TrackerState
@@ -17,22 +19,29 @@ BOTH = 2.0  # ways to a false alarm where batches are known: within one, and bet
 SETTLED = 1.15  # it must not have moved by such a factor since the first cycles were gone over with it
 
 
-def find_shift(
+def take(
     settings: TrackerSettings,
     state: TrackerState,
     reading: Reading,
     variance: float,
     where: Place,
     announced: float,
-) -> tuple[TrackerState, Shift | None]:
-    """Take a reading into the bank; report the shift that it makes certain enough.
+) -> tuple[Samples, tuple[float, float], float]:
+    """Take a reading into the bank.
 
     Parameters
     ----------
     announced : float
         1: a batch change came with this cycle, -1: surely none, 0: nobody says.
+
+    Returns
+    -------
+    bank : ndarray, shape (k, 22)
+    outliers : tuple of float
+    statistic : float
+        Of a change since the last one that was reported.
     """
-    table = np.zeros((banks.ROWS, banks.WIDTH))
+    table = np.empty((banks.ROWS, banks.WIDTH))
     table[: len(state.bank)] = state.bank
     design = banks.design(
         settings.hazard,
@@ -47,21 +56,32 @@ def find_shift(
     count, _, statistic = banks.run_cycle(
         table, len(state.bank), design, values, outliers, float(state.accepted)
     )
-    fresh = replace(state, bank=table[:count].copy(), outliers=(float(outliers[0]), float(outliers[1])))
+    return table[:count].copy(), (float(outliers[0]), float(outliers[1])), statistic
+
+
+def find_shift(
+    settings: TrackerSettings,
+    state: TrackerState,
+    reading: Reading,
+    noise: Noise,
+    bank: Samples,
+    statistic: float,
+    where: Place,
+    announced: float,
+) -> tuple[TrackerState, Shift | None]:
+    """Report the shift that a reading, in `bank` by now, makes certain enough."""
     if announced > 0.0:
         # an announced change is no finding, and what came before it has been settled by it
-        return replace(fresh, accepted_before=where.index - 1, accepted=where.index), None
+        return replace(state, accepted_before=where.index - 1, accepted=where.index), None
     # with known batches, false alarms are shared out to changes within a batch and between batches
     known = settings.batch is BatchKnowledge.KNOWN and reading.batch_id is not None
     ways = BOTH if known else 1.0
     threshold = banks.threshold(ways * settings.false_alarm_cycles)
-    certain = statistic > threshold and _settled(state)
-    if announced < 0.0 or where.lag > 0 or not certain:
-        return fresh, None
-    fresh = replace(fresh, accepted_before=state.accepted, accepted=where.index)
-    cycle, size, std = banks.last_shift(fresh.bank, fresh.accepted_before, fresh.accepted)
+    if announced < 0.0 or where.lag > 0 or statistic <= threshold or not _settled(state, noise):
+        return state, None
+    cycle, size, std = banks.last_shift(bank, state.accepted, where.index)
     shift = Shift(cycle, size, std, where.index, statistic, threshold)
-    return replace(fresh, shift=shift), shift
+    return replace(state, accepted_before=state.accepted, accepted=where.index, shift=shift), shift
 
 
 def innovation(state: TrackerState, reading: Reading, variance: float, where: Place) -> float:
@@ -74,7 +94,12 @@ def innovation(state: TrackerState, reading: Reading, variance: float, where: Pl
 
 
 def compare_batch(
-    settings: TrackerSettings, state: TrackerState, variance: float, index: int
+    settings: TrackerSettings,
+    state: TrackerState,
+    current: wear.WearFilter,
+    noise: Noise,
+    variance: float,
+    index: int,
 ) -> tuple[TrackerState, Shift | None]:
     """Test whether the PLC's present batch differs from the one before.
 
@@ -82,8 +107,8 @@ def compare_batch(
     shift its exponential is a martingale, so that a batch is reported in error with probability at
     most 1 / threshold (Ville 1939). The threshold shares the false alarms out over the batches.
     """
-    current, previous = state.filter, state.previous_batch
-    if current is None or previous is None or previous not in current.batches:
+    previous = state.previous_batch
+    if previous is None or previous not in current.batches:
         return state, None
     size, std = wear.contrast(current, current.current, previous)
     prior = settings.step_std * math.sqrt(variance)
@@ -94,22 +119,22 @@ def compare_batch(
     if state.tested:
         reported = state.shift is not None and state.shift.cycle == state.batch_start
         return (replace(state, shift=shift) if reported else state), None
-    if statistic <= threshold or not _settled(state):
+    if statistic <= threshold or not _settled(state, noise):
         return state, None
     return replace(state, shift=shift, tested=True), shift
 
 
 def not_yet(state: TrackerState) -> str:
     """Say why no change of batch would be reported yet; empty where one would be."""
-    if _settled(state):
+    if _settled(state, state.noise):
         return ""
     return "no change of batch is reported yet: the scale of the noise is still being learned"
 
 
-def _settled(state: TrackerState) -> bool:
+def _settled(state: TrackerState, noise: Noise) -> bool:
     """Whether the scale of the noise is known well enough to tell a shift from noise."""
-    if state.noise.weight < FEWEST_DIFFERENCES:
+    if noise.weight < FEWEST_DIFFERENCES:
         return False
-    moved = state.noise.factor / state.replayed_factor
-    early = state.history is not None and state.noise.weight < LEARNING_DIFFERENCES
+    moved = noise.factor / state.replayed_factor
+    early = state.history is not None and noise.weight < LEARNING_DIFFERENCES
     return not early or 1.0 / SETTLED < moved < SETTLED

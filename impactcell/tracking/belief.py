@@ -9,6 +9,7 @@ from impactcell.compiled import compiled
 from impactcell.records import Quality, WearState
 
 INTERVAL = 0.95  # coverage of cycles_to_limit_low .. high
+SPREAD = float(ndtri(0.5 + INTERVAL / 2.0))
 FARTHEST = 1e9  # cycles; a limit farther off than this is not reached
 
 
@@ -36,11 +37,8 @@ def wear_state(
         above, expected, low, high = 0.0, math.inf, math.inf, math.inf
     else:
         above = float(ndtr((level - limit) / std)) if std > 0.0 else float(level > limit)
-        spread = float(ndtri(0.5 + INTERVAL / 2.0))
         spreads = (level_var, cross, slope_var, *noise)
-        expected, low, high = (
-            _first(level - limit, slope, spreads, z, FARTHEST) for z in (0.0, spread, -spread)
-        )
+        expected, low, high = _reached(level - limit, slope, spreads)
     return WearState(
         level, std, slope, math.sqrt(slope_var), limit, above, expected, low, high, quality, reason
     )
@@ -58,20 +56,26 @@ def _above(
 
 
 @compiled
-def _first(
-    above: float,
-    slope: float,
-    spreads: tuple[float, float, float, float, float],
-    z: float,
-    farthest: float,
-) -> float:
-    """First number of cycles at which `_above` is positive, by bisection; inf if beyond `farthest`."""
+def _reached(
+    above: float, slope: float, spreads: tuple[float, float, float, float, float]
+) -> tuple[float, float, float]:
+    """Cycles until the limit is reached, and both ends of their interval."""
+    return (
+        _first(above, slope, spreads, 0.0),
+        _first(above, slope, spreads, SPREAD),
+        _first(above, slope, spreads, -SPREAD),
+    )
+
+
+@compiled
+def _first(above: float, slope: float, spreads: tuple[float, float, float, float, float], z: float) -> float:
+    """First number of cycles at which `_above` is positive, by bisection; inf if beyond `FARTHEST`."""
     if _above(above, slope, spreads, z, 0.0) >= 0.0:
         return 0.0
     near, far = 0.0, 1.0
     while _above(above, slope, spreads, z, far) < 0.0:
         near, far = far, far * 2.0
-        if far > farthest:
+        if far > FARTHEST:
             return np.inf
     while far - near > 1e-10 * far:
         middle = 0.5 * (near + far)

@@ -27,7 +27,9 @@ from impactcell.tracking.reference import Reference
 from impactcell.tracking.variation import MODES
 
 COMPONENTS = 3  # principal components of T^2
-SHARES = {"t_squared": 0.02, "spe": 0.02, "level": 0.08, "tilt": 0.08, "bump": 0.42, "ripple": 0.38}
+KINDS = ("t_squared", "spe", *scan.FAMILIES)
+SHARES = (0.02, 0.02, 0.08, 0.08, 0.42, 0.38)
+BUMP = scan.FAMILIES.index("bump")
 LEAST_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
 INVISIBLE = 1e-9  # components smaller than this against the noise
 SMALLEST = 1e-300  # p-value
@@ -66,29 +68,69 @@ class Verdict:
 def judge(reference: Reference, slide: profile.Information, grid_m: Samples) -> Verdict:
     """Test one cycle against its material's reference."""
     cycles = float(reference.variation.cycles)
-    n = min(slide.seen, references.judged(reference))
-    G, y = references.unsure(reference, *references.deviating(reference, slide, n))
-    C = reference.components[:n].copy()
+    looked = shapes.shapes(float(grid_m[-1]), len(grid_m))
+    rows, across, waves = looked.within(slide.reached_m, len(slide.vector))
+    t_squared, spe, freedom, scale, found, centre = _tested(
+        reference.matrix,
+        reference.strength,
+        reference.mean,
+        reference.components,
+        reference.met,
+        reference.varied,
+        reference.weight,
+        cycles,
+        reference.spe_sum,
+        float(max(reference.spe_count, 1)),
+        slide.matrix,
+        slide.vector,
+        slide.seen,
+        rows,
+        across,
+        waves,
+    )
+    best = found.tolist()
+    chi_squared = float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0
+    p_values = (_hotelling(t_squared, int(cycles)), chi_squared, *[p for p, _, _ in best])
+    odds = [share / max(p, SMALLEST) for share, p in zip(SHARES, p_values, strict=True)]
+    most = odds.index(max(odds))
+    _, size, std = best[most - 2 if most >= 2 else BUMP]
+    at = float(grid_m[centre]) if centre >= 0 else math.nan
+    return Verdict(1.0 / sum(odds), t_squared, spe, freedom, KINDS[most], at, size, std)
+
+
+@compiled
+def _tested(
+    pooled: Samples,
+    strength: float,
+    mean: Samples,
+    components: Samples,
+    met: Samples,
+    varied: Samples,
+    weight: float,
+    cycles: float,
+    spe_sum: float,
+    spe_count: float,
+    matrix: Samples,
+    vector: Samples,
+    seen: int,
+    rows: Samples,
+    across: int,
+    waves: int,
+) -> tuple[float, float, int, float, Samples, int]:
+    """T^2, SPE, its freedom and the scale of the noise, and what `scan.scan` finds."""
+    n = min(seen, references.judged(met, varied, weight, cycles))
+    known, own = references.deviating(matrix, vector, mean, n, seen)
+    G, y = references.unsure(known, own, pooled, strength)
+    C = linear.part(components, 0, n, 0, MODES)
     t_squared, spe, freedom = _squares(G, y, C, COMPONENTS)
     # variation beyond the modes, or noise that was declared too low, widens everything once it is certain
-    count = max(reference.spe_count, 1)
-    usual_spe = reference.spe_sum / count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * count))
+    usual_spe = spe_sum / spe_count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * spe_count))
     scale = max(1.0, usual_spe)
-    found = {
-        "t_squared": _hotelling(t_squared, int(cycles)),
-        "spe": float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0,
-    }
     P, u = linear.varied(C, G, y)
-    scale *= 1.0 + 2.0 * MODES / cycles
-    least = 30.0 / (LARGEST * references.usual(reference.mean, n)) ** 2
-    looked = shapes.shapes(float(grid_m[-1]), len(grid_m))
-    best, centre = scan.scan(looked, P, u, C, slide.reached_m, least, scale, cycles)
-    found.update({name: b[0] for name, b in best.items()})
-    odds = {name: share / max(found[name], SMALLEST) for name, share in SHARES.items()}
-    kind = max(odds, key=lambda name: odds[name])
-    _, size, std = best.get(kind, best["bump"])
-    at = float(grid_m[centre]) if centre >= 0 else math.nan
-    return Verdict(1.0 / sum(odds.values()), t_squared, spe, freedom, kind, at, size, std)
+    least = 30.0 / (LARGEST * references.usual(mean, n)) ** 2
+    shown, wider = linear.part(rows, 0, len(rows), 0, n), scale * (1.0 + 2.0 * MODES / cycles)
+    found, centre = scan.scan(shown, P, u, C, across, waves, least, wider, cycles)
+    return t_squared, spe, freedom, scale, found, centre
 
 
 @compiled
@@ -97,11 +139,12 @@ def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, f
 
     Whitened by a Cholesky factor that takes the best known direction next and ends where nothing is known.
     """
+    n, k = C.shape
     # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
-    left, rest = linear.varied(C[:, leading:].copy(), G, y)
-    image = left @ C[:, :leading].copy()
-    n = len(rest)
-    whitened, inside, freedom = np.zeros(n), np.zeros((n, leading)), 0
+    left, rest = linear.varied(linear.part(C, 0, n, leading, k), G, y)
+    image = linear.product(left, linear.part(C, 0, n, 0, leading))
+    whitened, inside, column = np.zeros(n), np.zeros((n, leading)), np.empty(n)
+    freedom, whole = 0, 0.0
     for k in range(n):
         best = 0
         for i in range(n):
@@ -109,24 +152,42 @@ def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, f
                 best = i
         if left[best, best] < LEAST_INFORMATION:
             break
-        column = left[:, best] / math.sqrt(left[best, best])
-        whitened[k] = rest[best] / column[best]
-        inside[k] = image[best] / column[best]
+        root = math.sqrt(left[best, best])
+        whitened[k] = rest[best] / root
+        for j in range(leading):
+            inside[k, j] = image[best, j] / root
+        for i in range(n):
+            column[i] = left[i, best] / root
         for i in range(n):
             rest[i] -= column[i] * whitened[k]
             for j in range(n):
                 left[i, j] -= column[i] * column[j]
             for j in range(leading):
                 image[i, j] -= column[i] * inside[k, j]
+        whole += whitened[k] ** 2
         freedom += 1
-    whole = (whitened**2).sum()
-    sizes = np.sqrt((inside**2).sum(axis=0))
+    gram = linear.product(inside, inside)
+    along, sizes = np.zeros(leading), np.empty(leading)
+    for a in range(leading):
+        sizes[a] = math.sqrt(gram[a, a])
+        for k in range(n):
+            along[a] += inside[k, a] * whitened[k]
     if freedom <= leading or sizes.min() < INVISIBLE:
         return 0.0, whole, freedom
-    inside /= sizes
-    gram, along = inside.T @ inside, inside.T @ whitened
-    t_squared = (along * linear.solved(gram + (gram * sizes**2) @ gram, along)).sum()
-    left_over = whole - (along * linear.solved(gram, along)).sum()
+    for a in range(leading):
+        along[a] /= sizes[a]
+        for b in range(leading):
+            gram[a, b] /= sizes[a] * sizes[b]
+    spread = gram.copy()
+    for a in range(leading):
+        for b in range(leading):
+            for c in range(leading):
+                spread[a, b] += gram[a, c] * sizes[c] ** 2 * gram[c, b]
+    t_squared, left_over = 0.0, whole
+    seen, noise = linear.solved(spread, along), linear.solved(gram, along)
+    for a in range(leading):
+        t_squared += along[a] * seen[a]
+        left_over -= along[a] * noise[a]
     return t_squared, max(left_over, 0.0), freedom - leading
 
 

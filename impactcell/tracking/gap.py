@@ -7,7 +7,7 @@ so that the false-alarm rate holds from the first captures on, whatever level is
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from scipy.special import ndtri, stdtr
 
@@ -57,20 +57,22 @@ def follow(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
     # capped, so that a gap that is closed is seen to be closed within a few captures
     excess = min(excess, 2.0 * limit)
     since = cycle if state.excess == 0.0 else state.since
-    fresh = replace(state, excess=excess, since=since)
-    if state.count < LEARNED and state.excess <= limit:
-        n = state.count + 1
-        step = value - state.mean
-        mean = state.mean + step / n
-        fresh = replace(fresh, count=n, mean=mean, squares=state.squares + step * (value - mean))
-    if fresh.count < FIRST:
+    count, mean, squares = state.count, state.mean, state.squares
+    if count < LEARNED and state.excess <= limit:
+        count += 1
+        step = value - mean
+        mean += step / count
+        squares += step * (value - mean)
+    fresh = GapState(count, mean, squares, excess, since)
+    if count < FIRST:
         return GapTracked(fresh, None, Evidence(), "the usual residual is being learned")
+    usual = math.exp(mean)
     evidence = Evidence(
         excess,
         limit,
         since if excess > 0.0 else 0,
-        gap - math.exp(fresh.mean),
-        math.exp(fresh.mean) * math.sqrt(fresh.squares / max(fresh.count - 1, 1)),
+        gap - usual,
+        usual * math.sqrt(squares / max(count - 1, 1)),
         false_alarm_cycles,
         false_alarm_cycles * period_s / 86_400.0,
     )

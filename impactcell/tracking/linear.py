@@ -31,15 +31,59 @@ def factor(matrix: Samples) -> Samples:
 
 
 @compiled
+def part(matrix: Samples, top: int, bottom: int, left: int, right: int) -> Samples:
+    """Copy of the rows `top` .. `bottom` - 1 in the columns `left` .. `right` - 1."""
+    found = np.empty((bottom - top, right - left))
+    for i in range(bottom - top):
+        for j in range(right - left):
+            found[i, j] = matrix[top + i, left + j]
+    return found
+
+
+@compiled
+def product(A: Samples, B: Samples) -> Samples:
+    """Give A' B, shapes (k, n) and (k, m)."""
+    found = np.zeros((A.shape[1], B.shape[1]))
+    for k in range(len(A)):
+        for i in range(A.shape[1]):
+            for j in range(B.shape[1]):
+                found[i, j] += A[k, i] * B[k, j]
+    return found
+
+
+@compiled
+def triangle(matrix: Samples) -> Samples:
+    """Lower triangle of a symmetric matrix, by rows: what is kept of one between cycles."""
+    kept, p = np.empty(len(matrix) * (len(matrix) + 1) // 2), 0
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            kept[p] = matrix[i, j]
+            p += 1
+    return kept
+
+
+@compiled
+def square(kept: Samples) -> Samples:
+    """Symmetric matrix of a lower triangle."""
+    n, p = int(math.sqrt(2.0 * len(kept))), 0
+    matrix = np.empty((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            matrix[i, j] = matrix[j, i] = kept[p]
+            p += 1
+    return matrix
+
+
+@compiled
 def forward(lower: Samples, right: Samples) -> Samples:
     """Solve L X = R, shapes (n, n) and (n, k)."""
     n, width = right.shape
     found = right.copy()
     for i in range(n):
         for k in range(i):
-            part = lower[i, k]
+            share = lower[i, k]
             for c in range(width):
-                found[i, c] -= part * found[k, c]
+                found[i, c] -= share * found[k, c]
         for c in range(width):
             found[i, c] /= lower[i, i]
     return found
@@ -54,9 +98,9 @@ def backward(lower: Samples, right: Samples) -> Samples:
         for c in range(width):
             found[i, c] /= lower[i, i]
         for k in range(i):
-            part = lower[i, k]
+            share = lower[i, k]
             for c in range(width):
-                found[k, c] -= part * found[i, c]
+                found[k, c] -= share * found[i, c]
     return found
 
 
@@ -65,6 +109,13 @@ def solved(matrix: Samples, right: Samples) -> Samples:
     """Solve M x = r for a symmetric positive definite matrix, shapes (n, n) and (n,)."""
     lower = factor(matrix)
     return backward(lower, forward(lower, right.reshape((len(right), 1)))).reshape(len(right))
+
+
+@compiled
+def inverse(matrix: Samples) -> Samples:
+    """Inverse of a symmetric positive definite matrix."""
+    lower = factor(matrix)
+    return backward(lower, forward(lower, np.eye(len(matrix))))
 
 
 @compiled
@@ -87,15 +138,18 @@ def marginal(
     """
     n, k = len(vector), len(along)
     right = np.empty((k, n + 1))
-    right[:, :n], right[:, n] = cross, along
+    for c in range(k):
+        for i in range(n):
+            right[c, i] = cross[c, i]
+        right[c, n] = along[c]
     half = forward(factor(inner), right)
     left, rest = matrix.copy(), vector.copy()
     for c in range(k):
         for i in range(n):
-            part = half[c, i]
-            rest[i] -= part * half[c, n]
+            share = half[c, i]
+            rest[i] -= share * half[c, n]
             for j in range(n):
-                left[i, j] -= part * half[c, j]
+                left[i, j] -= share * half[c, j]
     return left, rest
 
 
@@ -105,15 +159,11 @@ def varied(components: Samples, matrix: Samples, vector: Samples) -> tuple[Sampl
 
     Shapes (n, k), (n, n) and (n,).
     """
-    n, k = components.shape
-    cross, inner, along = np.zeros((k, n)), np.eye(k), np.zeros(k)
+    k = components.shape[1]
+    cross, inner, along = product(components, matrix), np.eye(k), np.zeros(k)
     for c in range(k):
-        for i in range(n):
-            part = components[i, c]
-            along[c] += part * vector[i]
-            for j in range(n):
-                cross[c, j] += part * matrix[i, j]
-        for d in range(k):
-            for i in range(n):
+        for i in range(len(vector)):
+            along[c] += components[i, c] * vector[i]
+            for d in range(k):
                 inner[c, d] += cross[c, i] * components[i, d]
     return marginal(matrix, vector, inner, cross, along)

@@ -62,44 +62,50 @@ class Noise:
     guessed: bool = False
 
 
-def declared_std(noise: Noise, value: float, std: float) -> tuple[Noise, float]:
-    """Find the standard deviation to go with a value: its own, the usual one, or a guess to be corrected."""
-    if std > 0.0 and math.isfinite(std):
-        usual = std if math.isnan(noise.usual_std) else noise.usual_std + 0.05 * (std - noise.usual_std)
-        return replace(noise, usual_std=usual), std
-    if not math.isnan(noise.usual_std):
-        return noise, noise.usual_std
-    guess = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
-    return replace(noise, usual_std=guess, weight=0.0, guessed=True), guess
+def in_a_row(noise: Noise, value: float) -> int:
+    """Count how many values in a row have been the same, with this one."""
+    return noise.identical + 1 if value == noise.last_value else 1
 
 
-def learn(noise: Noise, value: float, std: float) -> Noise:
-    """Take one more difference into the factor."""
-    if math.isnan(noise.last_value):
-        return replace(noise, last_value=value, last_std=std)
-    squared = (value - noise.last_value) ** 2 / (std**2 + noise.last_std**2)
-    weight = min(noise.weight + 1.0, MEMORY)
-    if noise.guessed and weight <= UNSCALED:
-        # nothing to judge outliers by yet: the plain mean
-        factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
-        rough = factor
-        return Noise(factor, weight, rough, noise.usual_std, value, std, noise.identical, noise.guessed)
-    clipped = min(squared, CLIP**2 * noise.rough) / CONSISTENCY
-    rough = max(noise.rough + (clipped - noise.rough) / weight, SMALLEST_FACTOR)
-    own = squared * _share(squared, noise.factor)
-    factor = max(noise.factor + (own - noise.factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
-    return Noise(factor, weight, rough, noise.usual_std, value, std, noise.identical, noise.guessed)
+def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[Noise, float]:
+    """Take in an estimate, and its difference from the one before into the factor unless it comes late.
+
+    Returns
+    -------
+    noise : Noise
+    std : float
+        To go with the value: its own, the usual one, or a guess to be corrected.
+    """
+    std, usual, weight, guessed = declared, noise.usual_std, noise.weight, noise.guessed
+    if declared > 0.0 and math.isfinite(declared):
+        usual = std if math.isnan(usual) else usual + 0.05 * (std - usual)
+    elif not math.isnan(usual):
+        std = usual
+    else:
+        std = usual = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
+        weight, guessed = 0.0, True
+    factor, rough, last_value, last_std = noise.factor, noise.rough, noise.last_value, noise.last_std
+    identical = in_a_row(noise, value)
+    if late:
+        return Noise(factor, weight, rough, usual, last_value, last_std, identical, guessed), std
+    if not math.isnan(last_value):
+        squared = (value - last_value) ** 2 / (std**2 + last_std**2)
+        weight = min(weight + 1.0, MEMORY)
+        if guessed and weight <= UNSCALED:
+            # nothing to judge outliers by yet: the plain mean
+            factor = rough = max(factor + (squared - factor) / weight, SMALLEST_FACTOR)
+        else:
+            clipped = min(squared, CLIP**2 * rough) / CONSISTENCY
+            rough = max(rough + (clipped - rough) / weight, SMALLEST_FACTOR)
+            own = squared * _share(squared, factor)
+            factor = max(factor + (own - factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
+    return Noise(factor, weight, rough, usual, value, std, identical, guessed), std
 
 
 def variance(noise: Noise, std: float) -> float:
     """Variance of an estimate that declares `std`; wider while a guessed scale rests on few differences."""
     doubt = 1.0 + 4.0 / max(noise.weight, 1.0) if noise.guessed else 1.0
     return noise.factor * doubt * std**2
-
-
-def count_identical(noise: Noise, value: float) -> Noise:
-    """Count how many values in a row have been the same."""
-    return replace(noise, identical=noise.identical + 1 if value == noise.last_value else 1)
 
 
 def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:

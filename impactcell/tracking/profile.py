@@ -11,6 +11,7 @@ log likelihood = -1/2 beta' G beta + h' beta. This is the Rauch-Tung-Striebel sm
 random walk in x (Wecker & Ansley 1983, JASA 78:81) without its first-order errors in time.
 """
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -22,7 +23,6 @@ from impactcell.tracking import linear
 from impactcell.tracking.slide import Slide
 
 FINE_STEPS = 300  # of the double integral over a slide, at least
-NEGLIGIBLE = 1e-12  # share of a smoothing that is left out
 STRENGTHS = np.logspace(-9.0, 9.0, 37)  # of the smoothing searched, over that which weighs like the data
 
 
@@ -58,14 +58,10 @@ def information(
     viscous_per_mass : float
         k_v / m where the model knows it, 1/s.
     """
-    t, x = slide.time_s, slide.distance_m
-    points, first = len(grid_m), float(grid_m[0])
-    columns = _columns(t, x, first, float(grid_m[1]) - first, points, gravity_m_s2, viscous_per_mass)
-    products = columns.T @ columns / slide.variance
-    seen = len(products) - 1
-    matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
-    matrix[:seen, :seen], vector[:seen] = products[:seen, :seen], products[:seen, seen]
-    return Information(matrix, vector, float(x[-1]), seen)
+    seen = _information(
+        slide.time_s, slide.distance_m, slide.variance, grid_m, gravity_m_s2, viscous_per_mass
+    )
+    return Information(*seen)
 
 
 @lru_cache(maxsize=64)
@@ -90,81 +86,102 @@ def roughness(coefficients: int) -> Samples:
     return penalty
 
 
-def smooth(seen: Information) -> tuple[Samples, Samples, float]:
-    """Posterior of the coefficients seen under exp(-lambda/2 beta' D beta), s in number.
+def smooth(seen: Information, grid_m: Samples) -> tuple[Samples, float]:
+    """Posterior mean of the coefficients seen under exp(-lambda/2 beta' D beta), and the likeliest lambda.
 
     lambda is weighted by its restricted likelihood. Coefficients beyond follow the last ones in a straight
     line, at no penalty, so that they may be left out.
-
-    Returns
-    -------
-    mean : ndarray, shape (s,)
-    covariance : ndarray, shape (s, s)
-    strength : float
-        The lambda of largest likelihood.
     """
-    return _smoothed(seen.matrix, seen.vector, seen.seen, STRENGTHS)
+    mean, strength, _, _ = _smoothed(seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, STRENGTHS)
+    return mean, strength
 
 
-def friction(seen: Information, points: int) -> tuple[Samples, Samples]:
-    """Friction and its standard deviation on the grid of so many points; nan where no spline was met."""
-    mean, covariance, _ = smooth(seen)
-    return _on_grid(mean, covariance, points)
-
-
-@compiled
-def _on_grid(mean: Samples, covariance: Samples, points: int) -> tuple[Samples, Samples]:
-    value, std = np.full(points, np.nan), np.full(points, np.nan)
-    weight = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
-    for k in range(len(mean) - 2):
-        total, variance = 0.0, 0.0
-        for i in range(3):
-            total += weight[i] * mean[k + i]
-            for j in range(3):
-                variance += weight[i] * weight[j] * covariance[k + i, k + j]
-        value[k], std[k] = total, np.sqrt(max(variance, 0.0))
+def friction(seen: Information, grid_m: Samples) -> tuple[Samples, Samples]:
+    """Friction and its standard deviation on the grid, by `smooth`; nan where the part did not get."""
+    _, _, value, std = _smoothed(seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, STRENGTHS)
     return value, std
 
 
 @compiled
-def _smoothed(matrix: Samples, vector: Samples, n: int, strengths: Samples) -> tuple[Samples, Samples, float]:
-    penalty, within = roughness(n), matrix[:n, :n].copy()
-    scale = np.trace(within) / np.trace(penalty)
+def _smoothed(
+    matrix: Samples, vector: Samples, n: int, reached: float, grid: Samples, strengths: Samples
+) -> tuple[Samples, float, Samples, Samples]:
+    """Mean and strength of `smooth`, and what `friction` gives."""
+    rough, within, trace = roughness(n), linear.part(matrix, 0, n, 0, n), 0.0
+    for i in range(n):
+        trace += within[i, i]
+    scale = trace / (6.0 * (n - 2))  # of D the trace is 6 (n - 2)
+    for i in range(n):
+        for j in range(n):
+            rough[i, j] *= scale
+            within[i, j] += rough[i, j]
     # both matrices diagonal at once: base = L L', scale D = L Q diag(e) Q' L', matrix has 1 - e
-    lower = linear.factor(within + scale * penalty)
-    half = linear.forward(lower, scale * penalty)
+    lower = linear.factor(within)
+    half = linear.forward(lower, rough)
     share, axes = np.linalg.eigh(linear.forward(lower, half.T.copy()))
-    share = np.minimum(np.maximum(share, 0.0), 1.0)
-    share[:2] = 0.0  # level and slope are not penalised; rounding must not say otherwise
     vectors = linear.backward(lower, axes)
-    inner = vectors.T @ vector[:n].copy()
-    fit = np.empty(len(strengths))
-    for k in range(len(strengths)):
-        fit[k] = (n - 2) * np.log(strengths[k])
-        for i in range(n):
-            diagonal = max((1.0 - share[i]) + strengths[k] * share[i], 1e-300)
-            fit[k] += inner[i] ** 2 / diagonal - np.log(diagonal)
+    many = len(strengths)
+    inner, means, inverse = np.zeros(n), np.empty((n, many)), np.empty((n, many))
+    fit, determinant = (n - 2) * np.log(strengths), np.ones(many)
+    for i in range(n):
+        # level and slope are not penalised; rounding must not say otherwise
+        own = min(max(share[i], 0.0), 1.0) if i > 1 else 0.0
+        for j in range(n):
+            inner[i] += vectors[j, i] * vector[j]
+        for k in range(many):
+            diagonal = (1.0 - own) + strengths[k] * own
+            inverse[i, k] = 1.0 / diagonal
+            means[i, k] = inner[i] * inverse[i, k]
+            fit[k] += inner[i] * means[i, k]
+            determinant[k] *= diagonal
+        if i % 16 == 15 or i == n - 1:  # the product of more of them might be too large a number
+            fit -= np.log(determinant)
+            determinant[:] = 1.0
     best = int(fit.argmax())
     # averaged over what lambda may be: the most likely one alone smooths away features it should doubt
-    share_of = np.exp(0.5 * (fit - fit[best]))
-    share_of /= share_of.sum()
-    mean, spread, inverse = np.zeros(n), np.zeros((n, n)), np.zeros(n)
-    means = np.empty((len(strengths), n))
-    for k in range(len(strengths)):
-        for i in range(n):
-            diagonal = max((1.0 - share[i]) + strengths[k] * share[i], 1e-300)
-            means[k, i] = inner[i] / diagonal
-            mean[i] += share_of[k] * means[k, i]
-            inverse[i] += share_of[k] / diagonal
-    for k in range(len(strengths)):
-        if share_of[k] > NEGLIGIBLE:
-            for i in range(n):
-                part = share_of[k] * (means[k, i] - mean[i])
-                for j in range(n):
-                    spread[i, j] += part * (means[k, j] - mean[j])
+    weight = np.exp(0.5 * (fit - fit[best]))
+    weight /= weight.sum()
+    mean, spread = np.zeros(n), np.zeros((n, n))
     for i in range(n):
-        spread[i, i] += inverse[i]
-    return vectors @ mean, vectors @ spread @ vectors.T, strengths[best] * scale
+        for k in range(many):
+            mean[i] += weight[k] * means[i, k]
+            spread[i, i] += weight[k] * inverse[i, k]
+        for k in range(many):
+            means[i, k] = (means[i, k] - mean[i]) * math.sqrt(weight[k])
+    spread += means @ means.T
+    value, std = np.full(len(grid), np.nan), np.full(len(grid), np.nan)
+    at = np.empty((n - 2, n))
+    for k in range(n - 2):
+        for j in range(n):
+            at[k, j] = (vectors[k, j] + 4.0 * vectors[k + 1, j] + vectors[k + 2, j]) / 6.0
+    image = at @ spread
+    for k in range(n - 2):
+        if grid[k] <= reached:
+            variance, value[k] = 0.0, 0.0
+            for j in range(n):
+                value[k] += at[k, j] * mean[j]
+                variance += at[k, j] * image[k, j]
+            std[k] = math.sqrt(max(variance, 0.0))
+    return vectors @ mean, strengths[best] * scale, value, std
+
+
+@compiled
+def _information(
+    t: Samples, x: Samples, variance: float, grid: Samples, gravity: float, viscous_per_mass: float
+) -> tuple[Samples, Samples, float, int]:
+    """Fields of `Information`."""
+    points, first = len(grid), grid[0]
+    spacing = grid[1] - first
+    columns = _columns(t, x, first, spacing, points, gravity, viscous_per_mass)
+    _project(t, columns)
+    seen = columns.shape[1] - 1
+    products = columns.T @ columns
+    matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
+    for i in range(seen):
+        vector[i] = products[i, seen] / variance
+        for j in range(i + 1):
+            matrix[i, j] = matrix[j, i] = products[i, j] / variance
+    return matrix, vector, x[-1], seen
 
 
 @compiled
@@ -182,41 +199,44 @@ def _columns(
         furthest = max(furthest, (x[k] - first) / spacing)
     seen = min(int(furthest), points - 2) + 4
     columns = np.empty((n, seen + 1))
-    now, speed = np.zeros(seen), np.zeros(seen)
-    before, place = np.zeros(seen), np.zeros(seen)
+    speed, place = np.zeros(seen), np.zeros(seen)
+    before, now = np.empty(4), np.empty(4)
     parts = max(1, FINE_STEPS // n)
     travelled = 0.0
-    met = _splines(x[0], first, spacing, points, before) + 4
+    cell = _splines(x[0], first, spacing, points, before)
     for k in range(n):
         if k > 0:
             step = (t[k] - t[k - 1]) / parts
             for part in range(parts):
                 # between blocks the path bends by less than a micrometre, which friction does not notice
                 at = x[k - 1] + (x[k] - x[k - 1]) * (part + 1.0) / parts
-                met = max(met, _splines(at, first, spacing, points, now) + 4)
-                for i in range(met):
-                    place[i] += step * speed[i] + step**2 * (2.0 * before[i] + now[i]) / 6.0
-                    speed[i] += step * (before[i] + now[i]) / 2.0
+                other = _splines(at, first, spacing, points, now)
+                for i in range(seen):
+                    place[i] += step * speed[i]
+                for i in range(4):
+                    place[cell + i] += step**2 / 3.0 * before[i]
+                    speed[cell + i] += step / 2.0 * before[i]
+                    place[other + i] += step**2 / 6.0 * now[i]
+                    speed[other + i] += step / 2.0 * now[i]
                     before[i] = now[i]
+                cell = other
             travelled += (x[k] + x[k - 1]) / 2.0 * (t[k] - t[k - 1])
         for i in range(seen):
             columns[k, i] = -gravity * place[i]
         columns[k, seen] = x[k] + viscous_per_mass * travelled
-    _project(t, columns)
     return columns
 
 
 @compiled
 def _splines(x: float, first: float, spacing: float, points: int, out: Samples) -> int:
-    """Values of all B-splines at a place; gives the first of the four that are not zero."""
+    """Values of the four B-splines that are not zero at a place; gives the first of them."""
     place = min(max((x - first) / spacing, 0.0), points - 1.0)
     cell = min(int(place), points - 2)
     u = place - cell
-    out[:] = 0.0
-    out[cell] = (1.0 - u) ** 3 / 6.0
-    out[cell + 1] = (3.0 * u**3 - 6.0 * u**2 + 4.0) / 6.0
-    out[cell + 2] = (-3.0 * u**3 + 3.0 * u**2 + 3.0 * u + 1.0) / 6.0
-    out[cell + 3] = u**3 / 6.0
+    out[0] = (1.0 - u) ** 3 / 6.0
+    out[1] = (3.0 * u**3 - 6.0 * u**2 + 4.0) / 6.0
+    out[2] = (-3.0 * u**3 + 3.0 * u**2 + 3.0 * u + 1.0) / 6.0
+    out[3] = u**3 / 6.0
     return cell
 
 

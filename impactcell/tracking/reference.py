@@ -35,7 +35,7 @@ class Reference:
     weight : float
         Cycles the mean rests on.
     matrix, vector : ndarray
-        Pooled information on the mean's coefficients, shapes (j, j) and (j,).
+        Pooled information on the mean's coefficients: the lower triangle by rows, and shape (j,).
     mean : ndarray, shape (j,)
     strength : float
         Smoothing of the mean.
@@ -52,7 +52,7 @@ class Reference:
     """
 
     weight: float = 0.0
-    matrix: Samples = field(default_factory=lambda: np.zeros((0, 0)))
+    matrix: Samples = field(default_factory=lambda: np.zeros(0))
     vector: Samples = field(default_factory=lambda: np.zeros(0))
     mean: Samples = field(default_factory=lambda: np.zeros(0))
     strength: float = 0.0
@@ -66,59 +66,61 @@ class Reference:
 
 def empty(coefficients: int) -> Reference:
     """Before the first cycle."""
-    square, line = np.zeros((coefficients, coefficients)), np.zeros(coefficients)
+    triangle, line = np.zeros(coefficients * (coefficients + 1) // 2), np.zeros(coefficients)
     components = np.zeros((coefficients, MODES))
-    return Reference(matrix=square, vector=line, mean=line, met=line, varied=line, components=components)
+    return Reference(matrix=triangle, vector=line, mean=line, met=line, varied=line, components=components)
 
 
 def restart(reference: Reference) -> Reference:
     """Another material: its mean is learned anew, how cycles vary is kept."""
-    square, line = np.zeros_like(reference.matrix), np.zeros_like(reference.vector)
-    return replace(reference, weight=0.0, matrix=square, vector=line, met=line)
+    triangle, line = np.zeros_like(reference.matrix), np.zeros_like(reference.vector)
+    return replace(reference, weight=0.0, matrix=triangle, vector=line, met=line)
 
 
-def reach(reference: Reference) -> int:
+@compiled
+def reach(met: Samples, weight: float) -> int:
     """Coefficients, from the first on, that enough cycles have met for the mean to be known there."""
-    return int(np.count_nonzero(reference.met >= min(reference.weight, FEWEST)))
+    n = 0
+    for cycles in met:
+        n += 1 if cycles >= min(weight, FEWEST) else 0
+    return n
 
 
-def judged(reference: Reference) -> int:
+@compiled
+def judged(met: Samples, varied: Samples, weight: float, cycles: float) -> int:
     """Coefficients, from the first on, where cycles can be judged: mean and variation are known."""
-    enough = min(float(reference.variation.cycles), FEWEST_VARIED)
-    return min(reach(reference), int(np.count_nonzero(reference.varied >= enough)))
-
-
-def deviating(reference: Reference, slide: profile.Information, n: int) -> tuple[Samples, Samples]:
-    """Leave of a cycle what it says of its first n coefficients: information, and h - G m.
-
-    Friction beyond is no better known than that it goes on from where it was, in steps of a share `CONTINUES`
-    of itself: a longer slide tells neither deviance nor how cycles vary.
-    """
-    return _deviating(slide.matrix, slide.vector, reference.mean, n, slide.seen)
-
-
-def unsure(reference: Reference, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
-    """Information (G^-1 + V)^-1 and its vector, V the covariance of the mean's error."""
-    return _unsure(matrix, vector, reference.matrix, reference.strength)
+    n = 0
+    for learned in varied:
+        n += 1 if learned >= min(cycles, FEWEST_VARIED) else 0
+    return min(reach(met, weight), n)
 
 
 @compiled
 def usual(mean: Samples, n: int) -> float:
     """Friction of the material over its first n coefficients."""
-    return max(abs(float(mean[:n].mean())), LEAST)
+    total = 0.0
+    for i in range(n):
+        total += mean[i]
+    return max(abs(total / n), LEAST)
 
 
 @compiled
-def _deviating(matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int) -> tuple[Samples, Samples]:
-    own = vector[:seen].copy()
+def deviating(matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int) -> tuple[Samples, Samples]:
+    """Leave of a cycle what it says of its first n coefficients, of `seen`: information, and h - G m.
+
+    Friction beyond is no better known than that it goes on from where it was, in steps of a share `CONTINUES`
+    of itself: a longer slide tells neither deviance nor how cycles vary.
+    """
+    own = np.empty(seen)
     for i in range(seen):
+        own[i] = vector[i]
         for j in range(seen):
             own[i] -= matrix[i, j] * mean[j]
-    known = matrix[:n, :n].copy()
+    known = linear.part(matrix, 0, n, 0, n)
     if seen <= n:
-        return known, own[:n].copy()
+        return known, own
     continues = 1.0 / (CONTINUES * usual(mean, n)) ** 2
-    inner, cross = matrix[n:seen, n:seen].copy(), matrix[n:seen, :n].copy()
+    inner, cross = linear.part(matrix, n, seen, n, seen), linear.part(matrix, n, seen, 0, n)
     known[n - 1, n - 1] += continues
     cross[0, n - 1] -= continues
     for i in range(seen - n):
@@ -127,80 +129,139 @@ def _deviating(matrix: Samples, vector: Samples, mean: Samples, n: int, seen: in
             inner[i - 1, i - 1] += continues
             inner[i, i - 1] -= continues
             inner[i - 1, i] -= continues
-    return linear.marginal(known, own[:n].copy(), inner, cross, own[n:].copy())
+    return linear.marginal(known, own[:n], inner, cross, own[n:])
 
 
 @compiled
-def _unsure(matrix: Samples, vector: Samples, pooled: Samples, strength: float) -> tuple[Samples, Samples]:
-    n, precise = len(vector), precision(pooled, strength)
-    beyond = np.zeros(len(precise) - n)
-    known, _ = linear.marginal(
-        precise[:n, :n].copy(), vector, precise[n:, n:].copy(), precise[n:, :n].copy(), beyond
-    )
-    return linear.marginal(matrix, vector, matrix + known, matrix, vector)
+def unsure(matrix: Samples, vector: Samples, pooled: Samples, strength: float) -> tuple[Samples, Samples]:
+    """Information (G^-1 + V)^-1 and its vector, V the covariance of the mean's error."""
+    precise = precision(pooled, strength)
+    n, j = len(vector), len(precise)
+    beyond, cross = linear.part(precise, n, j, n, j), linear.part(precise, n, j, 0, n)
+    known, _ = linear.marginal(linear.part(precise, 0, n, 0, n), vector, beyond, cross, np.zeros(j - n))
+    for i in range(n):
+        for k in range(n):
+            known[i, k] += matrix[i, k]
+    return linear.marginal(matrix, vector, known, matrix, vector)
 
 
 @compiled
 def precision(pooled: Samples, strength: float) -> Samples:
     """Inverse covariance of the mean's coefficients from their pooled information, shape (j, j)."""
-    n = len(pooled)
-    return pooled + strength * profile.roughness(n) + VAGUE * np.eye(n)
+    matrix = linear.square(pooled)
+    rough = profile.roughness(len(matrix))
+    for i in range(len(matrix)):
+        matrix[i, i] += VAGUE
+        for j in range(len(matrix)):
+            matrix[i, j] += strength * rough[i, j]
+    return matrix
 
 
-def learn(reference: Reference, slide: profile.Information, settled: float) -> Reference:
+def learn(
+    reference: Reference,
+    slide: profile.Information,
+    grid_m: Samples,
+    settled: float,
+    spe: float | None = None,
+) -> Reference:
     """Take one normal cycle into the reference.
 
     Parameters
     ----------
     settled : float
         Cycles, at least 1, before which the mean is too rough to show how a cycle differs from it.
+    spe : float or None
+        SPE of a judged cycle over its degrees of freedom.
     """
-    varied, components, met = reference.variation, reference.components, reference.varied
+    known, components, strength = reference.variation, reference.components, reference.strength
     total = len(slide.vector)
-    if reference.weight >= settled:
-        n = min(reach(reference), slide.seen)
-        varied = variation.learn(varied, *deviating(reference, slide, n), reference.weight, total)
-        components = variation.components(varied, total)
-        met = met + (np.arange(total) < min(n, slide.seen - 1))
-    elif reference.weight == 0.0 and varied.cycles == 0:
-        first, _, _ = profile.smooth(slide)
-        varied = variation.guess(float(np.median(first)))
-        components = variation.components(varied, total)
-    kept = 1.0 - 1.0 / MEMORY if reference.weight >= MEMORY else 1.0
-    strength = reference.strength
-    matrix, vector = _pooled(
-        reference.matrix, reference.vector, kept, components, slide.matrix, slide.vector, slide.seen
+    varies = reference.weight >= settled
+    if not varies and reference.weight == 0.0 and known.cycles == 0:
+        first, _ = profile.smooth(slide, grid_m)
+        known = variation.guess(float(np.median(first)))
+        components = variation.components(np.eye(MODES), variation.cosines(total) * known.scale)
+    cycles = known.cycles + 1 if varies else known.cycles
+    matrix, vector, mean, components, met, varied, *sums = _learned(
+        reference.matrix,
+        reference.vector,
+        reference.mean,
+        strength,
+        components,
+        reference.met,
+        reference.varied,
+        reference.weight,
+        known.weights,
+        known.moments,
+        known.information,
+        cycles,
+        known.scale,
+        variation.cosines(total),
+        slide.matrix,
+        slide.vector,
+        slide.seen,
+        varies,
     )
     if reference.weight in SMOOTHED_AT:
-        _, _, strength = profile.smooth(profile.Information(matrix, vector, slide.reached_m, total))
-    return replace(
-        reference,
-        weight=min(reference.weight + 1.0, MEMORY),
-        matrix=matrix,
-        vector=vector,
-        mean=linear.solved(precision(matrix, strength), vector),
-        strength=strength,
-        variation=varied,
-        components=components,
-        met=reference.met * kept + (np.arange(total) < slide.seen - 1),
-        varied=met,
+        pooled = profile.Information(linear.square(matrix), vector, slide.reached_m, total)
+        _, strength = profile.smooth(pooled, grid_m)
+        mean = linear.solved(precision(matrix, strength), vector)
+    return Reference(
+        min(reference.weight + 1.0, MEMORY),
+        matrix,
+        vector,
+        mean,
+        strength,
+        Variation(cycles, known.scale, *sums),
+        components,
+        met,
+        varied,
+        reference.spe_sum if spe is None else reference.spe_sum + spe,
+        reference.spe_count if spe is None else reference.spe_count + 1,
     )
 
 
 @compiled
-def _pooled(
+def _learned(
+    pooled: Samples,
+    summed: Samples,
+    mean: Samples,
+    strength: float,
+    components: Samples,
+    met: Samples,
+    varied: Samples,
+    weight: float,
+    weights: Samples,
+    moments: Samples,
+    information: Samples,
+    cycles: int,
+    scale: Samples,
+    cosines: Samples,
     matrix: Samples,
     vector: Samples,
-    kept: float,
-    components: Samples,
-    own_matrix: Samples,
-    own_vector: Samples,
     seen: int,
-) -> tuple[Samples, Samples]:
-    """Information on the mean with one cycle more, which says less of it the more cycles vary."""
-    pooled, summed = matrix * kept, vector * kept
-    own = own_matrix[:seen, :seen].copy()
-    left, rest = linear.varied(components[:seen].copy(), own, own_vector[:seen].copy())
-    pooled[:seen, :seen] += left
-    summed[:seen] += rest
-    return pooled, summed
+    varies: bool,  # noqa: FBT001  # compiled code takes its arguments by position
+) -> tuple[Samples, Samples, Samples, Samples, Samples, Samples, Samples, Samples, Samples]:
+    """All that a reference keeps with one cycle more, which says less of the mean the more cycles vary."""
+    met, varied, pooled, summed = met.copy(), varied.copy(), pooled.copy(), summed.copy()
+    if varies:
+        n, B = min(reach(met, weight), seen), cosines.copy()
+        for i in range(len(B)):
+            for k in range(MODES):
+                B[i, k] *= scale[k]
+        known, own = deviating(matrix, vector, mean, n, seen)
+        weights, moments, information = variation.taken(B, known, own, weight, weights, moments, information)
+        components = variation.components(variation.spread(weights, moments, information, cycles), B)
+        for i in range(min(n, seen - 1)):
+            varied[i] += 1.0
+    kept = 1.0 - 1.0 / MEMORY if weight >= MEMORY else 1.0
+    vary = linear.part(components, 0, seen, 0, MODES)
+    left, rest = linear.varied(vary, linear.part(matrix, 0, seen, 0, seen), vector[:seen])
+    p = 0
+    for i in range(len(summed)):
+        met[i] = met[i] * kept + (1.0 if i < seen - 1 else 0.0)
+        summed[i] = summed[i] * kept + (rest[i] if i < seen else 0.0)
+        for j in range(i + 1):
+            pooled[p] = pooled[p] * kept + (left[i, j] if i < seen else 0.0)
+            p += 1
+    mean = linear.solved(precision(pooled, strength), summed)
+    return pooled, summed, mean, components, met, varied, weights, moments, information

@@ -16,51 +16,13 @@ import numpy as np
 
 from impactcell.compiled import compiled
 from impactcell.records import Samples
-from impactcell.tracking.shapes import Shapes
 
 FAMILIES = ("level", "tilt", "bump", "ripple")
 NOTHING = (1.0, 0.0, math.inf)  # p-value, size and standard deviation of what cannot be seen
 
 
-def scan(
-    looked: Shapes,
-    P: Samples,
-    u: Samples,
-    C: Samples,
-    reached_m: float,
-    least: float,
-    scale: float,
-    cycles: float,
-) -> tuple[dict[str, list[float]], int]:
-    """Look for every family of shapes in one cycle.
-
-    Parameters
-    ----------
-    P, u, C : ndarray, shapes (s, s), (s,), (s, k)
-        Information, scores and components of the variation, of the coefficients that were seen.
-    reached_m : float
-        How far the part slid.
-    least : float
-        Information on its size that a shape must have to be looked for.
-    scale : float
-        Variance of a score of a normal cycle.
-    cycles : float
-        From which the variation was learned.
-
-    Returns
-    -------
-    found : dict
-        Of every family p-value, size and its standard deviation, of the most telling shape of either sign.
-    centre : int
-        Grid point of the most telling bump; -1 if none can be seen.
-    """
-    rows, across, waves = looked.within(reached_m, len(u))
-    found, centre = _scan(rows, P, u, C, across, waves, least, scale, cycles)
-    return dict(zip(FAMILIES, found.tolist(), strict=True)), centre
-
-
 @compiled
-def _scan(
+def scan(
     rows: Samples,
     P: Samples,
     u: Samples,
@@ -71,18 +33,43 @@ def _scan(
     scale: float,
     cycles: float,
 ) -> tuple[Samples, int]:
-    """p-value, size and standard deviation as rows for level, tilt, bump, ripple; grid point of the bump."""
+    """Look for every family of shapes in one cycle.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (m, s)
+        Shapes, and places of bumps and waves among them, as `Shapes.within` gives them.
+    P, u, C : ndarray, shapes (s, s), (s,), (s, k)
+        Information, scores and components of the variation, of the coefficients that were seen.
+    least : float
+        Information on its size that a shape must have to be looked for.
+    scale : float
+        Variance of a score of a normal cycle.
+    cycles : float
+        From which the variation was learned.
+
+    Returns
+    -------
+    found : ndarray, shape (4, 3)
+        Of each of `FAMILIES`: p-value, size and its standard deviation, of the most telling shape of either
+        sign.
+    centre : int
+        Grid point of the most telling bump; -1 if none can be seen.
+    """
     image = rows @ P
-    along, score, known = image @ C, rows @ u, (rows * image).sum(axis=1)
+    along, score, known = image @ C, rows @ u, np.empty(len(rows))
+    for i in range(len(rows)):
+        known[i] = _dot(rows[i], image[i])
     level, tilt = len(rows) - 2, len(rows) - 1
     bumps = level - 2 * waves
     found = np.empty((4, 3))
     found[0] = _one(score[level], known[level], _dot(along[level], along[level]), least, scale, cycles)
     # slope about the point where it does not depend on the level, so that the two are looked for apart
     turn = _dot(rows[tilt], image[level]) / known[level]
-    own = along[tilt] - turn * along[level]
-    about, left = score[tilt] - turn * score[level], known[tilt] - turn**2 * known[level]
-    found[1] = _one(about, left, _dot(own, own), least, scale, cycles)
+    about, left, varied = score[tilt] - turn * score[level], known[tilt] - turn**2 * known[level], 0.0
+    for k in range(along.shape[1]):
+        varied += (along[tilt, k] - turn * along[level, k]) ** 2
+    found[1] = _one(about, left, varied, least, scale, cycles)
     p_value, row = _largest_bump(rows, image, along, score, known, bumps, across, least, scale, cycles)
     found[2] = (p_value, score[row] / known[row], math.sqrt(scale / known[row])) if row >= 0 else NOTHING
     found[3] = _largest_ripple(rows, image, along, score, bumps, level, least, scale, cycles)

@@ -1,7 +1,7 @@
 """Is a reading usable, and where in time does it belong? Says why where something is wrong."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 LARGEST_FRICTION = 10.0  # a friction coefficient beyond this is a fault of the measurement
 SMALLEST_STD = 1e-9
@@ -51,31 +51,23 @@ def place(clock: Clock, cycle: int, time_ns: int, reorder_limit: int) -> tuple[C
     """Find the place of a cycle and move the clock there."""
     index = cycle + clock.base
     if not clock.seen:
-        return _seen(replace(clock, last=index, time_ns=time_ns), index, reorder_limit), Place(
-            index, 0, 0, repeated=False
-        )
-    if index in clock.seen:
-        return clock, Place(
-            index, 0, 0, repeated=True, note=f"cycle {cycle} came twice, the second is ignored"
-        )
-    if index < clock.last - reorder_limit:
-        base = clock.last + 1 - cycle
-        note = f"cycle numbers restarted at {cycle}"
-        index = clock.last + 1
-        moved = _timed(replace(clock, base=base, last=index), time_ns, 1)
-        return _seen(moved[0], index, reorder_limit), Place(
-            index, 1, 0, repeated=False, note=_join(note, moved[1])
-        )
-    if index < clock.last:
-        lag = clock.last - index
-        return _seen(clock, index, reorder_limit), Place(
-            index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late"
-        )
+        return Clock(clock.base, index, (index,), time_ns), Place(index, 0, 0, repeated=False)
+    if index == clock.last or index in clock.seen:
+        note = f"cycle {cycle} came twice, the second is ignored"
+        return clock, Place(index, 0, 0, repeated=True, note=note)
+    seen, lag = (*clock.seen[-reorder_limit:], index), clock.last - index
+    if 0 < lag <= reorder_limit:
+        clock = Clock(clock.base, clock.last, seen, clock.time_ns, clock.period_s)
+        return clock, Place(index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late")
+    restarted = lag > 0
+    base = clock.last + 1 - cycle if restarted else clock.base
+    index = cycle + base
     passed = index - clock.last
-    timed, note = _timed(clock, time_ns, passed)
-    seen = (*clock.seen[-reorder_limit:], index)
-    clock = Clock(clock.base, index, seen, timed.time_ns, timed.period_s)
-    return clock, Place(index, passed, 0, repeated=False, note=note)
+    time_ns, period_s, note = _timed(clock, time_ns, passed)
+    if restarted:
+        seen = (*seen[:-1], index)
+        note = "; ".join(filter(None, (f"cycle numbers restarted at {cycle}", note)))
+    return Clock(base, index, seen, time_ns, period_s), Place(index, passed, 0, repeated=False, note=note)
 
 
 def fault(value: float, std: float) -> tuple[str, bool]:
@@ -96,24 +88,13 @@ def usable_std(std: float) -> float:
     return std if SMALLEST_STD <= std <= LARGEST_FRICTION else math.nan
 
 
-def _timed(clock: Clock, time_ns: int, passed: int) -> tuple[Clock, str]:
-    """Follow the period between cycles; a clock that goes back is reported and otherwise ignored."""
+def _timed(clock: Clock, time_ns: int, passed: int) -> tuple[int, float, str]:
+    """Time and period after `passed` cycles; a clock that goes back is reported and otherwise ignored."""
     if time_ns == 0 or clock.time_ns == 0:
-        return replace(clock, time_ns=time_ns or clock.time_ns), ""
+        return time_ns or clock.time_ns, clock.period_s, ""
     elapsed = (time_ns - clock.time_ns) * 1e-9
     if elapsed <= 0.0:
-        return replace(clock, time_ns=time_ns), f"the clock went back by {-elapsed:g} s"
-    each = elapsed / passed
-    if math.isnan(clock.period_s):
-        return replace(clock, time_ns=time_ns, period_s=each), ""
+        return time_ns, clock.period_s, f"the clock went back by {-elapsed:g} s"
+    each, usual = elapsed / passed, clock.period_s
     # a pause is not a slower rate: one period counts at most as twice the usual one
-    period = clock.period_s + 0.05 * (min(each, 2.0 * clock.period_s) - clock.period_s)
-    return replace(clock, time_ns=time_ns, period_s=period), ""
-
-
-def _seen(clock: Clock, index: int, kept: int) -> Clock:
-    return replace(clock, seen=(*clock.seen[-kept:], index))
-
-
-def _join(*notes: str) -> str:
-    return "; ".join(note for note in notes if note)
+    return time_ns, each if math.isnan(usual) else usual + 0.05 * (min(each, 2.0 * usual) - usual), ""

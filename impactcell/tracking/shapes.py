@@ -1,7 +1,9 @@
 """Shapes that a deviant cycle may have: bumps, ripples, level and tilt."""
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import neg
 
 import numpy as np
 
@@ -26,14 +28,14 @@ class Shapes:
         Level and tilt.
     spacing_m : float
         Of the grid.
-    waves_m : ndarray, shape (q,)
+    waves_m : tuple of float
     """
 
     bumps: Samples
     ripples: Samples
     plain: Samples
     spacing_m: float
-    waves_m: Samples
+    waves_m: tuple[float, ...]
 
     @lru_cache(maxsize=64)  # noqa: B019  # few shapes are ever made, and they are kept anyway
     def among(self, across: int, first: int, coefficients: int) -> Samples:
@@ -53,7 +55,7 @@ class Shapes:
         waves : int
         """
         across = min(max(int(reached_m / self.spacing_m), 1) + 1, self.bumps.shape[1])
-        first = int(np.searchsorted(-self.waves_m, -reached_m))
+        first = bisect_left(self.waves_m, -reached_m, key=neg)
         return self.among(across, first, coefficients), across, len(self.waves_m) - first
 
 
@@ -67,4 +69,10 @@ def shapes(length_m: float, points: int) -> Shapes:
     waves = length_m / np.arange(1.0, length_m / max(4.0 * spacing, SHORTEST_WAVE_M) + 0.5, 0.5)
     ripples = np.array([[f(2.0 * np.pi * grid / w) for f in (np.cos, np.sin)] for w in waves])
     plain = np.array([np.ones(points), grid / length_m])
-    return Shapes(bumps @ to_coefficients, ripples @ to_coefficients, plain @ to_coefficients, spacing, waves)
+    return Shapes(
+        bumps @ to_coefficients,
+        ripples @ to_coefficients,
+        plain @ to_coefficients,
+        spacing,
+        tuple(waves.tolist()),
+    )

@@ -116,7 +116,7 @@ def update(
     """
     if restart or (batch_id and batch_id != state.batch_id and state.batch_id):
         state = replace(state, reference=references.restart(state.reference), deviant_run=0)
-    if batch_id:
+    if batch_id and batch_id != state.batch_id:
         state = replace(state, batch_id=batch_id)
     grid = settings.grid_m
     try:
@@ -126,7 +126,7 @@ def update(
         signature = Signature(grid, nothing, nothing, math.nan, math.nan, math.nan, Quality.BAD, str(error))
         return SignatureTracked(state, signature, None, judged=False)
     seen = profile.information(slide, grid, gravity_m_s2, viscous_per_mass)
-    friction, std = _published(seen, settings)
+    friction, std = profile.friction(seen, grid)
     known = state.reference
     if known.variation.cycles < settings.learned_cycles or known.weight < FEWEST_OF_MATERIAL:
         left = settings.learned_cycles - known.variation.cycles
@@ -151,14 +151,6 @@ def update(
     return SignatureTracked(learned(state, seen, settings, verdict), signature, evidence, judged=True)
 
 
-def _published(seen: profile.Information, settings: SignatureSettings) -> tuple[Samples, Samples]:
-    """Friction and its standard deviation on the grid, nan where the part did not get."""
-    friction, std = profile.friction(seen, settings.points)
-    beyond = int(settings.grid_m.searchsorted(seen.reached_m, side="right"))
-    friction[beyond:] = std[beyond:] = math.nan
-    return friction, std
-
-
 def learned(
     state: SignatureState,
     seen: profile.Information,
@@ -167,20 +159,17 @@ def learned(
 ) -> SignatureState:
     """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
     if verdict is None:
-        return replace(
-            state, reference=references.learn(state.reference, seen, settings.settled), deviant_run=0
-        )
+        fresh = references.learn(state.reference, seen, settings.grid_m, settings.settled)
+        return SignatureState(fresh, state.batch_id)
     if verdict.p_value < 1.0 / settings.false_alarm_cycles:
         run = state.deviant_run + 1
         if run < GIVEN_UP:
-            return replace(state, deviant_run=run)
-        fresh = references.learn(references.restart(state.reference), seen, settings.settled)
-        return replace(state, reference=fresh, deviant_run=0)
-    fresh = references.learn(state.reference, seen, settings.settled)
-    if verdict.spe_freedom > 0:
-        ratio = verdict.spe / verdict.spe_freedom
-        fresh = replace(fresh, spe_sum=fresh.spe_sum + ratio, spe_count=fresh.spe_count + 1)
-    return replace(state, reference=fresh, deviant_run=0)
+            return SignatureState(state.reference, state.batch_id, run)
+        fresh = references.learn(references.restart(state.reference), seen, settings.grid_m, settings.settled)
+        return SignatureState(fresh, state.batch_id)
+    spe = verdict.spe / verdict.spe_freedom if verdict.spe_freedom > 0 else None
+    fresh = references.learn(state.reference, seen, settings.grid_m, settings.settled, spe)
+    return SignatureState(fresh, state.batch_id)
 
 
 def _evidence(

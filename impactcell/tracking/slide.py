@@ -55,20 +55,18 @@ def find_slide(capture: Capture, separation_s: float | None = None) -> Slide:
     if channel is None:
         raise NoSlideError("the capture has no position channel")
     start = _separation(capture) if separation_s is None else separation_s
-    time, position, usable = _usable(*_contiguous(channel), float(capture.direction), start)
+    time, position = _contiguous(channel)
+    noise = channel.noise_std or _noise(time, position, start)
+    finite, usable, size, t, x = _cut(time, position, float(capture.direction), start, noise)
+    if finite < FEWEST_SAMPLES:
+        raise NoSlideError(f"the position channel has {finite} usable samples")
     if usable < FEWEST_SAMPLES:
-        raise NoSlideError(f"the position channel has {usable} usable samples")
-    if len(time) < FEWEST_SAMPLES:
-        raise NoSlideError(f"{len(time)} position samples after loss of contact")
-    noise = channel.noise_std or _noise(position)
+        raise NoSlideError(f"{usable} position samples after loss of contact")
     if not noise > 0.0:
         raise NoSlideError("the position is constant")
-    end = float(np.mean(position[-max(3, len(position) // 50) :]))
-    last = _first_beyond(position, end - max(REST_MARGIN_M, 4.0 * noise))
-    if last < FEWEST_SAMPLES:
+    if size == 0:
         raise NoSlideError("the part did not slide")
-    size = max(1, last // BLOCKS)
-    return Slide(*_blocks(time[:last], position[:last], size, start), noise**2 / size)
+    return Slide(t, x, noise**2 / size)
 
 
 def _contiguous(channel: Channel) -> tuple[Samples, Samples]:
@@ -111,51 +109,59 @@ def _last_touch(time: Samples, values: Samples, noise: float) -> float:
     return float(time[0])
 
 
-@compiled
-def _usable(time: Samples, values: Samples, direction: float, start: float) -> tuple[Samples, Samples, int]:
-    """Finite samples from `start` on, along the tap; and how many are finite at all."""
-    n = len(values)
-    times, positions = np.empty(n), np.empty(n)
-    usable = kept = 0
-    for k in range(n):
-        if math.isfinite(values[k]) and math.isfinite(time[k]):
-            usable += 1
-            if time[k] >= start:
-                times[kept], positions[kept] = time[k], values[k] * direction
-                kept += 1
-    return times[:kept], positions[:kept], usable
-
-
-@compiled
-def _first_beyond(position: Samples, limit: float) -> int:
-    """Find the first sample close to the end, for a later one may fall back by noise.
-
-    A record that is cut before rest is used up to its end.
-    """
-    for k in range(len(position)):
-        if position[k] >= limit:
-            return k
-    return 0
-
-
-def _noise(position: Samples) -> float:
+def _noise(time: Samples, values: Samples, start: float) -> float:
     """Find the standard deviation of white noise from third differences, which the motion hardly moves."""
-    third = np.diff(position, 3)
+    usable = np.isfinite(values) & np.isfinite(time) & (time >= start)
+    if np.count_nonzero(usable) < FEWEST_SAMPLES:
+        return 0.0
+    third = np.diff(values[usable], 3)
     return float(np.median(np.abs(third))) / 0.6745 / math.sqrt(20.0)
 
 
 @compiled
-def _blocks(time: Samples, position: Samples, size: int, start: float) -> tuple[Samples, Samples]:
-    """Means of blocks of `size` samples, time from `start` and distance from there."""
-    n = len(time) // size
-    t, x = np.zeros(n), np.zeros(n)
+def _cut(
+    time: Samples, values: Samples, direction: float, start: float, noise: float
+) -> tuple[int, int, int, Samples, Samples]:
+    """Cut out the samples from `start` on to just before rest, and average them in blocks.
+
+    Returns
+    -------
+    finite, usable : int
+        Samples that are numbers, and those of them from `start` on.
+    size : int
+        Samples a block; 0 where the part did not slide.
+    time, distance : ndarray, shape (n,)
+        Means of the blocks, time from `start` and distance from there.
+    """
+    t, x, finite, usable = np.empty(len(values)), np.empty(len(values)), 0, 0
+    for k in range(len(values)):
+        if math.isfinite(values[k]) and math.isfinite(time[k]):
+            finite += 1
+            if time[k] >= start:
+                t[usable], x[usable] = time[k], values[k] * direction
+                usable += 1
+    if usable < FEWEST_SAMPLES or not noise > 0.0:
+        return finite, usable, 0, t[:0], x[:0]
+    few = max(3, usable // 50)
+    # the first sample close to the end, for a later one may fall back by noise; a record that is cut before
+    # rest is used up to its end
+    last, end = 0, 0.0
+    for k in range(usable - few, usable):
+        end += x[k] / few
+    limit = end - max(REST_MARGIN_M, 4.0 * noise)
+    while x[last] < limit:
+        last += 1
+    if last < FEWEST_SAMPLES:
+        return finite, usable, 0, t[:0], x[:0]
+    size = max(1, last // BLOCKS)
+    n = last // size
     for k in range(n):
-        for i in range(k * size, (k + 1) * size):
-            t[k] += time[i] - start
-            x[k] += position[i]
-        t[k] /= size
-        x[k] /= size
+        first, total, way = k * size, 0.0, 0.0
+        for i in range(first, first + size):
+            total += t[i] - start
+            way += x[i]
+        t[k], x[k] = total / size, way / size
     # zero of distance: back along the first blocks to loss of contact; a micrometre is near enough
     few = min(n, 8) - 1
     origin = x[0] - t[0] * (x[few] - x[0]) / (t[few] - t[0])
-    return t, x - origin
+    return finite, usable, size, t[:n].copy(), x[:n] - origin

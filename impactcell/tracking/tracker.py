@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from impactcell.records import Samples
 from impactcell.tracking import bank as banks
 from impactcell.tracking import batch as batches
 from impactcell.tracking import commissioning, honesty, screening, wear
@@ -24,33 +25,39 @@ def track(settings: TrackerSettings, state: TrackerState, reading: Reading) -> T
     clock, where = screening.place(state.clock, reading.cycle, reading.time_ns, settings.reorder_limit)
     problem, unusable = screening.fault(reading.mu_s, reading.mu_s_std)
     notes = [note for note in (where.note, problem) if note]
-    counted = state.noise
+    noise = state.noise
     if not (unusable or where.repeated):
-        counted = noises.count_identical(state.noise, reading.mu_s)
-        if counted.identical >= settings.identical_limit:
-            notes.append(f"mu_s has been the same {counted.identical} times in a row, not used")
-            unusable = True
+        identical = noises.in_a_row(noise, reading.mu_s)
+        if identical >= settings.identical_limit:
+            notes.append(f"mu_s has been the same {identical} times in a row, not used")
+            noise, unusable = replace(noise, identical=identical), True
     if unusable or where.repeated:
         # the clock must not pass a cycle that was not taken in: its time passes with the next one
         clock = replace(clock, last=state.clock.last) if state.clock.seen else state.clock
-        kept = replace(state, clock=clock, noise=counted)
+        kept = replace(state, clock=clock, noise=noise)
         if len(state.bank) == 0:
             return nothing_yet(settings, kept, reading, notes)
         return outcome(settings, kept, reading, notes, used=False)
-    known, std = noises.declared_std(counted, reading.mu_s, screening.usable_std(reading.mu_s_std))
-    if where.lag == 0:
-        known = noises.learn(known, reading.mu_s, std)
-    variance = noises.variance(known, std)
-    fresh = replace(state, clock=clock, noise=known)
+    noise, std = noises.take(noise, reading.mu_s, screening.usable_std(reading.mu_s_std), late=where.lag > 0)
+    variance = noises.variance(noise, std)
     if len(state.bank) == 0:
+        fresh = replace(state, clock=clock, noise=noise)
         fresh = _begin(settings, fresh, reading, variance, std, where.index)
         return outcome(settings, fresh, reading, notes, used=True)
-    fresh, announced = _announce(settings, fresh, reading, where)
-    if fresh.batch_count > 10 and where.index - fresh.first < RESTLESS * fresh.batch_count:
+    before, announced = _announce(settings, state, reading, where)
+    if before.batch_count > 10 and where.index - before.first < RESTLESS * before.batch_count:
         notes.append("the batch id changes too often to say anything of batches")
-    fresh, shift, innovation = _take(settings, fresh, reading, variance, where, announced)
+    bank, outliers, statistic = batches.take(settings, before, reading, variance, where, announced)
+    fresh, shift = batches.find_shift(settings, before, reading, noise, bank, statistic, where, announced)
+    fresh, known, shift, innovation = _follow(settings, fresh, reading, noise, bank, variance, where, shift)
+    monitor, factor = fresh.monitor, 1.0
     if where.lag == 0:
-        fresh, added = _learn(settings, fresh, reading, std, where.index, announced, innovation)
+        monitor, factor = honesty.watch(monitor, innovation)
+    fresh = replace(
+        fresh, clock=clock, noise=noise, bank=bank, outliers=outliers, filter=known, monitor=monitor
+    )
+    if where.lag == 0:
+        fresh, added = _learn(settings, fresh, reading, std, where.index, announced, factor)
         notes.extend(added)
     expected = announced > 0.0 and reading.expected_change
     return outcome(
@@ -108,50 +115,48 @@ def _announce(
     return fresh, 1.0 if believed or reading.expected_change else 0.0
 
 
-def _take(
+def _follow(
     settings: TrackerSettings,
     state: TrackerState,
     reading: Reading,
+    noise: noises.Noise,
+    bank: Samples,
     variance: float,
     where: screening.Place,
-    announced: float,
-) -> tuple[TrackerState, Shift | None, float]:
-    """Take the reading into the bank, and into the filter where the batch is known."""
-    before = state
-    state, shift = batches.find_shift(settings, state, reading, variance, where, announced)
-    said, current = reading.batch_id, before.filter
+    shift: Shift | None,
+) -> tuple[TrackerState, wear.WearFilter | None, Shift | None, float]:
+    """Take the reading, in `bank` by now, into the filter where the batch is known; its innovation."""
+    said, current = reading.batch_id, state.filter
     known = settings.batch is BatchKnowledge.KNOWN
-    if known and said is not None and current is not None and shift is None:
-        # a late cycle of a batch that the filter has forgotten goes into the bank only
-        if where.lag == 0 or said in current.batches:
-            return _take_known(settings, state, reading, said, current, variance, where)
-        return state, None, batches.innovation(before, reading, variance, where)
-    innovation = batches.innovation(before, reading, variance, where)
-    if not known:
-        return state, shift, innovation
-    if said is None:
-        if current is None or where.lag > 0:
-            return state, shift, innovation
-        # nobody says of which batch the cycle was: its time passes, and after a change the bank knows better
-        passed = wear.pass_cycles(current, where.passed, state.level_variance, state.slope_variance)
-        return replace(state, filter=passed if shift is None else None), shift, innovation
-    if current is None:
-        mean, covariance = banks.moments(state.bank)
-        return replace(state, filter=wear.resume(mean, covariance, said)), shift, innovation
-    # what was learned of the noise from here on would be learned from a mix of two materials
-    changed = wear.change_within(current, *banks.moments(state.bank))
-    return replace(state, filter=changed, tested=True, history=None), shift, innovation
+    forgotten = where.lag > 0 and current is not None and said not in current.batches
+    if known and said is not None and current is not None and shift is None and not forgotten:
+        return _follow_known(settings, state, reading, noise, said, current, variance, where)
+    innovation = batches.innovation(state, reading, variance, where)
+    if known and said is None:
+        if current is not None and where.lag == 0:
+            # nobody says of which batch the cycle was: its time passes; after a change the bank knows better
+            passed = wear.pass_cycles(current, where.passed, state.level_variance, state.slope_variance)
+            current = passed if shift is None else None
+    elif known and said is not None and current is None:
+        current = wear.resume(*banks.moments(bank), said)
+    elif known and current is not None and shift is not None:
+        current = wear.change_within(current, *banks.moments(bank))
+        # what was learned of the noise from here on would be learned from a mix of two materials
+        state = replace(state, tested=True, history=None)
+    # else a late cycle of a batch that the filter has forgotten is in the bank only
+    return state, current, shift, innovation
 
 
-def _take_known(
+def _follow_known(
     settings: TrackerSettings,
     state: TrackerState,
     reading: Reading,
+    noise: noises.Noise,
     said: str,
     current: wear.WearFilter,
     variance: float,
     where: screening.Place,
-) -> tuple[TrackerState, Shift | None, float]:
+) -> tuple[TrackerState, wear.WearFilter, Shift | None, float]:
     """Take a reading of a known batch into the filter, and test the batch against the one before."""
     if where.lag == 0:
         current = wear.pass_cycles(current, where.passed, state.level_variance, state.slope_variance)
@@ -160,8 +165,8 @@ def _take_known(
     current, error = wear.measure(
         current, reading.mu_s, variance, settings.outlier_threshold, where.lag, said
     )
-    state, shift = batches.compare_batch(settings, replace(state, filter=current), variance, where.index)
-    return state, shift, error.value / error.std
+    state, shift = batches.compare_batch(settings, state, current, noise, variance, where.index)
+    return state, current, shift, error.value / error.std
 
 
 def _learn(
@@ -171,13 +176,11 @@ def _learn(
     std: float,
     index: int,
     announced: float,
-    innovation: float,
+    factor: float,
 ) -> tuple[TrackerState, list[str]]:
-    """Commission the process noise from the first cycles, later keep it honest by the innovations."""
-    monitor, factor = honesty.watch(state.monitor, innovation)
+    """Commission the process noise from the first cycles, later keep it honest by `factor`."""
     notes: list[str] = []
     unit = state.noise.factor * state.noise.usual_std**2
-    state = replace(state, monitor=monitor)
     if factor != 1.0:
         level = honesty.adapted(state.level_variance, factor, unit)
         if level != state.level_variance:

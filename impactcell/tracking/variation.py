@@ -40,118 +40,115 @@ class Variation:
         Cycles learned from.
     scale : ndarray, shape (6,)
         First guess of the modes' standard deviations, friction.
-    weights : ndarray, shape (21, 21)
-        Sum of tr(E_p W E_q W), E_p the symmetric unit matrices.
+    weights : ndarray, shape (231,)
+        Sum of tr(E_p W E_q W), E_p the symmetric unit matrices: the lower triangle by rows.
     moments : ndarray, shape (21,)
         Sum of tr E_p (T d d' T - T K T').
     information : ndarray, shape (6, 6)
         Sum of K.
-    spread : ndarray, shape (6, 6)
-        Lambda.
     """
 
     cycles: int = 0
     scale: Samples = field(default_factory=lambda: np.zeros(MODES))
-    weights: Samples = field(default_factory=lambda: np.zeros((PAIRS, PAIRS)))
+    weights: Samples = field(default_factory=lambda: np.zeros(PAIRS * (PAIRS + 1) // 2))
     moments: Samples = field(default_factory=lambda: np.zeros(PAIRS))
     information: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
-    spread: Samples = field(default_factory=lambda: np.eye(MODES))
 
 
 def guess(friction: float) -> Variation:
     """Before the first cycle, from the friction's own size."""
     scale = FIRST_SPREAD * abs(friction) / np.arange(1.0, MODES + 1.0)
-    weights, moments = np.zeros((PAIRS, PAIRS)), np.zeros(PAIRS)
-    _add(np.eye(MODES), np.zeros((MODES, MODES)), RIDGE, weights, moments)
-    return Variation(scale=scale, weights=weights, moments=moments)
-
-
-def learn(
-    variation: Variation, matrix: Samples, vector: Samples, weight: float, coefficients: int
-) -> Variation:
-    """Take one cycle in.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (s, s)
-        Information G of the cycle on the first s coefficients.
-    vector : ndarray, shape (s,)
-        h - G m.
-    weight : float
-        Cycles that m rests on.
-    coefficients : int
-        All of them, j.
-    """
-    sums = _taken(
-        basis(variation, coefficients)[: len(vector)].copy(),
-        matrix,
-        vector,
-        weight / (weight + 1.0),
-        variation.weights,
-        variation.moments,
-        variation.information,
-        variation.cycles + 1,
-    )
-    return Variation(variation.cycles + 1, variation.scale, *sums)
-
-
-def basis(variation: Variation, coefficients: int) -> Samples:
-    """Modes in units of their first guess, as columns, shape (j, 6)."""
-    return cosines(coefficients) * variation.scale
+    fresh = Variation(scale=scale)
+    _add(np.eye(MODES), np.zeros((MODES, MODES)), RIDGE, fresh.weights, fresh.moments)
+    return fresh
 
 
 @compiled
-def _taken(
+def taken(
     B: Samples,
     matrix: Samples,
     vector: Samples,
-    share: float,
+    weight: float,
     weights: Samples,
     moments: Samples,
     information: Samples,
-    cycles: int,
-) -> tuple[Samples, Samples, Samples, Samples]:
-    """All sums with one cycle more, and Lambda."""
-    K = B.T @ (matrix @ B)
-    K = (K + K.T) / 2.0
-    T = np.linalg.inv(np.eye(MODES) + K)
-    r = T @ (B.T @ vector)
-    W = T @ K
-    W = (W + W.T) / 2.0
-    weights, moments, information = weights.copy(), moments.copy(), information + K
-    _add(W, share * np.outer(r, r) - W @ T.T, 1.0, weights, moments)
-    return weights, moments, information, _spread(weights, moments, information, cycles)
+) -> tuple[Samples, Samples, Samples]:
+    """Take one cycle into the three sums.
+
+    Parameters
+    ----------
+    B : ndarray, shape (s, 6)
+        Modes in units of their first guess, on the first s coefficients.
+    matrix, vector : ndarray, shapes (s, s), (s,)
+        Information G of the cycle on them, and h - G m.
+    weight : float
+        Cycles that m rests on.
+    """
+    B = linear.part(B, 0, len(vector), 0, MODES)
+    K = linear.product(linear.product(matrix, B), B)
+    along = np.zeros((MODES, 1))
+    for i in range(len(vector)):
+        for k in range(MODES):
+            along[k, 0] += B[i, k] * vector[i]
+    lost = K.copy()
+    for i in range(MODES):
+        lost[i, i] += 1.0
+    T = linear.inverse(lost)
+    r, W, TKT = linear.product(T, along), linear.product(T, K), linear.product(T, linear.product(K, T))
+    share = weight / (weight + 1.0)
+    weights, moments, information = weights.copy(), moments.copy(), information.copy()
+    for i in range(MODES):
+        for k in range(MODES):
+            W[i, k] = W[k, i] = (W[i, k] + W[k, i]) / 2.0
+            TKT[i, k] = share * r[i, 0] * r[k, 0] - TKT[i, k]
+            information[i, k] += K[i, k]
+    _add(W, TKT, 1.0, weights, moments)
+    return weights, moments, information
 
 
 @compiled
-def _spread(weights: Samples, moments: Samples, information: Samples, cycles: int) -> Samples:
-    found, upper, p = np.empty((MODES, MODES)), linear.solved(weights, moments), 0
+def spread(weights: Samples, moments: Samples, information: Samples, cycles: int) -> Samples:
+    """Lambda, shape (6, 6)."""
+    found, upper, p = np.empty((MODES, MODES)), linear.solved(linear.square(weights), moments), 0
     for i in range(MODES):
         for j in range(i, MODES):
             found[i, j] = found[j, i] = upper[p]
             p += 1
+    noise, lost = np.empty((MODES, MODES)), np.empty((MODES, MODES))
+    for i in range(MODES):
+        for j in range(MODES):
+            one = 1.0 if i == j else 0.0
+            noise[i, j] = (information[i, j] + one) / cycles
+            lost[i, j] = information[i, j] / math.sqrt(2.0 * cycles) + one
     # in units of the noise of one cycle
-    root = linear.factor((information + np.eye(MODES)) / cycles)
-    values, vectors = np.linalg.eigh(root.T @ found @ root)
+    root = linear.factor(noise)
+    values, vectors = np.linalg.eigh(linear.product(linear.product(found, root), root))
     # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
     edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0
-    back = linear.backward(root, vectors * np.sqrt(np.where(values > edge, values, 0.0)))
+    for k in range(MODES):
+        for i in range(MODES):
+            vectors[i, k] *= math.sqrt(values[k]) if values[k] > edge else 0.0
+    back = linear.backward(root, vectors)
     # noise in n cycles hides a variance of sqrt(2 / n) of its own
-    spread: Samples = back @ back.T + np.linalg.inv(information / math.sqrt(2.0 * cycles) + np.eye(MODES))
-    return spread
-
-
-def components(variation: Variation, coefficients: int) -> Samples:
-    """Principal components as columns, largest first, scaled to their standard deviations, shape (j, 6)."""
-    return _scaled(variation.spread, basis(variation, coefficients))
+    whole = linear.inverse(lost)
+    for i in range(MODES):
+        for j in range(MODES):
+            for k in range(MODES):
+                whole[i, j] += back[i, k] * back[j, k]
+    return whole
 
 
 @compiled
-def _scaled(spread: Samples, B: Samples) -> Samples:
-    values, vectors = np.linalg.eigh(spread)
-    scaled = vectors * np.sqrt(np.maximum(values, 0.0))
-    largest_first: Samples = B @ scaled[:, ::-1].copy()
-    return largest_first
+def components(Lambda: Samples, B: Samples) -> Samples:
+    """Principal components as columns, largest first, scaled to their standard deviations, shape (j, 6)."""
+    values, vectors = np.linalg.eigh(Lambda)
+    found = np.zeros((len(B), MODES))
+    for i in range(len(B)):
+        for c in range(MODES):
+            for k in range(MODES):
+                found[i, c] += B[i, k] * vectors[k, MODES - 1 - c]
+            found[i, c] *= math.sqrt(max(values[MODES - 1 - c], 0.0))
+    return found
 
 
 @lru_cache(maxsize=8)
@@ -167,15 +164,14 @@ def cosines(coefficients: int) -> Samples:
 def _add(W: Samples, seen: Samples, share: float, weights: Samples, moments: Samples) -> None:
     """Add tr(E_p W E_q W) and tr(E_p seen) to the sums."""
     n = len(W)
-    p = 0
+    p = at = 0
     for i in range(n):
         for j in range(i, n):
             twice = 1.0 if i == j else 2.0
             moments[p] += share * twice * seen[i, j]
-            q = 0
-            for k in range(n):
-                for m in range(k, n):
-                    both = 0.5 if k == m else 1.0
-                    weights[p, q] += share * twice * both * (W[i, k] * W[j, m] + W[i, m] * W[j, k])
-                    q += 1
             p += 1
+            for k in range(i + 1):
+                for m in range(k, n if k < i else j + 1):
+                    both = 0.5 if k == m else 1.0
+                    weights[at] += share * twice * both * (W[i, k] * W[j, m] + W[i, m] * W[j, k])
+                    at += 1

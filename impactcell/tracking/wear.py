@@ -1,4 +1,4 @@
-"""Friction over time with the batch known: a Kalman filter on filterpy, state [level, slope, offsets].
+"""Friction over time with the batch known: a Kalman filter, state [level, slope, offsets].
 
 Measurement of cycle n in batch i, and what passes between cycles::
 
@@ -9,14 +9,16 @@ The first batch is the reference, its offset zero. Every later batch has an offs
 state, so that a batch that comes back is recognised and the size of a shift has its exact variance.
 Outliers are clipped after Huber (1964): beyond c standard deviations R is inflated until the innovation
 moves the state as one of c standard deviations would; beyond 2 c its influence falls off again.
+
+Prediction and update are filterpy's `predict` and `update`, compiled; the tests hold them to those.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import predict, update
 
+from impactcell.compiled import compiled
 from impactcell.records import Samples
 
 KEPT_BATCHES = 12  # more are forgotten, the longest unseen first; their uncertainty stays in level and slope
@@ -76,14 +78,7 @@ def change_within(state: WearFilter, mean: Samples, covariance: Samples) -> Wear
 
 def pass_cycles(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:
     """Predict over `cycles` cycles; the variances are those of the random walks, a cycle."""
-    n = len(state.mean)
-    transition = np.eye(n)
-    transition[0, 1] = cycles
-    noise = np.zeros((n, n))
-    noise[0, 0] = level_variance * cycles + slope_variance * cycles**3 / 3.0
-    noise[0, 1] = noise[1, 0] = slope_variance * cycles**2 / 2.0
-    noise[1, 1] = slope_variance * cycles
-    mean, covariance = predict(state.mean, state.covariance, F=transition, Q=noise)
+    mean, covariance = _predicted(state.mean, state.covariance, float(cycles), level_variance, slope_variance)
     return WearFilter(state.batches, state.current, mean, covariance)
 
 
@@ -103,14 +98,15 @@ def change_batch(state: WearFilter, batch: str, step_variance: float) -> WearFil
         if len(batches) > KEPT_BATCHES:
             kept = [i for i in range(len(mean)) if i != 2]
             batches, mean, covariance = (batches[0], *batches[2:]), mean[kept], covariance[np.ix_(kept, kept)]
-        n = len(mean)
-        before = _row(batches, state.current, n)
-        batches, mean = (*batches, batch), np.append(mean, before[2:] @ mean[2:])
+        n, before = len(mean), _place(batches, state.current)
+        # a new offset is the present one and a step
+        batches, mean = (*batches, batch), np.append(mean, mean[before] if before else 0.0)
         grown = np.zeros((n + 1, n + 1))
         grown[:n, :n] = covariance
-        before[:2] = 0.0
-        grown[n, :n] = grown[:n, n] = covariance @ before
-        grown[n, n] = before @ covariance @ before + step_variance
+        if before:
+            grown[n, :n] = grown[:n, n] = covariance[before]
+            grown[n, n] = covariance[before, before]
+        grown[n, n] += step_variance
         covariance = grown
     return WearFilter(batches, batch, mean, covariance)
 
@@ -119,24 +115,16 @@ def measure(
     state: WearFilter, value: float, variance: float, threshold: float, lag: int = 0, batch: str | None = None
 ) -> tuple[WearFilter, Innovation]:
     """Update with one measurement, `lag` cycles late, of `batch` (the present one if None)."""
-    design = _row(state.batches, state.current if batch is None else batch, len(state.mean))
-    design[1] = -float(lag)
-    own = float(design @ state.covariance @ design)
-    innovation = value - float(design @ state.mean)
-    ratio = abs(innovation) / math.sqrt(own + variance) / threshold
-    if ratio > 1.0:
-        # beyond twice the threshold it is no measurement of this quantity: it counts less the farther it is
-        ratio *= max(1.0, 0.5 * ratio)
-        # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
-        variance = (own + variance) * ratio - own
-    mean, covariance = update(
-        state.mean, state.covariance, np.array([value]), np.array([[variance]]), design[np.newaxis, :]
+    mean, covariance, innovation, std = _updated(
+        state.mean,
+        state.covariance,
+        value,
+        variance,
+        threshold,
+        float(lag),
+        _place(state.batches, state.current if batch is None else batch),
     )
-    symmetric = (covariance + covariance.T) / 2.0
-    fresh = WearFilter(state.batches, state.current, np.asarray(mean, dtype=np.float64), symmetric)
-    return fresh, Innovation(
-        innovation, math.sqrt(own + variance) if ratio <= 1.0 else math.sqrt((own + variance) / ratio)
-    )
+    return WearFilter(state.batches, state.current, mean, covariance), Innovation(innovation, std)
 
 
 def offset(state: WearFilter, batch: str) -> tuple[float, float]:
@@ -146,14 +134,81 @@ def offset(state: WearFilter, batch: str) -> tuple[float, float]:
 
 def contrast(state: WearFilter, batch: str, other: str | None) -> tuple[float, float]:
     """Offset of `batch` minus that of `other`, and its standard deviation."""
-    n = len(state.mean)
-    row = _row(state.batches, batch, n) - _row(state.batches, other, n)
-    return float(row @ state.mean), math.sqrt(max(float(row @ state.covariance @ row), 0.0))
+    size = variance = 0.0
+    a, b = _place(state.batches, batch), _place(state.batches, other)
+    if a:
+        size, variance = float(state.mean[a]), float(state.covariance[a, a])
+    if b:
+        size, variance = size - float(state.mean[b]), variance + float(state.covariance[b, b])
+    if a and b:
+        variance -= 2.0 * float(state.covariance[a, b])
+    return size, math.sqrt(max(variance, 0.0))
 
 
-def _row(batches: tuple[str | None, ...], batch: str | None, n: int) -> Samples:
-    row = np.zeros(n)
-    row[0] = 1.0
-    if batch != batches[0]:
-        row[1 + batches.index(batch)] = 1.0
-    return row
+def _place(batches: tuple[str | None, ...], batch: str | None) -> int:
+    """Place of a batch's offset in the state; 0 for the reference batch, which has none."""
+    return 0 if batch == batches[0] else 1 + batches.index(batch)
+
+
+@compiled
+def _predicted(
+    mean: Samples, covariance: Samples, cycles: float, level_variance: float, slope_variance: float
+) -> tuple[Samples, Samples]:
+    mean, P = mean.copy(), covariance.copy()
+    mean[0] += cycles * mean[1]
+    for i in range(len(mean)):
+        P[0, i] += cycles * P[1, i]
+    for i in range(len(mean)):
+        P[i, 0] += cycles * P[i, 1]
+    P[0, 0] += level_variance * cycles + slope_variance * cycles**3 / 3.0
+    P[0, 1] += slope_variance * cycles**2 / 2.0
+    P[1, 0] = P[0, 1]
+    P[1, 1] += slope_variance * cycles
+    return mean, P
+
+
+@compiled
+def _updated(
+    mean: Samples,
+    covariance: Samples,
+    value: float,
+    variance: float,
+    threshold: float,
+    lag: float,
+    place: int,
+) -> tuple[Samples, Samples, float, float]:
+    """State after a measurement, its innovation and that one's standard deviation."""
+    n = len(mean)
+    h, g, K, left, P = np.zeros(n), np.zeros(n), np.empty(n), covariance.copy(), covariance.copy()
+    h[0], h[1] = 1.0, -lag
+    if place > 0:
+        h[place] = 1.0
+    own, innovation = 0.0, value
+    for i in range(n):
+        for j in range(n):
+            g[i] += covariance[i, j] * h[j]
+        own += h[i] * g[i]
+        innovation -= h[i] * mean[i]
+    std = math.sqrt(own + variance)
+    ratio = abs(innovation) / std / threshold
+    if ratio > 1.0:
+        # beyond twice the threshold it is no measurement of this quantity: it counts less the farther it is
+        ratio *= max(1.0, 0.5 * ratio)
+        # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
+        variance = (own + variance) * ratio - own
+    fresh = mean.copy()
+    for i in range(n):
+        K[i] = g[i] / (own + variance)
+        fresh[i] += K[i] * innovation
+    # (I - K h') P (I - K h')' + K R K', which stays positive whatever rounding does to K
+    for i in range(n):
+        along = 0.0
+        for j in range(n):
+            left[i, j] -= K[i] * g[j]
+            along += left[i, j] * h[j]
+        for j in range(n):
+            P[i, j] = left[i, j] - along * K[j] + variance * K[i] * K[j]
+    for i in range(n):
+        for j in range(i):
+            P[i, j] = P[j, i] = (P[i, j] + P[j, i]) / 2.0
+    return fresh, P, innovation, std

@@ -73,6 +73,19 @@ def test_realarm_after_so_many_cycles():
     assert not state.alarm(WEAR).acknowledged
 
 
+def test_a_call_again_while_the_rule_rests_keeps_what_was_said():
+    settings = AlarmSettings(rules={BATCH: RuleSettings(off_delay=9, realarm=2)})
+    state = alarms.initial_state(settings)
+    evidence = Evidence(12.0, 11.0, 4, 0.01, 0.002)
+    state, _ = alarms.after_cycle(settings, state, [alarms.batch_shift(evidence)], 5, 0)
+    said, called = state.alarm(BATCH).message, []
+    for i in range(6, 10):
+        state, moved = alarms.after_cycle(settings, state, [alarms.batch_shift(None)], i, 0)
+        called.extend(i for _ in moved)
+    assert called == [7, 9]
+    assert (state.alarm(BATCH).message, state.alarm(BATCH).evidence) == (said, evidence)
+
+
 def test_a_shift_stands_for_a_while_and_clears_by_itself():
     settings = AlarmSettings(rules={BATCH: RuleSettings(off_delay=3)})
     state = alarms.initial_state(settings)

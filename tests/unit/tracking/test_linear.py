@@ -45,3 +45,18 @@ def test_unknowns_that_vary_are_known_less():
     expected = np.linalg.inv(np.linalg.inv(MATRIX) + components @ components.T)
     assert information == pytest.approx(expected, rel=1e-7)
     assert vector == pytest.approx(expected @ np.linalg.solve(MATRIX, VECTOR), rel=1e-7)
+
+
+def test_a_triangle_holds_all_of_a_symmetric_matrix():
+    assert linear.triangle(MATRIX).tolist() == MATRIX[np.tril_indices(9)].tolist()
+    lower = np.tril(MATRIX)
+    assert linear.square(lower[np.tril_indices(9)]).tolist() == (lower + np.tril(lower, -1).T).tolist()
+    for n in range(60):
+        assert linear.square(np.zeros(n * (n + 1) // 2)).shape == (n, n)
+
+
+def test_products_inverses_and_parts():
+    other = RNG.normal(size=(9, 4))
+    assert linear.product(MATRIX, other) == pytest.approx(MATRIX.T @ other)
+    assert linear.inverse(MATRIX) == pytest.approx(np.linalg.inv(MATRIX), rel=1e-7)
+    assert linear.part(MATRIX, 2, 7, 1, 4).tolist() == MATRIX[2:7, 1:4].tolist()

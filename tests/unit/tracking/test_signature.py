@@ -9,6 +9,7 @@ import pytest
 from impactcell import values
 from impactcell.records import Channel, Quality
 from impactcell.tracking import gap, profile, signature
+from impactcell.tracking.slide import find_slide
 from tests.benchmarks._slides import slide
 
 SETTINGS = signature.SignatureSettings()
@@ -209,6 +210,33 @@ def test_a_restored_state_replays_to_the_same_bits(learned):
     ours, theirs = (signature.update(SETTINGS, s, capture) for s in (state, restored))
     assert values.dumps(ours.state) == values.dumps(theirs.state)
     assert ours.signature.friction.tobytes() == theirs.signature.friction.tobytes()
+
+
+def test_smoothing_is_the_posterior_averaged_over_its_strength():
+    capture, _ = slide(textured(4, bump=0.2), 0.09, 1e4, NOISE, 4)
+    seen = profile.information(find_slide(capture), GRID, 9.81)
+    n = seen.seen
+    G, h, D = seen.matrix[:n, :n], seen.vector[:n], profile.roughness(n)
+    strengths = profile.STRENGTHS * np.trace(G) / np.trace(D)
+    means = np.array([np.linalg.solve(G + strength * D, h) for strength in strengths])
+    fits = (n - 2) * np.log(strengths) - [np.linalg.slogdet(G + strength * D)[1] for strength in strengths]
+    weights = np.exp(0.5 * (fits + means @ h - (fits + means @ h).max()))
+    weights /= weights.sum()
+    mean = weights @ means
+    covariance = np.einsum("k,ki,kj->ij", weights, means - mean, means - mean)
+    covariance += sum(
+        w * np.linalg.inv(G + strength * D) for w, strength in zip(weights, strengths, strict=True)
+    )
+    found, _ = profile.smooth(seen, GRID)
+    assert found == pytest.approx(mean, rel=1e-6)
+    value, std = profile.friction(seen, GRID)
+    row = np.zeros((n - 2, n))
+    for k in range(n - 2):
+        row[k, k : k + 3] = np.array([1.0, 4.0, 1.0]) / 6.0
+    met = np.isfinite(value)
+    assert (met == (seen.reached_m >= GRID)).all()
+    assert value[met] == pytest.approx((row @ mean)[: met.sum()], rel=1e-6)
+    assert std[met] == pytest.approx(np.sqrt(np.diag(row @ covariance @ row.T))[: met.sum()], rel=1e-4)
 
 
 def test_splines_reproduce_a_straight_line():
