@@ -7,7 +7,7 @@
 
 `step` takes a cycle; `find` takes what happens beside the cycles (link, journal); `act` takes what people
 do to a condition; `start_batch` and `reset_wear` what they do to the tracker. Each gives a new `CellState`,
-which `impactcell.values` writes and reads back bit for bit.
+which `impactcell.packing` writes and reads back bit for bit.
 """
 
 import math

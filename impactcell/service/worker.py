@@ -18,6 +18,7 @@ from impactcell.fieldbus.ring import Mark
 from impactcell.intake import Announcement
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
+from impactcell.packing import pack, unpack
 from impactcell.positioning import Belief
 from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Shelving, Snapshot
 from impactcell.service.keeping import Keeper
@@ -195,7 +196,7 @@ class Worker:
         if blob is None:
             return Durable(core.initial_state(self._design))
         try:
-            stored = values.loads(Durable, blob)
+            stored = unpack(Durable, blob)
             return replace(stored, state=core.adapted(self._design, stored.state))
         except ValueError as error:
             self.log.warning(
@@ -244,7 +245,7 @@ class Worker:
             return core.step(self._design, self._state, empty, positioning, announcement, (*faults, fault))
 
     def _blob(self) -> bytes:
-        return values.dumps(Durable(self._state, self._snapshot, self.belief))
+        return pack(Durable(self._state, self._snapshot, self.belief))
 
     def _find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
         self._state, moved = core.find(self._design, self._state, finding, time_ns)

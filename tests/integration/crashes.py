@@ -11,6 +11,7 @@ from impactcell import cell as core
 from impactcell import values
 from impactcell.intake import BatchSaid
 from impactcell.journal.store import Journal
+from impactcell.packing import unpack
 from impactcell.records import PositioningState
 from impactcell.service.design import cell_design
 from impactcell.service.worker import Durable
@@ -79,7 +80,7 @@ def judged(cell_file: Path, journal_file: Path, told: list[str]) -> Outcome:
     design = cell_design(read_cell(cell_file))
     state, cycles = core.initial_state(design), []
     with Journal(journal_file, "press-1", read_only=True) as journal:
-        stored = values.loads(Durable, journal.state() or b"")
+        stored = unpack(Durable, journal.state() or b"")
         for capture in journal.captures():
             state = core.step(design, state, capture, PositioningState()).state
             cycles.append(capture.cycle)
