@@ -39,7 +39,7 @@ class Outer:
 @given(
     st.lists(st.floats(), min_size=4, max_size=4),
     st.lists(st.floats(), max_size=12),
-    st.lists(st.integers(), max_size=4),
+    st.lists(st.integers(-(2**63), 2**64 - 1), max_size=4),
     st.text(),
 )
 def test_round_trip_is_exact(four, numbers, counts, text):
@@ -81,14 +81,20 @@ def test_it_takes_little_more_room_than_the_numbers():
             ("other", float),
         ],
         [("table", Samples), ("counts", tuple[int, ...]), ("names", tuple[str | None, ...])],
-        [("table", Samples), ("counts", tuple[int, ...]), ("names", tuple[str, ...]), ("only", float)],
-        [("counts", tuple[int, ...]), ("table", Samples), ("names", tuple[str | None, ...]), ("only", float)],
+        [("table", Samples), ("counts", tuple[str, ...]), ("names", tuple[str | None, ...]), ("only", float)],
+        [
+            ("table", Samples),
+            ("counts", tuple[int, ...]),
+            ("names", tuple[str | None, ...]),
+            ("only", float),
+            ("more", float, 0.0),
+        ],
     ],
-    ids=["another name", "one less", "another type", "another order"],
+    ids=["another name", "one less", "another type", "one more with a default"],
 )
 def test_another_version_is_refused(fields):
-    older = dataclasses.make_dataclass("Inner", fields, frozen=True)
-    with pytest.raises(ValueError, match="not a stored Inner: its fields are others"):
+    older = dataclasses.make_dataclass("Inner", fields, frozen=True, slots=True)
+    with pytest.raises(ValueError, match="not a stored Inner: "):
         unpack(older, pack(Inner(np.zeros(3), (1,))))
 
 
@@ -97,8 +103,12 @@ def test_damaged_bytes_are_refused():
     for end in range(len(data)):
         with pytest.raises(ValueError, match=r".+"):
             unpack(Inner, data[:end])
-    with pytest.raises(ValueError, match="more than it holds"):
+    with pytest.raises(ValueError, match="trailing"):
         unpack(Inner, data + struct.pack("<d", 1.0))
+    with pytest.raises(ValueError, match="not a stored Inner"):
+        unpack(Inner, pack(Inner(np.zeros(3), (1,), (), "x")))
+    with pytest.raises(ValueError, match="not a stored Inner"):
+        unpack(Inner, data.replace(data[data.index(b"table") + 5 :][:3], b"\xc3\xc3\xc3", 1))
 
 
 @pytest.mark.parametrize(
@@ -106,8 +116,7 @@ def test_damaged_bytes_are_refused():
     [
         (Inner(np.zeros(2, np.float32), ()), "float32"),
         (Inner(np.zeros(2), (1j,)), "complex"),
-        (Inner(np.zeros(2), (), (), "x"), "no number"),
-        ({1, 2}, "no packed form"),
+        (Inner(np.zeros(2), (b"" for _ in ())), "generator"),
     ],
 )
 def test_what_cannot_be_written_is_refused(value, why):
