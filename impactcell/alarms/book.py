@@ -14,7 +14,7 @@ _PLACES = {name: place for place, name in enumerate(AlarmName)}
 
 @dataclass(frozen=True, slots=True)
 class AlarmState:
-    """Alarms of a cell with their delays, in the order of `AlarmName`; `impactcell.values` writes it.
+    """Alarms of a cell with their delays, in the order of `AlarmName`; `impactcell.packing` writes it.
 
     Attributes
     ----------

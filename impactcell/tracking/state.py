@@ -53,7 +53,7 @@ class Shift:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackerState:
-    """All that is kept between cycles; `impactcell.values` writes it bit for bit.
+    """All that is kept between cycles; `impactcell.packing` writes it bit for bit.
 
     Attributes
     ----------
