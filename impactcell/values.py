@@ -1,4 +1,4 @@
-"""Frozen dataclasses as JSON with names, and back to the same bits: for what is kept long and looked at.
+"""Frozen dataclasses as JSON with names, and back to the same bits: for what people may look at.
 
 Floats are written in hexadecimal (`float.hex`), arrays as their little-endian bytes in base64. What can
 be written: dataclasses, floats, ints, bools, strings, None, enums, tuples, mappings with string keys
