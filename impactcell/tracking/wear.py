@@ -1,4 +1,4 @@
-"""Friction over time with the batch known: a Kalman filter, state [level, slope, offsets].
+"""Friction over time with the batch known: a Kalman filter on filterpy, state [level, slope, offsets].
 
 Measurement of cycle n in batch i, and what passes between cycles::
 
@@ -9,16 +9,14 @@ The first batch is the reference, its offset zero. Every later batch has an offs
 state, so that a batch that comes back is recognised and the size of a shift has its exact variance.
 Outliers are clipped after Huber (1964): beyond c standard deviations R is inflated until the innovation
 moves the state as one of c standard deviations would; beyond 2 c its influence falls off again.
-
-Prediction and update are filterpy's `predict` and `update`, compiled; the tests hold them to those.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from filterpy.kalman import predict, update
 
-from impactcell.compiled import compiled
 from impactcell.records import Samples
 
 KEPT_BATCHES = 12  # more are forgotten, the longest unseen first; their uncertainty stays in level and slope
@@ -78,7 +76,14 @@ def change_within(state: WearFilter, mean: Samples, covariance: Samples) -> Wear
 
 def pass_cycles(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:
     """Predict over `cycles` cycles; the variances are those of the random walks, a cycle."""
-    mean, covariance = _predicted(state.mean, state.covariance, float(cycles), level_variance, slope_variance)
+    n = len(state.mean)
+    transition = np.eye(n)
+    transition[0, 1] = cycles
+    noise = np.zeros((n, n))
+    noise[0, 0] = level_variance * cycles + slope_variance * cycles**3 / 3.0
+    noise[0, 1] = noise[1, 0] = slope_variance * cycles**2 / 2.0
+    noise[1, 1] = slope_variance * cycles
+    mean, covariance = predict(state.mean, state.covariance, F=transition, Q=noise)
     return WearFilter(state.batches, state.current, mean, covariance)
 
 
@@ -115,16 +120,22 @@ def measure(
     state: WearFilter, value: float, variance: float, threshold: float, lag: int = 0, batch: str | None = None
 ) -> tuple[WearFilter, Innovation]:
     """Update with one measurement, `lag` cycles late, of `batch` (the present one if None)."""
-    mean, covariance, innovation, std = _updated(
-        state.mean,
-        state.covariance,
-        value,
-        variance,
-        threshold,
-        float(lag),
-        _place(state.batches, state.current if batch is None else batch),
-    )
-    return WearFilter(state.batches, state.current, mean, covariance), Innovation(innovation, std)
+    design = np.zeros((1, len(state.mean)))
+    design[0, :2] = 1.0, -lag
+    if place := _place(state.batches, state.current if batch is None else batch):
+        design[0, place] = 1.0
+    row = design[0]
+    own = float(row @ state.covariance @ row)
+    innovation, std = value - float(row @ state.mean), math.sqrt(own + variance)
+    ratio = abs(innovation) / std / threshold
+    if ratio > 1.0:
+        # beyond twice the threshold it is no measurement of this quantity: it counts less the farther it is
+        ratio *= max(1.0, 0.5 * ratio)
+        # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
+        variance = (own + variance) * ratio - own
+    mean, covariance = update(state.mean, state.covariance, np.array([value]), np.array([[variance]]), design)
+    symmetric = (covariance + covariance.T) / 2.0
+    return WearFilter(state.batches, state.current, mean, symmetric), Innovation(innovation, std)
 
 
 def offset(state: WearFilter, batch: str) -> tuple[float, float]:
@@ -148,67 +159,3 @@ def contrast(state: WearFilter, batch: str, other: str | None) -> tuple[float, f
 def _place(batches: tuple[str | None, ...], batch: str | None) -> int:
     """Place of a batch's offset in the state; 0 for the reference batch, which has none."""
     return 0 if batch == batches[0] else 1 + batches.index(batch)
-
-
-@compiled
-def _predicted(
-    mean: Samples, covariance: Samples, cycles: float, level_variance: float, slope_variance: float
-) -> tuple[Samples, Samples]:
-    mean, P = mean.copy(), covariance.copy()
-    mean[0] += cycles * mean[1]
-    for i in range(len(mean)):
-        P[0, i] += cycles * P[1, i]
-    for i in range(len(mean)):
-        P[i, 0] += cycles * P[i, 1]
-    P[0, 0] += level_variance * cycles + slope_variance * cycles**3 / 3.0
-    P[0, 1] += slope_variance * cycles**2 / 2.0
-    P[1, 0] = P[0, 1]
-    P[1, 1] += slope_variance * cycles
-    return mean, P
-
-
-@compiled
-def _updated(
-    mean: Samples,
-    covariance: Samples,
-    value: float,
-    variance: float,
-    threshold: float,
-    lag: float,
-    place: int,
-) -> tuple[Samples, Samples, float, float]:
-    """State after a measurement, its innovation and that one's standard deviation."""
-    n = len(mean)
-    h, g, K, left, P = np.zeros(n), np.zeros(n), np.empty(n), covariance.copy(), covariance.copy()
-    h[0], h[1] = 1.0, -lag
-    if place > 0:
-        h[place] = 1.0
-    own, innovation = 0.0, value
-    for i in range(n):
-        for j in range(n):
-            g[i] += covariance[i, j] * h[j]
-        own += h[i] * g[i]
-        innovation -= h[i] * mean[i]
-    std = math.sqrt(own + variance)
-    ratio = abs(innovation) / std / threshold
-    if ratio > 1.0:
-        # beyond twice the threshold it is no measurement of this quantity: it counts less the farther it is
-        ratio *= max(1.0, 0.5 * ratio)
-        # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
-        variance = (own + variance) * ratio - own
-    fresh = mean.copy()
-    for i in range(n):
-        K[i] = g[i] / (own + variance)
-        fresh[i] += K[i] * innovation
-    # (I - K h') P (I - K h')' + K R K', which stays positive whatever rounding does to K
-    for i in range(n):
-        along = 0.0
-        for j in range(n):
-            left[i, j] -= K[i] * g[j]
-            along += left[i, j] * h[j]
-        for j in range(n):
-            P[i, j] = left[i, j] - along * K[j] + variance * K[i] * K[j]
-    for i in range(n):
-        for j in range(i):
-            P[i, j] = P[j, i] = (P[i, j] + P[j, i]) / 2.0
-    return fresh, P, innovation, std

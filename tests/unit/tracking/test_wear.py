@@ -2,7 +2,6 @@
 
 import math
 
-import filterpy.kalman
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -49,39 +48,6 @@ def test_equals_least_squares_with_batches_that_come_back():
     difference = np.array([0.0, 0.0, 1.0, -1.0])
     assert size == pytest.approx(difference @ expected, abs=2e-3)
     assert std == pytest.approx(math.sqrt(difference @ covariance @ difference), rel=1e-3)
-
-
-def test_every_step_is_filterpys():
-    rng = np.random.default_rng(3)
-    state = wear.start(0.2, 4e-6, 2e-4, "A")
-    for cycle in range(1, 400):
-        batch, passed, lag = (
-            "ABCABD"[cycle // 70],
-            int(rng.integers(1, 4)),
-            int(rng.integers(0, 3)) * (cycle % 5 == 0),
-        )
-        n = len(state.mean)
-        F, Q = np.eye(n), np.zeros((n, n))
-        F[0, 1] = passed
-        Q[:2, :2] = 1e-9 * np.diag([passed, 0.0])
-        Q[:2, :2] += 1e-13 * np.array([[passed**3 / 3.0, passed**2 / 2.0], [passed**2 / 2.0, passed]])
-        mean, covariance = filterpy.kalman.predict(state.mean, state.covariance, F=F, Q=Q)
-        state = wear.pass_cycles(state, passed, 1e-9, 1e-13)
-        assert state.mean == pytest.approx(mean, rel=1e-12)
-        assert state.covariance == pytest.approx(covariance, rel=1e-11, abs=1e-25)
-        if batch != state.current:
-            state = wear.change_batch(state, batch, 6.4e-5)
-        H = np.zeros((1, len(state.mean)))
-        H[0, :2] = 1.0, -lag
-        if batch != "A":
-            H[0, 1 + state.batches.index(batch)] = 1.0
-        value = 0.2 + 1e-5 * cycle + 0.002 * rng.normal()
-        mean, covariance = filterpy.kalman.update(
-            state.mean, state.covariance, np.array([value]), np.array([[4e-6]]), H
-        )
-        state, _ = wear.measure(state, value, 4e-6, math.inf, lag)
-        assert state.mean == pytest.approx(mean, rel=1e-10)
-        assert state.covariance == pytest.approx(covariance, rel=1e-8, abs=1e-20)
 
 
 def test_an_outlier_is_clipped():
