@@ -259,8 +259,8 @@ def tables(quick: bool = False) -> list[Table]:
             [one.row() for one in loads],
             f"The whole service: Modbus, prediction, tracking, alarms, journal, OPC UA (publishing interval "
             f"{PUBLISHING_MS} ms); modules and client on the other core. {seconds:g} s each, one cell "
-            f"{ALONE} times as long, after what had waited in the modules' rings at the start was worked off. A "
-            f"cycle comes every {1e3 * PERIOD_S:g} ms, so that it meets the publishing clock in all its phases.",
+            f"{ALONE} times as long, after what had waited in the modules' rings was worked off. "
+            f"A cycle comes every {1e3 * PERIOD_S:g} ms and meets the publishing clock in all its phases.",
         ),
         Table(
             "The service",
