@@ -137,10 +137,12 @@ class Module:
         skip = 0
         while True:
             try:
+                asked_s = loop.time()
                 polled = await self._poll()
                 backoff.reset()
-                if newest != (newest := Mark(polled.session, polled.cycle_counter)):
-                    schedule.saw_cycle(loop.time())
+                shown = Mark(polled.session, polled.cycle_counter)
+                schedule.polled(asked_s, loop.time(), new=shown != newest)
+                newest = shown
                 want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, skip)
                 if want is None:
                     await asyncio.sleep(schedule.delay_s(loop.time(), self._client.round_trip_s))
@@ -158,6 +160,7 @@ class Module:
             schedule.learn(
                 1e-9 * capture.time_ns or loop.time(),
                 distance(last.cycle, want.mark.cycle) if last and last.session == want.mark.session else 0,
+                newest=want.mark == newest,
             )
             last = want.mark
             reception = Reception(capture, want.mark, want.missed, want.restarted, read.faults)

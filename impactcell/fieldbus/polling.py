@@ -1,5 +1,6 @@
 """When to ask for the next cycle: often when one is due, else seldom. Pure; the caller brings the time."""
 
+import math
 from typing import Final
 
 FINE_S: Final = 0.003
@@ -17,30 +18,44 @@ _LONGEST: Final = 3.0
 """A longer time between cycles, in periods, is a pause or a clock that was set, and counts as this."""
 _DRIFT: Final = 5e-4
 """The most by which the module's clock can be slow or fast."""
+_UNKNOWN: Final = (-math.inf, math.inf)
 
 
 class PollSchedule:
-    """Learns the cycle period and how much it varies.
+    """Learns the cycle period, how much it varies, and what the module's clock shows.
 
-    Both come from the cycles' own times: those at which a busy service sees them vary with its load, and
-    would make it poll the more the less time it has. So does when the next one is due: a cycle seen late must
-    not make the next one late as well. What the module's clock shows is known from the cycle seen soonest.
+    Period and variation come from the cycles' own times: those at which a busy service sees them vary with
+    its load, and would make it poll the more the less time it has. So does when the next one is due: a cycle
+    seen late must not make the next one late as well. It came after the last poll that did not show it and
+    before the one that did, so the lag from its own time to when it can be seen lies between two bounds, which
+    close in from cycle to cycle; polls are dense from the earliest to the latest moment these leave.
     """
 
     def __init__(self) -> None:
-        self._seen_s: float | None = None
+        self._asked_s = self._before_s = -math.inf
+        self._seen_s = math.inf
         self._made_s: float | None = None
         self._period_s: float | None = None
         self._spread_s = 0.0
-        self._offset_s = 0.0
-        self._due_s = 0.0
+        self._lag_s = _UNKNOWN
 
-    def saw_cycle(self, now_s: float) -> None:
-        """Take note that a poll showed a new cycle."""
-        self._seen_s = now_s
+    def polled(self, asked_s: float, answered_s: float, *, new: bool) -> None:
+        """Take note of a poll, and whether it showed a cycle that the one before did not."""
+        if new:
+            self._before_s, self._seen_s = self._asked_s, answered_s
+        self._asked_s = asked_s
 
-    def learn(self, made_s: float, cycles: int = 1) -> None:
-        """Take note of when a cycle was made, on any clock, `cycles` after the one before."""
+    def learn(self, made_s: float, cycles: int = 1, *, newest: bool = True) -> None:
+        """Take note of when a cycle was made, on any clock.
+
+        Parameters
+        ----------
+        made_s : float
+        cycles : int
+            How many after the one before; 0 if that is not known.
+        newest : bool
+            Whether it is the one that the last poll with something new showed.
+        """
         if self._made_s is not None and cycles > 0 and made_s > self._made_s:
             period_s = (made_s - self._made_s) / cycles
             if self._period_s is None:
@@ -50,24 +65,34 @@ class PollSchedule:
                 self._period_s += _GAIN * error_s
                 self._spread_s += _GAIN * (abs(error_s) - self._spread_s)
         self._made_s = made_s
-        if self._seen_s is not None and self._period_s is not None:
-            self._offset_s += _DRIFT * self._period_s
-            late_s = self._seen_s - made_s - self._offset_s
-            if not 0.0 <= late_s < self._period_s:  # seen sooner than any, or a clock was set
-                self._offset_s += late_s
-            self._due_s = made_s + self._offset_s + self._period_s
+        if newest:
+            self._lag_s = self._bounds(self._before_s - made_s, self._seen_s - made_s)
+
+    def _bounds(self, least_s: float, most_s: float) -> tuple[float, float]:
+        """Bounds of the lag, given those that the newest cycle shows."""
+        period_s = self._period_s or 0.0
+        low_s, high_s = self._lag_s[0] - _DRIFT * period_s, self._lag_s[1] + _DRIFT * period_s
+        if most_s < low_s or least_s > high_s + period_s:  # sooner than it could be, or a clock was set
+            return least_s, most_s
+        if least_s > high_s:  # held up in the module: once, or from now on
+            high_s += _GAIN * (least_s - high_s)
+        high_s = min(high_s, most_s)
+        return min(max(low_s, least_s), high_s), high_s
 
     def delay_s(self, now_s: float, round_trip_s: float) -> float:
         """Return the wait before the next poll; at least three round trips, so that a slow line has rest."""
-        fine_s = min(max(FINE_S, self._spread_s), COARSE_S)
-        least_s = max(fine_s, 3.0 * round_trip_s if round_trip_s == round_trip_s else 0.0)
-        if self._seen_s is None or self._period_s is None:
-            return max(least_s, QUIET_S)
+        rest_s = 3.0 * round_trip_s if round_trip_s == round_trip_s else 0.0
+        low_s, high_s = self._lag_s
+        if self._made_s is None or self._period_s is None or low_s == -math.inf:
+            return max(rest_s, QUIET_S)
+        least_s = max(rest_s, min(max(FINE_S, self._spread_s, 0.5 * (high_s - low_s)), COARSE_S))
+        due_s = self._made_s + self._period_s
         margin_s = 2.0 * self._spread_s + FINE_S
-        overdue_s = now_s - self._due_s
-        if overdue_s < -margin_s:
+        early_s = due_s + low_s - margin_s - now_s
+        if early_s > 0.0:
             regular = 10.0 * margin_s < self._period_s
-            return max(least_s, min(-margin_s - overdue_s, REGULAR_S if regular else QUIET_S))
+            return max(least_s, min(early_s, REGULAR_S if regular else QUIET_S))
+        overdue_s = now_s - due_s - high_s
         if overdue_s < margin_s:
             return least_s
         return max(least_s, min(IDLE_S, QUIET_S if overdue_s < 3.0 * self._period_s else 0.1 * overdue_s))

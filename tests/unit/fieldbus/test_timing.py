@@ -21,16 +21,17 @@ def follow(
 
     The poller is held up before each poll for a random time of mean `busy_s`; `clock` is the module's.
     """
-    schedule, now_s, due_s = PollSchedule(), 0.0, 0.0
+    schedule, now_s, due_s, asked_s = PollSchedule(), 0.0, 0.0, 0.0
     late, polls = [], 0
     held_up = np.random.default_rng(9)
     for period_s in periods_s:
         due_s += period_s
         while now_s < due_s:
-            now_s += schedule.delay_s(now_s, round_trip_s) + held_up.exponential(busy_s)
+            asked_s = now_s + schedule.delay_s(now_s, round_trip_s)
+            now_s = asked_s + held_up.exponential(busy_s)
             polls += 1
+            schedule.polled(asked_s, now_s, new=now_s >= due_s)
         late.append(now_s - due_s)
-        schedule.saw_cycle(now_s)
         schedule.learn(clock(due_s))
     return late, polls / len(periods_s)
 
@@ -52,6 +53,48 @@ def test_a_cycle_seen_late_does_not_make_the_next_one_late() -> None:
     late, _ = follow([0.5] * 600, busy_s=0.01)
     assert np.quantile(late[20:], 0.99) < 1.5 * 0.046
     assert np.median(late[20:]) < 0.015
+
+
+@pytest.mark.parametrize("first_s", [0.0, 0.05, 0.2, 0.45])
+def test_cycles_that_waited_at_the_start_do_not_make_later_ones_late(first_s: float) -> None:
+    """Fifteen in the ring, the newest of them old: its age says little of when the next one can be seen."""
+    schedule, now_s = PollSchedule(), 0.0
+    schedule.polled(0.0, 0.0, new=True)
+    for cycle in range(-14, 1):
+        schedule.learn(0.5 * cycle - first_s, newest=cycle == 0)
+    late, polls = [], 0
+    for cycle in range(1, 60):
+        due_s = 0.5 * cycle - first_s
+        while now_s < due_s:
+            now_s += schedule.delay_s(now_s, 1e-4)
+            polls += 1
+            schedule.polled(now_s, now_s, new=now_s >= due_s)
+        late.append(now_s - due_s)
+        schedule.learn(due_s)
+    assert max(late) <= QUIET_S + 1e-9
+    assert max(late[3:]) < 2 * FINE_S
+    assert polls < 10 * 59
+
+
+def test_a_module_that_is_slow_for_once_or_for_good() -> None:
+    """One cycle shown 20 ms late costs the next ones little; from cycle 100 on all are."""
+    held_up = np.zeros(200)
+    held_up[50], held_up[100:] = 0.02, 0.02
+    schedule, now_s = PollSchedule(), 0.0
+    late, polls = [], np.zeros(200)
+    for cycle, held_up_s in enumerate(held_up):
+        shown_s = 0.5 * cycle + held_up_s
+        while now_s < shown_s:
+            now_s += schedule.delay_s(now_s, 1e-4)
+            polls[cycle] += 1
+            schedule.polled(now_s, now_s, new=now_s >= shown_s)
+        late.append(now_s - shown_s)
+        schedule.learn(0.5 * cycle)
+    assert max(late[51:100]) < 2 * FINE_S
+    assert max(late[20:50]) < 2 * FINE_S
+    assert max(late[110:]) < 2 * FINE_S
+    assert max(polls[60:100]) < 10
+    assert max(polls[120:]) < 10
 
 
 @pytest.mark.parametrize("rate", [1.0 - 1e-4, 1.0, 1.0 + 1e-4])
@@ -83,9 +126,10 @@ def test_irregular_cycles_are_never_seen_later_than_the_quiet_poll() -> None:
 
 def test_an_idle_module_is_left_in_peace() -> None:
     schedule = PollSchedule()
-    schedule.learn(0.0)
-    schedule.learn(0.5)
-    schedule.saw_cycle(0.5)
+    for cycle in range(5):
+        schedule.polled(0.5 * cycle - 0.01, 0.5 * cycle - 0.01, new=False)
+        schedule.polled(0.5 * cycle, 0.5 * cycle, new=True)
+        schedule.learn(0.5 * cycle)
     assert schedule.delay_s(60.0, 1e-4) == IDLE_S
 
 
