@@ -27,8 +27,8 @@ class PollSchedule:
     Period and variation come from the cycles' own times: those at which a busy service sees them vary with
     its load, and would make it poll the more the less time it has. So does when the next one is due: a cycle
     seen late must not make the next one late as well. It came after the last poll that did not show it and
-    before the one that did, so the lag from its own time to when it can be seen lies between two bounds, which
-    close in from cycle to cycle; polls are dense from the earliest to the latest moment these leave.
+    before the one that did, so the lag from its own time to when it can be seen lies between two bounds. They
+    close in from cycle to cycle; polls are dense from the earliest to the latest moment that they leave.
     """
 
     def __init__(self) -> None:

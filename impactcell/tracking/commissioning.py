@@ -7,6 +7,7 @@ adopted by mistake costs a wear rate most of its precision.
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -112,6 +113,7 @@ def most_likely(settings: TrackerSettings, history: History, factor: float) -> t
     """Find the random walks of level and slope, in standard deviations of one estimate a cycle."""
     start = (settings.level_noise, settings.slope_noise)
 
+    @cache
     def likelihood(level: float, slope: float) -> float:
         return replay(settings, history, factor, level, slope).likelihood
 
