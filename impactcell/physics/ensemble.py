@@ -158,7 +158,9 @@ class Ensemble:
             taps = {**taps, "mass_kg": mass_kg}
         if initial_speed_m_s is not None:
             taps = {**taps, "initial_speed_m_s": initial_speed_m_s}
-        table = np.broadcast_to(np.asarray(parameters, np.float64), (self._count, len(self.names)))
+        table, shape = np.asarray(parameters, np.float64), (self._count, len(self.names))
+        if table.shape != shape:
+            table = np.broadcast_to(table, shape)
         rows = self._program.rows(table, self.gravity_m_s2, taps)
         rows[:, at.MU_S] *= friction_factor
         rows[:, at.MU_K] *= friction_factor

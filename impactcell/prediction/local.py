@@ -83,6 +83,37 @@ def median(values: Samples) -> float:
 
 
 @compiled
+def middle_second_difference(values: Samples) -> float:
+    """Median of the absolute second differences of three values and more, by quickselect (Hoare 1961)."""
+    n = len(values) - 2
+    found = np.empty(n)
+    for i in range(n):
+        found[i] = abs((values[i + 2] - values[i + 1]) - (values[i + 1] - values[i]))
+    half, low, high = n // 2, 0, n - 1
+    while low < high:
+        pivot = found[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while found[i] < pivot:
+                i += 1
+            while found[j] > pivot:
+                j -= 1
+            if i <= j:
+                found[i], found[j] = found[j], found[i]
+                i += 1
+                j -= 1
+        if half <= j:
+            high = j
+        elif half >= i:
+            low = i
+        else:
+            break
+    if n % 2:
+        return float(found[half])
+    return float(0.5 * (np.max(found[:half]) + found[half]))
+
+
+@compiled
 def polynomial(
     times: Samples, values: Samples, origin_s: float, scale_s: float, degree: int
 ) -> tuple[Samples, Samples, float]:

@@ -16,6 +16,7 @@ from impactcell.errors import (
 )
 from impactcell.prediction.local import (
     median,
+    middle_second_difference,
     polynomial,
     running_mean,
     spread,
@@ -132,8 +133,7 @@ def noise_std(channel: Channel) -> float:
     raster = (channel.resolution or 0.0) / math.sqrt(12.0)
     if channel.noise_std is not None:
         return math.hypot(channel.noise_std, raster)
-    second = np.diff(channel.values, 2)
-    white = 1.4826 * float(np.median(np.abs(second))) / math.sqrt(6.0)
+    white = 1.4826 * middle_second_difference(channel.values) / math.sqrt(6.0)
     return max(white, raster, 1e-9 * float(np.abs(channel.values).max()))
 
 

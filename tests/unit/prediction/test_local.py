@@ -12,6 +12,7 @@ from impactcell.prediction.blocks import blocks
 from impactcell.prediction.local import (
     mean,
     median,
+    middle_second_difference,
     polynomial,
     running_mean,
     spread,
@@ -105,3 +106,20 @@ def test_scatter_and_means_of_blocks_hold_all_squares() -> None:
     sums = made.scatter
     within = float((sums.values - 3e4 * sums.both + 1.5e4**2 * sums.times).sum()) / 0.3**2
     assert between + within == pytest.approx(direct, rel=1e-9)
+
+
+@given(
+    values=st.lists(st.integers(-5, 5) | st.floats(-1e6, 1e6), min_size=3, max_size=60).map(
+        lambda drawn: np.array(drawn, dtype=np.float64)
+    )
+)
+def test_middle_second_difference_is_numpys_to_the_bit(values: np.ndarray) -> None:
+    """Few distinct values, as codes give them, and many."""
+    assert middle_second_difference(values) == np.median(np.abs(np.diff(values, 2)))
+
+
+@pytest.mark.parametrize("size", [20_000, 20_001])
+def test_middle_second_difference_of_ordered_and_of_equal_values(size: int) -> None:
+    ordered = np.arange(size, dtype=np.float64) ** 3
+    for values in (ordered, -ordered, np.zeros(size)):
+        assert middle_second_difference(values) == np.median(np.abs(np.diff(values, 2)))
