@@ -45,7 +45,7 @@ def tables(quick: bool = False) -> list[Table]:
         run(numbers[-1], commissioned=True)
         run(1, SMALLER)
     os.sched_setaffinity(0, EVERY_CORE)
-    most = max((one for one in loads if one.missed == 0), key=lambda one: one.cells, default=None)
+    without_loss = [n for n in numbers if not any(one.missed for one in loads if one.cells == n)]
     single = loads[0].delays_ms
     return [
         Table(
@@ -73,7 +73,7 @@ def tables(quick: bool = False) -> list[Table]:
             "The service",
             COLUMNS,
             [
-                ("cells on one core with no cycle missed", ">= 24", f"{most.cells if most else 0}", ""),
+                ("cells on one core with no cycle missed", ">= 24", f"{max(without_loss, default=0)}", ""),
                 (
                     "cycle complete to OPC UA notification, p99, one cell",
                     f"<= {PUBLISHING_MS} + 30 ms",
