@@ -8,12 +8,14 @@ from rich.text import Text
 
 from impactcell.records import AlarmName, Quality, Snapshot
 
-ROWS = 12
 QUALITY_STYLE = {Quality.GOOD: "green", Quality.UNCERTAIN: "yellow", Quality.BAD: "red"}
 
 
-def chart(snapshots: Sequence[Snapshot], columns: int) -> Text:
-    """Draw one column a cycle: a dot for the estimate, shading for the level with its offset, ± 2 sd."""
+LEGEND = "mu_s  • cycle  ░ level ± 2 sd  ✗ deviant  ┆ shift"
+
+
+def chart(snapshots: Sequence[Snapshot], columns: int, rows: int) -> Text:
+    """Draw one column a cycle: what stands in `LEGEND`, the level with the offset of its batch."""
     shown = list(snapshots)[-columns:]
     bands = [_band(s) for s in shown]
     numbers = [s.friction.mu_s.value for s in shown] + [edge for band in bands for edge in band]
@@ -24,15 +26,31 @@ def chart(snapshots: Sequence[Snapshot], columns: int) -> Text:
     margin = max(0.02 * abs(high), 0.1 * (high - low), 1e-4)
     low, high = low - margin, high + margin
 
-    scale = _Scale(low, high)
+    scale = _Scale(low, high, rows)
+    shifts = _shifts(shown)
     text = Text()
-    for row in range(ROWS):
-        label = f"{high - (row + 0.5) * (high - low) / ROWS:7.4f} " if row % 3 == 0 else " " * 8
+    for row in range(rows):
+        label = f"{high - (row + 0.5) * (high - low) / rows:7.4f} " if row % 3 == 0 else " " * 8
         text.append(label, style="dim")
-        for snapshot, (bottom, top) in zip(shown, bands, strict=True):
-            text.append(*_mark(snapshot, row, scale, (bottom, top)))
-        text.append("\n")
+        for snapshot, band in zip(shown, bands, strict=True):
+            mark, style = _mark(snapshot, row, scale, band)
+            shifted = mark == " " and snapshot.cycle in shifts
+            text.append(*(("┆", "magenta") if shifted else (mark, style)))
+        text.append("\n" if row + 1 < rows else "")
     return text
+
+
+def _shifts(snapshots: Sequence[Snapshot]) -> set[int]:
+    """Cycles of the batch shifts as last believed: each is found, and refined, some cycles after it."""
+    last, found = 0, [0]
+    for snapshot in snapshots:
+        shift = snapshot.batch.last_shift_cycle
+        if shift > last:
+            found.append(shift)
+            last = snapshot.cycle
+        elif shift:
+            found[-1] = shift
+    return set(found)
 
 
 def _band(snapshot: Snapshot) -> tuple[float, float]:
@@ -52,8 +70,6 @@ def _mark(snapshot: Snapshot, row: int, scale: "_Scale", band: tuple[float, floa
         return ("✗", "bold red") if odd else ("•", QUALITY_STYLE[mu_s.quality])
     if math.isfinite(band[0]) and scale.row(band[1]) <= row <= scale.row(band[0]):
         return "░", "blue"
-    if snapshot.batch.last_shift_cycle == snapshot.cycle:
-        return "┆", "magenta"
     return " ", ""
 
 
@@ -61,6 +77,8 @@ def _mark(snapshot: Snapshot, row: int, scale: "_Scale", band: tuple[float, floa
 class _Scale:
     low: float
     high: float
+    rows: int
 
     def row(self, value: float) -> int:
-        return min(ROWS - 1, max(0, int((self.high - value) / (self.high - self.low) * ROWS)))
+        share = (self.high - value) / (self.high - self.low)
+        return min(self.rows - 1, max(0, int(share * self.rows)))

@@ -9,10 +9,10 @@ import signal
 import sys
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.live import Live
 
 from impactcell.commands.telling import quiet
@@ -39,7 +39,7 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
         The simulator did not start, or no cycle came.
     """
     if sys.stderr.isatty() and not quiet():
-        sys.stderr.write("setting up; the first time on a machine takes a minute, to compile\n")
+        sys.stderr.write("setting up; the first time on a machine takes a minute or two, to compile\n")
     # Until the event loop takes the signal over, an end has to pass through `set_up`, which cleans up.
     signal.signal(signal.SIGTERM, _end)
     with set_up(scenario, cycles) as stage:
@@ -199,14 +199,19 @@ async def _live(show: _Show) -> bool:
     console = Console()
     with Live(console=console, auto_refresh=False, screen=True) as live:
 
-        def draw(now: _Show, _: Snapshot) -> None:
-            live.update(render(now.scene(), min(shutil.get_terminal_size().columns, 160)), refresh=True)
+        def draw(now: _Show, _: Snapshot | None = None) -> None:
+            live.update(_drawn(now.scene()), refresh=True)
 
-        live.update(render(show.scene(), min(console.width, 160)), refresh=True)
+        draw(show)
         interrupted = await show.run(draw)
     if show.snapshots:
-        console.print(render(show.scene(), min(console.width, 160)))
+        console.print(_drawn(replace(show.scene(), link="")))
     return interrupted
+
+
+def _drawn(scene: Scene) -> RenderableType:
+    columns, lines = shutil.get_terminal_size()
+    return render(scene, min(columns, 160), lines)
 
 
 def _plain(_: _Show, snapshot: Snapshot) -> None:

@@ -96,7 +96,11 @@ def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-ar
     """Tell what a scenario does, from which cycle on."""
     told = [(1, "the surface wears: mu_s grows slowly")] if content.get("wear") else []
     told += [
-        (batch["from_cycle"], f"batch {batch['id']} is on the table")
+        (
+            batch["from_cycle"],
+            f"batch {batch['id']} is on the table"
+            + ("" if batch.get("announced", True) else ", and the PLC says nothing of it"),
+        )
         for batch in content.get("batches", [])
         if batch["from_cycle"] > 1
     ]

@@ -1,16 +1,22 @@
 """The live view of one cell in a terminal: friction with its band, wear, batch, alarms, where to connect."""
 
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rich.console import Group, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from impactcell.demo.chart import QUALITY_STYLE, chart
+from impactcell.demo.chart import LEGEND, QUALITY_STYLE, chart
 from impactcell.records import Alarm, Snapshot
+
+WIDE = 100
+"""Columns from which on facts stand side by side and alarms in a table."""
+LEAST_ROWS, MOST_ROWS = 4, 20
+"""Of the chart; in a terminal too low for the least it is left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +27,13 @@ class Scene:
     ----------
     cell : str
     endpoint : str
-        Where an OPC UA client connects.
+        Where an OPC UA client connects, and as whom.
     story : str
         What is happening in the cell, in a sentence.
     snapshots : sequence of Snapshot
         The last cycles, oldest first.
     link : str
-        State of the link to the module.
+        State of the link to the module; empty once the cell has ended, so that nobody tries to connect.
     """
 
     cell: str
@@ -37,42 +43,59 @@ class Scene:
     link: str = "connected"
 
 
-def render(scene: Scene, width: int = 100) -> RenderableType:
-    """Draw the scene for a terminal `width` columns wide."""
+def render(scene: Scene, width: int = 100, height: int = 40) -> RenderableType:
+    """Draw the scene for a terminal of `width` columns and `height` lines; the chart gets what is left."""
     if not scene.snapshots:
-        return Panel(f"waiting for the first cycle ({scene.link})", title=f"impactcell · {scene.cell}")
+        waiting = f"waiting for the first cycle ({scene.link})"
+        return Panel(waiting, title=f"impactcell · {scene.cell}", width=width)
     last = scene.snapshots[-1]
+    parts: list[RenderableType] = [Text(scene.story, style="italic"), _facts(last, wide=width >= WIDE)]
+    below: list[RenderableType] = [_alarms(last.alarms, wide=width >= WIDE)]
+    if scene.link:
+        below.append(Text(f"OPC UA: {scene.endpoint} · Ctrl-C ends", style="dim"))
+    measure = Console(width=width - 4, file=io.StringIO())
+    taken = sum(len(measure.render_lines(part)) for part in (*parts, *below)) + 4
+    if height - taken >= LEAST_ROWS:
+        curve = chart(scene.snapshots, max(20, width - 16), min(height - taken, MOST_ROWS))
+        parts.append(Panel(curve, title=LEGEND, title_align="left"))
+    title = f"impactcell · {scene.cell} · cycle {last.cycle} · "
+    title += f"module {scene.link}" if scene.link else "ended"
+    return Panel(Group(*parts, *below), title=title, width=width)
+
+
+def _facts(last: Snapshot, *, wide: bool) -> Table:
+    friction = last.friction
+    left: list[tuple[str, str | Text]] = [
+        ("mu_s", _coefficient(last)),
+        ("mu_k", _plus_minus(friction.mu_k.value, friction.mu_k.std)),
+        ("peak force", f"{friction.peak_force_n:.1f} N"),
+        ("slid", f"{friction.sliding_distance_m * 1e6:.0f} µm"),
+    ]
+    right: list[tuple[str, str | Text]] = [
+        ("wear level", _level(last)),
+        ("wear limit", _limit(last)),
+        ("batch", _batch(last)),
+        ("signature", _signature(last)),
+    ]
     facts = Table.grid(padding=(0, 2))
-    facts.add_column(style="dim", no_wrap=True)
-    facts.add_column(no_wrap=True)
-    facts.add_column(style="dim", no_wrap=True)
-    facts.add_column()
-    facts.add_row("mu_s", _coefficient(last), "wear level", _level(last))
-    facts.add_row(
-        "mu_k",
-        Text(_plus_minus(last.friction.mu_k.value, last.friction.mu_k.std)),
-        "wear limit",
-        _limit(last),
-    )
-    facts.add_row("peak force", f"{last.friction.peak_force_n:.1f} N", "batch", _batch(last))
-    facts.add_row("slid", f"{last.friction.sliding_distance_m * 1e6:.0f} µm", "signature", _signature(last))
-    curve = Panel(
-        chart(scene.snapshots, max(20, width - 16)), title="static friction mu_s", title_align="left"
-    )
-    title = f"impactcell · {scene.cell} · cycle {last.cycle} · module {scene.link}"
-    subtitle = f"OPC UA: {scene.endpoint} · Ctrl-C ends"
-    return Panel(
-        Group(Text(scene.story, style="italic"), facts, curve, _alarms(last.alarms)),
-        title=title,
-        subtitle=subtitle,
-        width=width,
-    )
+    for _ in range(2 if wide else 1):
+        facts.add_column(style="dim", no_wrap=True)
+        facts.add_column()
+    if wide:
+        for one, other in zip(left, right, strict=True):
+            facts.add_row(*one, *other)
+    else:
+        for row in left + right:
+            facts.add_row(*row)
+    return facts
 
 
 def _plus_minus(value: float, std: float) -> str:
+    """Show four decimals, or as many as the first digit of the standard deviation needs."""
     if math.isnan(value):
         return "none"
-    return f"{value:.4f} ± {std:.4f}" if math.isfinite(std) else f"{value:.4f}"
+    decimals = 4 if not 0.0 < std < 1e-4 else min(-math.floor(math.log10(std)), 7)
+    return f"{value:.{decimals}f} ± {std:.{decimals}f}" if math.isfinite(std) else f"{value:.4f}"
 
 
 def _coefficient(snapshot: Snapshot) -> Text:
@@ -125,15 +148,26 @@ def _signature(snapshot: Snapshot) -> Text:
     return text
 
 
-def _alarms(alarms: Sequence[Alarm]) -> RenderableType:
+def _alarms(alarms: Sequence[Alarm], *, wide: bool) -> RenderableType:
     shown = [alarm for alarm in alarms if alarm.active or not alarm.acknowledged]
     if not shown:
         return Text("no alarms", style="green")
-    table = Table(expand=True, box=None, header_style="dim")
-    for heading in ("alarm", "state", "since cycle", "message"):
-        table.add_column(heading, no_wrap=heading != "message")
+    rows = []
     for alarm in shown:
         state = ("active" if alarm.active else "cleared") + ("" if alarm.acknowledged else ", unacknowledged")
-        style = "bold red" if alarm.active else "yellow"
-        table.add_row(Text(alarm.name.value, style=style), state, str(alarm.cycle), alarm.message)
+        name = Text(alarm.name.value, style="bold red" if alarm.active else "yellow")
+        rows.append((name, state, str(alarm.cycle), alarm.message))
+    if not wide:
+        return Group(
+            *(
+                Text.assemble(name, f" {state} since cycle {cycle}: {said}")
+                for name, state, cycle, said in rows
+            )
+        )
+    table = Table(expand=True, box=None, header_style="dim", padding=(0, 2, 0, 0))
+    for heading in ("alarm", "state", "since cycle"):
+        table.add_column(heading, no_wrap=True)
+    table.add_column("message", ratio=1)
+    for row in rows:
+        table.add_row(*row)
     return table

@@ -12,9 +12,12 @@ from impactcell.records import Alarm, AlarmName, Coefficient, Quality, Snapshot
 from tests.snapshots import make_capture, make_snapshot
 
 
-def drawn(snapshots: list[Snapshot], width: int = 100) -> str:
+def drawn(snapshots: list[Snapshot], width: int = 100, height: int = 40, link: str = "connected") -> str:
     console = Console(width=width, file=io.StringIO(), record=True)
-    console.print(render(Scene("press-1", "opc.tcp://127.0.0.1:4840", "wear grows", snapshots), width))
+    scene = Scene(
+        "press-1", "opc.tcp://127.0.0.1:4840 · password 0123456789ab", "wear grows", snapshots, link
+    )
+    console.print(render(scene, width, height))
     return console.export_text()
 
 
@@ -44,6 +47,53 @@ def test_what_a_viewer_looks_for_is_there() -> None:
     ):
         assert expected in text
     assert "no alarms" not in text
+
+
+def with_alarms(snapshot: Snapshot) -> Snapshot:
+    shift = Alarm(AlarmName.BATCH_SHIFT, active=True, acknowledged=False, cycle=21, message="by +0.01 " * 8)
+    return replace(snapshot, alarms=(shift, *snapshot.alarms[1:]))
+
+
+@pytest.mark.parametrize(("width", "height"), [(60, 24), (80, 24), (100, 24), (160, 50)])
+def test_nothing_is_cut_off(width: int, height: int) -> None:
+    text = drawn([*history(29), with_alarms(history(30)[-1])], width, height)
+    assert len(text.splitlines()) <= height
+    for whole in ("wear level", "0.2030 ± 0.0010", "signature", "BatchShift", "•", "0123456789ab"):
+        assert whole in text
+    assert "…" not in text
+
+
+def test_a_low_terminal_keeps_the_facts_and_does_without_the_chart() -> None:
+    text = drawn(history(30), 80, 14)
+    assert len(text.splitlines()) <= 14
+    assert "signature" in text
+    assert "░" not in text
+
+
+def test_a_shift_is_marked_where_it_was_not_where_it_was_found() -> None:
+    found = [
+        replace(s, batch=replace(s.batch, last_shift=0.01, last_shift_cycle=8 if s.cycle < 15 else 9))
+        if s.cycle >= 12
+        else s
+        for s in history(30)
+    ]
+    columns = {
+        line.index("┆") for line in drawn(found).splitlines()[1:] if "┆" in line and "mu_s" not in line
+    }
+    first = len("│ │ ") + 8
+    assert columns == {first + 9 - 1}
+
+
+def test_small_deviations_are_shown_with_the_decimals_that_they_need() -> None:
+    last = history(1)[0]
+    known = replace(last, friction=replace(last.friction, mu_k=Coefficient(0.1512345, 2e-5, Quality.GOOD)))
+    assert "0.15123 ± 0.00002" in drawn([known])
+
+
+def test_nobody_is_told_to_connect_to_a_cell_that_has_ended() -> None:
+    text = drawn(history(3), link="")
+    assert "ended" in text
+    assert "opc.tcp" not in text
 
 
 @pytest.mark.parametrize("width", [60, 100, 160])
