@@ -4,11 +4,12 @@ import importlib
 import pkgutil
 from pathlib import Path
 
+from impactcell.commands.progress import progress
 from impactcell.errors import SettingsError
 
 
 def draw(directory: Path) -> list[Path]:
-    """Draw every figure as PNG and SVG; return the files in the order they were written.
+    """Draw every figure as PNG and SVG; return the files by name.
 
     Raises
     ------
@@ -20,11 +21,13 @@ def draw(directory: Path) -> list[Path]:
     mpl.use("Agg")
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        return [
-            path
-            for topic in pkgutil.iter_modules(__path__)
-            for path in importlib.import_module(f"{__name__}.{topic.name}").draw(directory)
-        ]
+        files: list[Path] = []
+        topics = list(pkgutil.iter_modules(__path__))
+        with progress("drawing", len(topics)) as done:
+            for topic in topics:
+                files += importlib.import_module(f"{__name__}.{topic.name}").draw(directory)
+                done()
+        return sorted(files)
     except OSError as error:
         raise SettingsError(
             f"{directory}: cannot be written ({error.strerror}); choose another directory"

@@ -22,12 +22,16 @@ from impactcell.tracking import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 GRAVITY_M_S2 = 9.81
 STD = 0.004
 LIMIT = 0.215
 BLUE, GREEN, RED = COLOURS
+PALE = "#bbbbbb"
 
 
 def draw(directory: Path) -> list[Path]:
@@ -42,7 +46,7 @@ def draw(directory: Path) -> list[Path]:
             ("figure-7-friction-over-batches", over_batches),
             ("figure-8-friction-along-the-stroke", along_stroke),
         ):
-            figure = Figure(figsize=(6.7, 3.2))
+            figure = Figure(figsize=(6.7, 3.5))
             make(figure)
             for suffix in ("png", "svg"):
                 files.append(directory / f"{name}.{suffix}")
@@ -62,13 +66,12 @@ def over_time(figure: "Figure") -> None:
     level = np.array([o.wear.level for o in outcomes])
     std = np.array([o.wear.level_std for o in outcomes])
     axes = figure.subplots(1, 2)
-    axes[0].plot(cycles, mu_s, ".", color="#bbbbbb", markersize=2, label="estimate of a cycle")
-    axes[0].fill_between(cycles, level - 2.0 * std, level + 2.0 * std, color=BLUE, alpha=0.25, linewidth=0)
+    axes[0].plot(cycles, mu_s, ".", color=PALE, markersize=2, label="estimate of a cycle")
+    axes[0].fill_between(cycles, level - 2.0 * std, level + 2.0 * std, color=BLUE, alpha=0.4, linewidth=0)
     axes[0].plot(cycles, level, color=BLUE, label="level ± 2 sd")
     axes[0].plot(cycles, truth, "--", color=GREY, linewidth=1.0, label="truth")
     axes[0].axhline(LIMIT, color=RED, linewidth=1.0, label="wear limit")
     axes[0].set(xlabel="cycle", ylabel="static friction coefficient", ylim=(0.185, 0.225), title="level")
-    axes[0].legend(fontsize=7, loc="upper left")
     shown = cycles[500:]
     left, low, high = (
         np.array([getattr(o.wear, name) for o in outcomes[500:]])
@@ -79,7 +82,7 @@ def over_time(figure: "Figure") -> None:
     axes[1].plot(shown, left, color=BLUE, label="expected")
     axes[1].plot(shown, (LIMIT - truth[500:]) / 4e-6, "--", color=GREY, linewidth=1.0, label="truth")
     axes[1].set(xlabel="cycle", ylabel="cycles to the limit", ylim=(0, 1e4), title="what is left")
-    axes[1].legend(fontsize=7)
+    _legends(axes)
 
 
 def over_batches(figure: "Figure") -> None:
@@ -91,15 +94,14 @@ def over_batches(figure: "Figure") -> None:
     unknown = _tracked(mu_s, [None] * len(mu_s), BatchKnowledge.UNKNOWN)
     known = _tracked(mu_s, [f"batch {i + 1}" for i in ids], BatchKnowledge.KNOWN)
     axes = figure.subplots(1, 2)
-    axes[0].plot(mu_s, ".", color="#bbbbbb", markersize=2, label="estimate of a cycle")
+    axes[0].plot(mu_s, ".", color=PALE, markersize=2, label="estimate of a cycle")
     axes[0].plot([o.wear.level + o.batch.offset for o in unknown], color=BLUE, label="level and batch")
     found = [o.shift for o in unknown if o.shift is not None]
     for number, shift in enumerate(found):
         axes[0].axvline(
-            shift.change_cycle, color=RED, linewidth=1.0, label="shift found" if number == 0 else None
+            shift.change_cycle, color=RED, linestyle=":", label="shift found" if number == 0 else None
         )
     axes[0].set(xlabel="cycle", ylabel="static friction coefficient", title="batch ids unknown")
-    axes[0].legend(fontsize=7, loc="lower left")
     last = [known[250 * (i + 1) - 1].batch for i in range(5)]
     axes[1].errorbar(
         range(1, 6),
@@ -112,7 +114,7 @@ def over_batches(figure: "Figure") -> None:
     )
     axes[1].plot(range(1, 6), offsets, "_", color=RED, markersize=14, label="truth")
     axes[1].set(xlabel="batch", ylabel="offset from the first batch", title="batch ids known")
-    axes[1].legend(fontsize=7)
+    _legends(axes)
 
 
 def along_stroke(figure: "Figure") -> None:
@@ -132,7 +134,7 @@ def along_stroke(figure: "Figure") -> None:
     axes = figure.subplots(1, 2)
     grid = settings.grid_m * 1e3
     for done in list(judged.values())[:20]:
-        axes[0].plot(grid, done.signature.friction, color="#bbbbbb", linewidth=0.6)
+        axes[0].plot(grid, done.signature.friction, color=PALE, linewidth=0.6)
     if deviant is not None:
         s = deviant.signature
         axes[0].fill_between(
@@ -145,15 +147,20 @@ def along_stroke(figure: "Figure") -> None:
         )
         axes[0].plot(grid, s.friction, color=RED, label="deviant cycle ± 2 sd")
         axes[0].axvline(s.deviates_at_m * 1e3, color=RED, linestyle=":", linewidth=1.0, label="deviates most")
-        axes[1].plot(100, s.spe, "o", color=RED)
-    axes[0].plot([], [], color="#bbbbbb", label="normal cycles")
+        axes[1].plot([100, 100], [s.spe, s.t_squared], "o", color=RED, label="both, deviant cycle")
+    axes[0].plot([], [], color=PALE, label="normal cycles")
     axes[0].set(xlabel="distance slid, mm", ylabel="kinetic friction coefficient", title="along the stroke")
-    axes[0].legend(fontsize=7)
     normal = {cycle: d.signature for cycle, d in judged.items() if d.deviation is None}
     axes[1].plot(list(normal), [s.spe for s in normal.values()], ".", color=BLUE, label="SPE")
     axes[1].plot(list(normal), [s.t_squared for s in normal.values()], ".", color=GREEN, label="T²")
     axes[1].set(xlabel="cycle", ylabel="statistic", yscale="log", title="judging each cycle")
-    axes[1].legend(fontsize=7)
+    _legends(axes)
+
+
+def _legends(panels: "Sequence[Axes]") -> None:
+    """Put each panel's legend below it, where it hides nothing that was measured."""
+    for axes in panels:
+        axes.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 
 
 def _tracked(mu_s: Samples, batches: list[str] | list[None], knowledge: BatchKnowledge) -> list[Tracked]:
