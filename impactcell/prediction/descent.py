@@ -25,6 +25,11 @@ NO_GAIN = 0.005
 and fro by less."""
 
 
+TO_AND_FRO = 0.1
+"""The same of a step that was refused: where the smaller ones after it mean nothing either, a kink passes
+samples, and the minimum lies within less than half a standard deviation."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Belief:
     """Prior in theta: mean, and one over its standard deviation; 0 where nothing is known.
@@ -165,7 +170,7 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
     """
     longest = np.minimum(0.5, LONGEST_IN_STD / np.maximum(known.weight, 1e-12))
     best = _at(response, known, start, side)
-    damping = 0.0
+    damping, refused = 0.0, math.inf
     for _ in range(MOST_STEPS):
         found, away = best.linear, best.theta - known.mean
         step, _, length, _ = _solved(found.normal, found.slope, known.weight, away, known.free, 1.0, damping)
@@ -180,12 +185,15 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
         except PhysicsError:
             tried = replace(best, cost=math.inf)
         if tried.cost <= best.cost + NO_GAIN * noise:
-            settled = abs(tried.cost - best.cost) < NO_GAIN * noise and damping <= 1e-2
+            gain = best.cost - tried.cost
+            settled = abs(gain) < NO_GAIN * noise and (damping <= 1e-2 or refused < TO_AND_FRO * noise)
+            refused = math.inf if gain > TO_AND_FRO * noise else refused
             best = tried
             if settled:
                 return best
             damping = 0.0 if damping < 1e-2 else 0.1 * damping
         else:
+            refused = tried.cost - best.cost
             damping = max(10.0 * damping, 1e-2)
             if damping > 1e8:
                 break
