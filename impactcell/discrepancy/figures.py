@@ -134,6 +134,7 @@ def traces(findings: Findings) -> str:
                             )
                 if row == len(channels) - 1:
                     lower.set_xlabel("time [ms]")
+        figure.align_ylabels()
         return _svg(figure)
 
 

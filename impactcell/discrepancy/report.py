@@ -17,6 +17,7 @@ from impactcell.physics.effects import LIBRARY
 GUIDE = (Path(__file__).parent / "README.md").as_uri() + "#a-new-effect"
 LARGE = 1.25
 """RMS of a region's residuals, in noise floors, from which on it is shown as large."""
+NAMES = {"ratio": "mu_s/mu_k"}
 UNITS = {"stiffness_n_per_m": "N/m", "damping_n_s_per_m": "N s/m"}
 
 
@@ -28,7 +29,7 @@ def write_report(findings: Findings, source: str, file: Path) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["zip"] = zip
+    environment.filters.update(zip=zip, number=number, grouped=grouped)
     page = environment.get_template("report.html.j2").render(**content(findings, source))
     file.write_text(page, encoding="utf-8")
 
@@ -36,6 +37,17 @@ def write_report(findings: Findings, source: str, file: Path) -> None:
 def words(identifier: str) -> str:
     """Name of an effect as one would say it."""
     return identifier.replace("_", " ")
+
+
+def number(value: float) -> str:
+    """Five digits, and an exponent only where the number could not be read without."""
+    text = f"{value:.5g}"
+    return grouped(float(text), 0) if "e+" in text and abs(value) < 1e7 else text
+
+
+def grouped(value: float, decimals: int) -> str:
+    """Thousands apart."""
+    return f"{value:,.{decimals}f}".replace(",", " ")
 
 
 def verdict_sentence(findings: Findings) -> str:
@@ -119,7 +131,8 @@ def content(findings: Findings, source: str) -> dict[str, Any]:
         "parameters": [
             {
                 "effect": words(one.effect) if one.effect else "nominal plant",
-                "name": one.parameter + (f" [batch {one.batch + 1}]" if one.batch else ""),
+                "name": NAMES.get(one.parameter, one.parameter)
+                + (f" [batch {one.batch + 1}]" if one.batch else ""),
                 "value": one.value,
                 "low": one.low,
                 "high": one.high,

@@ -7,7 +7,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from impactcell.discrepancy.report import content, verdict_sentence, words, write_report
+from impactcell.discrepancy.report import content, number, verdict_sentence, words, write_report
 from impactcell.discrepancy.workflow import Findings, investigate
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import make
@@ -123,3 +123,22 @@ def test_parameters_have_their_units_and_regions_their_place(tied: Findings) -> 
         if cell is not None
     }
     assert cells == set(tied.proof.regions)
+
+
+def test_numbers_are_told_as_one_reads_them(tied: Findings) -> None:
+    assert [number(value) for value in (670681.4, 440.834, 0.155968, 249.9, 3.2e-6, 4e9)] == [
+        "670 680",
+        "440.83",
+        "0.15597",
+        "249.9",
+        "3.2e-06",
+        "4e+09",
+    ]
+    shown = {row["name"]: row for row in content(tied, "a campaign")["parameters"]}
+    assert shown["mu_s/mu_k"]["value"] > 1.0
+
+
+def test_a_phone_scrolls_tables_and_not_the_page(tied: Findings, tmp_path: Path) -> None:
+    write_report(tied, "a campaign", tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("<table>") == page.count('<div class="wide"><table>') > 3
