@@ -233,7 +233,7 @@ class Journal(Section):
     retain_captures_days: Positive = 30.0
     """Captures older than this are dropped; their summaries stay."""
     max_size_mb: Positive = 4096.0
-    """Above this, captures are thinned, oldest first, then summaries."""
+    """Size that is kept; from 5 % below it on, captures are thinned, oldest first, then summaries."""
 
 
 class Monitoring(Section):
