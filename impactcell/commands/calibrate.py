@@ -7,7 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from impactcell.commands.files import check_target
 from impactcell.commands.progress import progress
+from impactcell.commands.telling import tell
+from impactcell.errors import SettingsError
 from impactcell.modelfile import write_model
 from impactcell.physics import Strike
 from impactcell.prediction import Model
@@ -47,8 +50,10 @@ def calibrate(cell: Path, output: Path) -> None:
     PredictionError
         The part does not slide free over the range.
     """
+    check_target(output, SettingsError)
     given = read_cell(cell)
     write_model(calibrated(given), output)
+    tell(f"{output}: model of {given.name}; it is used where a cell file's `model` names it")
 
 
 def calibrated(cell: Cell) -> Model:

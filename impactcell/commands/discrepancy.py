@@ -14,6 +14,8 @@ from typing import Any
 
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.campaign.recorded import from_captures
+from impactcell.commands.files import recorded as opened
+from impactcell.commands.telling import tell
 from impactcell.discrepancy.report import write_report
 from impactcell.discrepancy.result import result, text_of
 from impactcell.discrepancy.trials import Mapper
@@ -63,6 +65,8 @@ def discrepancy(
     """
     if (campaign is None) == (journal is None):
         raise CampaignError("name either a campaign directory or --journal DB")
+    if output.exists() and not output.is_dir():
+        raise CampaignError(f"{output}: is a file; name a directory")
     plant = None
     name = "fitted"
     if cell is not None:
@@ -79,7 +83,7 @@ def discrepancy(
         findings = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=say)
         say("writing the report")
         _write(findings, data, output, source, name)
-    sys.stdout.write(f"{sentence(findings)}\n{output / 'report.html'}\n")
+    tell(f"{sentence(findings)}\n{output / 'report.html'}")
 
 
 def sentence(findings: Findings) -> str:
@@ -93,9 +97,7 @@ def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> t
     if journal is None:
         assert campaign is not None  # noqa: S101 - one of them is given
         return str(campaign.name), read(campaign)
-    from impactcell.journal.store import Journal
-
-    with Journal(journal, None, read_only=True) as store:
+    with opened(journal) as store:
         try:
             recorded = from_captures(store.captures(), plant.gravity_m_s2 if plant else 9.81)
         except CampaignError as error:
@@ -106,9 +108,8 @@ def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> t
 def _recording_model(journal: Path) -> Model | None:
     """Model that the recording cell ran with; None in a journal that has none yet."""
     from impactcell import values
-    from impactcell.journal.store import Journal
 
-    with Journal(journal, None, read_only=True) as store:
+    with opened(journal) as store:
         try:
             return values.loads(Model, store.model.encode()) if store.model else None
         except ValueError as error:
@@ -159,8 +160,6 @@ def _write(findings: Findings, data: Campaign, output: Path, source: str, nomina
     """Write all three files beside the directory and move them in together at the end."""
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
-        if output.exists() and not output.is_dir():
-            raise CampaignError(f"{output}: is a file; name a directory")
         beside = Path(tempfile.mkdtemp(prefix=f".{output.name}.", dir=output.parent))
     except OSError as error:
         raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error

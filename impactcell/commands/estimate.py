@@ -11,7 +11,9 @@ from typing import TextIO
 import numpy as np
 
 from impactcell.campaign import Campaign, Excitation, read
+from impactcell.commands.files import check_target
 from impactcell.commands.progress import progress
+from impactcell.commands.telling import note, tell
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.physics import Strike
 from impactcell.prediction import Model, calibrate
@@ -51,6 +53,8 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
     PredictionError
         No plant could be fitted.
     """
+    if output is not None:
+        check_target(output, CampaignError)
     given = read(campaign)
     if given.excitation is Excitation.DRIVEN:
         raise CampaignError(f"{campaign}: estimate needs taps or free slides, this campaign is driven")
@@ -73,6 +77,7 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
             _write(rows, file)
     except OSError as fault:
         raise CampaignError(f"{output}: cannot be written: {fault.strerror}") from fault
+    tell(f"{len(rows)} shots in {output}")
 
 
 def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
@@ -84,7 +89,7 @@ def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
                 found.append(replace(shot, mass_kg=weigh(shot, slide(shot))))
                 continue
             except (PredictionError, PhysicsError) as fault:
-                sys.stderr.write(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {fault}\n")
+                note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {fault}")
         found.append(shot)
     return tuple(found)
 
@@ -122,12 +127,12 @@ def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> t
     with progress("fitting the plant", 1):
         fitted = fit_plant(shots, campaign.gravity_m_s2)
     plant, prior = fitted.model.plant, fitted.model.prior
-    sys.stderr.write(
+    note(
         f"plant fitted to {len(fitted.used)} of {len(shots)} shots: k {plant.stiffness_n_per_m:.6g} ± "
         f"{prior.stiffness_std_n_per_m:.2g} N/m, b {plant.damping_n_s_per_m:.5g} ± "
         f"{prior.damping_std_n_s_per_m:.2g} N s/m, "
         f"mu_k/mu_s {fitted.model.ratio:.4f} ± {prior.ratio_std:.2g}; "
-        f"residuals {fitted.gap:.3g} times the noise\n"
+        f"residuals {fitted.gap:.3g} times the noise"
     )
     return fitted.model, fitted.gap
 

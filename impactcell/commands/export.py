@@ -1,13 +1,12 @@
 """`impactcell export`: the captures of a journal as a campaign directory."""
 
-import sys
 from pathlib import Path
 
 from impactcell import campaign
 from impactcell.campaign.recorded import from_captures
-from impactcell.commands.telling import tell
+from impactcell.commands.files import recorded as opened
+from impactcell.commands.telling import note, tell
 from impactcell.errors import CampaignError
-from impactcell.journal.store import Journal
 
 
 def export(
@@ -20,16 +19,16 @@ def export(
     JournalError
         The journal cannot be read.
     CampaignError
-        It holds no captures in that range, or the directory exists already.
+        It is not there, holds no captures in that range, or the directory exists already.
     """
-    with Journal(journal, None, read_only=True) as source:
+    with opened(journal) as source:
         try:
             recorded = from_captures(source.captures(first_cycle, last_cycle))
         except CampaignError as error:
             raise CampaignError(f"{journal}: {error}") from error
     campaign.write(recorded.campaign, output)
     if recorded.other_stroke:
-        sys.stderr.write(f"{recorded.other_stroke} cycles with another stroke were left out\n")
+        note(f"{recorded.other_stroke} cycles with another stroke were left out")
     if recorded.no_channels:
-        sys.stderr.write(f"{recorded.no_channels} cycles without samples were left out\n")
+        note(f"{recorded.no_channels} cycles without samples were left out")
     tell(f"{len(recorded.campaign.shots)} shots in {output}")

@@ -19,7 +19,7 @@ def _be_verbose(verbose: bool) -> None:  # noqa: FBT001 - typer's callback signa
 
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Only errors.", callback=_be_quiet)]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="More of what happens.", callback=_be_verbose)]
-Cells = Annotated[list[Path], typer.Argument(metavar="CELL.yaml...", help="One file a cell.")]
+Cells = Annotated[list[Path], typer.Argument(metavar="CELL.yaml", help="One file a cell.")]
 Cell = Annotated[Path, typer.Argument(metavar="CELL.yaml")]
 OptionalCell = Annotated[
     Path | None, typer.Option("--cell", metavar="CELL.yaml", help="Use this cell's model.")

@@ -15,6 +15,12 @@ def tell(text: str) -> None:
         sys.stdout.write(f"{text}\n")
 
 
+def note(text: str) -> None:
+    """Say on standard error what a reader of the result should know; nothing with `-q`."""
+    if _log.isEnabledFor(logging.WARNING):
+        sys.stderr.write(f"{text}\n")
+
+
 def quiet() -> bool:
     """Whether `-q` was given."""
     return not _log.isEnabledFor(logging.INFO)

@@ -68,7 +68,9 @@ def track(
     replayed = replay(settings, readings)
     if replayed.used < FEWEST:
         why = f"; {replayed.notes[0][1]}" if replayed.notes else ""
-        raise SeriesError(f"{series}: only {replayed.used} of {len(readings)} cycles can be used{why}")
+        raise SeriesError(
+            f"{series}: only {replayed.used} of {len(readings)} cycles can be used, it takes {FEWEST}{why}"
+        )
     text = json.dumps(_as_json(replayed)) if as_json else _as_text(replayed)
     sys.stdout.write(text + "\n")
 
@@ -218,6 +220,10 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def _cycles(count: float) -> str:
+    return f"{count:.0f}" if math.isfinite(count) else "never"
+
+
 def _as_text(replayed: Replayed) -> str:
     wear = replayed.last.wear
     lines = [
@@ -226,10 +232,10 @@ def _as_text(replayed: Replayed) -> str:
         f"wear    {wear.rate_per_cycle * 1e3:+.6f} ± {wear.rate_std * 1e3:.6f} per 1000 cycles",
     ]
     if math.isfinite(wear.limit):
-        low, high = wear.cycles_to_limit_low, wear.cycles_to_limit_high
-        lines.append(
-            f"limit   {wear.limit:g} in {wear.cycles_to_limit:.0f} cycles, 95 %: {low:.0f} .. {high:.0f}"
+        left, low, high = map(
+            _cycles, (wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high)
         )
+        lines.append(f"limit   {wear.limit:g}, cycles to it: {left}, 95 %: {low} .. {high}")
     for r in replayed.raised:
         e = r.evidence
         lines.append(

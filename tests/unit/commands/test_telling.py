@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from impactcell.__main__ import app
+from impactcell.commands import discrepancy as command
+from impactcell.commands.telling import note
 from impactcell.journal.store import Journal
 from tests.snapshots import make_capture, make_snapshot
 
@@ -38,6 +40,26 @@ def test_export(
     assert out[: len(said)] == said
     assert bool(out) == bool(said)
     assert (tmp_path / "c" / "shots.csv").exists()
+
+
+@pytest.mark.parametrize(("options", "said"), [((), "Missing: x\nout/report.html\n"), (("-q",), "")])
+def test_discrepancy(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    options: tuple[str, ...],
+    said: str,
+) -> None:
+    for name, made in (("_read", ("name", None)), ("investigate", None), ("_write", None)):
+        monkeypatch.setattr(command, name, lambda *_, made=made, **__: made)
+    monkeypatch.setattr(command, "sentence", lambda _: "Missing: x")
+    assert run(capsys, "discrepancy", "shots", "-o", "out", *options) == said
+
+
+@pytest.mark.parametrize(("level", "said"), [(logging.INFO, "2 left out\n"), (logging.ERROR, "")])
+def test_a_note_is_no_error(capsys: pytest.CaptureFixture[str], level: int, said: str) -> None:
+    PKG.setLevel(level)
+    note("2 left out")
+    assert capsys.readouterr() == ("", said)
 
 
 def test_a_result_is_written_whatever_the_options(capsys: pytest.CaptureFixture[str]) -> None:

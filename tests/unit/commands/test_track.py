@@ -87,6 +87,13 @@ def test_the_text_form(tmp_path, capsys):
     assert "BatchShift at cycle 90" in out
 
 
+def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
+    track(write(tmp_path / "s.csv", truth()[:4] * 0.0 + 0.2), limit=0.3)
+    out = capsys.readouterr().out
+    assert "never" in out
+    assert "inf" not in out
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -99,7 +106,10 @@ def test_the_text_form(tmp_path, capsys):
         ("cycle,mu_s,mu_s_std\nx,0.2,0.1\n", ":2: cycle `x` is not a whole number"),
         ("cycle,mu_s,mu_s_std\ninf,0.2,0.1\n", ":2: cycle `inf` is not a whole number"),
         ("cycle,mu_s,mu_s_std\n1,abc,0.1\n", ":2: mu_s `abc` is not a number"),
-        ("cycle,mu_s,mu_s_std\n1,nan,0.1\n2,inf,0.1\n", "only 0 of 2 cycles can be used; mu_s is missing"),
+        (
+            "cycle,mu_s,mu_s_std\n1,nan,0.1\n2,inf,0.1\n",
+            "only 0 of 2 cycles can be used, it takes 2; mu_s is",
+        ),
     ],
 )
 def test_faults_of_a_file(tmp_path, text, message):

@@ -1,0 +1,27 @@
+"""The files that a verb is given, looked at before any work is done."""
+
+from pathlib import Path
+
+from impactcell.errors import CampaignError, ImpactCellError
+from impactcell.journal.store import Journal
+
+
+def recorded(journal: Path) -> Journal:
+    """Open a cell's journal to read it.
+
+    Raises
+    ------
+    CampaignError
+        There is no such file.
+    JournalError
+        It is no journal, or one of another version.
+    """
+    if not journal.is_file():
+        raise CampaignError(f"{journal}: there is no such journal; name the `file` of the cell's `journal`")
+    return Journal(journal, None, read_only=True)
+
+
+def check_target(file: Path, error: type[ImpactCellError]) -> None:
+    """Raise `error` for a file whose directory is not there, which would else be found after the work."""
+    if not file.parent.is_dir():
+        raise error(f"{file}: cannot be written: there is no directory {file.parent}; make it first")
