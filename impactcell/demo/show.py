@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import logging
 import math
 import shutil
 import signal
@@ -197,13 +198,17 @@ def _end(*_: object) -> None:
 
 async def _live(show: _Show) -> bool:
     console = Console()
-    with Live(console=console, auto_refresh=False, screen=True) as live:
+    logging.disable(logging.WARNING)  # a line of the log would push the view up; it shows the same itself
+    try:
+        with Live(console=console, auto_refresh=False, screen=True) as live:
 
-        def draw(now: _Show, _: Snapshot | None = None) -> None:
-            live.update(_drawn(now.scene()), refresh=True)
+            def draw(now: _Show, _: Snapshot | None = None) -> None:
+                live.update(_drawn(now.scene()), refresh=True)
 
-        draw(show)
-        interrupted = await show.run(draw)
+            draw(show)
+            interrupted = await show.run(draw)
+    finally:
+        logging.disable(logging.NOTSET)
     if show.snapshots:
         console.print(_drawn(replace(show.scene(), link="")))
     return interrupted

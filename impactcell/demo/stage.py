@@ -95,6 +95,8 @@ def paced(content: dict, cycles: int | None) -> dict:  # type: ignore[type-arg]
 def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-arg]
     """Tell what a scenario does, from which cycle on."""
     told = [(1, "the surface wears: mu_s grows slowly")] if content.get("wear") else []
+    if content.get("positioning"):
+        told.append((1, "parts come one after the other and are tapped to their targets"))
     told += [
         (
             batch["from_cycle"],

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from impactcell.demo.chart import LEGEND, QUALITY_STYLE, chart
-from impactcell.records import Alarm, Snapshot
+from impactcell.records import Alarm, Estimator, Snapshot
 
 WIDE = 100
 """Columns from which on facts stand side by side and alarms in a table."""
@@ -68,8 +68,8 @@ def _facts(last: Snapshot, *, wide: bool) -> Table:
     left: list[tuple[str, str | Text]] = [
         ("mu_s", _coefficient(last)),
         ("mu_k", _plus_minus(friction.mu_k.value, friction.mu_k.std)),
-        ("peak force", f"{friction.peak_force_n:.1f} N"),
-        ("slid", f"{friction.sliding_distance_m * 1e6:.0f} µm"),
+        ("peak force", _measured(friction.peak_force_n, "N", 1)),
+        ("slid", _measured(friction.sliding_distance_m * 1e6, "µm", 0)),
     ]
     right: list[tuple[str, str | Text]] = [
         ("wear level", _level(last)),
@@ -77,6 +77,10 @@ def _facts(last: Snapshot, *, wide: bool) -> Table:
         ("batch", _batch(last)),
         ("signature", _signature(last)),
     ]
+    if math.isfinite(last.positioning.target_m):
+        left.append(("", ""))
+        remaining = _measured(last.positioning.remaining_m * 1e3, "mm", 3)
+        right.append(("target", f"{last.positioning.target_m * 1e3:.2f} mm, remaining {remaining}"))
     facts = Table.grid(padding=(0, 2))
     for _ in range(2 if wide else 1):
         facts.add_column(style="dim", no_wrap=True)
@@ -85,8 +89,9 @@ def _facts(last: Snapshot, *, wide: bool) -> Table:
         for one, other in zip(left, right, strict=True):
             facts.add_row(*one, *other)
     else:
-        for row in left + right:
-            facts.add_row(*row)
+        for name, value in left + right:
+            if name:
+                facts.add_row(name, value)
     return facts
 
 
@@ -98,10 +103,15 @@ def _plus_minus(value: float, std: float) -> str:
     return f"{value:.{decimals}f} ± {std:.{decimals}f}" if math.isfinite(std) else f"{value:.4f}"
 
 
+def _measured(value: float, unit: str, decimals: int) -> str:
+    return f"{value:.{decimals}f} {unit}" if math.isfinite(value) else "none"
+
+
 def _coefficient(snapshot: Snapshot) -> Text:
     mu_s = snapshot.friction.mu_s
     text = Text(_plus_minus(mu_s.value, mu_s.std), style=QUALITY_STYLE[mu_s.quality])
-    return text.append(f"  by {snapshot.friction.estimator.value}", style="dim")
+    by = snapshot.friction.estimator
+    return text if by is Estimator.NONE else text.append(f"  by {by.value}", style="dim")
 
 
 def _level(snapshot: Snapshot) -> Text:

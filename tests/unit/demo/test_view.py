@@ -8,7 +8,16 @@ import pytest
 from rich.console import Console
 
 from impactcell.demo.view import Scene, render
-from impactcell.records import Alarm, AlarmName, Coefficient, Quality, Snapshot
+from impactcell.records import (
+    Alarm,
+    AlarmName,
+    Coefficient,
+    Estimator,
+    FrictionEstimate,
+    PositioningState,
+    Quality,
+    Snapshot,
+)
 from tests.snapshots import make_capture, make_snapshot
 
 
@@ -90,6 +99,14 @@ def test_small_deviations_are_shown_with_the_decimals_that_they_need() -> None:
     assert "0.15123 ± 0.00002" in drawn([known])
 
 
+def test_a_positioning_cell_shows_its_task() -> None:
+    (snapshot,) = history(1)
+    assert "remaining" not in drawn([snapshot])
+    task = PositioningState(target_m=0.01, remaining_m=8.277e-3)
+    for width in (80, 120):
+        assert "10.00 mm, remaining 8.277 mm" in drawn([replace(snapshot, positioning=task)], width)
+
+
 def test_nobody_is_told_to_connect_to_a_cell_that_has_ended() -> None:
     text = drawn(history(3), link="")
     assert "ended" in text
@@ -106,7 +123,12 @@ def test_nothing_known_is_drawn_as_such() -> None:
     snapshot = make_snapshot(make_capture(1, samples=8))
     blank = replace(
         snapshot,
-        friction=replace(snapshot.friction, mu_s=Coefficient(reason="clipped"), mu_k=Coefficient()),
+        friction=FrictionEstimate(
+            *[Coefficient(reason="clipped")] * 5,
+            Estimator.NONE,
+            peak_force_n=math.nan,
+            sliding_distance_m=math.nan,
+        ),
         wear=replace(
             snapshot.wear, level=math.nan, level_std=math.nan, cycles_to_limit=math.nan, quality=Quality.BAD
         ),
@@ -115,3 +137,5 @@ def test_nothing_known_is_drawn_as_such() -> None:
     text = drawn([blank])
     assert "no usable estimate yet" in text
     assert "none" in text
+    assert "nan" not in text
+    assert "by none" not in text
