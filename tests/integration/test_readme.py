@@ -68,7 +68,15 @@ def test_the_commands_in_their_order(checkout: Path, tmp_path: Path) -> None:
     assert "connected to 127.0.0.1:15020" in done.stderr
     assert "Traceback" not in done.stderr
     assert (tmp_path / "discrepancy" / "report.html").is_file()
-    assert len((tmp_path / "estimates.csv").read_text().splitlines()) > 10
+    promised = re.search(
+        r"`(Missing: .*?) falls", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL
+    )
+    assert promised is not None
+    assert " ".join(promised[1].split()) in done.stdout
+    rows = (tmp_path / "estimates.csv").read_text().splitlines()[1:]
+    assert len(rows) > 10
+    assert all(",uncertain," in row for row in rows)
+    assert sum("the model misses" in row for row in rows) > 0.9 * len(rows)
 
 
 def test_every_link_leads_somewhere() -> None:
