@@ -134,7 +134,7 @@ class Module:
         last, backoff, schedule = after, Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
         newest = Mark(0, 0)
-        skip = 0
+        overtaken = 0
         while True:
             try:
                 asked_s = loop.time()
@@ -143,7 +143,7 @@ class Module:
                 shown = Mark(polled.session, polled.cycle_counter)
                 schedule.polled(asked_s, loop.time(), new=shown != newest)
                 newest = shown
-                want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, skip)
+                want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, overtaken // 2)
                 if want is None:
                     await asyncio.sleep(schedule.delay_s(loop.time(), self._client.round_trip_s))
                     continue
@@ -152,10 +152,10 @@ class Module:
                 await self._down(error)
                 await asyncio.sleep(backoff.next_delay_s())
                 continue
-            if read is None:  # overwritten meanwhile: look at the ring again, further from its end
-                skip = min(max(1, 2 * skip), self.registers.slots // 2)
+            if read is None:  # overwritten meanwhile: look at the ring again, and then further from its end
+                overtaken = min(max(1, 2 * overtaken), self.registers.slots)
                 continue
-            skip //= 2
+            overtaken //= 2
             capture = replace(read.capture, session=want.mark.session)
             schedule.learn(
                 1e-9 * capture.time_ns or loop.time(),

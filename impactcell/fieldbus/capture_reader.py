@@ -24,6 +24,8 @@ _BREAKS: Final = 30
 """Times that the link may fail on one cycle, without getting further, before it is given up."""
 _PAUSE_S: Final = 0.001
 """Rest after the first discarded reading, doubled with each: the module may be writing the slot."""
+_REFUSED: Final = (1, 2, 3)
+"""Exceptions that the request earns; all others tell of a module, or a gateway, that cannot answer now."""
 _ARRAYS: Final = ("force", "position", "actuator")
 
 
@@ -86,8 +88,9 @@ class CaptureReader:
 
         Raises
         ------
-        LinkError, ProtocolError
-            If the link fails; the next call for the same cycle goes on where this one stopped.
+        LinkError, ProtocolError, ModbusExceptionError
+            If the link fails, or the module cannot answer now; the next call for the same cycle goes on where
+            this one stopped.
         """
         if self._failing is None or self._failing.mark != want.mark:
             self._failing, self._failures, self._breaks, self._reading = want, 0, 0, None
@@ -106,19 +109,20 @@ class CaptureReader:
                     self._failing = self._reading = None
                     return self._put_together(reading)
                 reason = fault
-            except ModbusExceptionError as error:
-                reason = str(error)
-                if self._progressed():
-                    continue
             except FieldbusError as error:
-                if not self._progressed():
-                    self._breaks += 1
-                if isinstance(error, ProtocolError) or "capture_crc32" not in self._registers:
-                    self._reading = None  # what came before the fault may be wrong too
-                if self._breaks < _BREAKS:
-                    raise
-                reason = f"the link failed each time: {error}"
-                break
+                progressed = self._progressed()
+                if isinstance(error, ModbusExceptionError) and (progressed or error.code in _REFUSED):
+                    reason = str(error)
+                    if progressed:
+                        continue
+                else:
+                    self._breaks += not progressed
+                    if isinstance(error, ProtocolError) or "capture_crc32" not in self._registers:
+                        self._reading = None  # what came before the fault may be wrong too
+                    if self._breaks < _BREAKS:
+                        raise
+                    reason = f"the link failed each time: {error}"
+                    break
             self._reading = None
             self._failures += 1
             self.discarded += 1

@@ -169,19 +169,21 @@ async def test_the_counter_wraps_without_loss(fpga: RegisterMap) -> None:
         assert module.status.missed == 0
 
 
-async def test_a_capture_overwritten_while_it_is_read_is_never_mixed(fpga: RegisterMap) -> None:
-    """Sixteen cycles happen while the oldest is being read: its slot is used again."""
+@pytest.mark.parametrize("made", [1, 16])
+@pytest.mark.parametrize("where", ["window_sequence", "force"])
+async def test_a_capture_overwritten_while_it_is_read_is_never_mixed(
+    fpga: RegisterMap, made: int, where: str
+) -> None:
+    """Cycles happen while the oldest is read, its slot is used again: none is missed but those overwritten."""
     device = ScriptedDevice(fpga)
-    make(device, 16)
-    device.on_read.append((fpga["force"].address + 1000, lambda: make(device, 16)))
-    async with running(fpga, device) as (_, module, receptions):
-        received = await take(receptions, 15)
-        cycles = [r.capture.cycle for r in received]
-        assert cycles[-1] == 32
-        assert cycles == sorted(set(cycles))
+    make(device, 17)
+    device.on_read.append((fpga[where].address, lambda: make(device, made)))
+    async with running(fpga, device, after=Mark(1, 1)) as (_, module, receptions):
+        received = await take(receptions, 16)
+        assert [r.capture.cycle for r in received] == list(range(2 + made, 18 + made))
+        assert [r.missed for r in received] == [made] + [0] * 15
         for reception in received:
             assert_whole(reception)
-        assert module.status.discarded >= 1
 
 
 async def test_another_client_that_selects_slots_does_not_mix_captures(fpga: RegisterMap) -> None:
@@ -218,6 +220,26 @@ async def test_a_module_that_is_busy_for_the_selection_of_a_slot_is_asked_again(
             assert_whole(reception)
         assert module.status.discarded == 0
     assert refused == [fpga["slot_select"].address] * 2
+
+
+@pytest.mark.parametrize("code", [4, 5, 6, 10, 11])
+@pytest.mark.parametrize("register", ["window_sequence", "position"])
+async def test_a_module_that_cannot_answer_for_a_while_loses_nothing(
+    fpga: RegisterMap, register: str, code: int
+) -> None:
+    """It, or the gateway before it, refuses everything, from within a capture on."""
+    device = ScriptedDevice(fpga)
+    make(device, 3)
+    async with running(fpga, device, timeout_s=0.1) as (server, module, receptions):
+
+        def refuse() -> None:
+            server.faults.inject(Fault(FaultKind.EXCEPTION, code=code))
+            asyncio.get_running_loop().call_later(0.7, server.faults.clear)
+
+        device.on_read.append((fpga[register].address, refuse))
+        for reception in await take(receptions, 3):
+            assert_whole(reception)
+        assert module.status.unreadable == 0
 
 
 async def test_a_wrong_crc_is_read_again(fpga: RegisterMap) -> None:
