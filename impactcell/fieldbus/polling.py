@@ -24,16 +24,18 @@ _UNKNOWN: Final = (-math.inf, math.inf)
 class PollSchedule:
     """Learns the cycle period, how much it varies, and what the module's clock shows.
 
-    Period and variation come from the cycles' own times: those at which a busy service sees them vary with
-    its load, and would make it poll the more the less time it has. So does when the next one is due: a cycle
-    seen late must not make the next one late as well. It came after the last poll that did not show it and
-    before the one that did, so the lag from its own time to when it can be seen lies between two bounds. They
-    close in from cycle to cycle; polls are dense from the earliest to the latest moment that they leave.
+    Period and variation come from the cycles' own times, as far as the polls bear them out: the times at
+    which a busy service sees them vary with its load, and would make it poll the more the less time it has.
+    So does when the next one is due: a cycle seen late must not make the next one late as well. It came after
+    the last poll that did not show it and before the one that did, so the lag from its own time to when it
+    can be seen lies between two bounds. They close in from cycle to cycle; polls are dense from the earliest
+    to the latest moment that they leave.
     """
 
     def __init__(self) -> None:
         self._asked_s = self._before_s = -math.inf
         self._seen_s = math.inf
+        self._shown_s = _UNKNOWN
         self._made_s: float | None = None
         self._period_s: float | None = None
         self._spread_s = 0.0
@@ -56,8 +58,13 @@ class PollSchedule:
         newest : bool
             Whether it is the one that the last poll with something new showed.
         """
-        if self._made_s is not None and cycles > 0 and made_s > self._made_s:
-            period_s = (made_s - self._made_s) / cycles
+        passed_s = math.nan if self._made_s is None or cycles <= 0 else made_s - self._made_s
+        shown_s = (self._before_s, self._seen_s) if newest else _UNKNOWN
+        # A clock may have been set, stand still or count in another unit; the polls cannot be so wrong.
+        passed_s = min(max(passed_s, shown_s[0] - self._shown_s[1]), shown_s[1] - self._shown_s[0])
+        self._shown_s = shown_s
+        if passed_s > 0.0:
+            period_s = passed_s / cycles
             if self._period_s is None:
                 self._period_s, self._spread_s = period_s, 0.1 * period_s
             else:

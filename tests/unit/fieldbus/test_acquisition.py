@@ -174,11 +174,11 @@ async def test_the_counter_wraps_without_loss(fpga: RegisterMap) -> None:
 async def test_a_capture_overwritten_while_it_is_read_is_never_mixed(
     fpga: RegisterMap, made: int, where: str
 ) -> None:
-    """Cycles happen while the oldest is read, its slot is used again: none is missed but those overwritten."""
+    """Cycles happen while the oldest is read: none is missed but those that they overwrite."""
     device = ScriptedDevice(fpga)
     make(device, 17)
     device.on_read.append((fpga[where].address, lambda: make(device, made)))
-    async with running(fpga, device, after=Mark(1, 1)) as (_, module, receptions):
+    async with running(fpga, device, after=Mark(1, 1)) as (_, _, receptions):
         received = await take(receptions, 16)
         assert [r.capture.cycle for r in received] == list(range(2 + made, 18 + made))
         assert [r.missed for r in received] == [made] + [0] * 15

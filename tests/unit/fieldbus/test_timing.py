@@ -108,6 +108,24 @@ def test_the_clock_of_the_module_may_drift_and_be_set(rate: float) -> None:
     assert polls < 15
 
 
+@pytest.mark.parametrize(
+    "clock",
+    [
+        math.floor,
+        lambda now_s: 1e-3 * now_s,
+        lambda now_s: 1e3 * now_s,
+        lambda now_s: 1.7e9,
+        lambda now_s: -now_s,
+        lambda now_s: now_s + 3600.0 * (now_s % 7.0 > 3.5),
+    ],
+    ids=["whole seconds", "too slow", "too fast", "stands still", "backwards", "to and fro"],
+)
+def test_a_clock_of_no_use_makes_no_cycle_late(clock: Callable[[float], float]) -> None:
+    late, polls = follow(list(np.random.default_rng(1).normal(0.5, 0.002, 300)), clock=clock)
+    assert max(late) <= QUIET_S + 1e-9
+    assert polls < 0.5 / QUIET_S
+
+
 def test_after_a_pause_the_rhythm_is_soon_known_again() -> None:
     jitter = np.random.default_rng(1).normal(0.5, 0.002, 80)
     jitter[40] = 10_000.0
