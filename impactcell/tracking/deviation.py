@@ -52,7 +52,7 @@ class Verdict:
     at_m : float
         Where the cycle deviates most.
     size, size_std : float
-        Friction of the best shape.
+        Friction of the likeliest shape, its standard deviation at that place and width.
     """
 
     p_value: float

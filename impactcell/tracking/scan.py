@@ -51,10 +51,10 @@ def scan(
     Returns
     -------
     found : ndarray, shape (4, 3)
-        Of each of `FAMILIES`: p-value, size and its standard deviation, of the most telling shape of either
-        sign.
+        Of each of `FAMILIES`: p-value of its most telling shape, size of its likeliest one, of either sign,
+        and standard deviation of that.
     centre : int
-        Grid point of the most telling bump; -1 if none can be seen.
+        Grid point of the likeliest bump; -1 if none can be seen.
     """
     image = rows @ P
     along, score, known = image @ C, rows @ u, np.empty(len(rows))
@@ -119,14 +119,18 @@ def _largest_bump(
     scale: float,
     cycles: float,
 ) -> tuple[float, int]:
-    """Find p-value and row of the most telling bump."""
-    best, c = -1, 0.0
+    """Find p-value of the most telling bump, and row of the likeliest one.
+
+    They are not the same: a score that owes much to what was learned of the variation may be large and not
+    rare.
+    """
+    best, c, most = -1, 0.0, 0.0
     for i in range(bumps):
         if known[i] >= least:
-            share = _dot(along[i], along[i]) / known[i]
-            z = _normal(score[i] ** 2 / (known[i] * scale), share, cycles)
-            if best < 0 or z > c:
-                best, c = i, z
+            share, squared = _dot(along[i], along[i]) / known[i], score[i] ** 2 / (known[i] * scale)
+            c = max(c, _normal(squared, share, cycles))
+            if best < 0 or squared > most:
+                best, most = i, squared
     if best < 0:
         return 1.0, -1
     euler, edge, area = _surface(rows, image, known, least, centres, bumps // centres)
@@ -200,12 +204,12 @@ def _largest_ripple(
     scale: float,
     cycles: float,
 ) -> tuple[float, float, float]:
-    """Find p-value, size and its standard deviation of the most telling ripple.
+    """Find p-value of the most telling ripple, size of the likeliest one and its standard deviation.
 
     The phase goes round, so that the edge of the surface is two circles. Between neighbouring waves it is as
     wide as the root mean square of the two angles between their planes.
     """
-    c, size, std, area, before = -1.0, 0.0, math.inf, 0.0, -1
+    c, most, size, std, area, before = -1.0, -1.0, 0.0, math.inf, 0.0, -1
     for i in range(first, end, 2):
         j = i + 1
         cc, ss, cs = _dot(rows[i], image[i]), _dot(rows[j], image[j]), _dot(rows[i], image[j])
@@ -216,9 +220,9 @@ def _largest_ripple(
         squared, varied = score[i] * a + score[j] * b, 0.0
         for k in range(along.shape[1]):
             varied += (a * along[i, k] + b * along[j, k]) ** 2
-        z = _normal(max(squared, 0.0) / scale, varied / max(squared, 1e-300), cycles)
-        if z > c:
-            c, size, std = z, math.hypot(a, b), math.sqrt(2.0 * scale / (cc + ss))
+        c = max(c, _normal(max(squared, 0.0) / scale, varied / max(squared, 1e-300), cycles))
+        if squared > most:
+            most, size, std = squared, math.hypot(a, b), math.sqrt(2.0 * scale / (cc + ss))
         if before == i - 2:
             area += 2.0 * math.pi * _between(rows, image, i - 2, i)
         before = i

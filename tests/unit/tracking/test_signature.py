@@ -92,6 +92,17 @@ def test_normal_cycles_are_not_deviant_and_a_bump_is_with_its_place(learned):
     assert values.dumps(odd.state.reference) == values.dumps(state.reference)
 
 
+@pytest.mark.parametrize("bump", [0.05, 0.1, 0.2, 0.4, 0.8])
+def test_size_and_place_of_a_bump_are_those_of_the_likeliest_one(learned, bump):
+    """The rarest one owes least to what was learned, which says nothing of where the friction is off."""
+    state, _ = learned
+    for cycle in range(500, 504):
+        capture, _ = slide(textured(cycle, bump=bump), 0.09, 1e4, NOISE, cycle)
+        odd = signature.update(SETTINGS, state, capture)
+        assert odd.deviation.size == pytest.approx(0.2 * bump, rel=0.2, abs=0.003)
+        assert odd.signature.deviates_at_m == pytest.approx(1e-3, abs=0.15e-3)
+
+
 def varying(cycle):
     """Level, tilt and bend of the friction all vary, the latter most where short slides do not get."""
     a, b, c = 0.005 * np.random.default_rng([8, cycle]).normal(size=3) * (2.0, 1.0, 1.0)
