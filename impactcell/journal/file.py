@@ -4,9 +4,15 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Final
 
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
 from impactcell.journal.schema import APPLICATION_ID, FORMAT, TABLES
+
+_NO_ROOM: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+_MAGIC: Final = b"SQLite format 3\0"
+_APPLICATION_ID_AT: Final = 68
+"""Where a database's header has it (The SQLite Database File Format, section 1.3)."""
 
 
 @contextmanager
@@ -15,7 +21,10 @@ def errors(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.OperationalError as error:
-        if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+        code = error.sqlite_errorcode & 0xFF
+        if code == sqlite3.SQLITE_ERROR:  # a table is missing
+            raise JournalError(f"{path}: cannot be used ({error}); name another file") from error
+        if code in _NO_ROOM:
             raise JournalFullError(f"{path}: the disk or its quota is full ({error}); make room") from error
         raise JournalFullError(
             f"{path}: cannot be written now ({error}); check its disk, directory and owner"
@@ -34,6 +43,8 @@ def opened(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.Connecti
     JournalError
         It cannot be opened.
     """
+    if not read_only:
+        _check_header(path)
     try:
         database = sqlite3.connect(
             f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}",
@@ -63,12 +74,37 @@ def _pragma(database: sqlite3.Connection, name: str) -> int:
 
 
 def _pages(database: sqlite3.Connection, path: Path) -> int:
+    with errors(path):
+        try:
+            return _pragma(database, "page_count")
+        except sqlite3.DatabaseError as error:
+            code = error.sqlite_errorcode & 0xFF
+            if code in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
+                raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
+            if code in _NO_ROOM:
+                raise
+            raise JournalError(
+                f"{path}: cannot be opened ({error}); check its owner and directory"
+            ) from error
+
+
+def _check_header(path: Path) -> None:
+    """Refuse a file that is not ours before SQLite has it.
+
+    SQLite takes a single byte for an empty file, and writes another program's log into its database. For the
+    one writer only: closing a file drops the locks that the process has on it, SQLite's too.
+    """
     try:
-        return _pragma(database, "page_count")
-    except sqlite3.DatabaseError as error:
-        if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
-            raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
-        raise JournalError(f"{path}: cannot be opened ({error}); check its owner and directory") from error
+        with path.open("rb") as file:
+            head = file.read(_APPLICATION_ID_AT + 4)
+    except OSError:
+        return  # it is not there, or SQLite will say what is wrong
+    if not head or path.with_name(f"{path.name}-journal").exists():  # new, or cut off while it was made
+        return
+    if not head.startswith(_MAGIC):
+        raise ForeignJournalError(f"{path}: not a journal, not even a database; it is left as it is")
+    if int.from_bytes(head[_APPLICATION_ID_AT:]) != APPLICATION_ID:
+        raise ForeignJournalError(f"{path}: a database, but no journal of impactcell; it is left as it is")
 
 
 def _create(database: sqlite3.Connection, cell: str) -> None:
@@ -92,6 +128,7 @@ def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
             "name another file"
         )
     with errors(path):
-        (kept,) = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
+        named = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
+    kept = named[0] if named else ""
     if cell is not None and kept != cell:
         raise ForeignJournalError(f"{path}: the journal of cell '{kept}', not of '{cell}'; name another file")

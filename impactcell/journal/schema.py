@@ -2,7 +2,8 @@
 
 One SQLite file a cell. `PRAGMA application_id` and `user_version` say that it is ours and of which
 format. `cycles` grows by one row a cycle; `captures` holds what was measured, and is thinned first;
-`state` is a single row, written in the same transaction as the cycle that made it.
+`state` is a single row, written in the same transaction as the cycle that made it. `seq` alone tells cycles
+apart: a module that keeps its session over a restart, or wraps its counter, makes the same numbers again.
 """
 
 from collections.abc import Callable
@@ -72,8 +73,7 @@ TABLES = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE cycles (
     seq INTEGER PRIMARY KEY,
-    {", ".join(f"{column.name} {column.sql_type}" for column in COLUMNS)},
-    UNIQUE (session, cycle)
+    {", ".join(f"{column.name} {column.sql_type}" for column in COLUMNS)}
 ) STRICT;
 CREATE INDEX cycles_by_time ON cycles (time_ns);
 CREATE TABLE captures (seq INTEGER PRIMARY KEY, blob BLOB NOT NULL) STRICT;

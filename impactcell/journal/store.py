@@ -7,7 +7,6 @@ A `Journal` is used from one thread at a time; `impactcell.service.worker` gives
 """
 
 import math
-import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -128,19 +127,17 @@ class Journal:
         JournalError
             If the cycle is stored already, or the file cannot be written.
         """
+        made = Position(capture.session, capture.cycle)
         with self._transaction():
-            try:
-                row = self._db.execute(
-                    _INSERT_CYCLE, [_sql(column.of(capture, snapshot)) for column in COLUMNS]
-                ).lastrowid
-            except sqlite3.IntegrityError as error:
-                raise JournalError(
-                    f"{self.path}: cycle {capture.cycle} is stored already, or holds what it cannot ({error})"
-                ) from error
+            if made == self.position():
+                raise JournalError(f"{self.path}: cycle {capture.cycle} is stored already")
+            row = self._db.execute(
+                _INSERT_CYCLE, [_sql(column.of(capture, snapshot)) for column in COLUMNS]
+            ).lastrowid
             self._db.execute("INSERT INTO captures VALUES (?, ?)", (row, encode_capture(capture)))
             self._put_alarms(changed)
             self._db.execute("INSERT OR REPLACE INTO state VALUES (1, ?, ?)", (row, state))
-        self._appended = Position(capture.session, capture.cycle)
+        self._appended = made
 
     def record(self, state: bytes, changed: Sequence[Alarm] = (), audit: AuditEntry | None = None) -> None:
         """Store what happened between cycles: alarms, a person's action and the state they led to."""

@@ -45,6 +45,18 @@ def test_a_cycle_is_stored_once(tmp_path: Path) -> None:
         assert journal.state() == b"state 1"
         append(journal, 1, session=2)
         assert journal.position() == Position(2, 1)
+    with Journal(tmp_path / "j", "c") as journal, pytest.raises(JournalError, match="stored already"):
+        append(journal, 1, session=2)
+
+
+def test_cycle_numbers_may_come_again(tmp_path: Path) -> None:
+    """A module that starts anew in the same session, and a counter that wraps."""
+    numbers = [1, 2, 3, 1, 2, 2**32 - 1, 1]
+    with Journal(tmp_path / "j", "c") as journal:
+        for number in numbers:
+            append(journal, number)
+        assert [capture.cycle for capture in journal.captures()] == numbers
+        assert journal.position() == Position(1, 1)
 
 
 def test_a_failed_append_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -73,7 +85,18 @@ def test_actions_are_audited_with_their_state(tmp_path: Path) -> None:
         assert journal.state() == b"after reset"
 
 
-@pytest.mark.parametrize("content", [b"not a database at all" * 100, None, "other version", "other cell"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"not a database at all" * 100,
+        b"\n",
+        b"SQLite format 3\0",
+        None,
+        "other version",
+        "other cell",
+        "no cell",
+    ],
+)
 def test_foreign_files_are_refused_and_left_alone(tmp_path: Path, content: bytes | str | None) -> None:
     path = tmp_path / "j"
     if isinstance(content, bytes):
@@ -88,10 +111,39 @@ def test_foreign_files_are_refused_and_left_alone(tmp_path: Path, content: bytes
             db = sqlite3.connect(path)
             db.execute("PRAGMA user_version = 99")
             db.close()
+        if content == "no cell":
+            with sqlite3.connect(path) as db:
+                db.execute("DELETE FROM meta")
+            db.close()
     before = path.read_bytes()
     with pytest.raises(ForeignJournalError):
         Journal(path, "press-1")
     assert path.read_bytes() == before
+
+
+def test_a_foreign_database_in_use_is_left_to_its_program(tmp_path: Path) -> None:
+    path, log = tmp_path / "j", tmp_path / "j-wal"
+    theirs = sqlite3.connect(tmp_path / "theirs")
+    theirs.execute("PRAGMA journal_mode = WAL")
+    theirs.execute("CREATE TABLE theirs (x)")
+    path.write_bytes((tmp_path / "theirs").read_bytes())
+    log.write_bytes((tmp_path / "theirs-wal").read_bytes())
+    theirs.close()
+    before = path.read_bytes(), log.read_bytes()
+    with pytest.raises(ForeignJournalError):
+        Journal(path, "press-1")
+    assert (path.read_bytes(), log.read_bytes()) == before
+
+
+def test_a_journal_without_a_table_is_no_full_disk(tmp_path: Path) -> None:
+    path = tmp_path / "j"
+    Journal(path, "c").close()
+    with sqlite3.connect(path) as db:
+        db.execute("DROP TABLE meta")
+    db.close()
+    with pytest.raises(JournalError, match="no such table: meta") as told:
+        Journal(path, "c")
+    assert not told.value.retry
 
 
 def test_the_model_is_kept_beside_the_captures(tmp_path: Path) -> None:
