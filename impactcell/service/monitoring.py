@@ -1,6 +1,8 @@
 """`/healthz` and Prometheus `/metrics` over HTTP for the cells of a process; off unless the YAML says so."""
 
 import json
+import logging
+import sys
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -13,6 +15,8 @@ from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
 from prometheus_client.registry import Collector, CollectorRegistry
 
 from impactcell.errors import SettingsError
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,11 @@ class CellHealth:
 
 
 Health = Callable[[], Iterable[CellHealth]]
+
+POLL_S = 0.1
+"""How long the end of the service may wait for the listener."""
+PATIENCE_S = 5.0
+"""How long a scraper may take to send its request, or to take the answer."""
 
 _METRICS: tuple[tuple[str, str, str, Callable[[CellHealth], float]], ...] = (
     ("gauge", "connected", "1 while the module answers", lambda h: float(h.connected)),
@@ -66,6 +75,16 @@ class _Cells(Collector):
             yield family
 
 
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request: object, client_address: object) -> None:  # noqa: ARG002 - its signature
+        """Stay silent where a scraper has gone; say what else went wrong."""
+        error = sys.exception()
+        if not isinstance(error, OSError):
+            log.error("monitoring: a request from %s failed", client_address, exc_info=error)
+
+
 class Monitoring:
     """An HTTP listener in a thread of its own, from entering the context to leaving it.
 
@@ -81,6 +100,8 @@ class Monitoring:
         registry.register(_Cells(health))
 
         class Handler(BaseHTTPRequestHandler):
+            timeout = PATIENCE_S
+
             def do_GET(self) -> None:
                 if self.path == "/metrics":
                     self._answer(200, CONTENT_TYPE_LATEST, generate_latest(registry))
@@ -105,14 +126,15 @@ class Monitoring:
 
     def __enter__(self) -> Self:
         try:
-            self._server = ThreadingHTTPServer((self.host, self.port), self._handler)
+            self._server = _Server((self.host, self.port), self._handler)
         except OSError as error:
             raise SettingsError(
                 f"monitoring: cannot listen on {self.host}:{self.port} ({error.strerror}); choose another"
             ) from error
-        self._server.daemon_threads = True
         self.port = self._server.server_address[1]
-        self._thread = threading.Thread(target=self._server.serve_forever, name="monitoring", daemon=True)
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(POLL_S,), name="monitoring", daemon=True
+        )
         self._thread.start()
         return self
 

@@ -2,6 +2,7 @@
 
 import json
 import socket
+import struct
 import urllib.error
 import urllib.request
 from dataclasses import replace
@@ -55,3 +56,18 @@ def test_a_port_in_use_is_said() -> None:
         pytest.raises(SettingsError, match="choose another"),
     ):
         Monitoring("127.0.0.1", taken.getsockname()[1], list).__enter__()
+
+
+def test_a_scraper_that_goes_away_is_no_news(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("impactcell.service.monitoring.PATIENCE_S", 0.05)
+    with Monitoring("127.0.0.1", 0, lambda: [PRESS]) as http:
+        for sent in (b"", b"GET /met", b"GET /metrics HTTP/1.0\r\n\r\n", b"GET / HTTP/1.0\r\n\r\n") * 5:
+            with socket.create_connection(("127.0.0.1", http.port)) as scraper:
+                scraper.sendall(sent)
+                scraper.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        with socket.create_connection(("127.0.0.1", http.port), timeout=5) as silent:
+            assert silent.recv(1) == b""
+        assert get(http.port, "/healthz")[0] == 200
+    assert capfd.readouterr() == ("", "")
