@@ -96,6 +96,12 @@ def _port(cell: Cell) -> int | None:
     return urlsplit(cell.settings.opcua.endpoint).port or None
 
 
+def _module(cell: Cell) -> tuple[str, int, int, Path]:
+    """Say where a cell acknowledges cycles; a device may serve several cells, each by a map of its own."""
+    module = cell.settings.module
+    return module.host, module.port, module.device_id, module.register_map
+
+
 def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
     """Read the cells of one process; see that they do not get in each other's way.
 
@@ -114,6 +120,11 @@ def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
         for other in cells[:index]:
             if cell.name == other.name:
                 faults.append(f"{cell.path}: cell '{cell.name}' is in {other.path} too; rename one")
+            if _module(cell) == _module(other):
+                faults.append(
+                    f"{cell.path}: {other.path} has the same module and register map; "
+                    "a module's cycles belong to one cell"
+                )
             journals = cell.settings.journal, other.settings.journal
             if journals[0] and journals[1] and journals[0].file == journals[1].file:
                 faults.append(

@@ -112,6 +112,7 @@ def test_cells_of_one_process_do_not_share_what_is_one_cells(config: Path) -> No
     with pytest.raises(SettingsError) as caught:
         read_cells([first, second])
     assert "same journal file" in str(caught.value)
+    assert "same module and register map" in str(caught.value)
     assert "same endpoint" in str(caught.value)
     with pytest.raises(SettingsError, match="rename one"):
         read_cells([first, first])
