@@ -107,7 +107,9 @@ def estimate(
     campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="A campaign directory.")],
     *,
     cell: OptionalCell = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="OUT.csv")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.csv", help="CSV file to write.")
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -126,7 +128,7 @@ def track(
         str | None, typer.Option(help="known or unknown; known by default where there is a batch column")
     ] = None,
     limit: Annotated[float | None, typer.Option(metavar="MU", help="Wear limit of mu_s.")] = None,
-    as_json: Annotated[bool, typer.Option("--json")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -140,7 +142,7 @@ def track(
 @app.command()
 def discrepancy(
     output: Directory,
-    campaign: Annotated[Path | None, typer.Argument(metavar="[CAMPAIGN]")] = None,
+    campaign: Annotated[Path | None, typer.Argument(metavar="CAMPAIGN", help="A campaign directory.")] = None,
     *,
     cell: OptionalCell = None,
     journal: Annotated[Path | None, typer.Option(metavar="DB", help="Recorded captures instead.")] = None,

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import os
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -80,9 +81,15 @@ class Host:
             The address cannot be listened on.
         """
         settings = self._settings
+        if not self._logins.users():
+            _log.warning(
+                "OPC UA: nobody can log in: %s names no user; add one with `impactcell users add`",
+                settings.users,
+            )
         if settings.allow_none:
             _log.warning(
-                "OPC UA sessions without encryption are allowed (allow_none); use this for trials only"
+                "OPC UA sessions without encryption are allowed (allow_sessions_without_encryption); "
+                "use this for trials only"
             )
         access = Access(
             self._endpoints,
@@ -123,7 +130,12 @@ class Host:
                 backlog=BACKLOG,
             )
         except (OSError, ValueError) as error:
-            raise AccessError(f"OPC UA server: cannot listen on {settings.endpoint}: {error}") from error
+            number = getattr(error, "errno", None)
+            reason = os.strerror(number) if number is not None and number > 0 else str(error)
+            raise AccessError(
+                f"OPC UA server: cannot listen on {settings.endpoint} ({reason}); choose another endpoint, "
+                "or end what uses it"
+            ) from error
         self._endpoints.port = self._listener.sockets[0].getsockname()[1]
         self._clock = asyncio.get_running_loop().create_task(self._run_clock(), name="opcua clock")
         _log.info("OPC UA server listens on %s (port %d)", settings.endpoint, self.port)

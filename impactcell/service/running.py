@@ -26,6 +26,7 @@ from impactcell.settings import Cell, read_cell
 TICK_S = 1.0
 STALE_PERIODS = 10.0
 STALE_AT_LEAST_S = 5.0
+_TOLD_ELSEWHERE = (AlarmName.MODULE_CONNECTION, AlarmName.JOURNAL_FAULT)
 
 Observer = Callable[[str, Snapshot], None]
 
@@ -53,6 +54,8 @@ class RunningCell:
         keep = Retention() if settings is None else retention(settings)
         self.worker = Worker(cell_design(cell), journal, keep)
         self.server: Server | None = None
+        self._notes: tuple[str, ...] = ()
+        self._active = {alarm.name for alarm in self.worker.alarms if alarm.active}
         self._observe = observe
         self._module = Module(cell.name, module_link(cell), cell.register_map, self._link_changed)
         self._positioning: PositioningTask | None = None
@@ -171,13 +174,22 @@ class RunningCell:
         processed = await self.worker.process(capture, positioning, self._announcement(), reception.faults)
         if task is not None:
             await self.worker.run(partial(task.learn, processed.stepped.snapshot))
-        for note in processed.stepped.notes:
-            self.log.info("%s", note, cycle=capture.cycle)
-        snapshot = processed.stepped.snapshot
+        snapshot, notes = processed.stepped.snapshot, processed.stepped.notes
+        for note in notes:
+            if note not in self._notes:
+                self.log.info("%s", note, cycle=capture.cycle)
+        self._notes = notes
         self._last_cycle_s, self._stale = time.monotonic(), False
         if self.server is not None:
             self.server.publish(self.cell.name, snapshot)
             self._show_module(self.server)
+        self._tell(processed.stepped.changed)
+        mu_s, late_s = snapshot.friction.mu_s, time.time() - 1e-9 * capture.time_ns
+        self.log.debug(
+            "mu_s %.4f ± %.4f (%s), gap %.2f, published %s after its end",
+            mu_s.value, mu_s.std, mu_s.quality.name.lower(), snapshot.friction.gap,
+            f"{1e3 * late_s:.0f} ms" if capture.time_ns else "some time", cycle=capture.cycle,
+        )  # fmt: skip
         if processed.durable is not None:
             await self._module.acknowledge(processed.durable)
         await self._look_at_journal()
@@ -258,9 +270,19 @@ class RunningCell:
             server.mark_stale(self.cell.name, self.worker.snapshot.time_ns)
 
     def _show_alarms(self, moved: tuple[Alarm, ...]) -> None:
+        self._tell(moved)
         if self.server is not None:
             for alarm in moved:
                 self.server.alarm(self.cell.name, alarm)
+
+    def _tell(self, moved: tuple[Alarm, ...]) -> None:
+        """Log each alarm that comes or goes, but for those that their finder has told of already."""
+        for alarm in moved:
+            if alarm.active != (alarm.name in self._active) and alarm.name not in _TOLD_ELSEWHERE:
+                said = "alarm %s is active: %s" if alarm.active else "alarm %s is over: %s"
+                level = logging.WARNING if alarm.active else logging.INFO
+                self.log.log(level, said, alarm.name.value, alarm.message, cycle=alarm.cycle or None)
+            (self._active.add if alarm.active else self._active.discard)(alarm.name)
 
     def _show_module(self, server: Server) -> None:
         status = self._module.status

@@ -46,6 +46,23 @@ async def test_captures_of_no_use(tmp_path: Path, caplog: pytest.LogCaptureFixtu
     assert "register force (320)" in text
 
 
+async def test_alarms_are_logged_as_they_come_and_every_cycle_where_asked(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.DEBUG, "impactcell")
+    async with simulator(tmp_path, strikes={"period_s": 0.2}) as module:
+        path = write_cell(tmp_path, module["port"], alarms={"wear_limit": 0.1})
+        async with serving(path) as watched:
+            await watched.alarm("press-1", AlarmName.WEAR_LIMIT, active=True)
+            seen = len(watched.snapshots["press-1"])
+            await watched.until("press-1", seen + 3)
+    lines = [record.getMessage() for record in caplog.records]
+    assert sum("alarm WearLimit is active: " in line for line in lines) == 1
+    for snapshot in watched.snapshots["press-1"][: seen + 3]:
+        start = f"cell=press-1 cycle={snapshot.cycle} mu_s {snapshot.friction.mu_s.value:.4f}"
+        assert any(line.startswith(start) for line in lines)
+
+
 async def test_one_sick_cell_leaves_the_other_alone(tmp_path: Path) -> None:
     strikes = {"period_s": 0.25}
     async with simulator(tmp_path, strikes=strikes) as module:
