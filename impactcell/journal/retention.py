@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 _CHUNK = 64
 _NS_PER_DAY = 86_400 * 10**9
+MOST = 512
+"""Captures, and cycles, dropped at once: after a long rest, or with a shorter retention, gigabytes may have
+to go, and neither a cycle nor the end of the service is to wait for that."""
 ROOM = 0.05
 """Share of the size that is left free, for what comes until thinning is due again."""
 
@@ -26,26 +29,40 @@ class Retention:
     max_size_bytes: int = 4096 * 2**20
 
 
-def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> None:
+def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> bool:
     """Drop what `keep` does not keep, and give the space back; the last cycle always stays.
 
     Called inside no transaction; each step commits by itself, so a crash in between loses nothing else.
+
+    Returns
+    -------
+    bool
+        Whether there may be more to drop; a call drops no more than `MOST` for each reason.
     """
     oldest_ns = now_ns - int(keep.days * _NS_PER_DAY)
-    oldest_capture_ns = now_ns - int(keep.captures_days * _NS_PER_DAY)
-    database.execute(
-        "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns < ?)", (oldest_capture_ns,)
+    oldest_capture_ns = now_ns - int(min(keep.captures_days, keep.days) * _NS_PER_DAY)
+    captures = database.execute(
+        "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns < ? "
+        "AND EXISTS (SELECT 1 FROM captures WHERE captures.seq = cycles.seq) ORDER BY time_ns LIMIT ?)",
+        (oldest_capture_ns, MOST),
     )
-    database.execute(
-        "DELETE FROM cycles WHERE time_ns < ? AND seq < (SELECT max(seq) FROM cycles)", (oldest_ns,)
+    cycles = database.execute(
+        "DELETE FROM cycles WHERE seq IN (SELECT seq FROM cycles WHERE time_ns < ? "
+        "AND seq < (SELECT max(seq) FROM cycles) ORDER BY time_ns LIMIT ?)",
+        (oldest_ns, MOST),
     )
+    more = MOST in (captures.rowcount, cycles.rowcount)
     database.execute("DELETE FROM alarms WHERE time_ns < ?", (oldest_ns,))
     database.execute("DELETE FROM audit WHERE time_ns < ?", (oldest_ns,))
-    while _size(database) > (1.0 - ROOM) * keep.max_size_bytes and _drop_oldest(database):
-        pass
+    for _ in range(MOST // _CHUNK):
+        if _size(database) <= (1.0 - ROOM) * keep.max_size_bytes or not _drop_oldest(database):
+            break
+    else:
+        more = True
     # execute() steps this statement once and gives back a single page; executescript() runs it to its end.
     database.executescript("PRAGMA incremental_vacuum")
     database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+    return more
 
 
 def _drop_oldest(database: sqlite3.Connection) -> bool:

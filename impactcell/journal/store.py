@@ -192,10 +192,10 @@ class Journal:
         with self._errors():
             self._db.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
-    def thin(self, keep: Retention, now_ns: int) -> None:
-        """Drop what `keep` does not keep; see `impactcell.journal.retention`."""
+    def thin(self, keep: Retention, now_ns: int) -> bool:
+        """Drop what `keep` does not keep, and say if there is more; see `impactcell.journal.retention`."""
         with self._errors():
-            thin(self._db, keep, now_ns)
+            return thin(self._db, keep, now_ns)
 
     def count(self) -> int:
         """Return how many cycles the journal holds."""

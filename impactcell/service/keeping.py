@@ -77,7 +77,8 @@ class Keeper:
             if self._since_thinned >= THIN_EVERY:
                 self._since_thinned = 0
                 # A module's clock that runs ahead must not make everything look old.
-                self.journal.thin(self._keep, min(time_ns, time.time_ns()))
+                if self.journal.thin(self._keep, min(time_ns, time.time_ns())):
+                    self._since_thinned = THIN_EVERY
             else:
                 self.journal.checkpoint()
         except JournalError as error:

@@ -191,3 +191,29 @@ def test_age_drops_captures_then_cycles_but_never_the_last(tmp_path: Path) -> No
         journal.thin(Retention(days=10, captures_days=5), now_ns + 11 * day_ns)
         assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(3,)]
         assert journal.state() == b"state 3"
+
+
+def test_a_capture_goes_with_its_cycle(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", "c") as journal:
+        for cycle in (1, 2, 3):
+            append(journal, cycle)
+        now_ns = make_capture(3).time_ns
+        journal.thin(Retention(days=10, captures_days=30), now_ns + 11 * 86_400 * 10**9)
+        assert journal._db.execute("SELECT count(*) FROM captures").fetchone() == (0,)
+
+
+@pytest.mark.parametrize("keep", [Retention(days=1, captures_days=1), Retention(max_size_bytes=1)])
+def test_no_call_drops_everything_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keep: Retention
+) -> None:
+    monkeypatch.setattr("impactcell.journal.retention.MOST", 128)
+    with Journal(tmp_path / "j", "c") as journal:
+        for cycle in range(1, 301):
+            append(journal, cycle, samples=10)
+        now_ns = make_capture(300).time_ns + 2 * 86_400 * 10**9
+        left = [300]
+        while journal.thin(keep, now_ns):
+            left.append(len(list(journal.captures())))
+        assert left[:3] == [300, 172, 44]
+        assert list(journal.captures()) == []
+        assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(300,)]

@@ -77,6 +77,25 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
     assert done == ["thin", "checkpoint", "checkpoint"]
 
 
+async def test_what_is_too_much_to_drop_at_once_goes_in_the_next_looks(
+    tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("impactcell.service.keeping.CHECKPOINT_EVERY", 1)
+    journal = Journal(tmp_path / "j", "c")
+    worker = Worker(design, journal, Retention())
+    more, looks = [False, True, True], []
+
+    def thin(*_: object) -> bool:
+        looks.append(len(more))
+        return more.pop()
+
+    monkeypatch.setattr(journal, "thin", thin)
+    for cycle in range(1, 7):
+        await process(worker, make_capture(cycle))
+    await worker.close()
+    assert looks == [3, 2, 1]
+
+
 async def test_what_cannot_be_stored_now_is_stored_later_in_order(
     tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
