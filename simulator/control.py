@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any, Self
 
+from impactcell.errors import MapError
 from simulator.faults import Fault, FaultInjector, FaultKind
 
 Action = Callable[..., object]
@@ -62,7 +63,7 @@ class Control:
         """Carry out one command and return the answer."""
         try:
             return {"ok": True, **self._obey(dict(json.loads(line)))}
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, KeyError, RecursionError, MapError) as error:
             return {"ok": False, "error": f"{type(error).__name__}: {error}"}
 
     def _obey(self, command: dict[str, Any]) -> dict[str, Any]:

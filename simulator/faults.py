@@ -4,10 +4,12 @@ Pure: an injector chooses a fault and `corrupt` changes a reply's bytes; the ser
 """
 
 import enum
+import math
 import random
 import struct
 from collections import Counter
 from dataclasses import dataclass, replace
+from operator import index
 from typing import Final
 
 
@@ -64,8 +66,12 @@ class Fault:
     def __post_init__(self) -> None:
         if not 0.0 <= self.probability <= 1.0:
             raise ValueError(f"fault {self.kind}: probability must be 0..1, not {self.probability}")
-        if self.seconds < 0.0 or not 1 <= self.code <= 255:
-            raise ValueError(f"fault {self.kind}: seconds must not be negative, code must be 1..255")
+        if not 0.0 <= self.seconds < math.inf:
+            raise ValueError(f"fault {self.kind}: seconds must be finite and not negative")
+        if not 1 <= index(self.code) <= 255:
+            raise ValueError(f"fault {self.kind}: code must be 1..255, not {self.code}")
+        if self.remaining is not None and index(self.remaining) < 1:
+            raise ValueError(f"fault {self.kind}: remaining must be at least 1, not {self.remaining}")
 
 
 class FaultInjector:

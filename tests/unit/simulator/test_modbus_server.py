@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import struct
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -14,6 +15,7 @@ from impactcell.fieldbus.registers import WIRE, Words
 from simulator.control import Control
 from simulator.faults import Fault, FaultInjector, FaultKind, corrupt
 from simulator.modbus_server import ModbusServer
+from tests.module_client import Client, scenario
 
 
 class Image:
@@ -176,7 +178,17 @@ def test_faults_happen_as_often_as_told_and_then_no_more() -> None:
     assert faults.happened == {FaultKind.DROP: drawn, FaultKind.BUSY: 3}
 
 
-@pytest.mark.parametrize("arguments", [{"probability": 1.5}, {"seconds": -1.0}, {"code": 0}])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"probability": 1.5},
+        {"seconds": -1.0},
+        {"seconds": math.nan},
+        {"seconds": math.inf},
+        {"code": 0},
+        {"remaining": 0},
+    ],
+)
 def test_impossible_faults_are_refused(arguments: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="fault delay"):
         Fault(FaultKind.DELAY, **arguments)
@@ -185,7 +197,12 @@ def test_impossible_faults_are_refused(arguments: dict[str, Any]) -> None:
 async def test_the_control_port_arms_disarms_and_acts() -> None:
     faults, called = FaultInjector(), []
     async with Control(
-        faults, {"restart": lambda: called.append("restart"), "count": lambda value: value + 1}
+        faults,
+        {
+            "restart": lambda: called.append("restart"),
+            "count": lambda value: value + 1,
+            "set_counter": Client(scenario()).device.set_counter,
+        },
     ) as control:
         reader, writer = await asyncio.open_connection("127.0.0.1", control.port)
 
@@ -210,7 +227,11 @@ async def test_the_control_port_arms_disarms_and_acts() -> None:
             "3",
             {"fault": "gremlins"},
             {"fault": "delay", "speed": 1},
+            {"fault": "exception", "code": 4.5},
+            {"fault": "delay", "remaining": "two"},
             {"do": "fly"},
+            {"do": "set_counter", "value": -1},
+            "[" * 20_000,
             {},
         ):
             answer = await say(wrong)
