@@ -11,7 +11,9 @@ which `impactcell.packing` writes and reads back bit for bit.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from impactcell import alarms
 from impactcell.alarms import AlarmSettings, AlarmState, Finding, Occurrence, Transition
@@ -25,6 +27,7 @@ from impactcell.intake import (
     mean_period_s,
     named_batch,
 )
+from impactcell.physics import Plant, Strike, free
 from impactcell.prediction import Model, estimate
 from impactcell.records import (
     Alarm,
@@ -34,6 +37,7 @@ from impactcell.records import (
     FrictionEstimate,
     PositioningState,
     Quality,
+    Samples,
     Snapshot,
 )
 from impactcell.tracking import (
@@ -212,7 +216,7 @@ def renew_surface(state: CellState) -> CellState:
 def _sign(
     design: CellDesign, state: CellState, capture: Capture, tracked: Tracked, period_s: float
 ) -> SignatureTracked:
-    """Friction along the stroke, with the viscous part that the model knows taken out."""
+    """Friction along the stroke, with what the model knows to depend on the speed taken out."""
     plant = design.model.plant
     viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
     slope = viscous / capture.mass_kg if isinstance(viscous, float) and capture.mass_kg > 0.0 else 0.0
@@ -223,9 +227,23 @@ def _sign(
         batch_id=tracked.batch.batch_id,
         restart=tracked.shift is not None,
         viscous_per_mass=slope,
+        acceleration=_known(plant, capture),
         gravity_m_s2=plant.gravity_m_s2,
         period_s=period_s,
     )
+
+
+def _known(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | None:
+    """Give what the model's effects, viscous friction apart, do to the free part; None if they do nothing."""
+    others = {
+        name: given
+        for name, given in plant.effects.items()
+        if name != "viscous_friction" and free.acts_on_speed(name)
+    }
+    if not others or not capture.mass_kg > 0.0:
+        return None
+    tap = Strike(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
+    return partial(free.acceleration, replace(plant, effects=others), tap)
 
 
 def _findings(

@@ -1,10 +1,12 @@
 """Friction along one slide as a linear Gaussian problem, solved exactly.
 
-While the part slides, x'' = -g mu(x) - (k_v / m) x'. Position itself is measured to a micrometre, where
-friction changes over tenths of a millimetre, so the measured x may stand as the argument of mu. With
-mu(x) = sum_j beta_j B_j(x), cubic B-splines on the grid, position is linear in what is unknown::
+While the part slides, x'' = -g mu(x) - (k_v / m) x' + a, with a what else the model knows of. Position
+itself is measured to a micrometre, where friction changes over tenths of a millimetre, so the measured x may
+stand as the argument of mu. With mu(x) = sum_j beta_j B_j(x), cubic B-splines on the grid, position is linear
+in what is unknown::
 
-    x(t) + (k_v / m) int (x - x_0) dt = x_0 + v_0 t - g sum_j beta_j W_j(t) + e,   W_j'' = B_j(x(t))
+    x(t) + (k_v / m) int (x - x_0) dt - int int a dt dt
+        = x_0 + v_0 t - g sum_j beta_j W_j(t) + e,   W_j'' = B_j(x(t))
 
 x_0 and v_0 are integrated out; what is left of the slide are an information matrix G and vector h:
 log likelihood = -1/2 beta' G beta + h' beta. This is the Rauch-Tung-Striebel smoother of an integrated
@@ -12,6 +14,7 @@ random walk in x (Wecker & Ansley 1983, JASA 78:81) without its first-order erro
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -21,6 +24,8 @@ from impactcell.compiled import compiled
 from impactcell.records import Samples
 from impactcell.tracking import linear
 from impactcell.tracking.slide import Slide
+
+Acceleration = Callable[[Samples], Samples]
 
 FINE_STEPS = 300  # of the double integral over a slide, at least
 STRENGTHS = np.logspace(-9.0, 9.0, 37)  # of the smoothing searched, over that which weighs like the data
@@ -47,7 +52,11 @@ class Information:
 
 
 def information(
-    slide: Slide, grid_m: Samples, gravity_m_s2: float, viscous_per_mass: float = 0.0
+    slide: Slide,
+    grid_m: Samples,
+    gravity_m_s2: float,
+    viscous_per_mass: float = 0.0,
+    acceleration: Acceleration | None = None,
 ) -> Information:
     """Turn a slide into information on the coefficients of the cubic B-splines of a uniform grid.
 
@@ -57,11 +66,27 @@ def information(
         Uniform; friction beyond its ends is that at the ends. There are g + 2 coefficients.
     viscous_per_mass : float
         k_v / m where the model knows it, 1/s.
+    acceleration : callable, optional
+        Speeds along the tap, m/s, to the acceleration along it, m/s², that the model knows beside friction
+        and k_v.
     """
+    moved_m = np.zeros(len(slide.time_s)) if acceleration is None else _moved(slide, acceleration)
     seen = _information(
-        slide.time_s, slide.distance_m, slide.variance, grid_m, gravity_m_s2, viscous_per_mass
+        slide.time_s, slide.distance_m, moved_m, slide.variance, grid_m, gravity_m_s2, viscous_per_mass
     )
     return Information(*seen)
+
+
+def _moved(slide: Slide, acceleration: Acceleration) -> Samples:
+    """Distance that an acceleration makes in the time of a slide, which passes a parabola's speeds or so."""
+    t, span = slide.time_s, slide.time_s[-1]
+    cubic = np.polynomial.Polynomial.fit(t, slide.distance_m, 3, domain=[0.0, span], window=[0.0, 1.0])
+    a = acceleration(np.maximum(cubic.deriv()(t), 0.0))
+    step = np.diff(t)
+    speed = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * step)])
+    ahead = speed[:-1] * step + (2.0 * a[:-1] + a[1:]) * step**2 / 6.0
+    moved: Samples = np.concatenate([[0.0], np.cumsum(ahead)])
+    return moved
 
 
 @lru_cache(maxsize=64)
@@ -167,12 +192,19 @@ def _smoothed(
 
 @compiled
 def _information(
-    t: Samples, x: Samples, variance: float, grid: Samples, gravity: float, viscous_per_mass: float
+    t: Samples,
+    x: Samples,
+    moved: Samples,
+    variance: float,
+    grid: Samples,
+    gravity: float,
+    viscous_per_mass: float,
 ) -> tuple[Samples, Samples, float, int]:
     """Fields of `Information`."""
     points, first = len(grid), grid[0]
     spacing = grid[1] - first
     columns = _columns(t, x, first, spacing, points, gravity, viscous_per_mass)
+    columns[:, -1] -= moved
     _project(t, columns)
     seen = columns.shape[1] - 1
     products = columns.T @ columns

@@ -96,6 +96,7 @@ def update(
     restart: bool = False,
     separation_s: float | None = None,
     viscous_per_mass: float = 0.0,
+    acceleration: profile.Acceleration | None = None,
     gravity_m_s2: float = 9.81,
     period_s: float = math.nan,
 ) -> SignatureTracked:
@@ -111,6 +112,8 @@ def update(
         Last loss of contact, if it is known; else it is found in the capture.
     viscous_per_mass : float
         k_v / m of the model, 1/s: one cycle cannot tell it from mu(x).
+    acceleration : callable, optional
+        What else the model knows to depend on the speed, see `profile.information`.
     period_s : float
         Time between cycles.
     """
@@ -125,7 +128,7 @@ def update(
         nothing = np.full(settings.points, math.nan)
         signature = Signature(grid, nothing, nothing, math.nan, math.nan, math.nan, Quality.BAD, str(error))
         return SignatureTracked(state, signature, None, judged=False)
-    seen = profile.information(slide, grid, gravity_m_s2, viscous_per_mass)
+    seen = profile.information(slide, grid, gravity_m_s2, viscous_per_mass, acceleration)
     friction, std = profile.friction(seen, grid)
     known = state.reference
     if known.variation.cycles < settings.learned_cycles or known.weight < FEWEST_OF_MATERIAL:

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from impactcell import values
+from impactcell.physics import Plant, Strike, free
 from impactcell.records import Channel, Quality
 from impactcell.tracking import gap, profile, signature
 from impactcell.tracking.slide import find_slide
@@ -26,6 +28,42 @@ def textured(cycle, bump=0.0):
         return 0.2 * (1.0 + a + b * (x / 1e-3 - 1.0) + 0.03 * np.sin(2.0 * np.pi * x / 1.3e-3) + near)
 
     return friction
+
+
+def test_what_the_model_knows_to_depend_on_the_speed_is_taken_out():
+    """Stribeck friction, drag and a tilt, integrated apart from the product; slides of either direction."""
+    from scipy.integrate import solve_ivp
+
+    effects = {
+        "stribeck_friction": {"friction_increase": 0.03, "stribeck_velocity_m_s": 0.04},
+        "quadratic_drag": {"drag_coefficient_n_s2_per_m2": 400.0},
+        "surface_tilt": {"tilt_rad": 0.01},
+    }
+    plant, mass = Plant(6.5e5, 465.0, 0.26, 0.2, effects=effects), 18.9
+
+    def stopped(_, y):
+        return y[1]
+
+    stopped.terminal = True
+    for direction in (1, -1):
+
+        def motion(_, y, direction=direction):
+            friction = 0.2 + 0.03 * math.exp(-((y[1] / 0.04) ** 2))
+            tilt = direction * 9.81 * math.sin(0.01)
+            return [y[1], -9.81 * friction - 400.0 / mass * y[1] ** 2 - tilt]
+
+        path = solve_ivp(motion, (0, 1), [0, 0.09], events=stopped, rtol=1e-10, dense_output=True)
+        t = np.arange(0.0, path.t[-1], 1e-5)
+        noisy = direction * path.sol(t)[0] + NOISE * np.random.default_rng(0).normal(size=len(t))
+        capture, _ = slide(textured(0), 0.09, 1e4, NOISE, 0)
+        capture = replace(capture, position=Channel(t, noisy, NOISE), direction=direction)
+        known = partial(free.acceleration, plant, Strike(0.05, mass, direction=direction))
+        state = signature.initial_state(SETTINGS)
+        found = signature.update(SETTINGS, state, capture, acceleration=known).signature
+        inner = 0.85 * path.y[0, -1] > GRID
+        assert found.friction[inner] == pytest.approx(0.2, abs=0.002)
+        without = signature.update(SETTINGS, state, capture).signature
+        assert np.abs(without.friction[inner] - 0.2).max() > 0.008
 
 
 @pytest.fixture(scope="module")
