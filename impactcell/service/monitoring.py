@@ -2,6 +2,7 @@
 
 import json
 import logging
+import math
 import sys
 import threading
 from collections.abc import Callable, Iterable
@@ -38,6 +39,22 @@ class CellHealth:
     def healthy(self) -> bool:
         """The module answers and the journal can be written."""
         return self.connected and self.journal_ok
+
+
+def absent(cell: str) -> CellHealth:
+    """Health of a cell that does not run."""
+    return CellHealth(
+        cell,
+        connected=False,
+        cycles=0,
+        missed=0,
+        last_cycle=0,
+        round_trip_ms=math.nan,
+        mu_s=math.nan,
+        wear_level=math.nan,
+        alarms_active=0,
+        journal_ok=False,
+    )
 
 
 Health = Callable[[], Iterable[CellHealth]]

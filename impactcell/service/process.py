@@ -9,11 +9,12 @@ import sys
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 
+from impactcell.errors import JournalError
 from impactcell.scada import Server
 from impactcell.service import logs, systemd
 from impactcell.service.actions import CellActions
 from impactcell.service.design import cell_description, server_settings
-from impactcell.service.monitoring import Monitoring
+from impactcell.service.monitoring import CellHealth, Monitoring, absent
 from impactcell.service.past import JournalHistory
 from impactcell.service.running import Observer, RunningCell
 from impactcell.settings import Cell
@@ -36,22 +37,25 @@ class Service:
     observe : callable, optional
         Called with the cell's name and each snapshot, after it was published.
 
+    A cell whose journal cannot be opened is told and left out, the others run.
+
     Raises
     ------
     JournalError
-        A journal cannot be opened; nothing has been started.
+        No cell's journal can be opened; nothing has been started.
     """
 
     def __init__(self, cells: Sequence[Cell], observe: Observer | None = None) -> None:
         self._cells = tuple(cells)
         self._observe = observe
         self.running: dict[str, RunningCell] = {}
+        self._left_out: tuple[str, ...] = ()
         self.endpoints: dict[str, str] = {}
         """Where each cell is to be found, once `run` has started."""
 
     async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
         """Run until `stop` is set; `started` is called when every endpoint listens."""
-        self.running = {cell.name: RunningCell(cell, self._observe) for cell in self._cells}
+        self._begin()
         async with contextlib.AsyncExitStack() as stack:
             await stack.enter_async_context(self._monitoring())
             servers = {}
@@ -78,6 +82,24 @@ class Service:
                 await asyncio.gather(*tasks, return_exceptions=True)
                 await asyncio.gather(*(running.close() for running in self.running.values()))
 
+    def _begin(self) -> None:
+        """Make every cell that can run."""
+        faults: dict[str, JournalError] = {}
+        for cell in self._cells:
+            try:
+                self.running[cell.name] = RunningCell(cell, self._observe)
+            except JournalError as error:
+                faults[cell.name] = error
+        if faults and not self.running:
+            raise JournalError("\n".join(map(str, faults.values())))
+        for name, error in faults.items():
+            log.error("cell=%s is left out until the service is started anew: %s", name, error)
+        self._cells = tuple(cell for cell in self._cells if cell.name in self.running)
+        self._left_out = tuple(faults)
+
+    def _health(self) -> list[CellHealth]:
+        return [cell.health for cell in self.running.values()] + [absent(name) for name in self._left_out]
+
     async def reload(self) -> None:
         """Read every cell's files again; see `RunningCell.reload`."""
         systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
@@ -101,9 +123,7 @@ class Service:
         listeners = [one for one in wanted if one is not None]
         with contextlib.ExitStack() as stack:
             for one in listeners:
-                http = stack.enter_context(
-                    Monitoring(one.host, one.port, lambda: [cell.health for cell in self.running.values()])
-                )
+                http = stack.enter_context(Monitoring(one.host, one.port, self._health))
                 log.info("health and metrics at http://%s:%d", http.host, http.port)
             yield
 

@@ -1,12 +1,18 @@
 """What a module can do to a cell: a clear message, a matching quality, and the next good cycle is used."""
 
+import asyncio
 import contextlib
+import json
 import logging
+import re
+import urllib.error
+import urllib.request
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from impactcell.errors import JournalError
 from impactcell.records import AlarmName, Quality
 from tests.integration.processes import CONFIG, simulator, write_cell
 from tests.integration.watched import serving
@@ -75,6 +81,33 @@ async def test_one_sick_cell_leaves_the_other_alone(tmp_path: Path) -> None:
             message = await watched.alarm("stranger", AlarmName.MODULE_CONNECTION, active=True)
             assert "device_id 9" in message or "device 9" in message
             await watched.until("well", 8)
+
+
+async def test_a_foreign_journal_keeps_its_own_cell_out_and_no_other(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "impactcell")
+    foreign = b"this is somebody's text file, not a journal\n" * 40
+    (tmp_path / "odd.sqlite").write_bytes(foreign)
+    monitoring = {"port": 0}
+    async with simulator(tmp_path, strikes={"period_s": 0.25}) as module:
+        well = write_cell(tmp_path, module["port"], "well", monitoring=monitoring)
+        odd = write_cell(tmp_path, 1, "odd", monitoring=monitoring)
+        async with serving(well, odd) as watched:
+            await watched.until("well", 3)
+            at = re.search(r"metrics at (http://\S+)", caplog.text)
+            assert at is not None
+            with pytest.raises(urllib.error.HTTPError) as caught:
+                await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz")
+            with caught.value as answer:
+                assert answer.code == 503
+                assert json.load(answer) == {"well": True, "odd": False}
+    assert (tmp_path / "odd.sqlite").read_bytes() == foreign
+    assert "cell=odd is left out until the service is started anew" in caplog.text
+    assert "odd.sqlite" in caplog.text
+    with pytest.raises(JournalError, match=r"odd\.sqlite"):
+        async with serving(odd):
+            pass
 
 
 async def test_another_map_version_is_refused_by_name(tmp_path: Path) -> None:
