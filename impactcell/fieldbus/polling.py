@@ -14,6 +14,8 @@ REGULAR_S: Final = 0.25
 IDLE_S: Final = 0.1
 """The same, once they have stopped coming."""
 _GAIN: Final = 0.25
+_SOMEWHAT_LATE: Final = 4.0
+"""So many margins beyond when it was due a cycle is still looked for as if it were."""
 _LONGEST: Final = 3.0
 """A longer time between cycles, in periods, is a pause or a clock that was set, and counts as this."""
 _DRIFT: Final = 5e-4
@@ -102,4 +104,6 @@ class PollSchedule:
         overdue_s = now_s - due_s - high_s
         if overdue_s < margin_s:
             return least_s
+        if overdue_s < _SOMEWHAT_LATE * margin_s:
+            return max(least_s, COARSE_S)
         return max(least_s, min(IDLE_S, QUIET_S if overdue_s < 3.0 * self._period_s else 0.1 * overdue_s))
