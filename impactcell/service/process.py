@@ -92,8 +92,8 @@ class Service:
                 faults[cell.name] = error
         if faults and not self.running:
             raise JournalError("\n".join(map(str, faults.values())))
-        for name, error in faults.items():
-            log.error("cell=%s is left out until the service is started anew: %s", name, error)
+        for name, fault in faults.items():
+            log.error("cell=%s is left out until the service is started anew: %s", name, fault)
         self._cells = tuple(cell for cell in self._cells if cell.name in self.running)
         self._left_out = tuple(faults)
 
