@@ -71,6 +71,13 @@ def remember(
     return replace(history, rows=rows, batches=batches)
 
 
+def with_std(history: History, std: float) -> History:
+    """Give every cycle of the history the same declared standard deviation."""
+    rows = history.rows.copy()
+    rows[:, STD] = std
+    return replace(history, rows=rows)
+
+
 def replay(
     settings: TrackerSettings, history: History, factor: float, level_walk: float, slope_walk: float
 ) -> Replayed:

@@ -3,6 +3,8 @@
 The factor comes from differences of successive estimates, which neither wear nor a batch step moves:
 E (z_n - z_{n-1})^2 = kappa^2 (s_n^2 + s_{n-1}^2). It is the maximum-likelihood one of a contaminated normal,
 by incremental EM; a winsorised one beside it pulls it up quickly where the declared scale is far too small.
+Where one standard deviation for all is clearly likelier than those declared, as where these are the width of
+a prior that every estimate shares, it is used instead.
 """
 
 import math
@@ -26,6 +28,8 @@ MEMORY = 5000.0  # cycles after which the factor forgets
 DECLARED_WEIGHT = 10.0  # differences that a declared standard deviation counts for
 GUESSED_RELATIVE_STD = 0.01  # where no standard deviation was ever declared: of the value itself
 CONTRADICTED = 2.0  # a factor beyond this, or below its inverse, says the declared scale is no guide
+FAR_OFF = 4.0  # an estimate that declares so many times the common one is worse than the others all the same
+CLEARLY = 2.0  # nats by which one standard deviation for all must be likelier than those declared
 SMALLEST_GUESS = 1e-6
 SMALLEST_FACTOR = 1e-6
 
@@ -50,6 +54,8 @@ class Noise:
         How many values in a row have been the same.
     guessed : bool
         No standard deviation was ever declared; the scale was guessed and is learned.
+    common : bool
+        The usual standard deviation is used for every estimate, whatever it declares.
     """
 
     factor: float = 1.0
@@ -60,6 +66,7 @@ class Noise:
     last_std: float = math.nan
     identical: int = 0
     guessed: bool = False
+    common: bool = False
 
 
 def in_a_row(noise: Noise, value: float) -> int:
@@ -77,7 +84,9 @@ def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[No
         To go with the value: its own, the usual one, or a guess to be corrected.
     """
     std, usual, weight, guessed = declared, noise.usual_std, noise.weight, noise.guessed
-    if declared > 0.0 and math.isfinite(declared):
+    if noise.common:
+        std = declared if declared > FAR_OFF * usual else usual
+    elif declared > 0.0 and math.isfinite(declared):
         usual = std if math.isnan(usual) else usual + 0.05 * (std - usual)
     elif not math.isnan(usual):
         std = usual
@@ -87,7 +96,9 @@ def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[No
     factor, rough, last_value, last_std = noise.factor, noise.rough, noise.last_value, noise.last_std
     identical = in_a_row(noise, value)
     if late:
-        return Noise(factor, weight, rough, usual, last_value, last_std, identical, guessed), std
+        return Noise(
+            factor, weight, rough, usual, last_value, last_std, identical, guessed, noise.common
+        ), std
     if not math.isnan(last_value):
         squared = (value - last_value) ** 2 / (std**2 + last_std**2)
         weight = min(weight + 1.0, MEMORY)
@@ -99,13 +110,34 @@ def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[No
             rough = max(rough + (clipped - rough) / weight, SMALLEST_FACTOR)
             own = squared * _share(squared, factor)
             factor = max(factor + (own - factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
-    return Noise(factor, weight, rough, usual, value, std, identical, guessed), std
+    return Noise(factor, weight, rough, usual, value, std, identical, guessed, noise.common), std
 
 
 def variance(noise: Noise, std: float) -> float:
     """Variance of an estimate that declares `std`; wider while a guessed scale rests on few differences."""
     doubt = 1.0 + 4.0 / max(noise.weight, 1.0) if noise.guessed else 1.0
     return noise.factor * doubt * std**2
+
+
+def one_for_all(noise: Noise, values: Samples, stds: Samples) -> Noise:
+    """Use one standard deviation for all from here on, if that explains the first values clearly better."""
+    if noise.common or noise.guessed or np.ptp(stds) == 0.0:
+        return noise
+    usual = float(np.median(stds))
+    declared, alike = stds[1:] ** 2 + stds[:-1] ** 2, np.full(len(stds) - 1, 2.0 * usual**2)
+    squares = np.diff(values) ** 2
+    if _likelihood(squares, alike) < _likelihood(squares, declared) + CLEARLY:
+        return noise
+    return replace(noise, common=True, usual_std=usual, last_std=usual)
+
+
+def _likelihood(squares: Samples, variances: Samples) -> float:
+    """Log likelihood of differences at their likeliest factor, a few of them with an outlier in."""
+    scaled = squares / variances
+    factor = _fit(scaled, max(float(np.median(scaled)) / 0.4549, SMALLEST_FACTOR), 0.0)
+    good = (1.0 - CONTAMINATED) * np.exp(-0.5 * scaled / factor)
+    odd = CONTAMINATED / math.sqrt(WIDE) * np.exp(-0.5 * scaled / (factor * WIDE))
+    return float(np.sum(np.log(np.maximum(good + odd, 1e-300)) - 0.5 * np.log(factor * variances)))
 
 
 def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:

@@ -194,13 +194,18 @@ def _learn(
     n = len(history.rows)
     ended = n >= settings.commissioning_cycles
     state = replace(state, history=None if ended else history)
+    alike = state.noise.common
     if n in commissioning.EARLY:
-        rows = history.rows
-        settled = noises.settle(state.noise, rows[:, commissioning.VALUE], rows[:, commissioning.STD])
+        first = history.rows[:, commissioning.VALUE], history.rows[:, commissioning.STD]
+        noise = noises.one_for_all(state.noise, *first)
+        if noise.common and not alike:
+            history = commissioning.with_std(history, noise.usual_std)
+            state = replace(state, history=None if ended else history)
+        settled = noises.settle(noise, first[0], history.rows[:, commissioning.STD])
         state = replace(state, noise=settled)
         unit = settled.factor * settled.usual_std**2
     moved = max(state.noise.factor / state.replayed_factor, state.replayed_factor / state.noise.factor)
-    rescaled = moved > commissioning.RESCALED
+    rescaled = moved > commissioning.RESCALED or state.noise.common != alike
     if not (ended or n in commissioning.SCHEDULE or (rescaled and n in commissioning.EARLY)):
         return state, notes
     level_walk, slope_walk = settings.level_noise, settings.slope_noise
