@@ -1,7 +1,8 @@
 """Shared by all tests: where the sample data lie, and no asyncio task may outlive its test."""
 
 import asyncio
-from collections.abc import AsyncIterator
+import logging
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,16 @@ def shared_data() -> Path:
     if not SHARED.is_dir():
         pytest.skip("the sample data are not beside this checkout")
     return SHARED
+
+
+@pytest.fixture(autouse=True)
+def same_log_level() -> Iterator[None]:
+    """Give every test the log level that the first one had: `-q` of one must not silence the next."""
+    loggers = [logging.getLogger(name) for name in ("", "impactcell", "simulator")]
+    before = [logger.level for logger in loggers]
+    yield
+    for logger, level in zip(loggers, before, strict=True):
+        logger.setLevel(level)
 
 
 @pytest_asyncio.fixture
