@@ -134,7 +134,7 @@ def one_for_all(noise: Noise, values: Samples, stds: Samples) -> Noise:
 def _likelihood(squares: Samples, variances: Samples) -> float:
     """Log likelihood of differences at their likeliest factor, a few of them with an outlier in."""
     scaled = squares / variances
-    factor = _fit(scaled, max(float(np.median(scaled)) / 0.4549, SMALLEST_FACTOR), 0.0)
+    factor = _fit(scaled, _start(scaled), 0.0)
     good = (1.0 - CONTAMINATED) * np.exp(-0.5 * scaled / factor)
     odd = CONTAMINATED / math.sqrt(WIDE) * np.exp(-0.5 * scaled / (factor * WIDE))
     return float(np.sum(np.log(np.maximum(good + odd, 1e-300)) - 0.5 * np.log(factor * variances)))
@@ -143,13 +143,17 @@ def _likelihood(squares: Samples, variances: Samples) -> float:
 def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:
     """Fit the factor to all of the first values at once, for following it up from a wrong one takes long."""
     squared = np.diff(values) ** 2 / (stds[1:] ** 2 + stds[:-1] ** 2)
-    # start from the median, which outliers hardly move: that of a squared standard normal is 0.4549
-    start = max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
+    start = _start(squared)
     factor = _fit(squared, start, 0.0 if noise.guessed else DECLARED_WEIGHT)
     if not 1.0 / CONTRADICTED < factor < CONTRADICTED:
         # what was declared is plainly wrong, and is no longer to weigh against the data
         factor = _fit(squared, start, 0.0)
     return replace(noise, factor=factor, rough=factor)
+
+
+def _start(squared: Samples) -> float:
+    """Factor by the median, which outliers hardly move: that of a squared standard normal is 0.4549."""
+    return max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
 
 
 @compiled

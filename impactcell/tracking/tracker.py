@@ -193,17 +193,16 @@ def _learn(
     history = commissioning.remember(state.history, index, reading.mu_s, std, announced, reading.batch_id)
     n = len(history.rows)
     ended = n >= settings.commissioning_cycles
-    state = replace(state, history=None if ended else history)
     alike = state.noise.common
     if n in commissioning.EARLY:
-        first = history.rows[:, commissioning.VALUE], history.rows[:, commissioning.STD]
-        noise = noises.one_for_all(state.noise, *first)
+        values = history.rows[:, commissioning.VALUE]
+        noise = noises.one_for_all(state.noise, values, history.rows[:, commissioning.STD])
         if noise.common and not alike:
             history = commissioning.with_std(history, noise.usual_std)
-            state = replace(state, history=None if ended else history)
-        settled = noises.settle(noise, first[0], history.rows[:, commissioning.STD])
+        settled = noises.settle(noise, values, history.rows[:, commissioning.STD])
         state = replace(state, noise=settled)
         unit = settled.factor * settled.usual_std**2
+    state = replace(state, history=None if ended else history)
     moved = max(state.noise.factor / state.replayed_factor, state.replayed_factor / state.noise.factor)
     rescaled = moved > commissioning.RESCALED or state.noise.common != alike
     if not (ended or n in commissioning.SCHEDULE or (rescaled and n in commissioning.EARLY)):

@@ -1,7 +1,5 @@
 """What a verb is given is looked at before it works, and found wanting as bad input."""
 
-import logging
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,15 +7,6 @@ import pytest
 from impactcell.__main__ import main
 
 CELL = str(Path(__file__).resolve().parents[3] / "config" / "cells" / "prototype.yaml")
-
-
-@pytest.fixture(autouse=True)
-def level() -> Iterator[None]:
-    """Leave the level as it was before `main`."""
-    logger = logging.getLogger("impactcell")
-    before = logger.level
-    yield
-    logger.setLevel(before)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """`-q` silences what is said beside a result, and never the result."""
 
 import logging
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,12 +15,9 @@ PKG = logging.getLogger("impactcell")
 
 
 @pytest.fixture(autouse=True)
-def level() -> Iterator[None]:
-    """Start as `main` does, and leave the level as it was."""
-    before = PKG.level
+def level() -> None:
+    """Start as `main` does."""
     PKG.setLevel(logging.INFO)
-    yield
-    PKG.setLevel(before)
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
