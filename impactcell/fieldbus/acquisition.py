@@ -145,7 +145,7 @@ class Module:
                 newest = shown
                 want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, overtaken // 2)
                 if want is None:
-                    await asyncio.sleep(schedule.delay_s(loop.time(), self._client.round_trip_s))
+                    await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
                 read = await self._reader.fetch(want)
             except FieldbusError as error:
@@ -167,7 +167,7 @@ class Module:
             self._count(reception, readable=read.readable)
             yield reception
             if last == newest:  # nothing waits behind it
-                await asyncio.sleep(schedule.delay_s(loop.time(), self._client.round_trip_s))
+                await asyncio.sleep(schedule.delay_s(loop.time()))
 
     async def _connect(self) -> None:
         """Connect and check who answers."""

@@ -1,6 +1,7 @@
 """When to ask for the next cycle: often when one is due, else seldom. Pure; the caller brings the time."""
 
 import math
+from collections import deque
 from typing import Final
 
 FINE_S: Final = 0.003
@@ -18,6 +19,10 @@ _SOMEWHAT_LATE: Final = 4.0
 """So many margins beyond when it was due a cycle is still looked for as if it were."""
 _LONGEST: Final = 3.0
 """A longer time between cycles, in periods, is a pause or a clock that was set, and counts as this."""
+_REST: Final = 3.0
+"""Round trips of rest between polls that no cycle is due for; one while one is."""
+_ROUND_TRIPS: Final = 8
+"""The shortest of so many polls is what the line takes; the others waited for a busy module or for us."""
 _DRIFT: Final = 5e-4
 """The most by which the module's clock can be slow or fast."""
 _UNKNOWN: Final = (-math.inf, math.inf)
@@ -42,12 +47,14 @@ class PollSchedule:
         self._period_s: float | None = None
         self._spread_s = 0.0
         self._lag_s = _UNKNOWN
+        self._took_s: deque[float] = deque(maxlen=_ROUND_TRIPS)
 
     def polled(self, asked_s: float, answered_s: float, *, new: bool) -> None:
         """Take note of a poll, and whether it showed a cycle that the one before did not."""
         if new:
             self._before_s, self._seen_s = self._asked_s, answered_s
         self._asked_s = asked_s
+        self._took_s.append(answered_s - asked_s)
 
     def learn(self, made_s: float, cycles: int = 1, *, newest: bool = True) -> None:
         """Take note of when a cycle was made, on any clock.
@@ -88,22 +95,23 @@ class PollSchedule:
         high_s = min(high_s, most_s)
         return min(max(low_s, least_s), high_s), high_s
 
-    def delay_s(self, now_s: float, round_trip_s: float) -> float:
-        """Return the wait before the next poll; at least three round trips, so that a slow line has rest."""
-        rest_s = 3.0 * round_trip_s if round_trip_s == round_trip_s else 0.0
+    def delay_s(self, now_s: float) -> float:
+        """Return the wait before the next poll: a round trip or three at least, so that a slow line rests."""
+        round_trip_s = min(self._took_s, default=0.0)
+        rest_s = _REST * round_trip_s
         low_s, high_s = self._lag_s
         if self._made_s is None or self._period_s is None or low_s == -math.inf:
             return max(rest_s, QUIET_S)
-        least_s = max(rest_s, min(max(FINE_S, self._spread_s, 0.5 * (high_s - low_s)), COARSE_S))
+        least_s = max(round_trip_s, min(max(FINE_S, self._spread_s, 0.5 * (high_s - low_s)), COARSE_S))
         due_s = self._made_s + self._period_s
         margin_s = 2.0 * self._spread_s + FINE_S
         early_s = due_s + low_s - margin_s - now_s
         if early_s > 0.0:
             regular = 10.0 * margin_s < self._period_s
-            return max(least_s, min(early_s, REGULAR_S if regular else QUIET_S))
+            return max(least_s, min(early_s, REGULAR_S if regular else max(rest_s, QUIET_S)))
         overdue_s = now_s - due_s - high_s
         if overdue_s < margin_s:
             return least_s
         if overdue_s < _SOMEWHAT_LATE * margin_s:
             return max(least_s, COARSE_S)
-        return max(least_s, min(IDLE_S, QUIET_S if overdue_s < 3.0 * self._period_s else 0.1 * overdue_s))
+        return max(rest_s, min(IDLE_S, QUIET_S if overdue_s < 3.0 * self._period_s else 0.1 * overdue_s))
