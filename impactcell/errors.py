@@ -25,7 +25,7 @@
     │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry, if busy)
     ├── JournalError
     │   ├── ForeignJournalError   not our file, or of another version; never overwritten
-    │   └── JournalFullError      the disk or the quota is full                       (retry)
+    │   └── JournalFullError      the disk is full, or the file cannot be used now    (retry)
     └── AccessError               users, certificates and rights of the OPC UA server
 
 `retry` says whether doing the same again can help. A message names the cell, the thing and the way out.
@@ -156,7 +156,7 @@ class ForeignJournalError(JournalError):
 
 
 class JournalFullError(JournalError):
-    """The disk or its quota is full, or the file cannot be written now."""
+    """The disk or its quota is full, or the file cannot be opened or written now."""
 
     retry: ClassVar[bool] = True
 

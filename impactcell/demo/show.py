@@ -21,6 +21,7 @@ from impactcell.demo.remedy import Remedy
 from impactcell.demo.stage import USER, Stage, set_up
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
+from impactcell.fieldbus.acquisition import ModuleStatus
 from impactcell.records import Snapshot
 from impactcell.service import Service
 
@@ -111,8 +112,8 @@ class _Show:
         self.endpoint = self.service.endpoints[self.stage.cell.name]
 
     def _take(self, snapshot: Snapshot) -> None:
-        assert self.service is not None  # noqa: S101 - it calls us
-        self.missed = self.service.running[self.stage.cell.name].status.missed
+        assert self._status is not None  # noqa: S101 - its cell calls us
+        self.missed = self._status.missed
         before = {alarm.name: alarm.active for alarm in self.snapshots[-1].alarms} if self.snapshots else {}
         self.raised += [
             {"alarm": alarm.name.value, "cycle": snapshot.cycle, "message": alarm.message}
@@ -131,10 +132,16 @@ class _Show:
                     await news.wait()
             except TimeoutError:
                 stop.set()
-                reason = self.service.running[self.stage.cell.name].status.reason if self.service else ""
+                reason = "" if self._status is None else self._status.reason
                 raise ImpactCellError(
                     f"no cycle for {PATIENCE_S:g} s: {reason or 'the module is silent'}"
                 ) from None
+
+    @property
+    def _status(self) -> ModuleStatus | None:
+        """State of the link; None while the cell does not run."""
+        running = self.service.running.get(self.stage.cell.name) if self.service else None
+        return None if running is None else running.status
 
     def scene(self) -> Scene:
         """Return what the live view shows now."""
@@ -142,8 +149,7 @@ class _Show:
         happened = sorted([*self.stage.story, *self.told], key=lambda entry: entry[0])
         told = [text for cycle, text in happened if cycle <= last]
         who = f"user {USER}, password {self.stage.password}"
-        status = self.service.running[self.stage.cell.name].status if self.service else None
-        link = "connected" if status is None or status.connected else "not connected"
+        link = "connected" if self._status is None or self._status.connected else "not connected"
         return Scene(
             self.stage.cell.name,
             f"{self.endpoint} · {who}",

@@ -1,5 +1,6 @@
 """The journal's file: opened, checked to be ours, and its errors by name."""
 
+import errno
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,20 +18,24 @@ _APPLICATION_ID_AT: Final = 68
 
 @contextmanager
 def errors(path: Path) -> Iterator[None]:
-    """Turn SQLite's errors into ours, which say whether trying again can help."""
+    """Turn the errors of SQLite and of the system into ours, which say whether trying again can help."""
     try:
         yield
+    except OSError as error:
+        raise _for_now(path, error.strerror, full=error.errno in (errno.ENOSPC, errno.EDQUOT)) from error
     except sqlite3.OperationalError as error:
         code = error.sqlite_errorcode & 0xFF
         if code == sqlite3.SQLITE_ERROR:  # a table is missing
             raise JournalError(f"{path}: cannot be used ({error}); name another file") from error
-        if code in _NO_ROOM:
-            raise JournalFullError(f"{path}: the disk or its quota is full ({error}); make room") from error
-        raise JournalFullError(
-            f"{path}: cannot be written now ({error}); check its disk, directory and owner"
-        ) from error
+        raise _for_now(path, error, full=code in _NO_ROOM) from error
     except (sqlite3.DatabaseError, OverflowError) as error:
         raise JournalError(f"{path}: cannot be used ({error})") from error
+
+
+def _for_now(path: Path, reason: object, *, full: bool) -> JournalFullError:
+    if full:
+        return JournalFullError(f"{path}: the disk or its quota is full ({reason}); make room")
+    return JournalFullError(f"{path}: cannot be used now ({reason}); check its disk, directory and owner")
 
 
 def opened(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.Connection:
@@ -40,27 +45,26 @@ def opened(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.Connecti
     ------
     ForeignJournalError
         The file is not a journal, of another format, or of another cell; it is left as it is.
+    JournalFullError
+        It cannot be opened now.
     JournalError
-        It cannot be opened.
+        It is damaged.
     """
     if not read_only:
         _check_header(path)
-    try:
+    with errors(path):
         database = sqlite3.connect(
             f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}",
             uri=True,
             isolation_level=None,
             check_same_thread=False,
         )
-    except sqlite3.Error as error:
-        raise JournalError(f"{path}: cannot be opened ({error}); check its directory and owner") from error
     try:
-        if _pages(database, path) == 0 and not read_only:
-            with errors(path):
+        with errors(path):
+            if _pages(database, path) == 0 and not read_only:
                 _create(database, cell or "")
-        _check(database, path, cell)
-        if not read_only:
-            with errors(path):
+            _check(database, path, cell)
+            if not read_only:
                 database.execute("PRAGMA journal_mode = WAL")
                 database.execute("PRAGMA synchronous = FULL")
     except BaseException:
@@ -74,18 +78,12 @@ def _pragma(database: sqlite3.Connection, name: str) -> int:
 
 
 def _pages(database: sqlite3.Connection, path: Path) -> int:
-    with errors(path):
-        try:
-            return _pragma(database, "page_count")
-        except sqlite3.DatabaseError as error:
-            code = error.sqlite_errorcode & 0xFF
-            if code in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
-                raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
-            if code in _NO_ROOM:
-                raise
-            raise JournalError(
-                f"{path}: cannot be opened ({error}); check its owner and directory"
-            ) from error
+    try:
+        return _pragma(database, "page_count")
+    except sqlite3.DatabaseError as error:
+        if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
+            raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
+        raise
 
 
 def _check_header(path: Path) -> None:
@@ -127,8 +125,7 @@ def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
             f"{path}: journal format {version}, this program writes {FORMAT}; it is left as it is: "
             "name another file"
         )
-    with errors(path):
-        named = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
+    named = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
     kept = named[0] if named else ""
     if cell is not None and kept != cell:
         raise ForeignJournalError(f"{path}: the journal of cell '{kept}', not of '{cell}'; name another file")

@@ -64,21 +64,19 @@ class Journal:
     ------
     ForeignJournalError
         If the file is not a journal, of another format, or of another cell; it is left as it is.
+    JournalFullError
+        If the file cannot be opened now.
     JournalError
-        If the file cannot be opened.
+        If it never can: another service writes it, or it is damaged.
     """
 
     def __init__(self, path: Path, cell: str | None, *, read_only: bool = False) -> None:
         self.path = path
         self._appended: Position | None = None
-        try:
+        with self._errors():
             if read_only and not path.is_file():
                 raise JournalError(f"{path}: there is no such journal")
             self._lock = None if read_only else locked(path)
-        except OSError as error:
-            raise JournalError(
-                f"{path}: cannot be opened ({error.strerror}); check its directory and owner"
-            ) from error
         try:
             self._db = opened(path, cell, read_only=read_only)
         except BaseException:

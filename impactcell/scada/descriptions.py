@@ -210,7 +210,7 @@ class HistorySource(Protocol):
     """Where the past is kept. Times are nanoseconds since 1970, both ends inclusive, None is open.
 
     `newest_first` reverses the order. A page holds at most `limit` entries; `resume` continues an earlier
-    page of the same question and stays valid over restarts.
+    page of the same question and stays valid over restarts. Every call may raise `RefusedError`.
     """
 
     async def values(

@@ -19,28 +19,33 @@ class CellActions:
     def __init__(self, cells: Mapping[str, RunningCell]) -> None:
         self._cells = cells
 
+    def _cell(self, cell: str) -> RunningCell:
+        if cell not in self._cells:
+            raise RefusedError("BadInvalidState", f"{cell}: does not run, its journal cannot be opened")
+        return self._cells[cell]
+
     async def start_batch(self, cell: str, batch_id: str, *, expected: bool, actor: Actor) -> None:
         """Begin another batch of material."""
         audit = _audit(actor, "StartBatch", BatchId=batch_id, Expected=expected)
-        await self._cells[cell].worker.change(
+        await self._cell(cell).worker.change(
             lambda state: core.start_batch(state, batch_id, expected=expected), audit
         )
 
     async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
         """Learn the wear level anew after worn parts were replaced."""
-        await self._cells[cell].worker.change(core.renew_surface, _audit(actor, "ResetWear", Comment=comment))
+        await self._cell(cell).worker.change(core.renew_surface, _audit(actor, "ResetWear", Comment=comment))
 
     async def set_target(self, cell: str, target_m: float, actor: Actor) -> None:
         """Start a positioning task."""
         try:
-            await self._cells[cell].set_target(target_m, _audit(actor, "SetTarget", Target=target_m * 1e3))
+            await self._cell(cell).set_target(target_m, _audit(actor, "SetTarget", Target=target_m * 1e3))
         except PositioningError as error:
             raise RefusedError("BadInvalidState", str(error)) from error
 
     async def abort_positioning(self, cell: str, actor: Actor) -> None:
         """End the positioning task that runs."""
         try:
-            await self._cells[cell].abort_positioning(_audit(actor, "AbortPositioning"))
+            await self._cell(cell).abort_positioning(_audit(actor, "AbortPositioning"))
         except PositioningError as error:
             raise RefusedError("BadInvalidState", str(error)) from error
 
@@ -59,7 +64,7 @@ class CellActions:
         occurrence = Occurrence(
             event, time_ns=audit.time_ns, user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
         )
-        done = await self._cells[cell].worker.act(alarm, occurrence, audit)
+        done = await self._cell(cell).worker.act(alarm, occurrence, audit)
         if done.refusal is not None:
             raise RefusedError(done.refusal.value, f"{cell}: {alarm.value}: {done.refusal.value}")
         return done.alarm

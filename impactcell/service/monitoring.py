@@ -42,7 +42,7 @@ class CellHealth:
 
 
 def absent(cell: str) -> CellHealth:
-    """Health of a cell that does not run."""
+    """Health of a cell that waits until its journal can be opened; the alarm is the journal's."""
     return CellHealth(
         cell,
         connected=False,
@@ -52,7 +52,7 @@ def absent(cell: str) -> CellHealth:
         round_trip_ms=math.nan,
         mu_s=math.nan,
         wear_level=math.nan,
-        alarms_active=0,
+        alarms_active=1,
         journal_ok=False,
     )
 

@@ -9,11 +9,15 @@ import sys
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 
+from impactcell import cell as core
+from impactcell.alarms import Finding
+from impactcell.celllog import CellLogger
 from impactcell.errors import JournalError
+from impactcell.records import AlarmName
 from impactcell.scada import Server
 from impactcell.service import logs, systemd
 from impactcell.service.actions import CellActions
-from impactcell.service.design import cell_description, server_settings
+from impactcell.service.design import cell_description, cell_design, server_settings
 from impactcell.service.monitoring import CellHealth, Monitoring, absent
 from impactcell.service.past import JournalHistory
 from impactcell.service.running import Observer, RunningCell
@@ -26,6 +30,9 @@ SWITCH_S = 0.001
 twenty times a capture: Python's own 5 ms would be felt."""
 RESTART_S = 1.0
 """A cell that met a fault of ours is begun anew after this long."""
+AGAIN_S, AGAIN_AT_MOST_S = 1.0, 30.0
+"""A journal that cannot be opened is tried again after the first, each time after twice as long, and at last
+every so often as the second says."""
 
 
 class Service:
@@ -37,19 +44,18 @@ class Service:
     observe : callable, optional
         Called with the cell's name and each snapshot, after it was published.
 
-    A cell whose journal cannot be opened is told and left out, the others run.
+    A cell whose journal cannot be opened is told and waits, without values, until it can; the others run.
 
     Raises
     ------
     JournalError
-        No cell's journal can be opened; nothing has been started.
+        No journal can be opened, and trying again cannot help; nothing has been started.
     """
 
     def __init__(self, cells: Sequence[Cell], observe: Observer | None = None) -> None:
         self._cells = tuple(cells)
         self._observe = observe
         self.running: dict[str, RunningCell] = {}
-        self._left_out: tuple[str, ...] = ()
         self.endpoints: dict[str, str] = {}
         """Where each cell is to be found, once `run` has started."""
 
@@ -65,9 +71,9 @@ class Service:
                 self.endpoints[cell.name] = servers[cell.settings.opcua.endpoint].endpoint
             tasks = [
                 asyncio.create_task(
-                    self._keep_running(running, servers[running.cell.settings.opcua.endpoint]), name=name
+                    self._keep_running(cell, servers[cell.settings.opcua.endpoint]), name=cell.name
                 )
-                for name, running in self.running.items()
+                for cell in self._cells
             ]
             tasks.append(asyncio.create_task(_watchdog(), name="watchdog"))
             systemd.notify("READY=1")
@@ -84,37 +90,33 @@ class Service:
 
     def _begin(self) -> None:
         """Make every cell that can run."""
-        faults: dict[str, JournalError] = {}
+        faults: list[JournalError] = []
         for cell in self._cells:
             try:
                 self.running[cell.name] = RunningCell(cell, self._observe)
             except JournalError as error:
-                faults[cell.name] = error
-        if faults and not self.running:
-            raise JournalError("\n".join(map(str, faults.values())))
-        for name, fault in faults.items():
-            log.error("cell=%s is left out until the service is started anew: %s", name, fault)
-        self._cells = tuple(cell for cell in self._cells if cell.name in self.running)
-        self._left_out = tuple(faults)
+                faults.append(error)
+        if faults and not self.running and not any(fault.retry for fault in faults):
+            raise JournalError("\n".join(map(str, faults)))
 
     def _health(self) -> list[CellHealth]:
-        return [cell.health for cell in self.running.values()] + [absent(name) for name in self._left_out]
+        cells = [(cell.name, self.running.get(cell.name)) for cell in self._cells]
+        return [absent(name) if running is None else running.health for name, running in cells]
 
     async def reload(self) -> None:
         """Read every cell's files again; see `RunningCell.reload`."""
         systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
-        for running in self.running.values():
+        for running in tuple(self.running.values()):
             await running.reload()
         systemd.notify("READY=1")
 
     def _server(self, endpoint: str) -> Server:
         cells = [cell for cell in self._cells if cell.settings.opcua.endpoint == endpoint]
-        running = {cell.name: self.running[cell.name] for cell in cells}
         return Server(
             server_settings(cells[0]),
             [cell_description(cell) for cell in cells],
-            JournalHistory({name: one.worker for name, one in running.items()}),
-            CellActions(running),
+            JournalHistory(self.running),
+            CellActions(self.running),
         )
 
     @contextlib.asynccontextmanager
@@ -127,18 +129,42 @@ class Service:
                 log.info("health and metrics at http://%s:%d", http.host, http.port)
             yield
 
-    async def _keep_running(self, running: RunningCell, server: Server) -> None:
+    async def _keep_running(self, cell: Cell, server: Server) -> None:
         """Begin a cell anew after a fault of ours, so that it stops neither itself nor the others."""
+        logger = CellLogger(log, cell.name)
         while True:
             try:
-                await running.run(server)
+                if cell.name not in self.running:
+                    await self._open(cell, server)
+                    logger.info("its journal can be opened now; the cell runs")
+                await self.running[cell.name].run(server)
             except asyncio.CancelledError:
                 raise
             except Exception:
-                running.log.exception("a fault of this program; the cell is begun anew in %g s", RESTART_S)
+                logger.exception("a fault of this program; the cell is begun anew in %g s", RESTART_S)
                 with contextlib.suppress(KeyError):
-                    server.mark_bad(running.cell.name, time.time_ns())
+                    server.mark_bad(cell.name, time.time_ns())
                 await asyncio.sleep(RESTART_S)
+
+    async def _open(self, cell: Cell, server: Server) -> None:
+        """Make a cell as soon as its journal can be opened; each reason why it cannot is told once."""
+        reason, again_s = "", AGAIN_S
+        while True:
+            # In a thread: a disk may take its time, and the others go on.
+            opening = asyncio.create_task(asyncio.to_thread(RunningCell, cell, self._observe))
+            try:
+                self.running[cell.name] = await asyncio.shield(opening)
+                return await self.running[cell.name].reload()  # its files may be others by now
+            except asyncio.CancelledError:
+                with contextlib.suppress(JournalError):
+                    self.running[cell.name] = await opening  # to be closed
+                raise
+            except JournalError as error:
+                if str(error) != reason:
+                    reason = str(error)
+                    _tell_fault(cell, server, reason)
+            await asyncio.sleep(again_s)
+            again_s = min(2.0 * again_s, AGAIN_AT_MOST_S)
 
 
 def run(cells: Sequence[Cell]) -> None:
@@ -185,6 +211,15 @@ async def _until_signalled(service: Service) -> bool:
 def _say_started(service: Service) -> None:
     for cell, endpoint in service.endpoints.items():
         log.info("cell=%s at %s", cell, endpoint)
+
+
+def _tell_fault(cell: Cell, server: Server, reason: str) -> None:
+    """Log why a cell does not run, and raise its alarm; once it runs, it shows its own."""
+    log.error("cell=%s waits until its journal can be opened: %s", cell.name, reason)
+    design = cell_design(cell)
+    fault = Finding(AlarmName.JOURNAL_FAULT, holds=True, message=reason)
+    for alarm in core.find(design, core.initial_state(design), fault, time.time_ns())[1]:
+        server.alarm(cell.name, alarm)
 
 
 async def _watchdog() -> None:

@@ -10,7 +10,7 @@ from functools import partial
 
 from impactcell.alarms import Finding
 from impactcell.celllog import CellLogger
-from impactcell.errors import ImpactCellError, PositioningError
+from impactcell.errors import ImpactCellError, JournalError, PositioningError
 from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
 from impactcell.intake import Announcement
 from impactcell.journal.retention import Retention
@@ -52,7 +52,12 @@ class RunningCell:
         settings = cell.settings.journal
         journal = None if settings is None else Journal(settings.file, cell.name)
         keep = Retention() if settings is None else retention(settings)
-        self.worker = Worker(cell_design(cell), journal, keep)
+        try:
+            self.worker = Worker(cell_design(cell), journal, keep)
+        except JournalError:
+            if journal is not None:
+                journal.close()
+            raise
         self.server: Server | None = None
         self._notes: tuple[str, ...] = ()
         self._active = {alarm.name for alarm in self.worker.alarms if alarm.active}

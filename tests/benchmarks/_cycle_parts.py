@@ -92,7 +92,7 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
     cell = read_cell(file)
     running = RunningCell(cell)
     recorded, rows = captures(), []
-    history, actions = JournalHistory({cell.name: running.worker}), CellActions({cell.name: running})
+    history, actions = JournalHistory({cell.name: running}), CellActions({cell.name: running})
     async with Server(server_settings(cell), [cell_description(cell)], history, actions) as server:
         for cycle in range(1, LEARNING + number + 1):
             np.add(ELSEWHERE, 1.0, out=ELSEWHERE)

@@ -13,7 +13,11 @@ from typing import Any
 import pytest
 
 from impactcell.errors import JournalError
+from impactcell.journal.store import Journal
 from impactcell.records import AlarmName, Quality
+from impactcell.scada import Actor, RefusedError, Role
+from impactcell.service.actions import CellActions
+from impactcell.service.past import JournalHistory
 from tests.integration.processes import CONFIG, simulator, write_cell
 from tests.integration.watched import serving
 
@@ -103,11 +107,45 @@ async def test_a_foreign_journal_keeps_its_own_cell_out_and_no_other(
                 assert answer.code == 503
                 assert json.load(answer) == {"well": True, "odd": False}
     assert (tmp_path / "odd.sqlite").read_bytes() == foreign
-    assert "cell=odd is left out until the service is started anew" in caplog.text
+    assert "cell=odd waits until its journal can be opened" in caplog.text
     assert "odd.sqlite" in caplog.text
     with pytest.raises(JournalError, match=r"odd\.sqlite"):
         async with serving(odd):
             pass
+
+
+async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caplog.set_level(logging.INFO, "impactcell")
+    monkeypatch.setattr("impactcell.service.process.AGAIN_S", 0.05)
+    obstacle = tmp_path / "press-1.sqlite.lock"
+    obstacle.mkdir()
+    actor = Actor("anna", Role.ENGINEER, "127.0.0.1")
+    async with simulator(tmp_path, strikes={"period_s": 0.25}) as module:
+        path = write_cell(tmp_path, module["port"], monitoring={"port": 0})
+        async with serving(path) as watched:
+            at = re.search(r"metrics at (http://\S+)", caplog.text)
+            assert at is not None
+            await asyncio.sleep(0.3)
+            with pytest.raises(urllib.error.HTTPError, match="503") as caught:
+                await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz")
+            caught.value.close()
+            actions, history = CellActions(watched.service.running), JournalHistory(watched.service.running)
+            with pytest.raises(RefusedError, match="does not run"):
+                await actions.start_batch("press-1", "B", expected=True, actor=actor)
+            with pytest.raises(RefusedError, match="cannot be opened"):
+                await history.values("press-1", "Friction/StaticFriction", None, None, 1)
+            obstacle.rmdir()
+            await watched.until("press-1", 3)
+            with await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz") as answer:
+                assert json.load(answer) == {"press-1": True}
+            await actions.start_batch("press-1", "B", expected=True, actor=actor)
+            assert (await history.values("press-1", "Friction/StaticFriction", None, None, 1)).values
+    with Journal(tmp_path / "press-1.sqlite", "press-1") as journal:
+        assert journal.count() >= 3
+    for said in ("cell=press-1 waits until its journal can be opened", "opened now; the cell runs"):
+        assert caplog.text.count(said) == 1, said
 
 
 async def test_another_map_version_is_refused_by_name(tmp_path: Path) -> None:

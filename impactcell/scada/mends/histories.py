@@ -10,7 +10,7 @@ from typing import Any, Final
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
-from impactcell.scada.descriptions import HistorySource
+from impactcell.scada.descriptions import HistorySource, RefusedError
 from impactcell.scada.mends.codec import FaultError
 from impactcell.scada.mends.dispatch import Context, Service, bounded
 from impactcell.scada.mends.eventfilter import Event, EventFilter
@@ -85,6 +85,9 @@ class Histories:
             data, left = await self._ask(node.NodeId, details, index, state)
         except FaultError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
+            return result
+        except RefusedError as refused:
+            result.StatusCode = ua.StatusCode(getattr(ua.StatusCodes, refused.code))
             return result
         if isinstance(data, ua.HistoryData):
             data.DataValues = [with_timestamps(value, wanted.TimestampsToReturn) for value in data.DataValues]
