@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.records import Samples
 from impactcell.tracking import bank as banks
 from impactcell.tracking import wear
-from impactcell.tracking.noise import Noise
+from impactcell.tracking.noise import Noise, moved
 from impactcell.tracking.screening import Place
 from impactcell.tracking.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.state import Reading, Shift, TrackerState
@@ -135,6 +135,6 @@ def _settled(state: TrackerState, noise: Noise) -> bool:
     """Whether the scale of the noise is known well enough to tell a shift from noise."""
     if noise.weight < FEWEST_DIFFERENCES:
         return False
-    moved = noise.factor / state.replayed_factor
-    early = state.history is not None and noise.weight < LEARNING_DIFFERENCES
-    return not early or 1.0 / SETTLED < moved < SETTLED
+    if state.history is None or noise.weight >= LEARNING_DIFFERENCES:
+        return True
+    return moved(noise, state.replayed, np.array([noise.last_std])) < SETTLED

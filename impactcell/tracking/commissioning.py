@@ -13,7 +13,9 @@ import numpy as np
 
 from impactcell.records import Samples
 from impactcell.tracking import bank as banks
+from impactcell.tracking import noise as noises
 from impactcell.tracking import wear
+from impactcell.tracking.noise import Noise
 from impactcell.tracking.settings import TrackerSettings
 
 SCHEDULE = (50, 100, 200)  # cycles after which there is a first look, before the end of commissioning
@@ -71,27 +73,20 @@ def remember(
     return replace(history, rows=rows, batches=batches)
 
 
-def with_std(history: History, std: float) -> History:
-    """Give every cycle of the history the same declared standard deviation."""
-    rows = history.rows.copy()
-    rows[:, STD] = std
-    return replace(history, rows=rows)
-
-
 def replay(
-    settings: TrackerSettings, history: History, factor: float, level_walk: float, slope_walk: float
+    settings: TrackerSettings, history: History, noise: Noise, level_walk: float, slope_walk: float
 ) -> Replayed:
     """Run the bank over the history.
 
     Parameters
     ----------
-    factor : float
-        Of the declared variances.
+    noise : Noise
+        What is known of it by now.
     level_walk, slope_walk : float
         Standard deviations a cycle, in standard deviations of one estimate.
     """
     rows = history.rows
-    variance = factor * rows[:, STD] ** 2
+    variance = noises.variances(noise, rows[:, STD])
     unit = float(np.median(variance))
     readings = np.zeros((len(rows), 6))
     readings[:, 0], readings[:, 1], readings[:, 4] = rows[:, VALUE], variance, rows[:, INDEX]
@@ -116,13 +111,13 @@ def replay(
     return Replayed(table[:count].copy(), (float(outliers[0]), float(outliers[1])), likelihood)
 
 
-def most_likely(settings: TrackerSettings, history: History, factor: float) -> tuple[float, float]:
+def most_likely(settings: TrackerSettings, history: History, noise: Noise) -> tuple[float, float]:
     """Find the random walks of level and slope, in standard deviations of one estimate a cycle."""
     start = (settings.level_noise, settings.slope_noise)
 
     @cache
     def likelihood(level: float, slope: float) -> float:
-        return replay(settings, history, factor, level, slope).likelihood
+        return replay(settings, history, noise, level, slope).likelihood
 
     none = likelihood(*start)
     level, best = start[0], none
@@ -139,11 +134,11 @@ def most_likely(settings: TrackerSettings, history: History, factor: float) -> t
 
 
 def replay_filter(
-    settings: TrackerSettings, history: History, factor: float, level_walk: float, slope_walk: float
+    settings: TrackerSettings, history: History, noise: Noise, level_walk: float, slope_walk: float
 ) -> wear.WearFilter:
     """Run the filter of known batches over the history."""
     rows = history.rows[history.rows[:, BATCH] >= 0.0]
-    variance = factor * rows[:, STD] ** 2
+    variance = noises.variances(noise, rows[:, STD])
     unit = float(np.median(variance))
     names = [history.batches[int(place)] for place in rows[:, BATCH]]
     state = wear.start(rows[0, VALUE], variance[0], settings.slope_std * math.sqrt(variance[0]), names[0])

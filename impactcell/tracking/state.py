@@ -71,6 +71,8 @@ class TrackerState:
         Index at which the PLC's present batch began, and how many there have been.
     tested : bool
         The present known batch has been reported as shifted, or was expected to be.
+    replayed : Noise
+        As it was when the first cycles were last gone over with it.
     """
 
     clock: Clock = field(default_factory=Clock)
@@ -87,7 +89,7 @@ class TrackerState:
     tested: bool = True
     shift: Shift | None = None
     first: int = 0
-    replayed_factor: float = 1.0
+    replayed: Noise = field(default_factory=Noise)
     history: History | None = None
     monitor: Monitor = field(default_factory=Monitor)
     level_variance: float = 0.0

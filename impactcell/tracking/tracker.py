@@ -83,6 +83,7 @@ def _begin(
         accepted=index,
         accepted_before=index,
         first=index,
+        replayed=state.noise,
         level_variance=settings.level_noise**2 * variance,
         slope_variance=settings.slope_noise**2 * variance,
         batch_id=reading.batch_id,
@@ -193,31 +194,28 @@ def _learn(
     history = commissioning.remember(state.history, index, reading.mu_s, std, announced, reading.batch_id)
     n = len(history.rows)
     ended = n >= settings.commissioning_cycles
-    alike = state.noise.common
-    if n in commissioning.EARLY:
-        values = history.rows[:, commissioning.VALUE]
-        noise = noises.one_for_all(state.noise, values, history.rows[:, commissioning.STD])
-        if noise.common and not alike:
-            history = commissioning.with_std(history, noise.usual_std)
-        settled = noises.settle(noise, values, history.rows[:, commissioning.STD])
-        state = replace(state, noise=settled)
-        unit = settled.factor * settled.usual_std**2
+    looked = ended or n in commissioning.SCHEDULE
     state = replace(state, history=None if ended else history)
-    moved = max(state.noise.factor / state.replayed_factor, state.replayed_factor / state.noise.factor)
-    rescaled = moved > commissioning.RESCALED or state.noise.common != alike
-    if not (ended or n in commissioning.SCHEDULE or (rescaled and n in commissioning.EARLY)):
+    if not (looked or n in commissioning.EARLY):
+        return state, notes
+    values, stds = history.rows[:, commissioning.VALUE], history.rows[:, commissioning.STD]
+    if n in commissioning.EARLY:
+        state = replace(state, noise=noises.settle(state.noise, values, stds))
+        unit = state.noise.factor * state.noise.usual_std**2
+    rescaled = noises.moved(state.noise, state.replayed, stds) > commissioning.RESCALED
+    if not (looked or rescaled):
         return state, notes
     level_walk, slope_walk = settings.level_noise, settings.slope_noise
-    if ended or n in commissioning.SCHEDULE:
-        level_walk, slope_walk = commissioning.most_likely(settings, history, state.noise.factor)
+    if looked:
+        level_walk, slope_walk = commissioning.most_likely(settings, history, state.noise)
     level, slope = level_walk**2 * unit, slope_walk**2 * unit
     unchanged = level == state.level_variance and slope == state.slope_variance
     if unchanged and not rescaled:
         return state, notes
-    again = commissioning.replay(settings, history, state.noise.factor, level_walk, slope_walk)
+    again = commissioning.replay(settings, history, state.noise, level_walk, slope_walk)
     filtered = state.filter and commissioning.replay_filter(
-        settings, history, state.noise.factor, level_walk, slope_walk
+        settings, history, state.noise, level_walk, slope_walk
     )
     fresh = replace(state, bank=again.bank, outliers=again.outliers, filter=filtered)
     fresh = replace(fresh, level_variance=level, slope_variance=slope)
-    return replace(fresh, replayed_factor=state.noise.factor), notes
+    return replace(fresh, replayed=state.noise), notes

@@ -21,7 +21,7 @@ UNIT, MEAN = 0.002, 0.2  # of a series in mu_s
 KNOWN_SEEDS = _streams.REPORTED + 20_000
 START_SEEDS = _streams.REPORTED + 30_000
 SOURCES = (
-    *("bank", "batch", "commissioning", "honesty", "hypotheses", "noise", "screening"),
+    *("bank", "batch", "commissioning", "declared", "honesty", "hypotheses", "noise", "screening"),
     *("settings", "tracker", "wear"),
 )
 DIRECTORY = Path(tracking.__file__).parent

@@ -11,7 +11,7 @@ from impactcell import alarms
 from impactcell.alarms import AlarmSettings
 from impactcell.records import AlarmName
 from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, gap, initial_state, signature, track
-from tests.benchmarks import _inside, _signatures, _slides, _steps, _tracker
+from tests.benchmarks import _declared, _inside, _signatures, _slides, _steps, _tracker
 from tests.benchmarks.table import Table
 
 
@@ -24,6 +24,7 @@ def tables(*, quick: bool = False) -> Iterator[Table]:
         _tracker.unknown_table,
         _tracker.starts_table,
         _tracker.known_table,
+        _declared.table,
         _steps.table,
         _signatures.speed_table,
         _signatures.error_table,

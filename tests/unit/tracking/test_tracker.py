@@ -299,23 +299,3 @@ def test_no_readings_whatever_break_the_state(readings, config):
         assert tracked.wear.quality is Quality.BAD or finite(tracked)
         assert tracked.used or tracked.wear.reason
     assert values.dumps(values.loads(TrackerState, values.dumps(state))) == values.dumps(state)
-
-
-@pytest.mark.parametrize(("honest", "common"), [(True, 1), (False, 10)])
-def test_declared_standard_deviations_that_say_nothing_of_the_spread_are_not_believed(honest, common):
-    """The width of a prior that all estimates share is no noise: velocities in turn declare 1 to 3.4."""
-    declared, chosen, shifts = np.array([0.0018, 0.0023, 0.0056, 0.0061]), 0, 0
-    for seed in range(12):
-        state, rng = initial_state(), np.random.default_rng(seed)
-        for cycle in range(1, 301):
-            std = float(declared[cycle % 4])
-            value = 0.2 + (std if honest else 0.0028) * rng.standard_normal()
-            tracked = track(
-                TrackerSettings(batch=BatchKnowledge.UNKNOWN),
-                state,
-                Reading(cycle, value, std, cycle * 10**9),
-            )
-            state, shifts = tracked.state, shifts + (tracked.shift is not None)
-        chosen += state.noise.common
-    assert (chosen <= common) if honest else (chosen >= common)
-    assert shifts <= 2  # 17 where they are believed
