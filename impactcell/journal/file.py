@@ -1,6 +1,7 @@
 """The journal's file: opened, checked to be ours, and its errors by name."""
 
 import errno
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -54,14 +55,14 @@ def opened(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.Connecti
         _check_header(path)
     with errors(path):
         database = sqlite3.connect(
-            f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}",
+            f"{path.absolute().as_uri()}?{_reading(path) if read_only else 'mode=rwc'}",
             uri=True,
             isolation_level=None,
             check_same_thread=False,
         )
     try:
         with errors(path):
-            if _pages(database, path) == 0 and not read_only:
+            if _pages(database, path, read_only=read_only) == 0 and not read_only:
                 _create(database, cell or "")
             _check(database, path, cell)
             if not read_only:
@@ -77,12 +78,30 @@ def _pragma(database: sqlite3.Connection, name: str) -> int:
     return int(database.execute(f"PRAGMA {name}").fetchone()[0])
 
 
-def _pages(database: sqlite3.Connection, path: Path) -> int:
+def _reading(path: Path) -> str:
+    """Say how to open a file that is only to be read.
+
+    SQLite wants to write a little beside the file even then. On a read-only medium, where it cannot, and
+    where nobody changes the file, it can do without, unless a log has what is not in the file yet.
+    """
+    logs = [path.with_name(path.name + suffix) for suffix in ("-wal", "-journal")]
+    unfinished = any(log.exists() and log.stat().st_size for log in logs)
+    fixed = os.statvfs(path).f_flag & os.ST_RDONLY and not unfinished
+    return "mode=ro&immutable=1" if fixed else "mode=ro"
+
+
+def _pages(database: sqlite3.Connection, path: Path, *, read_only: bool) -> int:
     try:
         return _pragma(database, "page_count")
     except sqlite3.DatabaseError as error:
-        if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
+        code = error.sqlite_errorcode & 0xFF
+        if code in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
             raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
+        if code == sqlite3.SQLITE_CANTOPEN and read_only:
+            raise JournalError(
+                f"{path}: cannot be read where it lies ({error}): SQLite has to write beside it; copy it, "
+                f"with {path.name}-wal where there is one, to a directory that can be written, and name the copy"
+            ) from error
         raise
 
 

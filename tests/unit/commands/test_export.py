@@ -1,5 +1,9 @@
 """A campaign exported from a journal reads back as what was recorded."""
 
+import os
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -53,6 +57,52 @@ def test_cycles_of_another_stroke_are_counted_out(capsys: pytest.CaptureFixture[
     fill(tmp_path / "j", captures)
     export(tmp_path / "j", tmp_path / "campaign")
     assert "1 cycles with another stroke were left out" in capsys.readouterr().err
+
+
+IN_A_READ_ONLY_PLACE = """
+mount --bind "$1" "$1" && mount -o remount,bind,ro "$1" || exit 77
+shift
+exec "$@"
+"""
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_a_read_only_medium(tmp_path: Path, log: bool) -> None:
+    place, copy = tmp_path / "place", tmp_path / "place" / "copy"
+    place.mkdir()
+    fill(tmp_path / "j", [make_capture(1)])
+    with Journal(tmp_path / "j", "press-1") as journal:  # as a power cut leaves it
+        journal.append(make_capture(2), make_snapshot(make_capture(2)), b"state")
+        for name in ("j", "j-wal") if log else ("j",):
+            shutil.copy(tmp_path / name, copy.with_name(name.replace("j", "copy")))
+    verb = [sys.executable, "-m", "impactcell", "export", str(copy), "-o", str(tmp_path / "campaign")]
+    namespace = ["unshare", "--map-root-user", "--mount", "sh", "-c", IN_A_READ_ONLY_PLACE, "sh", str(place)]
+    try:
+        done = subprocess.run([*namespace, *verb], capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        pytest.skip("there is no unshare here to make a medium read-only with")
+    if done.returncode == 77 or done.stderr.startswith("unshare:"):
+        pytest.skip(f"no medium can be made read-only here: {done.stderr.strip()}")
+    if log:
+        assert done.returncode == 1
+        assert "copy it, with copy-wal where there is one, to a directory that can be written" in done.stderr
+    else:
+        assert done.returncode == 0, done.stderr
+        assert [shot.cycle for shot in campaign.read(tmp_path / "campaign").shots] == [1]
+
+
+def test_a_log_is_never_left_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the medium is read-only for us, but not for the service."""
+    fill(tmp_path / "j", [make_capture(1)])
+    read_only = os.statvfs_result((*os.statvfs(tmp_path)[:8], os.ST_RDONLY, 255))
+    monkeypatch.setattr("impactcell.journal.file.os.statvfs", lambda _: read_only)
+    with Journal(tmp_path / "j", None, read_only=True) as reader:
+        assert not (tmp_path / "j-shm").exists()
+        assert reader.count() == 1
+    with Journal(tmp_path / "j", "press-1") as journal:
+        journal.append(make_capture(2), make_snapshot(make_capture(2)), b"state")
+        with Journal(tmp_path / "j", None, read_only=True) as reader:
+            assert reader.count() == 2
 
 
 def test_nothing_to_export_is_said(tmp_path: Path) -> None:
