@@ -14,6 +14,8 @@ REGULAR_S: Final = 0.25
 """The same, where cycles come so regularly that none is early."""
 IDLE_S: Final = 0.1
 """The same, once they have stopped coming."""
+_IRREGULAR: Final = 0.02
+"""Where cycles come quite irregularly, polls may be so much of the variation apart."""
 _GAIN: Final = 0.25
 _SOMEWHAT_LATE: Final = 4.0
 """So many margins beyond when it was due a cycle is still looked for as if it were."""
@@ -48,6 +50,7 @@ class PollSchedule:
         self._spread_s = 0.0
         self._lag_s = _UNKNOWN
         self._took_s: deque[float] = deque(maxlen=_ROUND_TRIPS)
+        self._first_s: float | None = None
 
     def polled(self, asked_s: float, answered_s: float, *, new: bool) -> None:
         """Take note of a poll, and whether it showed a cycle that the one before did not."""
@@ -55,6 +58,8 @@ class PollSchedule:
             self._before_s, self._seen_s = self._asked_s, answered_s
         self._asked_s = asked_s
         self._took_s.append(answered_s - asked_s)
+        if self._first_s is None:
+            self._first_s = asked_s
 
     def learn(self, made_s: float, cycles: int = 1, *, newest: bool = True) -> None:
         """Take note of when a cycle was made, on any clock.
@@ -101,17 +106,27 @@ class PollSchedule:
         rest_s = _REST * round_trip_s
         low_s, high_s = self._lag_s
         if self._made_s is None or self._period_s is None or low_s == -math.inf:
-            return max(rest_s, QUIET_S)
-        least_s = max(round_trip_s, min(max(FINE_S, self._spread_s, 0.5 * (high_s - low_s)), COARSE_S))
+            waited_s = 0.0 if self._first_s is None else now_s - self._first_s
+            return max(rest_s, _between(QUIET_S, 0.01 * waited_s))
+        fine_s = max(FINE_S, self._spread_s, 0.5 * (high_s - low_s))
+        coarse_s = _between(COARSE_S, _IRREGULAR * self._spread_s)
+        least_s = max(round_trip_s, min(fine_s, coarse_s))
+        quiet_s = max(rest_s, QUIET_S, coarse_s)
         due_s = self._made_s + self._period_s
         margin_s = 2.0 * self._spread_s + FINE_S
         early_s = due_s + low_s - margin_s - now_s
         if early_s > 0.0:
             regular = 10.0 * margin_s < self._period_s
-            return max(least_s, min(early_s, REGULAR_S if regular else max(rest_s, QUIET_S)))
+            return max(least_s, min(early_s, REGULAR_S if regular else quiet_s))
         overdue_s = now_s - due_s - high_s
         if overdue_s < margin_s:
             return least_s
         if overdue_s < _SOMEWHAT_LATE * margin_s:
-            return max(least_s, COARSE_S)
-        return max(rest_s, min(IDLE_S, QUIET_S if overdue_s < 3.0 * self._period_s else 0.1 * overdue_s))
+            return max(least_s, coarse_s)
+        stopped = overdue_s >= 3.0 * self._period_s
+        return max(quiet_s, _between(0.0, 0.1 * overdue_s) if stopped else 0.0)
+
+
+def _between(shortest_s: float, wanted_s: float) -> float:
+    """Limit a wait to what is never too long."""
+    return min(max(shortest_s, wanted_s), IDLE_S)

@@ -153,6 +153,23 @@ def test_an_idle_module_is_left_in_peace() -> None:
     assert schedule.delay_s(60.0) == IDLE_S
 
 
+def test_cycles_by_hand_every_minute_or_so_cost_few_polls() -> None:
+    periods = np.random.default_rng(2).exponential(60.0, 60) + 5.0
+    late, polls = follow(list(periods))
+    assert max(late) <= IDLE_S + ROUND_TRIP_S
+    assert polls / np.mean(periods) < 20  # a second
+
+
+def test_a_module_without_cycles_is_left_in_peace_after_a_while() -> None:
+    schedule, now_s, polls = PollSchedule(), 0.0, 0
+    while now_s < 60.0:
+        schedule.polled(now_s, now_s, new=False)
+        now_s += schedule.delay_s(now_s)
+        polls += 1
+    assert polls < 1000
+    assert schedule.delay_s(now_s) == IDLE_S
+
+
 def test_a_slow_line_has_rest_between_polls() -> None:
     schedule = PollSchedule()
     assert schedule.delay_s(0.0) > 0.0
