@@ -167,7 +167,12 @@ class FrictionEstimate:
 
 @dataclass(frozen=True, slots=True)
 class WearState:
-    """Friction followed over time: `level` is mu_s at the reference batch, `rate` its change per cycle."""
+    """Friction followed over time: `level` is mu_s at the reference batch, `rate` its change per cycle.
+
+    Standard deviations here come from how the estimates scatter. What all estimates of a cell share, such as
+    an error of mass, of the force's scale or of the prior on mu_k/mu_s, moves the level as a whole and is in
+    the standard deviation of each cycle's estimate only: changes are known better than the level itself.
+    """
 
     level: float
     level_std: float
