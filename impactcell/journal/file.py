@@ -100,7 +100,7 @@ def _pages(database: sqlite3.Connection, path: Path, *, read_only: bool) -> int:
         if code == sqlite3.SQLITE_CANTOPEN and read_only:
             raise JournalError(
                 f"{path}: cannot be read where it lies ({error}): SQLite has to write beside it; copy it, "
-                f"with {path.name}-wal where there is one, to a directory that can be written, and name the copy"
+                f"with {path.name}-wal where there is one, to a directory that can be written, and name that"
             ) from error
         raise
 

@@ -19,7 +19,8 @@ class Retention:
     Attributes
     ----------
     days, captures_days : float
-        Cycles, and captures, older than this are dropped.
+        Cycles, and captures, older than this are dropped. One without a time (0, from a module whose clock is
+        not set) is of unknown age, and goes only when its room is needed.
     max_size_bytes : int
         When less than `ROOM` of it is left, captures are dropped oldest first, then cycles with their alarms.
     """
@@ -42,17 +43,17 @@ def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> bool:
     oldest_ns = now_ns - int(keep.days * _NS_PER_DAY)
     oldest_capture_ns = now_ns - int(min(keep.captures_days, keep.days) * _NS_PER_DAY)
     captures = database.execute(
-        "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns < ? "
+        "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns > 0 AND time_ns < ? "
         "AND EXISTS (SELECT 1 FROM captures WHERE captures.seq = cycles.seq) ORDER BY time_ns LIMIT ?)",
         (oldest_capture_ns, MOST),
     )
     cycles = database.execute(
-        "DELETE FROM cycles WHERE seq IN (SELECT seq FROM cycles WHERE time_ns < ? "
+        "DELETE FROM cycles WHERE seq IN (SELECT seq FROM cycles WHERE time_ns > 0 AND time_ns < ? "
         "AND seq < (SELECT max(seq) FROM cycles) ORDER BY time_ns LIMIT ?)",
         (oldest_ns, MOST),
     )
     more = MOST in (captures.rowcount, cycles.rowcount)
-    database.execute("DELETE FROM alarms WHERE time_ns < ?", (oldest_ns,))
+    database.execute("DELETE FROM alarms WHERE time_ns > 0 AND time_ns < ?", (oldest_ns,))
     database.execute("DELETE FROM audit WHERE time_ns < ?", (oldest_ns,))
     for _ in range(MOST // _CHUNK):
         if _size(database) <= (1.0 - ROOM) * keep.max_size_bytes or not _drop_oldest(database):

@@ -73,11 +73,12 @@ class Keeper:
         if self.journal is None:
             return
         self._since_checkpoint = 0
+        now_ns = time.time_ns()
         try:
             if self._since_thinned >= THIN_EVERY:
                 self._since_thinned = 0
-                # A module's clock that runs ahead must not make everything look old.
-                if self.journal.thin(self._keep, min(time_ns, time.time_ns())):
+                # A module's clock that runs ahead must not make everything look old; 0 is no time at all.
+                if self.journal.thin(self._keep, min(time_ns or now_ns, now_ns)):
                     self._since_thinned = THIN_EVERY
             else:
                 self.journal.checkpoint()

@@ -229,7 +229,7 @@ class Journal(Section):
     file: OutputFile
     """SQLite file; one a cell."""
     retain_days: Positive = 365.0
-    """Cycles older than this are dropped."""
+    """Cycles older than this are dropped; those without a time only where room is needed."""
     retain_captures_days: Positive = 30.0
     """Captures older than this are dropped; their summaries stay."""
     max_size_mb: Positive = 4096.0

@@ -1,11 +1,13 @@
 """What was committed is there, with its state; what was not has left no trace."""
 
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
+from impactcell.journal.history import Question
 from impactcell.journal.retention import ROOM, Retention
 from impactcell.journal.store import AuditEntry, Journal, Position
 from impactcell.records import Alarm, AlarmName
@@ -191,6 +193,20 @@ def test_age_drops_captures_then_cycles_but_never_the_last(tmp_path: Path) -> No
         journal.thin(Retention(days=10, captures_days=5), now_ns + 11 * day_ns)
         assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(3,)]
         assert journal.state() == b"state 3"
+
+
+def test_what_has_no_time_is_of_no_age_but_takes_room(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", "c") as journal:
+        for cycle in (1, 2, 3):
+            capture = replace(make_capture(cycle), time_ns=0) if cycle == 2 else make_capture(cycle)
+            journal.append(capture, make_snapshot(capture), b"state", [Alarm(AlarmName.WEAR_LIMIT)])
+        now_ns = make_capture(3).time_ns + 11 * 86_400 * 10**9
+        journal.thin(Retention(days=10, captures_days=5), now_ns)
+        assert [capture.cycle for capture in journal.captures()] == [2]
+        assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(2,), (3,)]
+        assert len(journal.alarms(Question(None, None, 10)).entries) == 3
+        journal.thin(Retention(max_size_bytes=1), now_ns)
+        assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(3,)]
 
 
 def test_a_capture_goes_with_its_cycle(tmp_path: Path) -> None:

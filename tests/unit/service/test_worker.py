@@ -17,6 +17,7 @@ from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.records import Capture, Channel, PositioningState, Quality
 from impactcell.service.design import cell_design
+from impactcell.service.keeping import Keeper
 from impactcell.service.worker import Worker
 from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
@@ -75,6 +76,20 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
         await worker.run(lambda: None)
     await worker.close()
     assert done == ["thin", "checkpoint", "checkpoint"]
+
+
+@pytest.mark.parametrize(
+    ("module_ns", "looked_ns"), [(0, 10**18), (10**18 - 5, 10**18 - 5), (10**18 + 5, 10**18)]
+)
+def test_what_is_kept_follows_the_module_unless_it_has_no_time_or_runs_ahead(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module_ns: int, looked_ns: int
+) -> None:
+    monkeypatch.setattr("impactcell.service.keeping.time.time_ns", lambda: 10**18)
+    looks: list[int] = []
+    with Journal(tmp_path / "j", "c") as journal:
+        monkeypatch.setattr(journal, "thin", lambda _, now_ns: looks.append(now_ns))
+        Keeper("c", journal, Retention()).tidy(module_ns)
+    assert looks == [looked_ns]
 
 
 async def test_what_is_too_much_to_drop_at_once_goes_in_the_next_looks(
