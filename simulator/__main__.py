@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from impactcell.errors import CampaignError, ImpactCellError, MapError, SettingsError
-from simulator.plant_integrator import NeverAtRestError
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -21,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (SettingsError, CampaignError, MapError) as error:
         print(error, file=sys.stderr)  # noqa: T201
         return BAD_INPUT
-    except (ImpactCellError, NeverAtRestError) as error:
+    except ImpactCellError as error:
         print(error, file=sys.stderr)  # noqa: T201
         return 1
     except KeyboardInterrupt:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
+from impactcell.errors import ImpactCellError
 from simulator.plant_forces import Contact, Forces, Phase
 
 RELATIVE_TOLERANCE = 1e-10
@@ -49,7 +50,7 @@ class Event:
     time_s: float
 
 
-class NeverAtRestError(RuntimeError):
+class NeverAtRestError(ImpactCellError):
     """The part was still moving when the time allowed had passed."""
 
 

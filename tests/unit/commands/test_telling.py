@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.__main__ import app
+from impactcell.cli import app
 from impactcell.commands import discrepancy as command
 from impactcell.commands.telling import note
 from impactcell.journal.store import Journal
