@@ -57,12 +57,24 @@ def _truths(file: Path | None, *, verbose: bool) -> Iterator[Callable[[Truth], N
 
 async def serve(
     scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None, *, verbose: bool = False
-) -> None:
-    """Serve until SIGTERM or SIGINT; prints one JSON line with the addresses once it listens."""
+) -> bool:
+    """Serve until SIGTERM or SIGINT; prints one JSON line with the addresses once it listens.
+
+    Returns
+    -------
+    bool
+        Whether SIGINT, as of Ctrl-C, has ended it.
+    """
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
+    by: list[signal.Signals] = []
+
+    def end(number: signal.Signals) -> None:
+        by.append(number)
+        stop.set()
+
     for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, stop.set)
+        loop.add_signal_handler(number, end, number)
     try:
         with _truths(truth_file, verbose=verbose) as tell:
             epoch_ns = time.time_ns()
@@ -78,6 +90,7 @@ async def serve(
     finally:
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.remove_signal_handler(number)
+    return signal.SIGINT in by
 
 
 async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> None:
@@ -128,10 +141,18 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
 def run(
     scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None, *, verbose: bool = False
 ) -> int:
-    """Serve in an event loop of its own; returns the exit code."""
+    """Serve in an event loop of its own; returns the exit code.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ended by Ctrl-C, after all was put away.
+    """
     try:
-        asyncio.run(serve(scenario, registers, truth_file, verbose=verbose))
+        interrupted = asyncio.run(serve(scenario, registers, truth_file, verbose=verbose))
     except OSError as error:
         print(f"{scenario.name}: cannot listen or write: {error.strerror or error}", file=sys.stderr)  # noqa: T201
         return 1
+    if interrupted:
+        raise KeyboardInterrupt
     return 0

@@ -126,8 +126,8 @@ def read_registers(port: int, address: int, count: int) -> bytes:
     return reply[9:]
 
 
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
-def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals) -> None:
+@pytest.mark.parametrize(("how", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
+def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals, code: int) -> None:
     scenario = (CONFIG / "sim" / "demo.yaml").read_text().replace("../maps", str(CONFIG / "maps"))
     (tmp_path / "s.yaml").write_text(scenario + "acceleration: 20\n")
     truth = tmp_path / "truth.jsonl"
@@ -146,7 +146,7 @@ def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals) ->
         finally:
             process.send_signal(how)
             out, err = process.communicate(timeout=30)
-    assert process.returncode == 0
+    assert process.returncode == code
     assert (out, err) == ("", "")
     lines = [json.loads(line) for line in truth.read_text().splitlines()]
     assert [line["cycle"] for line in lines] == list(range(1, len(lines) + 1))
