@@ -28,10 +28,12 @@ from impactcell.service import Service
 SHOWN = 400
 PATIENCE_S = 60.0
 """Without a cycle for so long, the demo has failed."""
+QUIET_S = 4.0
+"""Without a cycle for so long, the last part lies where it stays: taps follow each other faster."""
 
 
 def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
-    """Run the demo until Ctrl-C, or for `cycles` cycles.
+    """Run the demo until Ctrl-C, for `cycles` cycles, or until its last part is in place.
 
     Raises
     ------
@@ -126,12 +128,18 @@ class _Show:
     async def _watch(self, news: asyncio.Event, stop: asyncio.Event) -> None:
         while True:
             news.clear()
+            last = bool(self.snapshots) and math.isclose(
+                self.snapshots[-1].positioning.target_m, self.stage.last_target_m, rel_tol=1e-6
+            )
             try:
-                # Without an end, silence is part of the show: a positioning cell waits for its next part.
-                async with asyncio.timeout(None if self.cycles is None else PATIENCE_S):
+                # Without an end, silence is part of the show.
+                async with asyncio.timeout(QUIET_S if last else None if self.cycles is None else PATIENCE_S):
                     await news.wait()
             except TimeoutError:
                 stop.set()
+                if last:
+                    self._say("that was the last part")
+                    return
                 reason = "" if self._status is None else self._status.reason
                 raise ImpactCellError(
                     f"no cycle for {PATIENCE_S:g} s: {reason or 'the module is silent'}"

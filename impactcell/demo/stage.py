@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import secrets
 import shutil
 import socket
@@ -39,11 +40,14 @@ class Stage:
         What happens in the cell: from which cycle on, and in words.
     password : str
         Of the user `demo`; made anew for each demo.
+    last_target_m : float
+        Where the last part should go; nan where cycles come without end.
     """
 
     cell: Cell
     story: tuple[tuple[int, str], ...]
     password: str
+    last_target_m: float = math.nan
 
 
 @contextlib.contextmanager
@@ -73,7 +77,8 @@ def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
         write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
         rehearse(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
         with _simulator(played) as port:
-            yield Stage(read_cell(_placed(scenario, directory, port)), story(content), password)
+            cell = read_cell(_placed(scenario, directory, port))
+            yield Stage(cell, story(content), password, last_target_m(content))
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 
@@ -115,6 +120,12 @@ def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-ar
         for entry in content.get("appearances", [])
     ]
     return tuple(sorted(told))
+
+
+def last_target_m(content: dict) -> float:  # type: ignore[type-arg]
+    """Find where the last part of a scenario should go; nan where no parts come."""
+    tasks = content.get("positioning", {}).get("tasks", [])
+    return float(tasks[-1]["target_m"]) if tasks else math.nan
 
 
 @contextlib.contextmanager
