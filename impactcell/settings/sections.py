@@ -112,7 +112,7 @@ class Module(Section):
     word_order: Literal["big", "little"] | None = None
     """Order of the words of a value of several registers; absent: as the map says."""
     window: Annotated[int, Field(ge=1, le=64)] = 1
-    """Requests in flight; 1 is safe with any device; with those that queue, 16 is fast and 64 twice as fast."""
+    """Requests in flight; 1 is safe with any device; 16 is fast with those that queue, 64 twice as fast."""
     max_registers_per_request: Annotated[int, Field(ge=1, le=125)] = 125
     """Registers asked for at once; some gateways allow fewer than 125."""
     pause_between_requests_ms: NotNegative = 0.0
