@@ -21,7 +21,7 @@ from scipy.special import chdtrc, fdtrc
 
 from impactcell.compiled import compiled
 from impactcell.records import Samples
-from impactcell.tracking import linear, profile, scan, shapes
+from impactcell.tracking import linear, profile, scan, shapes, sizing
 from impactcell.tracking import reference as references
 from impactcell.tracking.reference import Reference
 from impactcell.tracking.variation import MODES
@@ -29,10 +29,10 @@ from impactcell.tracking.variation import MODES
 COMPONENTS = 3  # principal components of T^2
 KINDS = ("t_squared", "spe", *scan.FAMILIES)
 SHARES = (0.02, 0.02, 0.08, 0.08, 0.42, 0.38)
-BUMP = scan.FAMILIES.index("bump")
 LEAST_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
 INVISIBLE = 1e-9  # components smaller than this against the noise
 SMALLEST = 1e-300  # p-value
+RARE = 0.01  # p-value below which a shape is sized: no cell may be set to more false alarms
 LARGEST = 0.5  # shapes that even half of the friction would not show are not looked for
 
 
@@ -52,7 +52,8 @@ class Verdict:
     at_m : float
         Where the cycle deviates most.
     size, size_std : float
-        Friction of the likeliest shape, its standard deviation at that place and width.
+        Friction of the likeliest family of shapes, and its standard deviation, by `sizing`; nan where the
+        p-value is not below `RARE`. A cycle that T^2 or SPE says most of is sized as a bump.
     """
 
     p_value: float
@@ -70,7 +71,7 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples) -> 
     cycles = float(reference.variation.cycles)
     looked = shapes.shapes(float(grid_m[-1]), len(grid_m))
     rows, across, waves = looked.within(slide.reached_m, len(slide.vector))
-    t_squared, spe, freedom, scale, found, centre = _tested(
+    t_squared, spe, freedom, scale, p_scan, centre, least, wider, P, u = _tested(
         reference.matrix,
         reference.strength,
         reference.mean,
@@ -88,14 +89,16 @@ def judge(reference: Reference, slide: profile.Information, grid_m: Samples) -> 
         across,
         waves,
     )
-    best = found.tolist()
     chi_squared = float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0
-    p_values = (_hotelling(t_squared, int(cycles)), chi_squared, *[p for p, _, _ in best])
+    p_values = (_hotelling(t_squared, int(cycles)), chi_squared, *p_scan.tolist())
     odds = [share / max(p, SMALLEST) for share, p in zip(SHARES, p_values, strict=True)]
     most = odds.index(max(odds))
-    _, size, std = best[most - 2 if most >= 2 else BUMP]
     at = float(grid_m[centre]) if centre >= 0 else math.nan
-    return Verdict(1.0 / sum(odds), t_squared, spe, freedom, KINDS[most], at, size, std)
+    p_value, size, std = 1.0 / sum(odds), math.nan, math.nan
+    if p_value < RARE:
+        family = most - 2 if most >= 2 else sizing.BUMP
+        size, std = sizing.sized(family, P, u, grid_m, slide.reached_m, least, wider)
+    return Verdict(p_value, t_squared, spe, freedom, KINDS[most], at, size, std)
 
 
 @compiled
@@ -116,8 +119,8 @@ def _tested(
     rows: Samples,
     across: int,
     waves: int,
-) -> tuple[float, float, int, float, Samples, int]:
-    """T^2, SPE, its freedom and the scale of the noise, and what `scan.scan` finds."""
+) -> tuple[float, float, int, float, Samples, int, float, float, Samples, Samples]:
+    """T^2, SPE, its freedom and the scale of the noise, what `scan.scan` finds, and what it was told."""
     n = min(seen, references.judged(met, varied, weight, cycles))
     known, own = references.deviating(matrix, vector, mean, n, seen)
     G, y = references.unsure(known, own, pooled, strength)
@@ -129,8 +132,8 @@ def _tested(
     P, u = linear.varied(C, G, y)
     least = 30.0 / (LARGEST * references.usual(mean, n)) ** 2
     shown, wider = linear.part(rows, 0, len(rows), 0, n), scale * (1.0 + 2.0 * MODES / cycles)
-    found, centre = scan.scan(shown, P, u, C, across, waves, least, wider, cycles)
-    return t_squared, spe, freedom, scale, found, centre
+    p_values, centre = scan.scan(shown, P, u, C, across, waves, least, wider, cycles)
+    return t_squared, spe, freedom, scale, p_values, centre, least, wider, P, u
 
 
 @compiled

@@ -18,7 +18,6 @@ from impactcell.compiled import compiled
 from impactcell.records import Samples
 
 FAMILIES = ("level", "tilt", "bump", "ripple")
-NOTHING = (1.0, 0.0, math.inf)  # p-value, size and standard deviation of what cannot be seen
 
 
 @compiled
@@ -50,9 +49,8 @@ def scan(
 
     Returns
     -------
-    found : ndarray, shape (4, 3)
-        Of each of `FAMILIES`: p-value of its most telling shape, size of its likeliest one, of either sign,
-        and standard deviation of that.
+    p_values : ndarray, shape (4,)
+        Of the most telling shape of each of `FAMILIES`.
     centre : int
         Grid point of the likeliest bump; -1 if none can be seen.
     """
@@ -62,29 +60,26 @@ def scan(
         known[i] = _dot(rows[i], image[i])
     level, tilt = len(rows) - 2, len(rows) - 1
     bumps = level - 2 * waves
-    found = np.empty((4, 3))
-    found[0] = _one(score[level], known[level], _dot(along[level], along[level]), least, scale, cycles)
+    p_values = np.empty(4)
+    p_values[0] = _one(score[level], known[level], _dot(along[level], along[level]), least, scale, cycles)
     # slope about the point where it does not depend on the level, so that the two are looked for apart
     turn = _dot(rows[tilt], image[level]) / known[level]
     about, left, varied = score[tilt] - turn * score[level], known[tilt] - turn**2 * known[level], 0.0
     for k in range(along.shape[1]):
         varied += (along[tilt, k] - turn * along[level, k]) ** 2
-    found[1] = _one(about, left, varied, least, scale, cycles)
-    p_value, row = _largest_bump(rows, image, along, score, known, bumps, across, least, scale, cycles)
-    found[2] = (p_value, score[row] / known[row], math.sqrt(scale / known[row])) if row >= 0 else NOTHING
-    found[3] = _largest_ripple(rows, image, along, score, bumps, level, least, scale, cycles)
-    return found, row % across if row >= 0 else -1
+    p_values[1] = _one(about, left, varied, least, scale, cycles)
+    p_values[2], row = _largest_bump(rows, image, along, score, known, bumps, across, least, scale, cycles)
+    p_values[3] = _largest_ripple(rows, image, along, score, bumps, level, least, scale, cycles)
+    return p_values, row % across if row >= 0 else -1
 
 
 @compiled
-def _one(
-    score: float, known: float, varied: float, least: float, scale: float, cycles: float
-) -> tuple[float, float, float]:
-    """Find p-value, size and its standard deviation of a single shape, of either sign."""
+def _one(score: float, known: float, varied: float, least: float, scale: float, cycles: float) -> float:
+    """Find the p-value of a single shape, of either sign; 1 where it cannot be seen."""
     if known < least:
-        return NOTHING
+        return 1.0
     z = _normal(score**2 / (known * scale), varied / known, cycles)
-    return math.erfc(z / math.sqrt(2.0)), score / known, math.sqrt(scale / known)
+    return math.erfc(z / math.sqrt(2.0))
 
 
 @compiled
@@ -203,13 +198,13 @@ def _largest_ripple(
     least: float,
     scale: float,
     cycles: float,
-) -> tuple[float, float, float]:
-    """Find p-value of the most telling ripple, size of the likeliest one and its standard deviation.
+) -> float:
+    """Find p-value of the most telling ripple.
 
     The phase goes round, so that the edge of the surface is two circles. Between neighbouring waves it is as
     wide as the root mean square of the two angles between their planes.
     """
-    c, most, size, std, area, before = -1.0, -1.0, 0.0, math.inf, 0.0, -1
+    c, area, before = -1.0, 0.0, -1
     for i in range(first, end, 2):
         j = i + 1
         cc, ss, cs = _dot(rows[i], image[i]), _dot(rows[j], image[j]), _dot(rows[i], image[j])
@@ -221,15 +216,14 @@ def _largest_ripple(
         for k in range(along.shape[1]):
             varied += (a * along[i, k] + b * along[j, k]) ** 2
         c = max(c, _normal(max(squared, 0.0) / scale, varied / max(squared, 1e-300), cycles))
-        if squared > most:
-            most, size, std = squared, math.hypot(a, b), math.sqrt(2.0 * scale / (cc + ss))
         if before == i - 2:
             area += 2.0 * math.pi * _between(rows, image, i - 2, i)
         before = i
     if c < 0.0:
-        return 1.0, 0.0, math.inf
+        return 1.0
     high = math.exp(-0.5 * c * c)
-    return min(1.0, high + area * c * high / (2.0 * math.pi) ** 1.5), size, std
+    tail: float = high + area * c * high / (2.0 * math.pi) ** 1.5
+    return min(1.0, tail)
 
 
 @compiled

@@ -11,7 +11,7 @@ from impactcell import alarms
 from impactcell.alarms import AlarmSettings
 from impactcell.records import AlarmName
 from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, gap, initial_state, signature, track
-from tests.benchmarks import _declared, _inside, _signatures, _slides, _steps, _tracker
+from tests.benchmarks import _declared, _inside, _signatures, _sizes, _slides, _steps, _tracker
 from tests.benchmarks.table import Table
 
 
@@ -29,6 +29,7 @@ def tables(*, quick: bool = False) -> Iterator[Table]:
         _signatures.speed_table,
         _signatures.error_table,
         _signatures.power_table,
+        _sizes.table,
     ):
         name, started = f"{make.__module__}.{make.__name__}", time.process_time()
         print(f"  {name} ...", file=sys.stderr, flush=True)
