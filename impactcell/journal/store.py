@@ -167,13 +167,14 @@ class Journal:
 
     def captures(self, first_cycle: int | None = None, last_cycle: int | None = None) -> Iterator[Capture]:
         """Yield the stored captures in order of their cycles; thinned ones are gone."""
-        rows = self._db.execute(
-            "SELECT blob FROM captures JOIN cycles USING (seq) "
-            "WHERE (?1 IS NULL OR cycle >= ?1) AND (?2 IS NULL OR cycle <= ?2) ORDER BY seq",
-            (first_cycle, last_cycle),
-        )
-        for (blob,) in rows:
-            yield decode_capture(blob)
+        with self._errors():
+            rows = self._db.execute(
+                "SELECT blob FROM captures JOIN cycles USING (seq) "
+                "WHERE (?1 IS NULL OR cycle >= ?1) AND (?2 IS NULL OR cycle <= ?2) ORDER BY seq",
+                (first_cycle, last_cycle),
+            )
+            for (blob,) in rows:
+                yield decode_capture(blob)
 
     def values(self, variable: str, question: Question) -> Page[PastValue]:
         """Return stored values of a variable; see `impactcell.journal.history`."""

@@ -148,6 +148,22 @@ def test_a_journal_without_a_table_is_no_full_disk(tmp_path: Path) -> None:
     assert not told.value.retry
 
 
+def test_a_damaged_file_gives_what_is_whole_and_then_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "j"
+    with Journal(path, "c") as journal:
+        append_many(journal, range(1, 40))
+    data = bytearray(path.read_bytes())
+    middle = slice(3 * len(data) // 4, 3 * len(data) // 4 + 4 * 4096)
+    data[middle] = b"\xff" * len(data[middle])
+    path.write_bytes(data)
+    read = []
+    with Journal(path, "c", read_only=True) as journal, pytest.raises(JournalError, match="cannot be used"):
+        for capture in journal.captures():
+            read.append(capture.cycle)
+    assert read == list(range(1, len(read) + 1))
+    assert 0 < len(read) < 39
+
+
 def test_the_model_is_kept_beside_the_captures(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", "c") as journal:
         assert journal.model == ""
