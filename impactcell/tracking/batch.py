@@ -137,4 +137,4 @@ def _settled(state: TrackerState, noise: Noise) -> bool:
         return False
     if state.history is None or noise.weight >= LEARNING_DIFFERENCES:
         return True
-    return moved(noise, state.replayed, np.array([noise.last_std])) < SETTLED
+    return moved(noise, state.replayed, np.array([noise.last_std]))[0] < SETTLED

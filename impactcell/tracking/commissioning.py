@@ -29,6 +29,7 @@ EARLY = (
     400,
 )  # cycles after which a wrong scale of the noise is corrected
 RESCALED = 1.07  # factor by which it must have moved
+RESHAPED = 1.5  # the same for variances that move apart: how far declared ones are believed
 LEVEL_WALKS = (0.0, 0.01, 0.03, 0.1, 0.3)  # standard deviations a cycle, of one estimate's
 SLOPE_WALKS = (0.0, 1e-5, 1e-4, 1e-3)
 CLEARLY = 5.0  # nats by which a random walk must be more likely than none

@@ -44,7 +44,7 @@ class Noise:
     rough : float
         The winsorised one.
     usual_std : float
-        Declared standard deviation as it usually is; nan before one was declared.
+        Mean of those declared, over so many; nan before one was.
     last_value, last_std : float
         The estimate before, with the standard deviation that it declared; nan before the first.
     identical : int
@@ -82,7 +82,7 @@ def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[No
     """
     std, usual, weight, guessed = declared, noise.usual_std, noise.weight, noise.guessed
     if declared > 0.0 and math.isfinite(declared):
-        usual = std if math.isnan(usual) else usual + 0.05 * (std - usual)
+        usual = std if math.isnan(usual) else usual + (std - usual) / (weight + 1.0)
     elif not math.isnan(usual):
         std = usual
     else:
@@ -125,10 +125,10 @@ def variances(noise: Noise, stds: Samples) -> Samples:
     return noise.factor * _spreads(noise, stds) ** 2
 
 
-def moved(noise: Noise, since: Noise, stds: Samples) -> float:
-    """Factor, at least one, by which the variance of one of these estimates is another than it was."""
-    ratio = variances(noise, stds) / variances(since, stds)
-    return float(max(np.max(ratio), 1.0 / np.min(ratio)))
+def moved(noise: Noise, since: Noise, stds: Samples) -> tuple[float, float]:
+    """Factors, at least one, by which variances of these estimates have moved together, and apart (rms)."""
+    ratios = np.log(variances(noise, stds) / variances(since, stds))
+    return math.exp(abs(np.mean(ratios))), math.exp(np.std(ratios))
 
 
 def _spreads(noise: Noise, stds: Samples) -> Samples:

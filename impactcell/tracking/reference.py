@@ -181,7 +181,7 @@ def learn(
         known = variation.guess(float(np.median(first)))
         components = variation.components(np.eye(MODES), variation.cosines(total) * known.scale)
     cycles = known.cycles + 1 if varies else known.cycles
-    matrix, vector, mean, components, met, varied, *sums = _learned(
+    matrix, vector, mean, components, met, varied, sums = _learned(
         reference.matrix,
         reference.vector,
         reference.mean,
@@ -190,9 +190,7 @@ def learn(
         reference.met,
         reference.varied,
         reference.weight,
-        known.weights,
-        known.moments,
-        known.information,
+        (known.weights, known.moments, known.seen, known.noise),
         cycles,
         known.scale,
         variation.cosines(total),
@@ -230,9 +228,7 @@ def _learned(
     met: Samples,
     varied: Samples,
     weight: float,
-    weights: Samples,
-    moments: Samples,
-    information: Samples,
+    sums: variation.Sums,
     cycles: int,
     scale: Samples,
     cosines: Samples,
@@ -240,7 +236,7 @@ def _learned(
     vector: Samples,
     seen: int,
     varies: bool,  # noqa: FBT001  # compiled code takes its arguments by position
-) -> tuple[Samples, Samples, Samples, Samples, Samples, Samples, Samples, Samples, Samples]:
+) -> tuple[Samples, Samples, Samples, Samples, Samples, Samples, variation.Sums]:
     """All that a reference keeps with one cycle more, which says less of the mean the more cycles vary."""
     met, varied, pooled, summed = met.copy(), varied.copy(), pooled.copy(), summed.copy()
     if varies:
@@ -249,8 +245,8 @@ def _learned(
             for k in range(MODES):
                 B[i, k] *= scale[k]
         known, own = deviating(matrix, vector, mean, n, seen)
-        weights, moments, information = variation.taken(B, known, own, weight, weights, moments, information)
-        components = variation.components(variation.spread(weights, moments, information, cycles), B)
+        sums = variation.taken(B, known, own, weight, *sums)
+        components = variation.components(variation.spread(*sums, cycles), B)
         for i in range(min(n, seen - 1)):
             varied[i] += 1.0
     kept = 1.0 - 1.0 / MEMORY if weight >= MEMORY else 1.0
@@ -264,4 +260,4 @@ def _learned(
             pooled[p] = pooled[p] * kept + (left[i, j] if i < seen else 0.0)
             p += 1
     mean = linear.solved(precision(pooled, strength), summed)
-    return pooled, summed, mean, components, met, varied, weights, moments, information
+    return pooled, summed, mean, components, met, varied, sums

@@ -202,7 +202,8 @@ def _learn(
     if n in commissioning.EARLY:
         state = replace(state, noise=noises.settle(state.noise, values, stds))
         unit = state.noise.factor * state.noise.usual_std**2
-    rescaled = noises.moved(state.noise, state.replayed, stds) > commissioning.RESCALED
+    together, apart = noises.moved(state.noise, state.replayed, stds)
+    rescaled = together > commissioning.RESCALED or apart > commissioning.RESHAPED
     if not (looked or rescaled):
         return state, notes
     level_walk, slope_walk = settings.level_noise, settings.slope_noise

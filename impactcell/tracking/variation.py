@@ -12,6 +12,11 @@ guess as weights), so that two sums are all that is kept, and slides may end in 
 that noise alone could have made, in units of the noise, are zero: else the modes swallow what they should
 tell apart. Added is what the cycles could not have seen, the standard error of a variation of none; where no
 slide has reached that is the first guess.
+
+That error is of cycles which count alike and may know the modes very differently, as after taps of different
+velocities. Where W and T of all of them commute it is sqrt(2) (sum T^2 W^2)^(1/2) / sum W^2; its inverse is
+taken as (A V^-1 A)^(1/2) / sqrt(2), A = sum W^2, V = sum (T W)^2, which for cycles that all know alike is
+sqrt(n / 2) K.
 """
 
 import math
@@ -29,6 +34,9 @@ PAIRS = MODES * (MODES + 1) // 2
 FIRST_SPREAD = 0.05  # of the friction itself: how much cycles vary before anything is known
 RIDGE = 0.5  # cycles' worth of weight on no variation at all, where nothing was seen
 
+Sums = tuple[Samples, Samples, Samples, Samples]
+"""Of `Variation`: weights, moments, seen, noise."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variation:
@@ -44,15 +52,16 @@ class Variation:
         Sum of tr(E_p W E_q W), E_p the symmetric unit matrices: the lower triangle by rows.
     moments : ndarray, shape (21,)
         Sum of tr E_p (T d d' T - T K T').
-    information : ndarray, shape (6, 6)
-        Sum of K.
+    seen, noise : ndarray, shape (6, 6)
+        Sums of W^2 and of (T W)' T W.
     """
 
     cycles: int = 0
     scale: Samples = field(default_factory=lambda: np.zeros(MODES))
     weights: Samples = field(default_factory=lambda: np.zeros(PAIRS * (PAIRS + 1) // 2))
     moments: Samples = field(default_factory=lambda: np.zeros(PAIRS))
-    information: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
+    seen: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
+    noise: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
 
 
 def guess(friction: float) -> Variation:
@@ -71,9 +80,10 @@ def taken(
     weight: float,
     weights: Samples,
     moments: Samples,
-    information: Samples,
-) -> tuple[Samples, Samples, Samples]:
-    """Take one cycle into the three sums.
+    seen: Samples,
+    noise: Samples,
+) -> Sums:
+    """Take one cycle into the four sums.
 
     Parameters
     ----------
@@ -96,32 +106,36 @@ def taken(
     T = linear.inverse(lost)
     r, W, TKT = linear.product(T, along), linear.product(T, K), linear.product(T, linear.product(K, T))
     share = weight / (weight + 1.0)
-    weights, moments, information = weights.copy(), moments.copy(), information.copy()
+    weights, moments = weights.copy(), moments.copy()
     for i in range(MODES):
         for k in range(MODES):
             W[i, k] = W[k, i] = (W[i, k] + W[k, i]) / 2.0
             TKT[i, k] = share * r[i, 0] * r[k, 0] - TKT[i, k]
-            information[i, k] += K[i, k]
+    TW = linear.product(T, W)
     _add(W, TKT, 1.0, weights, moments)
-    return weights, moments, information
+    return weights, moments, seen + linear.product(W, W), noise + linear.product(TW, TW)
 
 
 @compiled
-def spread(weights: Samples, moments: Samples, information: Samples, cycles: int) -> Samples:
+def spread(weights: Samples, moments: Samples, seen: Samples, noise: Samples, cycles: int) -> Samples:
     """Lambda, shape (6, 6)."""
     found, upper, p = np.empty((MODES, MODES)), linear.solved(linear.square(weights), moments), 0
     for i in range(MODES):
         for j in range(i, MODES):
             found[i, j] = found[j, i] = upper[p]
             p += 1
-    noise, lost = np.empty((MODES, MODES)), np.empty((MODES, MODES))
-    for i in range(MODES):
-        for j in range(MODES):
-            one = 1.0 if i == j else 0.0
-            noise[i, j] = (information[i, j] + one) / cycles
-            lost[i, j] = information[i, j] / math.sqrt(2.0 * cycles) + one
+    half = linear.forward(linear.factor(noise), seen)
+    squares, turned = np.linalg.eigh(linear.product(half, half))
+    each, lost = np.eye(MODES) / cycles, np.eye(MODES)
+    for k in range(MODES):
+        known = math.sqrt(max(squares[k], 0.0))
+        for i in range(MODES):
+            for j in range(MODES):
+                both = known * turned[i, k] * turned[j, k]
+                each[i, j] += both / math.sqrt(cycles)
+                lost[i, j] += both / math.sqrt(2.0)
     # in units of the noise of one cycle
-    root = linear.factor(noise)
+    root = linear.factor(each)
     values, vectors = np.linalg.eigh(linear.product(linear.product(found, root), root))
     # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
     edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0

@@ -35,6 +35,7 @@ MODES = (
     lambda x: 0.005 * np.cos(np.pi * x / 2e-3),
 )
 LEARNED = (50, 100, 400, 2000)
+SPEEDS, MIXED, LEVELS = (0.05, 0.0667, 0.0833, 0.1), 150, (1e-2, 1e-3, 1e-4, 1e-5)
 ORACLE = (0.5, 0.8, 0.9, 0.95, 0.99)
 
 
@@ -137,6 +138,36 @@ def false_alarm_table(*, quick: bool) -> Table:
         "row is plain counting. Information on the friction drawn at random, as one slide at 10 kHz gives it."
     )
     return Table("False alarms a cycle", ["what", "bar", "mean", "95 %", "worst reference"], rows, note)
+
+
+def mixed_table(*, quick: bool) -> Table:
+    """False alarms of real slides whose velocities come in turn, while cycles are still being learned."""
+    settings = signature.SignatureSettings()
+    runs = 4 if quick else 40
+    found: dict[float, list[float]] = {speed: [] for speed in SPEEDS}
+    for run in range(runs):
+        rng, state = np.random.default_rng([13, run]), signature.initial_state(settings)
+        for cycle in range(MIXED):
+            speed = SPEEDS[cycle % len(SPEEDS)]
+            capture, _ = slide(_normal(rng), speed, RATE, NOISE, run * MIXED + cycle)
+            seen = profile.information(find_slide(capture), settings.grid_m, GRAVITY)
+            known, verdict = state.reference, None
+            if known.variation.cycles >= settings.learned_cycles:
+                verdict = deviation.judge(known, seen, settings.grid_m)
+                found[speed].append(verdict.p_value)
+            state = signature.learned(state, seen, settings, verdict and replace(verdict, p_value=1.0))
+    rows = []
+    for name, p in [(f"{speed:g} m/s", np.array(found[speed])) for speed in SPEEDS] + [
+        ("all", np.concatenate(list(found.values())))
+    ]:
+        rows.append([name, f"{len(p)}", *(f"{np.mean(p < level):.1e}" for level in LEVELS)])
+    return Table(
+        "False alarms a cycle where velocities come in turn",
+        ["velocity", "cycles judged", *(f"below {level:g}" for level in LEVELS)],
+        rows,
+        f"{runs} references learned from {MIXED} slides each, which end at different places and tell "
+        "differently much; plain counting, so that the columns are to be at most their own headings.",
+    )
 
 
 def _tail(

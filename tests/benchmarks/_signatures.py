@@ -66,7 +66,9 @@ def error_table(*, quick: bool) -> Table:
 
 def power_table(*, quick: bool) -> list[Table]:
     """False alarms of deviant cycles, and the power against them."""
-    return [_deviant.false_alarm_table(quick=quick), _deviant.power_table(quick=quick)]
+    return [
+        make(quick=quick) for make in (_deviant.false_alarm_table, _deviant.mixed_table, _deviant.power_table)
+    ]
 
 
 def speed_table(*, quick: bool) -> Table:

@@ -19,7 +19,7 @@ def learned(true_sizes, cycles, seed):
     """First guess, and Lambda of cycles whose modes vary by `true_sizes` of it, far above their noise."""
     rng = np.random.default_rng(seed)
     first = variation.guess(0.2)
-    sums, basis = (first.weights, first.moments, first.information), first.scale * MODES
+    sums, basis = (first.weights, first.moments, first.seen, first.noise), first.scale * MODES
     G = information(1e8)
     for _ in range(cycles):
         deviation = basis @ (np.array(true_sizes) * rng.normal(size=variation.MODES))
@@ -43,10 +43,31 @@ def test_modes_that_do_not_vary_are_zero():
 
 def test_what_was_never_seen_keeps_the_first_guess():
     first = variation.guess(0.2)
-    sums = (first.weights, first.moments, first.information)
+    sums = (first.weights, first.moments, first.seen, first.noise)
     for _ in range(50):
         sums = variation.taken(MODES, information(0.0), np.zeros(COEFFICIENTS), 100.0, *sums)
     assert variation.spread(*sums, 50) == pytest.approx(np.eye(variation.MODES))
+
+
+def test_precise_cycles_are_not_judged_by_what_noisy_ones_leave_unknown():
+    """Half of the cycles are ten times noisier, as after taps of another velocity; only the level varies."""
+    precise, noisy, level, odd = 0.01, 0.1, 0.05, []
+    unit = np.eye(variation.MODES)
+    for seed in range(20):
+        rng, first = np.random.default_rng(seed), variation.guess(0.2)
+        sums = (first.weights, first.moments, first.seen, first.noise)
+
+        def drawn(noise, rng=rng):
+            return level * rng.normal() * unit[0] + noise * rng.normal(size=variation.MODES)
+
+        for cycle in range(60):
+            noise = precise if cycle % 2 else noisy
+            sums = variation.taken(unit, unit / noise**2, drawn(noise) / noise**2, 1e12, *sums)
+        covariance = variation.spread(*sums, 60) + precise**2 * unit
+        scores = np.array([drawn(precise) for _ in range(400)])
+        distances = np.einsum("ni,ij,nj->n", scores, np.linalg.inv(covariance), scores)
+        odd.append(np.mean(distances > 22.46))  # one in a thousand of chi squared with six degrees of freedom
+    assert np.mean(odd) < 2e-3
 
 
 def test_components_are_the_principal_ones_of_the_covariance():
