@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TextIO
 
+from impactcell.ending import signalled
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
 from simulator.control import Control
@@ -67,30 +68,18 @@ async def serve(
     """
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
-    by: list[signal.Signals] = []
-
-    def end(number: signal.Signals) -> None:
-        by.append(number)
-        stop.set()
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, end, number)
-    try:
-        with _truths(truth_file, verbose=verbose) as tell:
-            epoch_ns = time.time_ns()
-            device = Device(
-                scenario,
-                registers,
-                session=epoch_ns // 1_000_000 % (2**32 - 1) + 1,
-                epoch_ns=epoch_ns,
-                now_s=loop.time(),
-                on_truth=tell,
-            )
-            await _serve(scenario, device, stop)
-    finally:
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.remove_signal_handler(number)
-    return signal.SIGINT in by
+    with signalled(stop) as came, _truths(truth_file, verbose=verbose) as tell:
+        epoch_ns = time.time_ns()
+        device = Device(
+            scenario,
+            registers,
+            session=epoch_ns // 1_000_000 % (2**32 - 1) + 1,
+            epoch_ns=epoch_ns,
+            now_s=loop.time(),
+            on_truth=tell,
+        )
+        await _serve(scenario, device, stop)
+    return signal.SIGINT in came
 
 
 async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> None:

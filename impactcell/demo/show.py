@@ -20,6 +20,7 @@ from impactcell.commands.telling import quiet
 from impactcell.demo.remedy import Remedy
 from impactcell.demo.stage import USER, Stage, set_up
 from impactcell.demo.view import Scene, render
+from impactcell.ending import signalled
 from impactcell.errors import ImpactCellError
 from impactcell.fieldbus.acquisition import ModuleStatus
 from impactcell.records import Snapshot
@@ -75,8 +76,6 @@ class _Show:
     async def run(self, draw: Callable[["_Show", Snapshot], None]) -> bool:
         """Run to the end; True if it was ended by Ctrl-C."""
         stop, news = asyncio.Event(), asyncio.Event()
-        ended_by: list[signal.Signals] = []
-
         remedy = Remedy(self.stage.cell, self._say)
 
         def observe(_: str, snapshot: Snapshot) -> None:
@@ -87,23 +86,17 @@ class _Show:
             if self.cycles is not None and self.seen >= self.cycles:
                 stop.set()
 
-        def end(number: signal.Signals) -> None:
-            ended_by.append(number)
-            stop.set()
-
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, end, number)
         self.service = Service([self.stage.cell], observe)
         watch = asyncio.create_task(self._watch(news, stop))
-        try:
-            await self.service.run(stop, self._started)
-        finally:
-            await remedy.close()
-            watch.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await watch
-        return signal.SIGINT in ended_by
+        with signalled(stop) as came:
+            try:
+                await self.service.run(stop, self._started)
+            finally:
+                await remedy.close()
+                watch.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await watch
+        return signal.SIGINT in came
 
     def _say(self, text: str) -> None:
         if not self.told or self.told[-1][1] != text:

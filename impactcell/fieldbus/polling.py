@@ -123,8 +123,9 @@ class PollSchedule:
             return least_s
         if overdue_s < _SOMEWHAT_LATE * margin_s:
             return max(least_s, coarse_s)
-        stopped = overdue_s >= 3.0 * self._period_s
-        return max(quiet_s, _between(0.0, 0.1 * overdue_s) if stopped else 0.0)
+        if overdue_s < 3.0 * self._period_s:
+            return quiet_s
+        return max(quiet_s, min(0.1 * overdue_s, IDLE_S))
 
 
 def _between(shortest_s: float, wanted_s: float) -> float:

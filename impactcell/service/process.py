@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from impactcell import cell as core
 from impactcell.alarms import Finding
 from impactcell.celllog import CellLogger
+from impactcell.ending import signalled
 from impactcell.errors import JournalError
 from impactcell.records import AlarmName
 from impactcell.scada import Server
@@ -189,23 +190,17 @@ def run(cells: Sequence[Cell]) -> None:
 
 async def _until_signalled(service: Service) -> bool:
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
-    by: list[signal.Signals] = []
     reloads: set[asyncio.Task[None]] = set()
-
-    def end(number: signal.Signals) -> None:
-        by.append(number)
-        stop.set()
 
     def reload() -> None:
         task = loop.create_task(service.reload())
         reloads.add(task)
         task.add_done_callback(reloads.discard)
 
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, end, number)
     loop.add_signal_handler(signal.SIGHUP, reload)
-    await service.run(stop, lambda: _say_started(service))
-    return signal.SIGINT in by
+    with signalled(stop) as came:
+        await service.run(stop, lambda: _say_started(service))
+    return signal.SIGINT in came
 
 
 def _say_started(service: Service) -> None:

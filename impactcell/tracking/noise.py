@@ -122,7 +122,7 @@ def variance(noise: Noise, std: float) -> float:
 
 def variances(noise: Noise, stds: Samples) -> Samples:
     """Variances of the estimates of a history, whose noise is now known."""
-    return noise.factor * _spreads(noise, stds) ** 2
+    return noise.factor * _unscaled(noise, stds)
 
 
 def moved(noise: Noise, since: Noise, stds: Samples) -> tuple[float, float]:
@@ -131,14 +131,15 @@ def moved(noise: Noise, since: Noise, stds: Samples) -> tuple[float, float]:
     return math.exp(abs(np.mean(ratios))), math.exp(np.std(ratios))
 
 
-def _spreads(noise: Noise, stds: Samples) -> Samples:
-    return np.array([beliefs.spread(noise.belief, std, noise.usual_std) for std in stds])
+def _unscaled(noise: Noise, stds: Samples) -> Samples:
+    """Variances before the factor."""
+    return np.array([beliefs.spread(noise.belief, std, noise.usual_std) for std in stds]) ** 2
 
 
 def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:
     """Fit the factor to all of the first values at once, for following it up from a wrong one takes long."""
-    variances = _spreads(noise, stds) ** 2
-    squared = np.diff(values) ** 2 / (variances[1:] + variances[:-1])
+    unscaled = _unscaled(noise, stds)
+    squared = np.diff(values) ** 2 / (unscaled[1:] + unscaled[:-1])
     # by the median, which outliers hardly move: that of a squared standard normal is 0.4549
     start = max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
     factor = _fit(squared, start, 0.0 if noise.guessed else DECLARED_WEIGHT)

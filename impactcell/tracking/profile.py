@@ -99,6 +99,14 @@ def on_grid(points: int) -> Samples:
     return matrix
 
 
+@lru_cache(maxsize=8)
+def shape_coefficients(points: int) -> Samples:
+    """Matrix that takes shapes on the grid, as rows, to those of their coefficients, shape (g, g + 2)."""
+    matrix: Samples = np.asarray(np.linalg.pinv(on_grid(points)).T, dtype=np.float64)
+    matrix.flags.writeable = False
+    return matrix
+
+
 @compiled
 def roughness(coefficients: int) -> Samples:
     """Penalty D of second differences, shape (j, j)."""

@@ -63,7 +63,7 @@ class Shapes:
 def shapes(length_m: float, points: int) -> Shapes:
     """Make the shapes for a grid of `points` from 0 to `length_m`."""
     grid = np.linspace(0.0, length_m, points)
-    to_coefficients = np.linalg.pinv(profile.on_grid(points)).T
+    to_coefficients = profile.shape_coefficients(points)
     spacing = float(grid[1] - grid[0])
     bumps = np.array([[np.exp(-0.5 * ((grid - c) / w) ** 2) for c in grid] for w in BUMP_WIDTHS_M])
     waves = length_m / np.arange(1.0, length_m / max(4.0 * spacing, SHORTEST_WAVE_M) + 0.5, 0.5)

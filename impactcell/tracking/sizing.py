@@ -28,9 +28,9 @@ from functools import lru_cache
 import numpy as np
 
 from impactcell.records import Samples
-from impactcell.tracking import profile, shapes
+from impactcell.tracking import profile, scan, shapes
 
-LEVEL, TILT, BUMP, RIPPLE = range(4)  # as in `scan.FAMILIES`
+LEVEL, TILT, BUMP, RIPPLE = map(scan.FAMILIES.index, ("level", "tilt", "bump", "ripple"))
 HALF = math.sqrt(2.0 * math.log(2.0))  # half width of a bell at half of its height, over its own
 ROUNDS = 3
 STEPS = 7  # in place, width or wave, of every round but the first
@@ -66,7 +66,7 @@ def sized(
     size, std : float
         Friction; of a tilt, from one end of the grid to the other.
     """
-    across = _coefficients(len(grid_m))[:, : len(u)]
+    across = profile.shape_coefficients(len(grid_m))[:, : len(u)]
     K, v = across @ P @ across.T, across @ u
     length, spacing = float(grid_m[-1]), float(grid_m[1] - grid_m[0])
     if family == BUMP:
@@ -81,12 +81,6 @@ def sized(
         waves = int(4.0 * (high[0] - low[0])) + 2
         return _averaged(lambda at: _ripples(K, v, grid_m, at), low, high, (waves,), least, scale)
     return _plain(family, K, v, grid_m, least, scale)
-
-
-@lru_cache(maxsize=8)
-def _coefficients(points: int) -> Samples:
-    """Matrix from friction on the grid to coefficients of the splines, as rows, shape (g, g + 2)."""
-    return np.asarray(np.linalg.pinv(profile.on_grid(points)).T, dtype=np.float64)
 
 
 def _plain(
