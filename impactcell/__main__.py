@@ -4,9 +4,9 @@ import sys
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run one verb of `impactcell.cli`; Ctrl-C ends it with 130, also before it has begun."""
+    """Run one verb of `impactcell.cli.app`; Ctrl-C ends it with 130, also before it has begun."""
     try:
-        from impactcell.cli import run_verb
+        from impactcell.cli.app import run_verb
 
         run_verb(arguments)
     except KeyboardInterrupt:

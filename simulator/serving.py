@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TextIO
 
-from impactcell.ending import signalled
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.process.signals import signalled
 from simulator.control import Control
 from simulator.device import Device, Truth
 from simulator.fault_schedule import arm

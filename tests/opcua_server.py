@@ -12,6 +12,7 @@ from asyncua.crypto import security_policies
 
 from impactcell.alarms import Event, Occurrence
 from impactcell.alarms.lifecycle import transition
+from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.records import Alarm, AlarmName, Evidence, Quality, Snapshot
 from impactcell.scada import (
     Actor,
@@ -28,7 +29,6 @@ from impactcell.scada import (
     ServerSettings,
     ValuePage,
 )
-from impactcell.scada.certificates import make_certificate, own_hosts, write_pair
 from impactcell.scada.users import User, with_password, write_users
 from tests.snapshots import make_capture, make_snapshot
 

@@ -1,6 +1,6 @@
 """Alarms people trust: rules that raise them, and one life cycle as a transition table."""
 
-from impactcell.alarms.book import AlarmState, act, after_cycle, at_time, find, initial_state
+from impactcell.alarms.alarm_set import AlarmState, act, after_cycle, at_time, find, initial_state
 from impactcell.alarms.lifecycle import Effect, Event, Occurrence, Refusal, Transition, retained, silent
 from impactcell.alarms.rules import (
     AlarmSettings,

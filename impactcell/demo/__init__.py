@@ -1,5 +1,5 @@
 """`impactcell demo`: a simulated cell and the service on loopback, with a live view."""
 
-from impactcell.demo.show import demo
+from impactcell.demo.runner import demo
 
 __all__ = ["demo"]

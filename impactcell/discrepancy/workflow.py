@@ -6,20 +6,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.campaign import Campaign, Excitation
-from impactcell.discrepancy import noise
-from impactcell.discrepancy.campaign import Material, laid_out, prepare, split
-from impactcell.discrepancy.experiment import Proposal, propose
-from impactcell.discrepancy.extend import Search, search
-from impactcell.discrepancy.fit import Fit, refit_own
-from impactcell.discrepancy.followed import decided, followed
-from impactcell.discrepancy.intervals import Estimate, estimates
-from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.prove import Proof, prove
-from impactcell.discrepancy.shots import Index, thinned
-from impactcell.discrepancy.start import fit_nominal
-from impactcell.discrepancy.tangent import linearise
-from impactcell.discrepancy.trials import Mapper, Setup
-from impactcell.discrepancy.unknown import Unexplained, describe
+from impactcell.discrepancy.data import noise_floor
+from impactcell.discrepancy.data.prepared_campaign import Material, laid_out, prepare, split
+from impactcell.discrepancy.data.shots import Index, thinned
+from impactcell.discrepancy.model.block_selection import decided, followed
+from impactcell.discrepancy.model.fit import Fit, refit_own
+from impactcell.discrepancy.model.initial_guess import fit_nominal
+from impactcell.discrepancy.model.intervals import Estimate, estimates
+from impactcell.discrepancy.model.linearisation import linearise
+from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.search.candidate_fits import Mapper, Setup
+from impactcell.discrepancy.search.experiment_design import Proposal, propose
+from impactcell.discrepancy.search.model_selection import Search, search
+from impactcell.discrepancy.search.unexplained_gap import Unexplained, describe
+from impactcell.discrepancy.search.validation import Proof, prove
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
 
@@ -49,8 +49,8 @@ class Findings:
 
     verdict: str
     material: Material
-    floor: noise.Floor
-    replicates: noise.Replicates
+    floor: noise_floor.Floor
+    replicates: noise_floor.Replicates
     training: Index
     held_out: Index
     problem: Problem
@@ -111,7 +111,7 @@ def investigate(
         # Blocks of one record share what acts between records; there are too few of those for any test.
         names = tuple(name for name in names if LIBRARY[name].kind is not Kind.BETWEEN_SHOTS)
     material = prepare(campaign)
-    floor = noise.sensors(material)
+    floor = noise_floor.sensors(material)
     training, held_out = split(material, seed)
     problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
     say("fitting the nominal model")
@@ -166,7 +166,7 @@ def investigate(
     )
 
 
-def _certain(material: Material, floor: noise.Floor) -> bool:
+def _certain(material: Material, floor: noise_floor.Floor) -> bool:
     """Whether what is above the floor is a gap: noise is stated, or sampled fast enough to be seen."""
     return "stated" in floor.source or material.excitation is Excitation.TAP
 
@@ -181,19 +181,19 @@ def _verdict(found: Search) -> str:
 
 def _prove(
     material: Material,
-    floor: noise.Floor,
+    floor: noise_floor.Floor,
     problems: tuple[Problem, Problem],
     nominal: Fit,
     final: Fit,
     places: tuple[Index, Index],
     seed: int,
-) -> tuple[Proof, noise.Replicates, Fit, Fit]:
+) -> tuple[Proof, noise_floor.Replicates, Fit, Fit]:
     problem, held_problem = problems
     held = refit_own(held_problem, final)
     log_factor = np.empty(len(material.shots))
     log_factor[places[0]] = final.local.log_factor
     log_factor[places[1]] = held.local.log_factor
-    replicates = noise.replicate_spread(material.shots, log_factor, len(material.batches))
+    replicates = noise_floor.replicate_spread(material.shots, log_factor, len(material.batches))
     proof, old, new = prove(problem, nominal, final, held_problem, floor, replicates, seed)
     return proof, replicates, old, new
 

@@ -12,19 +12,19 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
-from impactcell.celllog import CellLogger
 from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader
+from impactcell.fieldbus.capture_ring import Mark, distance, next_wanted
 from impactcell.fieldbus.decoding import ModuleReport
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.mapped import MappedDevice
-from impactcell.fieldbus.polling import PollSchedule
-from impactcell.fieldbus.reception import ModuleStatus, Reception
+from impactcell.fieldbus.poll_schedule import PollSchedule
+from impactcell.fieldbus.received_cycle import ModuleStatus, Reception
+from impactcell.fieldbus.register_client import MappedDevice
 from impactcell.fieldbus.registers import RegisterMap, Value
-from impactcell.fieldbus.ring import Mark, distance, next_wanted
 from impactcell.fieldbus.transport import ModbusClient
+from impactcell.process.cell_logger import CellLogger
 
 __all__ = ["Module", "ModuleStatus", "Reception"]
 

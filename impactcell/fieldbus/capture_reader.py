@@ -12,10 +12,10 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
-from impactcell.fieldbus.exchange import PartialBlock
-from impactcell.fieldbus.mapped import MappedDevice
+from impactcell.fieldbus.capture_ring import Want
+from impactcell.fieldbus.register_client import MappedDevice
 from impactcell.fieldbus.registers import Value, Words, capture_crc32
-from impactcell.fieldbus.ring import Want
+from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.records import Capture
 
 _ATTEMPTS: Final = 5

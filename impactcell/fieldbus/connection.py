@@ -13,8 +13,8 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import BUSY, FrameReader, check_reply
-from impactcell.fieldbus.exchange import Batch, Exchange, Flight
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.request_batching import Batch, Exchange, Flight
 from impactcell.fieldbus.transactions import Transactions
 
 BUSY_PAUSE_S: Final = 0.02

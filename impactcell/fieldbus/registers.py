@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from impactcell.errors import MapError
-from impactcell.fieldbus.declaration import declared_fields
+from impactcell.fieldbus.map_validation import declared_fields
 from impactcell.fieldbus.register import KINDS, SI_FACTOR, WIRE, Register, Value, Words
 
 __all__ = ["REGISTER_SPACE", "REQUIRED", "WIRE", "Register", "RegisterMap", "Value", "Words", "capture_crc32"]

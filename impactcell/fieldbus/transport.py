@@ -6,9 +6,9 @@ import contextlib
 from impactcell.errors import LinkError
 from impactcell.fieldbus.codec import write_request
 from impactcell.fieldbus.connection import Connection
-from impactcell.fieldbus.exchange import Batch, Exchange, PartialBlock
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import Words
+from impactcell.fieldbus.request_batching import Batch, Exchange, PartialBlock
 from impactcell.fieldbus.transactions import Transactions
 
 

@@ -4,8 +4,8 @@ import importlib
 import pkgutil
 from pathlib import Path
 
-from impactcell.commands.progress import progress
 from impactcell.errors import SettingsError
+from impactcell.process.progress import progress
 
 
 def draw(directory: Path) -> list[Path]:

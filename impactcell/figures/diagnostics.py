@@ -11,15 +11,8 @@ import numpy as np
 
 from impactcell.figures.friction import COLOURS, GREY, STYLE
 from impactcell.records import Capture, Channel, Samples
-from impactcell.tracking import (
-    BatchKnowledge,
-    Reading,
-    Tracked,
-    TrackerSettings,
-    initial_state,
-    signature,
-    track,
-)
+from impactcell.tracking import BatchKnowledge, Reading, Tracked, TrackerSettings, initial_state, track
+from impactcell.tracking.signature import tracker
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,13 +112,13 @@ def over_batches(figure: "Figure") -> None:
 
 def along_stroke(figure: "Figure") -> None:
     """Figure 8: friction along single strokes, and one that deviates among those that do not."""
-    settings = signature.SignatureSettings()
-    state = signature.initial_state(settings)
+    settings = tracker.SignatureSettings()
+    state = tracker.initial_state(settings)
     judged, deviant = {}, None
     for cycle in range(120):
         rng = np.random.default_rng([8, cycle])
         capture = _slide(rng, cycle, bump=0.12 if cycle == 100 else 0.0)
-        done = signature.update(settings, state, capture)
+        done = tracker.update(settings, state, capture)
         state = done.state
         if cycle == 100:
             deviant = done

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
-from impactcell import values
 from impactcell.errors import JournalError
 from impactcell.records import Alarm, Quality
+from impactcell.serialization import json_text
 
 T = TypeVar("T")
 
@@ -98,7 +98,7 @@ def past_alarms(database: sqlite3.Connection, question: Question) -> Page[Alarm]
     """
     rows, resume = _page(database, question, "id, time_ns, record", "alarms", "id")
     try:
-        return Page(tuple(values.loads(Alarm, record.encode()) for _, _, record in rows), resume)
+        return Page(tuple(json_text.loads(Alarm, record.encode()) for _, _, record in rows), resume)
     except ValueError as error:
         raise JournalError(f"an alarm in the journal cannot be read: {error}") from error
 

@@ -14,15 +14,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from impactcell import values
 from impactcell.errors import JournalError
-from impactcell.journal.blobs import decode_capture, encode_capture
-from impactcell.journal.file import errors, opened
+from impactcell.journal.capture_codec import decode_capture, encode_capture
+from impactcell.journal.database import errors, opened
 from impactcell.journal.history import Page, PastValue, Question, past_alarms, past_values
 from impactcell.journal.lock import locked
 from impactcell.journal.retention import Retention, thin
 from impactcell.journal.schema import COLUMNS
 from impactcell.records import Alarm, Capture, Snapshot
+from impactcell.serialization import json_text
 
 _INSERT_CYCLE = (
     f"INSERT INTO cycles ({', '.join(c.name for c in COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"  # noqa: S608
@@ -105,7 +105,7 @@ class Journal:
 
     @property
     def model(self) -> str:
-        """Model the recording cell runs with, as `impactcell.values` writes it; empty before the first."""
+        """Model the recording cell runs with, as JSON; empty before the first."""
         return self._meta("model")
 
     def keep_model(self, model: str) -> None:
@@ -215,7 +215,7 @@ class Journal:
     def _put_alarms(self, changed: Sequence[Alarm]) -> None:
         self._db.executemany(
             "INSERT INTO alarms (time_ns, record) VALUES (?, ?)",
-            [(alarm.time_ns, values.dumps(alarm).decode()) for alarm in changed],
+            [(alarm.time_ns, json_text.dumps(alarm).decode()) for alarm in changed],
         )
 
     @contextmanager

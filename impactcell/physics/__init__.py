@@ -40,7 +40,7 @@ from impactcell.physics.ensemble import Ensemble, Figures, Traces
 from impactcell.physics.modified_euler import GridMotion, strike_modified_euler
 from impactcell.physics.motion import Event, EventKind, Motion, Sampled
 from impactcell.physics.plant import Plant, Strike
-from impactcell.physics.tap import slide, strike
+from impactcell.physics.simulate import slide, strike
 
 __all__ = [
     "Effect",

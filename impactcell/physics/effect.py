@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from impactcell.compiled import Law
-from impactcell.physics import layout as at
+from impactcell.numerics.jit import Law
+from impactcell.physics import memory_layout as at
 from impactcell.records import Samples
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.physics import layout as at
-from impactcell.physics.course import integrate_all
+from impactcell.physics import memory_layout as at
+from impactcell.physics.integrator import integrate_all
+from impactcell.physics.law_table import assemble, columns, parameter_range, parameter_vector
 from impactcell.physics.plant import Plant, Strike
-from impactcell.physics.program import assemble, columns, parameter_range, parameter_vector
 from impactcell.records import Samples
 
 LONGEST_S = 600.0

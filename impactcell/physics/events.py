@@ -6,8 +6,8 @@ for on the interpolant and then located with full steps, so that it is as exact 
 
 import numpy as np
 
-from impactcell.compiled import Integers, Numbers, compiled, invoke
-from impactcell.physics import layout as at
+from impactcell.numerics.jit import Integers, Numbers, compiled, invoke
+from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import (
     actuator_speed,
     body_force,

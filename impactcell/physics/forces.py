@@ -2,11 +2,11 @@
 
 Every law is evaluated by its smooth continuation: what is switched on is said by `mode`, never by the sign
 of the state, so that a step that runs past an event is still a step of a smooth equation. All arrays are
-bare pointers (`impactcell.compiled.pointer`) laid out as in `impactcell.physics.layout`.
+bare pointers (`impactcell.numerics.jit.pointer`) laid out as in `impactcell.physics.memory_layout`.
 """
 
-from impactcell.compiled import Integers, Numbers, compiled, invoke
-from impactcell.physics import layout as at
+from impactcell.numerics.jit import Integers, Numbers, compiled, invoke
+from impactcell.physics import memory_layout as at
 
 
 @compiled

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.compiled import compiled
 from impactcell.errors import NoStopError, PhysicsError
+from impactcell.numerics.jit import compiled
 from impactcell.physics.plant import Plant, Strike
 from impactcell.records import Samples
 

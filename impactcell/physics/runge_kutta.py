@@ -10,8 +10,8 @@ import math
 import numpy as np
 from scipy.integrate import DOP853
 
-from impactcell.compiled import Integers, Numbers, compiled
-from impactcell.physics import layout as at
+from impactcell.numerics.jit import Integers, Numbers, compiled
+from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import derivative
 
 STAGES = 12

@@ -9,17 +9,17 @@ import numpy as np
 
 from impactcell.errors import PositioningError
 from impactcell.physics import Plant
-from impactcell.positioning import belief as beliefs
-from impactcell.positioning.belief import Belief
-from impactcell.positioning.choice import choose
-from impactcell.positioning.learning import learn
-from impactcell.positioning.limits import largest_force
-from impactcell.positioning.outlook import Bounds, Outlook, look_ahead, stiffest
-from impactcell.positioning.profile import Profile, learn_profile
-from impactcell.positioning.response import displacement_of
-from impactcell.positioning.spread import Z, distribution, plants, scenarios
+from impactcell.positioning import planner_posterior as beliefs
+from impactcell.positioning.action_selection import choose
+from impactcell.positioning.displacement_model import displacement_of
+from impactcell.positioning.displacement_quantiles import Z, distribution, plants, scenarios
+from impactcell.positioning.dynamic_programming import AIMS
+from impactcell.positioning.friction_along_stroke import Profile, learn_profile
+from impactcell.positioning.lookahead_table import Bounds, Outlook, look_ahead, stiffest
+from impactcell.positioning.planner_posterior import Belief
+from impactcell.positioning.posterior_update import learn
+from impactcell.positioning.safety_limits import largest_force
 from impactcell.positioning.tap import Tap, Unreachable
-from impactcell.positioning.value import AIMS
 from impactcell.records import Quality, Samples, Signature
 
 CAUTION = (1.0, 20.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
@@ -214,7 +214,7 @@ class TapPlanner:
             )
 
     def force(self, tap: Tap, mass_kg: float) -> float:
-        """Bound on the contact force of a tap (N), for `impactcell.positioning.limits.released`."""
+        """Bound on the contact force of a tap (N), for `impactcell.positioning.safety_limits.released`."""
         return largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(self._belief), mass_kg, self._gravity)
 
     def _part(self, mass_kg: float) -> Samples:

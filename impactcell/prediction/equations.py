@@ -12,8 +12,8 @@ from itertools import pairwise
 from scipy.optimize import brentq
 
 from impactcell.errors import NegativeRootError, PredictionError
+from impactcell.prediction.feature_extraction import Reading
 from impactcell.prediction.model import REFERENCE_VELOCITY, DistanceForm, Model, Predictor, Sensitivity
-from impactcell.prediction.reading import Reading
 from impactcell.records import Capture, Coefficient, Quality
 
 LOWEST_MU = 1e-3

@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
-from impactcell.prediction.doubt import DOUBTED
 from impactcell.prediction.equations import (
     beyond_calibration,
     by_distance,
@@ -13,9 +12,10 @@ from impactcell.prediction.equations import (
     mix,
     out_of_range,
 )
+from impactcell.prediction.feature_extraction import Reading, peak_force, sensed
 from impactcell.prediction.model import Model
-from impactcell.prediction.reading import Reading, peak_force, sensed
-from impactcell.prediction.sliding import Slide, slide
+from impactcell.prediction.phase_reweighting import DOUBTED
+from impactcell.prediction.slide_features import Slide, slide
 from impactcell.prediction.waveform import Waveform, braking_friction, fit
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
 

@@ -1,6 +1,6 @@
 """mu_s and mu_k from the whole waveform of a tap: maximum a posteriori, with k and b as nuisances.
 
-Gauss-Newton on the blocks of a capture (`impactcell.prediction.response`), started from the curvature of
+Gauss-Newton on the blocks of a capture (`linearised_model`), started from the curvature of
 the slide. Priors are those of the model: mu_k is free; mu_k/mu_s, k and b are log-normal about its plant's.
 Where breakaway may be immediate the posterior has a kink and is fitted on either side of it
 (`impactcell.prediction.posterior`): mu_s is then seen only through the prior on mu_k/mu_s, and its
@@ -14,12 +14,9 @@ import numpy as np
 
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.physics import Plant
-from impactcell.prediction.descent import Belief, Minimum, descend
-from impactcell.prediction.doubt import DOUBTED, LATER, doubt, phases
-from impactcell.prediction.model import Model
-from impactcell.prediction.posterior import Posterior, mixture
-from impactcell.prediction.reading import checked, refuse_clipped
-from impactcell.prediction.response import (
+from impactcell.prediction.feature_extraction import checked, refuse_clipped
+from impactcell.prediction.gauss_newton import Belief, Minimum, descend
+from impactcell.prediction.linearised_model import (
     DAMPING,
     MU_K,
     RATIO,
@@ -29,7 +26,10 @@ from impactcell.prediction.response import (
     respond,
     with_parameters,
 )
-from impactcell.prediction.sliding import Slide, slide
+from impactcell.prediction.model import Model
+from impactcell.prediction.phase_reweighting import DOUBTED, LATER, doubt, phases
+from impactcell.prediction.posterior import Posterior, mixture
+from impactcell.prediction.slide_features import Slide, slide
 from impactcell.records import Capture, Samples
 
 FAR_FROM_KINK = 6.0
@@ -62,7 +62,7 @@ class Waveform:
         RMS of the residuals of single samples over the sensors' noise; 1 = noise.
     misfit : float
         The same for blocks. The standard deviations are widened by it where it is above 1; where it is well
-        above, the phases that the model misses count for less (`impactcell.prediction.doubt`).
+        above, the phases that the model misses count for less (`impactcell.prediction.phase_reweighting`).
     """
 
     mu_s: float

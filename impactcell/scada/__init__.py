@@ -5,7 +5,7 @@
 
 from typing import TYPE_CHECKING
 
-from impactcell.scada.descriptions import (
+from impactcell.scada.interface import (
     Actions,
     Actor,
     AlarmPage,

@@ -12,10 +12,10 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.alarms import retained
+from impactcell.opcua.event_filter import Event, Path
+from impactcell.opcua.node_values import GOOD, Values, moment
 from impactcell.records import Alarm, AlarmName, Shelving
-from impactcell.scada.mends.eventfilter import Event, Path
-from impactcell.scada.space import CellSpace
-from impactcell.scada.values import GOOD, Values, moment
+from impactcell.scada.cell_nodes import CellSpace
 
 MAX_SHELVE_S: Final = 24 * 3600.0
 """Longest time a condition can be shelved: nobody remembers longer why."""

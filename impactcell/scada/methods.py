@@ -8,16 +8,16 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.alarms import Event
+from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.method_service import Argument, ArgumentError, Calls, Method
+from impactcell.opcua.request_dispatch import Context
+from impactcell.opcua.subscription_service import Monitoring
 from impactcell.records import Alarm, AlarmName
+from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition, refresh_event
-from impactcell.scada.descriptions import Actions, CellDescription, RefusedError
-from impactcell.scada.mends.calls import Argument, ArgumentError, Calls, Method
-from impactcell.scada.mends.codec import FaultError
-from impactcell.scada.mends.dispatch import Context
-from impactcell.scada.mends.monitoring import Monitoring
-from impactcell.scada.nodes import MM_PER_M, target_range_mm
+from impactcell.scada.interface import Actions, CellDescription, RefusedError
+from impactcell.scada.node_table import MM_PER_M, target_range_mm
 from impactcell.scada.rights import CONDITION_AREAS, Area
-from impactcell.scada.space import CellSpace
 
 _audit: Final = logging.getLogger("impactcell.audit")
 

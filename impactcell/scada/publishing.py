@@ -6,13 +6,7 @@ from typing import Final
 
 from asyncua import ua
 
-from impactcell.records import Quality, Snapshot
-from impactcell.scada.descriptions import ModuleState
-from impactcell.scada.instances import read
-from impactcell.scada.nodes import CYCLE, MODULE
-from impactcell.scada.nodes import Value as NodeValue
-from impactcell.scada.space import CellSpace
-from impactcell.scada.values import (
+from impactcell.opcua.node_values import (
     BAD,
     LAST_USABLE,
     NO_COMMUNICATION,
@@ -22,6 +16,12 @@ from impactcell.scada.values import (
     Variable,
     moment,
 )
+from impactcell.opcua.type_instances import read
+from impactcell.records import Quality, Snapshot
+from impactcell.scada.cell_nodes import CellSpace
+from impactcell.scada.interface import ModuleState
+from impactcell.scada.node_table import CYCLE, MODULE
+from impactcell.scada.node_table import Value as NodeValue
 
 _EMPTY: Final[dict[ua.VariantType, object]] = {
     ua.VariantType.Double: math.nan,

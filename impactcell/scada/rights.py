@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from impactcell.alarms import Event
-from impactcell.scada.descriptions import Role
+from impactcell.scada.interface import Role
 
 
 class Right(enum.Enum):

@@ -9,24 +9,18 @@ from urllib.parse import urlsplit
 from asyncua import Server as AsyncuaServer
 from asyncua import ua
 
+from impactcell.opcua.event_filter import Event
+from impactcell.opcua.history_service import Histories
+from impactcell.opcua.node_values import Values
+from impactcell.opcua.service_host import Host, aggregate_functions
+from impactcell.opcua.type_instances import link
 from impactcell.records import Alarm, AlarmName, Snapshot
+from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
 from impactcell.scada.conditions import Condition
-from impactcell.scada.descriptions import (
-    Actions,
-    CellDescription,
-    HistorySource,
-    ModuleState,
-    ServerSettings,
-)
-from impactcell.scada.host import Host, aggregate_functions
-from impactcell.scada.instances import link
-from impactcell.scada.mends.eventfilter import Event
-from impactcell.scada.mends.histories import Histories
+from impactcell.scada.interface import Actions, CellDescription, HistorySource, ModuleState, ServerSettings
 from impactcell.scada.methods import bind_cell, bind_condition, bind_refresh
-from impactcell.scada.nodes import HISTORY
+from impactcell.scada.node_table import HISTORY
 from impactcell.scada.publishing import CellValues
-from impactcell.scada.space import CellSpace, cell_notifiers, load_types, method_declarations
-from impactcell.scada.values import Values
 
 
 class Server:

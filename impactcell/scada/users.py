@@ -23,7 +23,7 @@ from argon2 import PasswordHasher
 from argon2.exceptions import Argon2Error, InvalidHashError
 
 from impactcell.errors import AccessError
-from impactcell.scada.descriptions import Role
+from impactcell.scada.interface import Role
 
 # OWASP's first recommendation for argon2id: 19 MiB, 2 passes, 1 lane.
 _HASHER: Final = PasswordHasher(time_cost=2, memory_cost=19_456, parallelism=1)

@@ -1,5 +1,5 @@
 """The running service: one task a cell, from the module's cycle to SCADA's nodes."""
 
-from impactcell.service.process import Service, run
+from impactcell.service.service import Service, run
 
 __all__ = ["Service", "run"]

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 
 from impactcell.cell import CellDesign
-from impactcell.celllog import CellLogger
 from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import Module
-from impactcell.fieldbus.commands import Positioner, TapCommand
 from impactcell.fieldbus.decoding import PositioningReport
-from impactcell.positioning import Belief, Limits, TapPlanner, sequence
-from impactcell.positioning.sequence import Phase, Sequence
+from impactcell.fieldbus.tap_commands import Positioner, TapCommand
+from impactcell.positioning import Belief, Limits, TapPlanner, task_state_machine
+from impactcell.positioning.task_state_machine import Phase, Sequence
+from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Evidence, PositioningState, Quality, Snapshot
 from impactcell.service.worker import Worker
 from impactcell.settings import Cell
@@ -22,7 +22,7 @@ WATCH_S = 0.1
 
 
 class PositioningTask:
-    """Drives `impactcell.positioning.sequence` for one cell.
+    """Drives `impactcell.positioning.task_state_machine` for one cell.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class PositioningTask:
             travel_m=(0.0, settings.travel_mm * 1e-3),
         )
         self._log = CellLogger(logging.getLogger(__name__), cell.name)
-        self._cell = sequence.Cell(
+        self._cell = task_state_machine.Cell(
             cell.name, limits, settings.encoder_resolution_um * 1e-6, two_sided=actuator.both_ends
         )
         self._planner = TapPlanner(
@@ -105,7 +105,7 @@ class PositioningTask:
             mass_kg = self._mass_kg
         before = self._sequence
         begun = await self._worker.run(
-            lambda: sequence.begin(
+            lambda: task_state_machine.begin(
                 before,
                 self._cell,
                 self._planner,
@@ -124,7 +124,7 @@ class PositioningTask:
         """Stop the task that runs, and the tap that is being executed; nothing happens where none runs."""
         if not self._sequence.running:
             return
-        self._set(sequence.aborted(self._sequence, by))
+        self._set(task_state_machine.aborted(self._sequence, by))
         try:
             await self._positioner.abort()
         except FieldbusError as error:
@@ -187,22 +187,22 @@ class PositioningTask:
         while self._sequence.phase is Phase.COMMANDING:
             tap = self._sequence.tap
             assert tap is not None  # noqa: S101 - COMMANDING has one
-            waiting = sequence.commanded(self._sequence)
+            waiting = task_state_machine.commanded(self._sequence)
             self._set(waiting)
             try:
                 await self._positioner.tap(TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction))
                 await self._module.read_report()
                 position_m = self._report().position_m
             except FieldbusError as error:
-                self._set(sequence.failed(self._sequence, f"{self._cell.name}: {error}"))
+                self._set(task_state_machine.failed(self._sequence, f"{self._cell.name}: {error}"))
                 return
             except PositioningError as error:
-                self._set(sequence.failed(self._sequence, str(error)))
+                self._set(task_state_machine.failed(self._sequence, str(error)))
                 return
             if self._sequence is not waiting:
                 return
             after = await self._worker.run(
-                lambda: sequence.observed(waiting, self._cell, self._planner, position_m)  # noqa: B023
+                lambda: task_state_machine.observed(waiting, self._cell, self._planner, position_m)  # noqa: B023
             )
             self._worker.belief = self._planner.belief
             if self._sequence is waiting:

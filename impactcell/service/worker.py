@@ -10,19 +10,19 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from impactcell import cell as core
-from impactcell import values
 from impactcell.alarms import Finding, Occurrence, Transition
 from impactcell.cell import CellDesign, CellState, Stepped
-from impactcell.celllog import CellLogger
-from impactcell.fieldbus.ring import Mark
-from impactcell.intake import Announcement
+from impactcell.cell.preprocessing import Announcement
+from impactcell.fieldbus.capture_ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
-from impactcell.packing import pack, unpack
 from impactcell.positioning import Belief
+from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Shelving, Snapshot
-from impactcell.service.keeping import Keeper
-from impactcell.service.rehearsal import rehearse
+from impactcell.serialization import json_text
+from impactcell.serialization.message_pack import pack, unpack
+from impactcell.service.journal_writer import Keeper
+from impactcell.service.warmup import rehearse
 
 T = TypeVar("T")
 
@@ -187,7 +187,7 @@ class Worker:
 
     def _keep_model(self) -> None:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
-        model = values.dumps(self._design.model).decode()
+        model = json_text.dumps(self._design.model).decode()
         self._keeper.store(lambda journal: journal.keep_model(model))
 
     def _restore(self) -> Durable:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from impactcell import yamlfile
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.modelfile import read_model
 from impactcell.prediction.model import Model
+from impactcell.settings import yaml_loader
+from impactcell.settings.model_file import read_model
 from impactcell.settings.sections import CellSettings
 
 
@@ -39,7 +39,7 @@ def read_cell(path: Path) -> Cell:
     faults: list[str] = []
     settings = layout = model = None
     try:
-        settings, _ = yamlfile.read(path, CellSettings)
+        settings, _ = yaml_loader.read(path, CellSettings)
         map_file: Path | None = settings.module.register_map
         model_file: Path | None = settings.model
         order = settings.module.word_order
@@ -62,7 +62,7 @@ def read_cell(path: Path) -> Cell:
 def _named(path: Path) -> tuple[Path | None, Path | None]:
     """Map and model that a faulty cell file names: their faults are told together with its own."""
     try:
-        data, _ = yamlfile.load(path)
+        data, _ = yaml_loader.load(path)
     except SettingsError:
         return None, None
     cell = data if isinstance(data, dict) else {}
@@ -81,7 +81,7 @@ def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
     SettingsError
         With every fault of the file, each with its name.
     """
-    data, _ = yamlfile.load(path)
+    data, _ = yaml_loader.load(path)
     if not isinstance(data, dict):
         raise SettingsError(f"{path}:1:1: a register map is a mapping of format, name and registers")
     try:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from impactcell.compiled import compiled
+from impactcell.numerics.jit import compiled
 
 EWMA_LAMBDA = 0.1
 CUSUM_SLACK = 0.5

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from impactcell.compiled import compiled
+from impactcell.numerics.jit import compiled
 from tests.benchmarks import _charts, _streams
 
 CLIP = 3.0

@@ -16,10 +16,10 @@ from impactcell import cell as core
 from impactcell.journal import store
 from impactcell.records import Capture, Channel, PositioningState, Summary, uniform_times
 from impactcell.scada import ModuleState, Server
-from impactcell.service.actions import CellActions
-from impactcell.service.design import cell_description, server_settings
-from impactcell.service.past import JournalHistory
-from impactcell.service.running import RunningCell
+from impactcell.service.cell_task import RunningCell
+from impactcell.service.factory import cell_description, server_settings
+from impactcell.service.history_source import JournalHistory
+from impactcell.service.operator_commands import CellActions
 from impactcell.service.worker import Worker
 from impactcell.settings import read_cell
 from tests.benchmarks._modules import FORCE_HZ, POSITION_HZ, taps

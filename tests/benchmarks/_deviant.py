@@ -7,9 +7,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 from scipy.stats import f as f_distribution
 
-from impactcell.tracking import deviation, profile, shapes, signature
-from impactcell.tracking import reference as references
-from impactcell.tracking.slide import find_slide
+from impactcell.tracking.signature import deviation_shapes, deviation_test, friction_profile, tracker
+from impactcell.tracking.signature import reference as references
+from impactcell.tracking.signature.slide_segment import find_slide
 from tests.benchmarks._slides import FRICTION, GRAVITY, slide
 from tests.benchmarks.table import Table
 
@@ -60,11 +60,11 @@ DEVIATIONS = {
 class Normality:
     """How normal cycles truly vary, as information on the spline coefficients of one typical slide."""
 
-    def __init__(self, settings: signature.SignatureSettings) -> None:
+    def __init__(self, settings: tracker.SignatureSettings) -> None:
         self.grid = settings.grid_m
-        self.to_coefficients = np.linalg.pinv(profile.on_grid(settings.points))
+        self.to_coefficients = np.linalg.pinv(friction_profile.on_grid(settings.points))
         capture, _ = slide(_normal(np.random.default_rng([8, 0])), SPEED, RATE, NOISE, 0)
-        self.seen = profile.information(find_slide(capture), self.grid, GRAVITY)
+        self.seen = friction_profile.information(find_slide(capture), self.grid, GRAVITY)
         G = self.G = self.seen.matrix
         self.C = self.to_coefficients @ (FRICTION * np.array([m(self.grid) for m in MODES]).T)
         texture = FRICTION * (1.0 + 0.03 * np.sin(2.0 * np.pi * self.grid / 1.3e-3))
@@ -101,7 +101,7 @@ def false_alarm_table(*, quick: bool) -> Table:
     Drawn are cycles pushed along a shape that is looked for until its score is near the threshold, of all
     shapes alike and one in ten as it is; each counts with the ratio of the densities.
     """
-    settings = signature.SignatureSettings()
+    settings = tracker.SignatureSettings()
     truth = Normality(settings)
     draws, references_tried = (150, 2) if quick else (1000, 16)
     alpha, push = 1.0 / settings.false_alarm_cycles, 5.0
@@ -109,7 +109,7 @@ def false_alarm_table(*, quick: bool) -> Table:
     ordinary = judged = 0
     for trial in range(references_tried):
         rng = np.random.default_rng([11, trial])
-        state = signature.initial_state(settings)
+        state = tracker.initial_state(settings)
         vectors = truth.vectors(rng, LEARNED[-1] + 10) + truth.G @ truth.mean
         for vector in vectors:
             known = state.reference
@@ -118,11 +118,11 @@ def false_alarm_table(*, quick: bool) -> Table:
             seen = replace(truth.seen, vector=vector)
             verdict = None
             if known.variation.cycles >= settings.learned_cycles:
-                verdict = deviation.judge(known, seen, truth.grid)
+                verdict = deviation_test.judge(known, seen, truth.grid)
                 ordinary += verdict.p_value < 100.0 * alpha
                 judged += 1
             # never given up: what is falsely thought deviant is learned all the same
-            state = signature.learned(state, seen, settings, verdict and replace(verdict, p_value=1.0))
+            state = tracker.learned(state, seen, settings, verdict and replace(verdict, p_value=1.0))
     rows = []
     for n, rates in found.items():
         error = 1.96 * np.std(rates) / math.sqrt(len(rates))
@@ -142,20 +142,20 @@ def false_alarm_table(*, quick: bool) -> Table:
 
 def mixed_table(*, quick: bool) -> Table:
     """False alarms of real slides whose velocities come in turn, while cycles are still being learned."""
-    settings = signature.SignatureSettings()
+    settings = tracker.SignatureSettings()
     runs = 4 if quick else 40
     found: dict[float, list[float]] = {speed: [] for speed in SPEEDS}
     for run in range(runs):
-        rng, state = np.random.default_rng([13, run]), signature.initial_state(settings)
+        rng, state = np.random.default_rng([13, run]), tracker.initial_state(settings)
         for cycle in range(MIXED):
             speed = SPEEDS[cycle % len(SPEEDS)]
             capture, _ = slide(_normal(rng), speed, RATE, NOISE, run * MIXED + cycle)
-            seen = profile.information(find_slide(capture), settings.grid_m, GRAVITY)
+            seen = friction_profile.information(find_slide(capture), settings.grid_m, GRAVITY)
             known, verdict = state.reference, None
             if known.variation.cycles >= settings.learned_cycles:
-                verdict = deviation.judge(known, seen, settings.grid_m)
+                verdict = deviation_test.judge(known, seen, settings.grid_m)
                 found[speed].append(verdict.p_value)
-            state = signature.learned(state, seen, settings, verdict and replace(verdict, p_value=1.0))
+            state = tracker.learned(state, seen, settings, verdict and replace(verdict, p_value=1.0))
     rows = []
     for name, p in [(f"{speed:g} m/s", np.array(found[speed])) for speed in SPEEDS] + [
         ("all", np.concatenate(list(found.values())))
@@ -172,7 +172,7 @@ def mixed_table(*, quick: bool) -> Table:
 
 def _tail(
     truth: Normality,
-    settings: signature.SignatureSettings,
+    settings: tracker.SignatureSettings,
     known: references.Reference,
     rng: np.random.Generator,
     draws: int,
@@ -180,7 +180,7 @@ def _tail(
     push: float,
 ) -> float:
     j = len(truth.G)
-    looked = shapes.shapes(settings.length_m, settings.points)
+    looked = deviation_shapes.shapes(settings.length_m, settings.points)
     rows, _, waves = looked.within(truth.seen.reached_m, j)
     first = len(rows) - 2 - 2 * waves
     cosines, sines = (rows[first + k : len(rows) - 2 : 2] for k in (0, 1))
@@ -201,7 +201,7 @@ def _tail(
     y += (push * sign)[:, np.newaxis] * (filters[picked] @ truth.covariance)
     ratio = 0.1 + 0.9 * (np.cosh(push * (y @ filters.T)) * math.exp(-(push**2) / 2.0)).mean(axis=1)
     alarms = [
-        deviation.judge(known, replace(truth.seen, vector=v), truth.grid).p_value < alpha
+        deviation_test.judge(known, replace(truth.seen, vector=v), truth.grid).p_value < alpha
         for v in y + truth.G @ truth.mean
     ]
     return float(np.mean(np.array(alarms) / ratio))
@@ -234,10 +234,10 @@ def _limits(truth: Normality, alpha: float) -> dict[str, dict[float, float]]:
 
 def power_table(*, quick: bool) -> Table:
     """Power at one false alarm in 100000 cycles beside the oracle's and the plain statistics'."""
-    settings = signature.SignatureSettings()
+    settings = tracker.SignatureSettings()
     truth = Normality(settings)
     alpha = 1.0 / settings.false_alarm_cycles
-    state = signature.initial_state(settings)
+    state = tracker.initial_state(settings)
     learned = 150 if quick else LEARNED[-1]
     runs = 40 if quick else 200
     false = judged = 0
@@ -245,7 +245,7 @@ def power_table(*, quick: bool) -> Table:
     for k in range(learned):
         rng = np.random.default_rng([8, k])
         capture, _ = slide(_normal(rng), SPEED, RATE, NOISE, k)
-        done = signature.update(settings, state, capture)
+        done = tracker.update(settings, state, capture)
         false += done.deviation is not None
         judged += done.judged
         state = done.state
@@ -266,12 +266,12 @@ def power_table(*, quick: bool) -> Table:
                 size = aim / truth.score(shape, _deviant(truth, base, size * sign, shape, 5000 + k).matrix)
                 seen = _deviant(truth, base, size * sign, shape, 5000 + k)
                 power[oracle].append(norm.sf(norm.isf(alpha) - size * truth.score(shape, seen.matrix)))
-                verdict = deviation.judge(state.reference, seen, truth.grid)
+                verdict = deviation_test.judge(state.reference, seen, truth.grid)
                 ours[oracle].append(verdict.p_value < alpha)
                 if verdict.p_value < alpha:
                     off[oracle].append(abs(verdict.at_m - place))
                 plain[oracle].append(_plain(verdict, state.reference.variation.cycles) < alpha)
-                verdict = deviation.judge(young.reference, seen, truth.grid)
+                verdict = deviation_test.judge(young.reference, seen, truth.grid)
                 early[oracle].append(verdict.p_value < alpha)
             amplitudes.append(100.0 * size)
         for kind, hits, bar in (
@@ -317,18 +317,18 @@ def power_table(*, quick: bool) -> Table:
     return Table("Deviant cycle at 1e-5 false alarms", columns, rows, note)
 
 
-def _deviant(truth: Normality, base, size: float, shape, seed: int) -> profile.Information:
+def _deviant(truth: Normality, base, size: float, shape, seed: int) -> friction_profile.Information:
     """What one slide says over friction that deviates by a shape, in shares of the friction."""
 
     def friction(x):
         return base(x) + size * FRICTION * shape(np.asarray(x))
 
     capture, _ = slide(friction, SPEED, RATE, NOISE, seed)
-    return profile.information(find_slide(capture), truth.grid, GRAVITY)
+    return friction_profile.information(find_slide(capture), truth.grid, GRAVITY)
 
 
-def _plain(verdict: deviation.Verdict, cycles: int) -> float:
+def _plain(verdict: deviation_test.Verdict, cycles: int) -> float:
     """p-value of Hotelling's T^2 and SPE alone, half of the false alarms each."""
-    k = deviation.COMPONENTS
+    k = deviation_test.COMPONENTS
     hotelling = f_distribution.sf(verdict.t_squared * (cycles - k) / (k * (cycles - 1.0)), k, cycles - k)
     return 2.0 * min(hotelling, chi2.sf(verdict.spe, max(verdict.spe_freedom, 1)))

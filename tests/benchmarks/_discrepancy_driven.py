@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from impactcell.campaign import Campaign, Excitation, Sensor
-from impactcell.discrepancy.result import result
+from impactcell.discrepancy.report.result import result
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import ImpactCellError
 from impactcell.records import Capture, Channel

@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from impactcell.discrepancy import noise
-from impactcell.discrepancy.campaign import laid_out, prepare
-from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.start import fit_nominal
+from impactcell.discrepancy.data import noise_floor
+from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare
+from impactcell.discrepancy.model.initial_guess import fit_nominal
+from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import ImpactCellError
 from simulator.campaign import make
 from simulator.effects import LIBRARY as LAWS
@@ -168,7 +168,7 @@ def nominal_gap(job: Job, strength: float, shots: int = FIRST_SHOTS) -> float:
         plan = scenario(few, [strength])
         made = make(plan)[1]
         material = prepare(recorded(plan, made))
-        floor = noise.sensors(material)
+        floor = noise_floor.sensors(material)
         every = np.arange(len(material.shots))
         problem = Problem(laid_out(material, every, floor.noise_std), len(material.batches))
         nominal = fit_nominal(problem)

@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from impactcell.discrepancy import name, noise
-from impactcell.discrepancy.campaign import laid_out, prepare, split
-from impactcell.discrepancy.fit import Fit, fit
-from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.start import fit_nominal
-from impactcell.discrepancy.tangent import linearise, scores
+from impactcell.discrepancy.data import noise_floor
+from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare, split
+from impactcell.discrepancy.model.fit import Fit, fit
+from impactcell.discrepancy.model.initial_guess import fit_nominal
+from impactcell.discrepancy.model.linearisation import linearise, scores
+from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.search import candidate_scores
 from impactcell.errors import DiscrepancyError
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks import _discrepancy_judge as judge
@@ -70,7 +71,7 @@ def run(task: Task) -> Row:
     """Answers of the rivals on one campaign."""
     job = task.job
     material = prepare(campaign(job, task.multiples))
-    floor = noise.sensors(material)
+    floor = noise_floor.sensors(material)
     training, _ = split(material, job.seed)
     library = tuple(effect for effect in LIBRARY if effect != job.removed)
     row: Row = {"key": job.key}
@@ -102,11 +103,11 @@ class Steps:
 
     def _fits(self, model: Fit) -> list[Fit]:
         tangent = linearise(self.problem, model)
-        found = name.candidates(self.problem, model, tangent, self.library)
+        found = candidate_scores.candidates(self.problem, model, tangent, self.library)
         scored = scores(tangent, found.products)
         ranked = []
         for number, effect in enumerate(found.names):
-            best = name.best_probes(found, scored, number, 1)
+            best = candidate_scores.best_probes(found, scored, number, 1)
             if best:
                 ranked.append((best[0][0], effect, best[0][1]))
         ranked.sort(key=lambda one: -one[0])

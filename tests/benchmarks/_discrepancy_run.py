@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from impactcell.discrepancy.result import result
+from impactcell.discrepancy.report.result import result
 from impactcell.discrepancy.workflow import investigate
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks._discrepancy_plan import calibrated

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 from pysindy import STLSQ, SmoothedFiniteDifference
 
-from impactcell.discrepancy.fit import Fit
-from impactcell.discrepancy.phases import FREE_SLIDE, LOADING, UNLOADING, course_of, phases
-from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.shots import ACTUATOR, FORCE, POSITION, Shot
+from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, Shot
+from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.model.phases import FREE_SLIDE, LOADING, UNLOADING, course_of, phases
+from impactcell.discrepancy.model.problem import Problem
 
 SMOOTH_SLIDE_S, SMOOTH_CONTACT_S = 0.010, 0.004
 STRIBECK_M_S = (0.01, 0.02, 0.04, 0.08)

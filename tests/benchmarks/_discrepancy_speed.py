@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.result import result
+from impactcell.discrepancy.report.result import result
 from impactcell.discrepancy.workflow import investigate
 from tests.benchmarks._discrepancy_judge import RIGHT, TIED, judged
 from tests.benchmarks._discrepancy_plan import calibrated, jobs

@@ -23,7 +23,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
-from impactcell.tracking.settings import TrackerSettings
+from impactcell.tracking.wear_batch.settings import TrackerSettings
 from tests.integration.processes import CONFIG, ROOT
 
 PERIOD_S = 0.497  # two a second, and through all phases of the publishing clock

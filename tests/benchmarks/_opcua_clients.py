@@ -13,7 +13,7 @@ import time
 from asyncua import Client, ua
 from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 
-from impactcell.scada.nodes import CYCLE
+from impactcell.scada.node_table import CYCLE
 from tests.opcua_server import CELL, CLIENT_URI
 
 # All figures that change with each cycle, and one of the link: 30.

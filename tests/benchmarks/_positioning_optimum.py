@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.compiled import compiled
-from impactcell.positioning.response import displacements
+from impactcell.numerics.jit import compiled
+from impactcell.positioning.displacement_model import displacements
 
 Samples = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from impactcell.physics import Plant
 from impactcell.positioning import Tap, TapPlanner, Unreachable
-from impactcell.positioning.belief import DAMPING, FRICTION, STIFFNESS, gaussian
+from impactcell.positioning.planner_posterior import DAMPING, FRICTION, STIFFNESS, gaussian
 from simulator.plant_nominal import nominal_taps
 
 RESULTS = Path("bench-results")

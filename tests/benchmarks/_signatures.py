@@ -6,7 +6,7 @@ import time
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
-from impactcell.tracking import incycle, signature
+from impactcell.tracking.signature import in_cycle_filter, tracker
 from tests.benchmarks import _deviant
 from tests.benchmarks._slides import FRICTION, slide
 from tests.benchmarks.table import Table
@@ -17,7 +17,7 @@ SPEED = 0.09
 
 def error_table(*, quick: bool) -> Table:
     """Relative error on bumps of 10 %, width (one sd, as in friction_patch) 0.4-0.8 mm, narrower beside."""
-    settings = signature.SignatureSettings()
+    settings = tracker.SignatureSettings()
     grid = settings.grid_m
     rows = []
     for rate, bar in ((1e3, "<= 1 %"), (1e4, ""), (1e5, "<= 0.3 %")):
@@ -31,7 +31,7 @@ def error_table(*, quick: bool) -> Table:
                 return FRICTION * (1.0 + h * np.exp(-0.5 * ((x - c) / w) ** 2))
 
             capture, distance = slide(friction, SPEED, rate, NOISE, k)
-            found = signature.update(settings, signature.initial_state(settings), capture).signature
+            found = tracker.update(settings, tracker.initial_state(settings), capture).signature
             use = (grid > 0.1 * distance) & (grid < 0.9 * distance)
             off = (found.friction - friction(grid))[use]
             each.setdefault(width, []).append((off**2).mean())
@@ -75,19 +75,19 @@ def speed_table(*, quick: bool) -> Table:
     n, rate = 400_000 if quick else 1_000_000, 1e6
     T = 1.0 / rate
     z = 0.1 * np.arange(n) * T + NOISE * np.random.default_rng(1).normal(size=n)
-    start = incycle.start(T, NOISE, 1e5)
-    incycle.filter_block(start, z[:10])
+    start = in_cycle_filter.start(T, NOISE, 1e5)
+    in_cycle_filter.filter_block(start, z[:10])
     best = math.inf
     for _ in range(7):
         state, before = start, time.perf_counter()
         for block in np.split(z, n // 10_000):
-            state, ours = incycle.filter_block(state, block)
+            state, ours = in_cycle_filter.filter_block(state, block)
         best = min(best, time.perf_counter() - before)
     few = 5_000
     oracle = KalmanFilter(3, 1)
     oracle.F = np.array([[1.0, T, T * T / 2.0], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
     oracle.H = np.array([[1.0, 0.0, 0.0]])
-    oracle.Q, oracle.x = incycle.process_noise(T, 1e5), np.zeros((3, 1))
+    oracle.Q, oracle.x = in_cycle_filter.process_noise(T, 1e5), np.zeros((3, 1))
     oracle.R *= NOISE**2
     oracle.P = np.diag([100.0 * NOISE**2, 1.0, 100.0])
     theirs, slowest = np.empty((few, 3)), math.inf
@@ -99,7 +99,7 @@ def speed_table(*, quick: bool) -> Table:
             oracle.update(z[k])
             theirs[k] = oracle.x[:, 0]
         slowest = min(slowest, time.perf_counter() - before)
-    _, ours = incycle.filter_block(start, z[:few])
+    _, ours = in_cycle_filter.filter_block(start, z[:few])
     apart = float((np.abs(ours - theirs).max(axis=0) / np.abs(theirs).max(axis=0)).max())
     ratio = (n / best) / (few / slowest)
     rows = [

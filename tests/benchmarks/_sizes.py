@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from impactcell.tracking import deviation, profile, scan, signature
-from impactcell.tracking.slide import find_slide
+from impactcell.tracking.signature import deviation_test, friction_profile, matched_filter_scan, tracker
+from impactcell.tracking.signature.slide_segment import find_slide
 from tests.benchmarks._deviant import NOISE, RATE, SPEED, Normality, _normal
 from tests.benchmarks._slides import FRICTION, GRAVITY, slide
 from tests.benchmarks.table import Table
@@ -50,12 +50,12 @@ SHAPES = {
 
 def table(*, quick: bool) -> Table:
     """Error over standard deviation of what is reported, that is of detected cycles only."""
-    settings = signature.SignatureSettings()
+    settings = tracker.SignatureSettings()
     truth, alpha = Normality(settings), 1.0 / settings.false_alarm_cycles
-    state = signature.initial_state(settings)
+    state = tracker.initial_state(settings)
     for vector in truth.vectors(np.random.default_rng(13), LEARNED) + truth.G @ truth.mean:
-        seen = profile.Information(truth.G, vector, truth.seen.reached_m, truth.seen.seen)
-        state = signature.learned(state, seen, settings, None)
+        seen = friction_profile.Information(truth.G, vector, truth.seen.reached_m, truth.seen.seen)
+        state = tracker.learned(state, seen, settings, None)
     rows = []
     for number, (name, (family, make)) in enumerate(SHAPES.items()):
         found, deviant = [], 0
@@ -69,8 +69,10 @@ def table(*, quick: bool) -> Table:
                 return base(x) + size * shape(np.asarray(x))
 
             capture, _ = slide(friction, SPEED, RATE, NOISE, 20_000 + k)
-            verdict = deviation.judge(
-                state.reference, profile.information(find_slide(capture), truth.grid, GRAVITY), truth.grid
+            verdict = deviation_test.judge(
+                state.reference,
+                friction_profile.information(find_slide(capture), truth.grid, GRAVITY),
+                truth.grid,
             )
             deviant += verdict.p_value < alpha
             if verdict.p_value < alpha and verdict.kind == family:
@@ -98,7 +100,8 @@ def table(*, quick: bool) -> Table:
         f"Reference of {LEARNED} cycles. Amplitudes such that the oracle's score is {SCORES[0]:g} to "
         f"{SCORES[1]:g}, log-uniform, at most {100 * LARGEST:g} % of the friction; bumps 0.2 to 1.85 mm from "
         "the start, 0.47 to 1.65 mm wide at half of their height, ripples of 0.45 to 2 mm at any phase. Only "
-        f"deviant cycles are sized, and only those told as the right one of {', '.join(scan.FAMILIES)} can "
-        "be compared. A mean above zero is a size told too large."
+        f"deviant cycles are sized, and only those told as the right one of "
+        f"{', '.join(matched_filter_scan.FAMILIES)} can be compared. A mean above zero "
+        "is a size told too large."
     )
     return Table("Size of a deviation", columns, rows, note)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from impactcell.tracking import TrackerSettings, bank
+from impactcell.tracking import TrackerSettings
+from impactcell.tracking.wear_batch import run_length_bank
 from tests.benchmarks import _charts, _streams
 from tests.benchmarks.table import Table
 
@@ -38,7 +39,7 @@ def _follow(
     for k in range(len(z)):
         t = first + k
         reading[0], reading[4] = z[k], t
-        count, _, statistic = bank.run_cycle(table, count, design, reading, outliers, accepted)
+        count, _, statistic = run_length_bank.run_cycle(table, count, design, reading, outliers, accepted)
         if statistic > limit:
             accepted = t
             found[n] = t
@@ -72,10 +73,12 @@ class Run:
     def start(cls, value: float) -> "Run":
         settings = TrackerSettings()
         prior = settings.outlier_probability
-        table = np.zeros((bank.ROWS, bank.WIDTH))
-        first = bank.seed(value, 1.0, settings.slope_std, 0, prior)
+        table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
+        first = run_length_bank.seed(value, 1.0, settings.slope_std, 0, prior)
         table[: len(first)] = first
-        made = bank.design(settings.hazard, settings.step_std**2, 0.0, 0.0, prior, settings.slope_std**2)
+        made = run_length_bank.design(
+            settings.hazard, settings.step_std**2, 0.0, 0.0, prior, settings.slope_std**2
+        )
         return cls(table, len(first), made, np.zeros(2), 0.0, 1)
 
     def copy(self) -> "Run":
@@ -94,7 +97,7 @@ class Run:
             self.outliers,
             self.accepted,
             self.design,
-            bank.threshold(DESIGN),
+            run_length_bank.threshold(DESIGN),
             found,
             level,
         )

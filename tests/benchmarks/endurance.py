@@ -17,7 +17,7 @@ from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.physics import Strike, strike
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
-from impactcell.service.design import cell_design
+from impactcell.service.factory import cell_design
 from impactcell.service.worker import Worker
 from impactcell.settings import read_cell
 from tests.benchmarks.table import Table

@@ -13,7 +13,7 @@ from impactcell.physics import Strike
 from impactcell.prediction import Model, calibrate, estimate, printed
 from impactcell.prediction.calibration import predictor
 from impactcell.prediction.equations import distance
-from impactcell.prediction.viscous import by_decrement, by_least_squares
+from impactcell.prediction.viscous_regression import by_decrement, by_least_squares
 from impactcell.prediction.waveform import fit
 from tests.benchmarks._prediction_shots import (
     FRICTIONS,

@@ -10,7 +10,9 @@ import numpy as np
 from impactcell import alarms
 from impactcell.alarms import AlarmSettings
 from impactcell.records import AlarmName
-from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, gap, initial_state, signature, track
+from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, initial_state, track
+from impactcell.tracking.model_gap import gap_cusum
+from impactcell.tracking.signature import tracker
 from tests.benchmarks import _declared, _inside, _signatures, _sizes, _slides, _steps, _tracker
 from tests.benchmarks.table import Table
 
@@ -49,19 +51,19 @@ def cost_table(*, quick: bool) -> Table:
         config, rules, shape = (
             TrackerSettings(batch=knowledge),
             AlarmSettings(),
-            signature.SignatureSettings(),
+            tracker.SignatureSettings(),
         )
         state, book = initial_state(), alarms.initial_state(rules)
-        signed, gaps = signature.initial_state(shape), gap.GapState()
+        signed, gaps = tracker.initial_state(shape), gap_cusum.GapState()
         took: dict[str, list[float]] = {"tracker": [], "signature": [], "gap and alarms": []}
         for i in range(n):
             reading = Reading(i, 0.2 + 0.002 * rng.normal(), 0.002, (i + 1) * 10**9, "A")
             t0 = time.thread_time()
             tracked = track(config, state, reading)
             t1 = time.thread_time()
-            seen = signature.update(shape, signed, captures[i % 20])
+            seen = tracker.update(shape, signed, captures[i % 20])
             t2 = time.thread_time()
-            followed = gap.follow(gaps, 1.0 + 0.02 * rng.normal(), i, 1e5, 1.0)
+            followed = gap_cusum.follow(gaps, 1.0 + 0.02 * rng.normal(), i, 1e5, 1.0)
             active = book.alarm(AlarmName.WEAR_LIMIT).active
             findings = [
                 alarms.wear_limit(rules, tracked.wear, i, active=active),

@@ -18,7 +18,7 @@ from impactcell.physics import (
     Plant,
     Strike,
     effects,
-    program,
+    law_table,
     slide,
     strike,
 )
@@ -237,7 +237,7 @@ def test_a_new_file_is_all_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
     library = effects._discover()
     assert set(library) == {*LIBRARY, "constant_pull"}
-    monkeypatch.setattr(program, "LIBRARY", library)
+    monkeypatch.setattr(law_table, "LIBRARY", library)
     pulled = Plant(*NOMINAL, effects={"constant_pull": {"pull_n": 5.0}})
     moved = slide(pulled, Strike(1.0, 18.9), 0.1)
     assert moved.displacement_m == pytest.approx(0.1**2 / 2.0 / (0.152 * 9.81 - 5.0 / 18.9), rel=1e-9)

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from impactcell.discrepancy import noise
-from impactcell.discrepancy.alone import Alone, alone
-from impactcell.discrepancy.campaign import laid_out, prepare
-from impactcell.discrepancy.problem import Problem
-from impactcell.discrepancy.start import fit_nominal
+from impactcell.discrepancy.data import noise_floor
+from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare
+from impactcell.discrepancy.model.initial_guess import fit_nominal
+from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model.split_fits import Alone, alone
 from tests.discrepancy.study import Job, campaign
 
 ON_THE_FLOOR = 1.05
@@ -21,7 +21,7 @@ def apart(hidden: str, multiple: float, *, blind: bool = False) -> Alone:
     if blind:
         given = replace(given, shots=tuple(replace(shot, position=None) for shot in given.shots))
     material = prepare(given)
-    shots = laid_out(material, np.arange(len(material.shots)), noise.sensors(material).noise_std)
+    shots = laid_out(material, np.arange(len(material.shots)), noise_floor.sensors(material).noise_std)
     problem = Problem(shots, len(material.batches))
     return alone(problem, fit_nominal(problem))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from impactcell import campaign as campaigns
-from impactcell.commands.discrepancy import discrepancy
+from impactcell.cli.discrepancy import discrepancy
 from impactcell.errors import DiscrepancyError
 from tests.discrepancy.test_workflow import make
 

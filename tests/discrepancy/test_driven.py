@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from impactcell.discrepancy.blocks import blocks, velocity
-from impactcell.discrepancy.campaign import laid_out, prepare
-from impactcell.discrepancy.drives import Drive, carried, smooth, weighed
-from impactcell.discrepancy.result import result
+from impactcell.discrepancy.data.driven_blocks import blocks, velocity
+from impactcell.discrepancy.data.measured_drive import Drive, carried, smooth, weighed
+from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare
+from impactcell.discrepancy.report.result import result
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
 from tests.benchmarks._discrepancy_driven import LISTED, Job, record

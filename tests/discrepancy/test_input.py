@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from impactcell import campaign as campaigns
-from impactcell import values
 from impactcell.campaign import Campaign
-from impactcell.commands import discrepancy as command
-from impactcell.commands.discrepancy import discrepancy
-from impactcell.discrepancy.campaign import prepare
-from impactcell.discrepancy.result import result
+from impactcell.cli import discrepancy as command
+from impactcell.cli.discrepancy import discrepancy
+from impactcell.discrepancy.data.prepared_campaign import prepare
+from impactcell.discrepancy.report.result import result
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
 from impactcell.journal.store import Journal
-from impactcell.modelfile import read_model
 from impactcell.records import Capture, Channel
+from impactcell.serialization import json_text
+from impactcell.settings.model_file import read_model
 from tests.discrepancy.study import strengths
 from tests.discrepancy.test_workflow import make
 from tests.snapshots import make_snapshot
@@ -68,7 +68,7 @@ def test_captures_of_a_journal_are_as_good_as_a_campaign(tmp_path: Path) -> None
 def test_the_model_that_a_journal_was_recorded_with_is_the_nominal_one(tmp_path: Path) -> None:
     model = read_model(Path("config/models/prototype.yaml"))
     with Journal(tmp_path / "j", "press-1") as journal:
-        journal.keep_model(values.dumps(model).decode())
+        journal.keep_model(json_text.dumps(model).decode())
         for capture in make("viscous_friction", shots=18).shots:
             journal.append(capture, make_snapshot(capture), b"state")
     discrepancy(None, tmp_path / "out", journal=tmp_path / "j")
@@ -158,7 +158,7 @@ def test_what_an_earlier_run_has_left_stays_when_this_one_fails(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("impactcell.commands.discrepancy.write_model", interrupt)
+    monkeypatch.setattr("impactcell.cli.discrepancy.write_model", interrupt)
     with pytest.raises(KeyboardInterrupt):
         discrepancy(tmp_path / "campaign", tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]

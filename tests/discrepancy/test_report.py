@@ -7,7 +7,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from impactcell.discrepancy.report import content, number, verdict_sentence, words, write_report
+from impactcell.discrepancy.report.page import content, number, verdict_sentence, words, write_report
 from impactcell.discrepancy.workflow import Findings, investigate
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import make

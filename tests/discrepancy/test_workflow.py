@@ -9,18 +9,18 @@ import pytest
 
 from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign
-from impactcell.commands.discrepancy import discrepancy
-from impactcell.discrepancy.fit import fit
-from impactcell.discrepancy.noise import replicate_spread
-from impactcell.discrepancy.own import point_at, settle
-from impactcell.discrepancy.problem import Problem, without_jumps
-from impactcell.discrepancy.result import result, text_of
-from impactcell.discrepancy.ties import folds, is_tied, out_of_shot
+from impactcell.cli.discrepancy import discrepancy
+from impactcell.discrepancy.data.noise_floor import replicate_spread
+from impactcell.discrepancy.model.fit import fit
+from impactcell.discrepancy.model.problem import Problem, without_jumps
+from impactcell.discrepancy.model.shot_parameters import point_at, settle
+from impactcell.discrepancy.report.result import result, text_of
+from impactcell.discrepancy.search.indistinguishability import folds, is_tied, out_of_shot
 from impactcell.discrepancy.workflow import Findings, investigate
 from impactcell.errors import CampaignError
-from impactcell.modelfile import read_model
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Channel
+from impactcell.settings.model_file import read_model
 from tests.discrepancy import study
 
 STRENGTH = 1.0
@@ -167,7 +167,7 @@ def test_an_interrupt_leaves_nothing_half_written(tmp_path: Path, monkeypatch: p
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("impactcell.commands.discrepancy.write_report", interrupt)
+    monkeypatch.setattr("impactcell.cli.discrepancy.write_report", interrupt)
     with pytest.raises(KeyboardInterrupt):
         discrepancy(tmp_path / "campaign", tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["campaign"]

@@ -8,12 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 
 from impactcell import cell as core
-from impactcell import values
-from impactcell.intake import BatchSaid
+from impactcell.cell.preprocessing import BatchSaid
 from impactcell.journal.store import Journal
-from impactcell.packing import unpack
 from impactcell.records import PositioningState
-from impactcell.service.design import cell_design
+from impactcell.serialization import json_text
+from impactcell.serialization.message_pack import unpack
+from impactcell.service.factory import cell_design
 from impactcell.service.worker import Durable
 from impactcell.settings import read_cell
 from tests.integration.processes import simulator, started, write_cell
@@ -93,4 +93,4 @@ def judged(cell_file: Path, journal_file: Path, told: list[str]) -> Outcome:
 
 
 def _without_alarms(state: core.CellState) -> bytes:
-    return values.dumps(replace(state, alarms=None, batch=BatchSaid()))  # type: ignore[arg-type]
+    return json_text.dumps(replace(state, alarms=None, batch=BatchSaid()))  # type: ignore[arg-type]

@@ -16,8 +16,8 @@ from impactcell.errors import JournalError
 from impactcell.journal.store import Journal
 from impactcell.records import AlarmName, Quality
 from impactcell.scada import Actor, RefusedError, Role
-from impactcell.service.actions import CellActions
-from impactcell.service.past import JournalHistory
+from impactcell.service.history_source import JournalHistory
+from impactcell.service.operator_commands import CellActions
 from tests.integration.processes import CONFIG, simulator, write_cell
 from tests.integration.watched import serving
 
@@ -118,7 +118,7 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     caplog.set_level(logging.INFO, "impactcell")
-    monkeypatch.setattr("impactcell.service.process.AGAIN_S", 0.05)
+    monkeypatch.setattr("impactcell.service.service.AGAIN_S", 0.05)
     obstacle = tmp_path / "press-1.sqlite.lock"
     obstacle.mkdir()
     actor = Actor("anna", Role.ENGINEER, "127.0.0.1")

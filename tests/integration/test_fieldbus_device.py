@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from impactcell.fieldbus.acquisition import Module, Reception
+from impactcell.fieldbus.capture_ring import PERIOD
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.ring import PERIOD
 from simulator.device import Device
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer

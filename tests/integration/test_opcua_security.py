@@ -214,8 +214,8 @@ async def test_start_without_what_is_needed(tmp_path) -> None:
 
 
 async def test_user_certificate() -> None:
-    from impactcell.scada.certificates import make_certificate, write_pair
-    from impactcell.scada.trust import der, fingerprint
+    from impactcell.opcua.certificates import make_certificate, write_pair
+    from impactcell.opcua.trust_list import der, fingerprint
 
     async with site() as here:
         certificate, key = make_certificate("person", "urn:test:person", ["localhost"])

@@ -17,10 +17,10 @@ from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 
 from impactcell.alarms import Event, Occurrence
+from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
+from impactcell.opcua.trust_list import fingerprint
 from impactcell.records import Alarm, AlarmName
 from impactcell.scada import HistoryValue, Role
-from impactcell.scada.certificates import make_certificate, own_hosts, write_pair
-from impactcell.scada.trust import fingerprint
 from impactcell.scada.users import User, read_users, write_users
 from tests.interop.wire import Wire
 from tests.opcua_server import CELL, PASSWORDS, START_NS, Site, site

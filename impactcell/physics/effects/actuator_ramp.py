@@ -1,6 +1,6 @@
 """Actuator ramp: the actuator needs time to reach its speed."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

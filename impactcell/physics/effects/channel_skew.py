@@ -1,6 +1,6 @@
 """Channel skew: force is recorded late against position."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

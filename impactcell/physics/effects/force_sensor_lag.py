@@ -1,6 +1,6 @@
 """Lag of the force sensor: its amplifier is a low-pass filter."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

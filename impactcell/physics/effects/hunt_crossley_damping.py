@@ -1,6 +1,6 @@
 """Hunt-Crossley damping: the contact's damping grows with its indentation, on approach and departure."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

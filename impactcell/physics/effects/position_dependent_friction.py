@@ -1,6 +1,6 @@
 """Friction that changes along the table, in proportion to the position."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

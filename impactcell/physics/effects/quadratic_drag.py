@@ -1,6 +1,6 @@
 """Quadratic drag: a fluid is pushed aside."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

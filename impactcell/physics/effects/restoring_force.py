@@ -1,6 +1,6 @@
 """Restoring force: a spring, a cable or a membrane pulls the part towards x = 0."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

@@ -1,6 +1,6 @@
 """Viscous friction: a lubricated surface resists in proportion to the speed."""
 
-from impactcell.compiled import Numbers
+from impactcell.numerics.jit import Numbers
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
+from impactcell.fieldbus.capture_ring import PERIOD, Mark
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap, Words
-from impactcell.fieldbus.ring import PERIOD, Mark
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from impactcell.fieldbus.backoff import CEILING_S, Backoff
-from impactcell.fieldbus.polling import COARSE_S, FINE_S, IDLE_S, QUIET_S, PollSchedule
+from impactcell.fieldbus.poll_schedule import COARSE_S, FINE_S, IDLE_S, QUIET_S, PollSchedule
 
 ROUND_TRIP_S = 1e-4
 

@@ -20,7 +20,7 @@ from impactcell.prediction.equations import (
     mix,
     out_of_range,
 )
-from impactcell.prediction.reading import Reading
+from impactcell.prediction.feature_extraction import Reading
 from impactcell.records import Quality
 from tests.taps import VISCOUS, Tap
 

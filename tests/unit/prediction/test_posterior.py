@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.prediction.blocks import blocks
-from impactcell.prediction.doubt import doubt
+from impactcell.prediction.block_averaging import blocks
+from impactcell.prediction.phase_reweighting import doubt
 from impactcell.prediction.posterior import Side, mixture
 from impactcell.records import Channel
 

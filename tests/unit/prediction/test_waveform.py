@@ -10,8 +10,8 @@ import pytest
 from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError, NotConvergedError
 from impactcell.physics import Plant, strike
 from impactcell.prediction import Model, Prior
-from impactcell.prediction.reading import noise_std
-from impactcell.prediction.response import commanded, with_parameters
+from impactcell.prediction.feature_extraction import noise_std
+from impactcell.prediction.linearised_model import commanded, with_parameters
 from impactcell.prediction.waveform import fit
 from impactcell.records import Channel
 from tests.taps import VISCOUS, Tap

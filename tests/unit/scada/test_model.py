@@ -7,7 +7,7 @@ import pytest
 
 import impactcell
 from impactcell.records import AlarmName
-from impactcell.scada.nodes import CYCLE, HISTORY, MODULE
+from impactcell.scada.node_table import CYCLE, HISTORY, MODULE
 
 MODEL = Path(impactcell.__file__).parent / "scada" / "model"
 NS = "{http://opcfoundation.org/UA/2011/03/UANodeSet.xsd}"

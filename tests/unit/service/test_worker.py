@@ -12,12 +12,12 @@ import pytest
 
 from impactcell import cell as core
 from impactcell.errors import JournalFullError
-from impactcell.fieldbus.ring import Mark
+from impactcell.fieldbus.capture_ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.records import Capture, Channel, PositioningState, Quality
-from impactcell.service.design import cell_design
-from impactcell.service.keeping import Keeper
+from impactcell.service.factory import cell_design
+from impactcell.service.journal_writer import Keeper
 from impactcell.service.worker import Worker
 from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
@@ -55,7 +55,7 @@ async def test_an_entry_that_can_never_be_stored_blocks_nothing(
 async def test_no_cycle_waits_for_the_journal_to_be_tidied(
     tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("impactcell.service.keeping.CHECKPOINT_EVERY", 2)
+    monkeypatch.setattr("impactcell.service.journal_writer.CHECKPOINT_EVERY", 2)
     journal = Journal(tmp_path / "j", "c")
     worker = Worker(design, journal, Retention())
     shown, done = threading.Event(), []
@@ -84,7 +84,7 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
 def test_what_is_kept_follows_the_module_unless_it_has_no_time_or_runs_ahead(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module_ns: int, looked_ns: int
 ) -> None:
-    monkeypatch.setattr("impactcell.service.keeping.time.time_ns", lambda: 10**18)
+    monkeypatch.setattr("impactcell.service.journal_writer.time.time_ns", lambda: 10**18)
     looks: list[int] = []
     with Journal(tmp_path / "j", "c") as journal:
         monkeypatch.setattr(journal, "thin", lambda _, now_ns: looks.append(now_ns))
@@ -95,7 +95,7 @@ def test_what_is_kept_follows_the_module_unless_it_has_no_time_or_runs_ahead(
 async def test_what_is_too_much_to_drop_at_once_goes_in_the_next_looks(
     tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("impactcell.service.keeping.CHECKPOINT_EVERY", 1)
+    monkeypatch.setattr("impactcell.service.journal_writer.CHECKPOINT_EVERY", 1)
     journal = Journal(tmp_path / "j", "c")
     worker = Worker(design, journal, Retention())
     more, looks = [False, True, True], []

@@ -1,0 +1,284 @@
+"""One cycle of a cell, from what was measured to what is shown. Pure: the same inputs give the same bits.
+
+::
+
+    capture ── estimate ── track ── signature ── gap ── alarms ──► snapshot
+                             ▲ state                        state ▼
+
+`step` takes a cycle; `find` takes what happens beside the cycles (link, journal); `act` takes what people
+do to a condition; `start_batch` and `reset_wear` what they do to the tracker. Each gives a new `CellState`,
+which `impactcell.serialization.message_pack` writes and reads back bit for bit.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from impactcell import alarms
+from impactcell.alarms import AlarmSettings, AlarmState, Finding, Occurrence, Transition
+from impactcell.cell.preprocessing import (
+    Announcement,
+    BatchSaid,
+    Known,
+    NamedBatch,
+    completed,
+    doubted,
+    mean_period_s,
+    named_batch,
+)
+from impactcell.physics import Plant, Strike, free_motion
+from impactcell.prediction import Model, estimate
+from impactcell.records import (
+    Alarm,
+    AlarmName,
+    Capture,
+    Evidence,
+    FrictionEstimate,
+    PositioningState,
+    Quality,
+    Samples,
+    Snapshot,
+)
+from impactcell.tracking import Reading, Tracked, TrackerSettings, TrackerState, reset_wear, track
+from impactcell.tracking.model_gap import gap_cusum
+from impactcell.tracking.signature import tracker as signature
+from impactcell.tracking.signature.tracker import SignatureSettings, SignatureState, SignatureTracked
+
+
+@dataclass(frozen=True, slots=True)
+class CellDesign:
+    """How one cell is computed; comes from its YAML and model file and does not change between cycles.
+
+    Attributes
+    ----------
+    known : Known
+        What holds where the module says nothing.
+    false_alarm_cycles : float
+        Designed mean number of cycles between two false alarms of one rule.
+    """
+
+    name: str
+    model: Model
+    tracker: TrackerSettings
+    signature: SignatureSettings
+    alarms: AlarmSettings
+    known: Known = field(default_factory=Known)
+    false_alarm_cycles: float = 100_000.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CellState:
+    """All that a cell keeps between cycles."""
+
+    tracker: TrackerState
+    signature: SignatureState
+    gap: gap_cusum.GapState
+    alarms: AlarmState
+    cycle: int = 0
+    time_ns: int = 0
+    period_s: float = 0.0
+    batch: BatchSaid = field(default_factory=BatchSaid)
+    grid: tuple[float, int] = (0.0, 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stepped:
+    """Outcome of one cycle.
+
+    Attributes
+    ----------
+    changed : tuple of Alarm
+        Alarms that moved with it, as they are now.
+    notes : tuple of str
+        What was wrong with the cycle, and what was done about it.
+    """
+
+    state: CellState
+    snapshot: Snapshot
+    changed: tuple[Alarm, ...]
+    notes: tuple[str, ...]
+
+
+def initial_state(design: CellDesign) -> CellState:
+    """State of a cell that has seen nothing."""
+    return CellState(
+        TrackerState(),
+        signature.initial_state(design.signature),
+        gap_cusum.GapState(),
+        alarms.initial_state(design.alarms),
+        grid=_grid(design),
+    )
+
+
+def adapted(design: CellDesign, state: CellState) -> CellState:
+    """Make a state fit the design: a signature on another grid is learned anew, all else stays."""
+    if state.grid == _grid(design):
+        return state
+    return replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
+
+
+def _grid(design: CellDesign) -> tuple[float, int]:
+    return design.signature.length_m, design.signature.points
+
+
+def step(
+    design: CellDesign,
+    state: CellState,
+    capture: Capture,
+    positioning: PositioningState,
+    announcement: Announcement | None = None,
+    faults: tuple[str, ...] = (),
+) -> Stepped:
+    """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
+    capture = completed(design.known, capture)
+    named = named_batch(state.batch, capture, announcement)
+    friction = doubted(estimate(capture, design.model), faults)
+    period_s = mean_period_s(state.period_s, (state.cycle, state.time_ns), capture)
+    tracked = track(
+        design.tracker,
+        state.tracker,
+        Reading.of(capture.cycle, capture.time_ns, friction, named.batch_id, expected=named.expected),
+    )
+    signed = _sign(design, state, capture, tracked, period_s)
+    gapped = gap_cusum.follow(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
+    findings = _findings(design, state, capture, tracked, signed, gapped, period_s)
+    alarm_state, moved = alarms.after_cycle(
+        design.alarms, state.alarms, findings, capture.cycle, capture.time_ns, announced=tracked.expected
+    )
+    after = replace(
+        state,
+        batch=named.said,
+        tracker=tracked.state,
+        signature=signed.state,
+        gap=gapped.state,
+        alarms=alarm_state,
+        cycle=capture.cycle,
+        time_ns=capture.time_ns,
+        period_s=period_s,
+    )
+    snapshot = Snapshot(
+        cycle=capture.cycle,
+        time_ns=capture.time_ns,
+        velocity_m_s=capture.velocity_m_s,
+        mass_kg=capture.mass_kg,
+        friction=friction,
+        wear=tracked.wear,
+        batch=tracked.batch,
+        signature=signed.signature,
+        positioning=positioning,
+        alarms=alarm_state.alarms,
+        model_name=design.model.name,
+        gap=friction.gap,
+        gap_quality=_gap_quality(friction, gapped),
+    )
+    return Stepped(after, snapshot, tuple(t.alarm for t in moved), _notes(friction, tracked))
+
+
+def find(
+    design: CellDesign, state: CellState, finding: Finding, time_ns: int
+) -> tuple[CellState, tuple[Alarm, ...]]:
+    """Take what a rule beside the cycles says, as of the link or the journal; the alarms that moved."""
+    found, done = alarms.find(design.alarms, state.alarms, finding, state.cycle, time_ns)
+    return replace(state, alarms=found), (done.alarm,) if done.effects else ()
+
+
+def pass_time(state: CellState, time_ns: int) -> tuple[CellState, tuple[Alarm, ...]]:
+    """End every shelving whose time is over, also while no cycles come."""
+    passed, moved = alarms.at_time(state.alarms, state.cycle, time_ns)
+    return replace(state, alarms=passed), tuple(transition.alarm for transition in moved)
+
+
+def act(state: CellState, name: AlarmName, occurrence: Occurrence) -> tuple[CellState, Transition]:
+    """Apply a person's action on a condition; a refused one leaves the state as it was."""
+    acted, done = alarms.act(state.alarms, name, replace(occurrence, cycle=state.cycle))
+    return replace(state, alarms=acted), done
+
+
+def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState:
+    """Name the batch from the next cycle on; an expected change raises no alarm and re-baselines."""
+    named = NamedBatch(batch_id, state.batch.by_module, expected)
+    return replace(state, batch=replace(state.batch, by_person=named))
+
+
+def renew_surface(state: CellState) -> CellState:
+    """Learn the wear level anew from the next cycle on, after worn parts were replaced."""
+    return replace(state, tracker=reset_wear(state.tracker))
+
+
+def _sign(
+    design: CellDesign, state: CellState, capture: Capture, tracked: Tracked, period_s: float
+) -> SignatureTracked:
+    """Friction along the stroke, with what the model knows to depend on the speed taken out."""
+    plant = design.model.plant
+    viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
+    slope = viscous / capture.mass_kg if isinstance(viscous, float) and capture.mass_kg > 0.0 else 0.0
+    return signature.update(
+        design.signature,
+        state.signature,
+        capture,
+        batch_id=tracked.batch.batch_id,
+        restart=tracked.shift is not None,
+        viscous_per_mass=slope,
+        acceleration=_known(plant, capture),
+        gravity_m_s2=plant.gravity_m_s2,
+        period_s=period_s,
+    )
+
+
+def _known(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | None:
+    """Give what the model's effects, viscous friction apart, do to the free part; None if they do nothing."""
+    others = {
+        name: given
+        for name, given in plant.effects.items()
+        if name != "viscous_friction" and free_motion.acts_on_speed(name)
+    }
+    if not others or not capture.mass_kg > 0.0:
+        return None
+    tap = Strike(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
+    return partial(free_motion.acceleration, replace(plant, effects=others), tap)
+
+
+def _findings(
+    design: CellDesign,
+    state: CellState,
+    capture: Capture,
+    tracked: Tracked,
+    signed: SignatureTracked,
+    gapped: gap_cusum.GapTracked,
+    period_s: float,
+) -> list[Finding]:
+    wear_active = state.alarms.alarm(AlarmName.WEAR_LIMIT).active
+    found = [
+        alarms.wear_limit(design.alarms, tracked.wear, capture.cycle, active=wear_active),
+        alarms.batch_shift(tracked.shift),
+        alarms.deviant_cycle(signed.deviation, signed.signature.deviates_at_m, judged=signed.judged),
+        Finding(AlarmName.MODEL_GAP, gapped.exceeds, _gap_message(gapped), gapped.evidence),
+    ]
+    return [replace(one, evidence=_rated(design, one.evidence, period_s)) for one in found]
+
+
+def _rated(design: CellDesign, evidence: Evidence, period_s: float) -> Evidence:
+    """Add how rarely the rule was designed to be wrong, in cycles and in days at the present rate."""
+    cycles = design.false_alarm_cycles
+    return replace(
+        evidence,
+        false_alarm_cycles=cycles,
+        false_alarm_days=cycles * period_s / 86_400 if period_s else math.nan,
+    )
+
+
+def _gap_message(gapped: gap_cusum.GapTracked) -> str:
+    evidence = gapped.evidence
+    return f"residual {evidence.size:+.2f} above its usual level since cycle {evidence.change_cycle}"
+
+
+def _gap_quality(friction: FrictionEstimate, gapped: gap_cusum.GapTracked) -> Quality:
+    if math.isnan(friction.gap):
+        return Quality.BAD
+    return Quality.UNCERTAIN if gapped.exceeds is None else Quality.GOOD
+
+
+def _notes(friction: FrictionEstimate, tracked: Tracked) -> tuple[str, ...]:
+    reason = friction.mu_s.reason if friction.mu_s.quality is not Quality.GOOD else ""
+    return tuple(dict.fromkeys(note for note in (reason, *tracked.notes) if note))

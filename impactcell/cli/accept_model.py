@@ -1,0 +1,31 @@
+"""`impactcell model accept`: an extended model into service, without losing what the cell has learned."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from impactcell.cli.calibrate import calibrated
+from impactcell.process.console import tell
+from impactcell.settings import read_cell
+from impactcell.settings.model_file import read_model, write_model
+
+
+def accept(cell: Path, extended: Path) -> None:
+    """Calibrate an extended model for the cell and put it in the place of the cell's model file.
+
+    The model that it replaces is kept beside it as `<name>.previous.yaml`. A running service sees the new
+    file within a second and goes on with it from the next cycle; tracker, alarms and journal stay.
+
+    Raises
+    ------
+    SettingsError
+        A file cannot be read or written.
+    PredictionError
+        The part would not slide free over the calibrated range.
+    """
+    given = read_cell(cell)
+    model = calibrated(replace(given, model=read_model(extended)))
+    target = given.settings.model
+    previous = target.with_name(f"{target.stem}.previous{target.suffix}")
+    previous.write_bytes(target.read_bytes())
+    write_model(model, target)
+    tell(f"{given.name} runs with model {model.name} from the next cycle on; before: {previous}")

@@ -1,0 +1,176 @@
+"""`impactcell estimate`: friction of every shot of a campaign, by every predictor."""
+
+import csv
+import math
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from impactcell.campaign import Campaign, Excitation, read
+from impactcell.cli.paths import check_target
+from impactcell.errors import CampaignError, PhysicsError, PredictionError
+from impactcell.physics import Strike
+from impactcell.prediction import Model, calibrate
+from impactcell.prediction import estimate as estimate_tap
+from impactcell.prediction.free_slide import free_slide_friction
+from impactcell.prediction.joint_plant_fit import fit_plant, weigh
+from impactcell.prediction.slide_features import slide
+from impactcell.process.console import note, tell
+from impactcell.process.progress import progress
+from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
+
+COLUMNS = (
+    "shot", "mu_s_force", "mu_s_distance", "mu_s_combined", "mu_s", "mu_s_std", "mu_k", "mu_k_std",
+    "mu_s_force_std", "mu_s_distance_std", "mu_s_combined_std", "estimator", "quality", "mu_k_quality",
+    "peak_force_n", "sliding_distance_m", "gap", "reason",
+)  # fmt: skip
+FRICTIONS = 9
+VELOCITIES = 9
+WIDEST = 0.3
+"""Friction is swept at least this far to either side of the plant's."""
+
+
+def estimate(campaign: Path, cell: Path | None = None, output: Path | None = None) -> None:
+    """Write a row a shot: mu_s by equations (4), (5), (6) and the waveform, and mu_k.
+
+    Parameters
+    ----------
+    campaign : Path
+        A campaign directory of taps, or of free slides (then only mu_k).
+    cell : Path, optional
+        Cell whose model is used; without it the plant is fitted to the campaign, k_v = 0.
+    output : Path, optional
+        CSV file; without it the rows go to standard output.
+
+    Raises
+    ------
+    CampaignError, SettingsError
+        What was given cannot be read, or the rows cannot be written.
+    PredictionError
+        No plant could be fitted.
+    """
+    if output is not None:
+        check_target(output, CampaignError)
+    given = read(campaign)
+    if given.excitation is Excitation.DRIVEN:
+        raise CampaignError(f"{campaign}: estimate needs taps or free slides, this campaign is driven")
+    if given.excitation is Excitation.FREE_SLIDE:
+        rows = [(shot.cycle, _of_free_slide(shot, given.gravity_m_s2)) for shot in given.shots]
+    else:
+        shots = weighed(given.shots)
+        plant, misfit = _model(given, shots, cell)
+        model = calibrated(plant, shots)
+        with progress("estimating", len(shots)) as done:
+            rows = []
+            for shot in shots:
+                rows.append((shot.cycle, estimate_tap(shot, model, misfit)))
+                done()
+    if output is None:
+        _write(rows, sys.stdout)
+        return
+    try:
+        with output.open("w", encoding="utf-8", newline="") as file:
+            _write(rows, file)
+    except OSError as fault:
+        raise CampaignError(f"{output}: cannot be written: {fault.strerror}") from fault
+    tell(f"{len(rows)} shots in {output}")
+
+
+def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
+    """Give a mass to the shots that lack one, by their momentum balance."""
+    found = []
+    for shot in shots:
+        if math.isnan(shot.mass_kg):
+            try:
+                found.append(replace(shot, mass_kg=weigh(shot, slide(shot))))
+                continue
+            except (PredictionError, PhysicsError) as fault:
+                note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {fault}")
+        found.append(shot)
+    return tuple(found)
+
+
+def calibrated(model: Model, shots: Sequence[Capture]) -> Model:
+    """Calibrate a model that has no predictors to the masses, velocities and stroke of a campaign."""
+    if model.predictors:
+        return model
+    known = [shot for shot in shots if shot.mass_kg > 0.0 and shot.velocity_m_s > 0.0]
+    if not known:
+        return model
+    strokes = {shot.stroke_m for shot in known}
+    stroke = known[0].stroke_m if len(strokes) == 1 else math.inf
+    masses = sorted({round(shot.mass_kg, 2) for shot in known})
+    if len(masses) > VELOCITIES:
+        masses = np.geomspace(masses[0], masses[-1], VELOCITIES).tolist()
+    fastest = max(shot.velocity_m_s for shot in known)
+    slowest = min(0.8 * fastest, *(shot.velocity_m_s for shot in known))
+    frictions = np.linspace(1.0 - WIDEST, 1.0 + WIDEST, FRICTIONS) * model.plant.mu_s
+    tap = Strike(fastest, masses[0], stroke, halts_at_separation=math.isinf(stroke))
+    velocities = np.linspace(slowest, fastest, VELOCITIES)
+    with progress("calibrating", len(masses)) as done:
+        predictors = calibrate(
+            model.plant, tap, masses, velocities, frictions, lambda at, _: done() if at else None
+        )
+    return replace(model, predictors=predictors, stroke_m=stroke)
+
+
+def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> tuple[Model, float]:
+    """Give the cell's model, or one fitted to the campaign with what it leaves unexplained."""
+    if cell is not None:
+        from impactcell.settings import read_cell
+
+        return read_cell(cell).model, 1.0
+    with progress("fitting the plant", 1):
+        fitted = fit_plant(shots, campaign.gravity_m_s2)
+    plant, prior = fitted.model.plant, fitted.model.prior
+    note(
+        f"plant fitted to {len(fitted.used)} of {len(shots)} shots: k {plant.stiffness_n_per_m:.6g} ± "
+        f"{prior.stiffness_std_n_per_m:.2g} N/m, b {plant.damping_n_s_per_m:.5g} ± "
+        f"{prior.damping_std_n_s_per_m:.2g} N s/m, "
+        f"mu_k/mu_s {fitted.model.ratio:.4f} ± {prior.ratio_std:.2g}; "
+        f"residuals {fitted.gap:.3g} times the noise"
+    )
+    return fitted.model, fitted.gap
+
+
+def _of_free_slide(shot: Capture, gravity_m_s2: float) -> FrictionEstimate:
+    nothing = Coefficient(reason="a free slide shows mu_k only")
+    try:
+        mu_k = free_slide_friction(shot, gravity_m_s2)
+    except PredictionError as fault:
+        mu_k = Coefficient(reason=str(fault))
+    return FrictionEstimate(
+        mu_s=nothing, mu_k=mu_k, by_force=nothing, by_distance=nothing, combined=nothing,
+        estimator=Estimator.NONE, peak_force_n=math.nan, sliding_distance_m=math.nan,
+    )  # fmt: skip
+
+
+def _write(rows: Iterable[tuple[int, FrictionEstimate]], file: TextIO) -> None:
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for shot, found in rows:
+        numbers = (
+            found.by_force.value, found.by_distance.value, found.combined.value, found.mu_s.value,
+            found.mu_s.std, found.mu_k.value, found.mu_k.std, found.by_force.std, found.by_distance.std,
+            found.combined.std,
+        )  # fmt: skip
+        figures = (found.peak_force_n, found.sliding_distance_m, found.gap)
+        writer.writerow(
+            [
+                shot,
+                *map(_number, numbers),
+                found.estimator.value,
+                found.mu_s.quality.name.lower(),
+                found.mu_k.quality.name.lower(),
+                *map(_number, figures),
+                found.mu_s.reason,
+            ]
+        )
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.7g}"

@@ -1,0 +1,34 @@
+"""`impactcell export`: the captures of a journal as a campaign directory."""
+
+from pathlib import Path
+
+from impactcell import campaign
+from impactcell.campaign.recorded import from_captures
+from impactcell.cli.paths import recorded as opened
+from impactcell.errors import CampaignError
+from impactcell.process.console import note, tell
+
+
+def export(
+    journal: Path, output: Path, *, first_cycle: int | None = None, last_cycle: int | None = None
+) -> None:
+    """Write the recorded captures between two cycles, both included, to a new campaign directory.
+
+    Raises
+    ------
+    JournalError
+        The journal cannot be read.
+    CampaignError
+        It is not there, holds no captures in that range, or the directory exists already.
+    """
+    with opened(journal) as source:
+        try:
+            recorded = from_captures(source.captures(first_cycle, last_cycle))
+        except CampaignError as error:
+            raise CampaignError(f"{journal}: {error}") from error
+    campaign.write(recorded.campaign, output)
+    if recorded.other_stroke:
+        note(f"{recorded.other_stroke} cycles with another stroke were left out")
+    if recorded.no_channels:
+        note(f"{recorded.no_channels} cycles without samples were left out")
+    tell(f"{len(recorded.campaign.shots)} shots in {output}")

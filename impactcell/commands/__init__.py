@@ -1,1 +1,0 @@
-"""Verbs of the command line that read and write files; one file a verb."""

@@ -1,0 +1,244 @@
+"""The demo from beginning to end: set up, show each cycle, sum up."""
+
+import asyncio
+import contextlib
+import json
+import logging
+import math
+import shutil
+import signal
+import sys
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from rich.console import Console, RenderableType
+from rich.live import Live
+
+from impactcell.demo.auto_teach import Remedy
+from impactcell.demo.scenario_setup import USER, Stage, set_up
+from impactcell.demo.view import Scene, render
+from impactcell.errors import ImpactCellError
+from impactcell.fieldbus.acquisition import ModuleStatus
+from impactcell.process.console import quiet
+from impactcell.process.signals import signalled
+from impactcell.records import Snapshot
+from impactcell.service import Service
+
+SHOWN = 400
+PATIENCE_S = 60.0
+"""Without a cycle for so long, the demo has failed."""
+QUIET_S = 4.0
+"""Without a cycle for so long, the last part lies where it stays: taps follow each other faster."""
+
+
+def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
+    """Run the demo until Ctrl-C, for `cycles` cycles, or until its last part is in place.
+
+    Raises
+    ------
+    SettingsError
+        There is no such scenario.
+    ImpactCellError
+        The simulator did not start, or no cycle came.
+    """
+    if sys.stderr.isatty() and not quiet():
+        sys.stderr.write("setting up; the first time on a machine takes a minute or two, to compile\n")
+    # Until the event loop takes the signal over, an end has to pass through `set_up`, which cleans up.
+    signal.signal(signal.SIGTERM, _end)
+    with set_up(scenario, cycles) as stage:
+        show = _Show(stage, cycles)
+        if as_json or quiet() or not sys.stdout.isatty():
+            interrupted = asyncio.run(show.run(_nothing if as_json or quiet() else _plain))
+        else:
+            interrupted = asyncio.run(_live(show))
+    if as_json:
+        print(json.dumps(show.summary()))  # noqa: T201 - the result of the verb
+    if interrupted:
+        raise KeyboardInterrupt
+
+
+@dataclass(slots=True)
+class _Show:
+    """Runs the service over the stage and keeps what it said."""
+
+    stage: Stage
+    cycles: int | None
+    snapshots: deque[Snapshot] = field(default_factory=lambda: deque(maxlen=SHOWN))
+    seen: int = 0
+    raised: list[dict[str, Any]] = field(default_factory=list)
+    service: Service | None = None
+    endpoint: str = ""
+    missed: int = 0
+    told: list[tuple[int, str]] = field(default_factory=list)
+
+    async def run(self, draw: Callable[["_Show", Snapshot], None]) -> bool:
+        """Run to the end; True if it was ended by Ctrl-C."""
+        stop, news = asyncio.Event(), asyncio.Event()
+        remedy = Remedy(self.stage.cell, self._say)
+
+        def observe(_: str, snapshot: Snapshot) -> None:
+            self._take(snapshot)
+            remedy.take(snapshot)
+            news.set()
+            draw(self, snapshot)
+            if self.cycles is not None and self.seen >= self.cycles:
+                stop.set()
+
+        self.service = Service([self.stage.cell], observe)
+        watch = asyncio.create_task(self._watch(news, stop))
+        with signalled(stop) as came:
+            try:
+                await self.service.run(stop, self._started)
+            finally:
+                await remedy.close()
+                watch.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await watch
+        return signal.SIGINT in came
+
+    def _say(self, text: str) -> None:
+        if not self.told or self.told[-1][1] != text:
+            self.told.append((self.snapshots[-1].cycle if self.snapshots else 0, text))
+
+    def _started(self) -> None:
+        assert self.service is not None  # noqa: S101 - it calls us
+        self.endpoint = self.service.endpoints[self.stage.cell.name]
+
+    def _take(self, snapshot: Snapshot) -> None:
+        assert self._status is not None  # noqa: S101 - its cell calls us
+        self.missed = self._status.missed
+        before = {alarm.name: alarm.active for alarm in self.snapshots[-1].alarms} if self.snapshots else {}
+        self.raised += [
+            {"alarm": alarm.name.value, "cycle": snapshot.cycle, "message": alarm.message}
+            for alarm in snapshot.alarms
+            if alarm.active and not before.get(alarm.name, False)
+        ]
+        self.snapshots.append(snapshot)
+        self.seen += 1
+
+    async def _watch(self, news: asyncio.Event, stop: asyncio.Event) -> None:
+        while True:
+            news.clear()
+            last = bool(self.snapshots) and math.isclose(
+                self.snapshots[-1].positioning.target_m, self.stage.last_target_m, rel_tol=1e-6
+            )
+            try:
+                # Without an end, silence is part of the show.
+                async with asyncio.timeout(QUIET_S if last else None if self.cycles is None else PATIENCE_S):
+                    await news.wait()
+            except TimeoutError:
+                stop.set()
+                if last:
+                    self._say("that was the last part")
+                    return
+                reason = "" if self._status is None else self._status.reason
+                raise ImpactCellError(
+                    f"no cycle for {PATIENCE_S:g} s: {reason or 'the module is silent'}"
+                ) from None
+
+    @property
+    def _status(self) -> ModuleStatus | None:
+        """State of the link; None while the cell does not run."""
+        running = self.service.running.get(self.stage.cell.name) if self.service else None
+        return None if running is None else running.status
+
+    def scene(self) -> Scene:
+        """Return what the live view shows now."""
+        last = self.snapshots[-1].cycle if self.snapshots else 0
+        happened = sorted([*self.stage.story, *self.told], key=lambda entry: entry[0])
+        told = [text for cycle, text in happened if cycle <= last]
+        who = f"user {USER}, password {self.stage.password}"
+        link = "connected" if self._status is None or self._status.connected else "not connected"
+        return Scene(
+            self.stage.cell.name,
+            f"{self.endpoint} · {who}",
+            told[-1] if told else "",
+            list(self.snapshots),
+            link,
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """One object that says how the demo went; null for what is not known."""
+        if not self.snapshots:
+            return {
+                "cell": self.stage.cell.name,
+                "endpoint": self.endpoint,
+                "cycles": 0,
+                "missed": self.missed,
+            }
+        last = self.snapshots[-1]
+        return {
+            "cell": self.stage.cell.name,
+            "endpoint": self.endpoint,
+            "cycles": self.seen,
+            "missed": self.missed,
+            "last_cycle": last.cycle,
+            "mu_s": _number(last.friction.mu_s.value),
+            "mu_s_std": _number(last.friction.mu_s.std),
+            "mu_k": _number(last.friction.mu_k.value),
+            "estimator": last.friction.estimator.value,
+            "quality": last.friction.mu_s.quality.name.lower(),
+            "wear": {
+                "level": _number(last.wear.level),
+                "level_std": _number(last.wear.level_std),
+                "rate_per_1000_cycles": _number(last.wear.rate_per_cycle * 1000),
+                "limit": _number(last.wear.limit),
+                "cycles_to_limit": _number(last.wear.cycles_to_limit),
+            },
+            "batch": {
+                "id": last.batch.batch_id,
+                "offset": _number(last.batch.offset),
+                "last_shift": _number(last.batch.last_shift),
+                "last_shift_cycle": last.batch.last_shift_cycle,
+            },
+            "alarms": self.raised,
+            "story": [{"cycle": cycle, "what": text} for cycle, text in self.stage.story],
+            "told": [{"cycle": cycle, "what": text} for cycle, text in self.told],
+        }
+
+
+def _end(*_: object) -> None:
+    raise SystemExit(0)
+
+
+async def _live(show: _Show) -> bool:
+    console = Console()
+    logging.disable(logging.WARNING)  # a line of the log would push the view up; it shows the same itself
+    try:
+        with Live(console=console, auto_refresh=False, screen=True) as live:
+
+            def draw(now: _Show, _: Snapshot | None = None) -> None:
+                live.update(_drawn(now.scene()), refresh=True)
+
+            draw(show)
+            interrupted = await show.run(draw)
+    finally:
+        logging.disable(logging.NOTSET)
+    if show.snapshots:
+        console.print(_drawn(replace(show.scene(), link="")))
+    return interrupted
+
+
+def _drawn(scene: Scene) -> RenderableType:
+    columns, lines = shutil.get_terminal_size()
+    return render(scene, min(columns, 160), lines)
+
+
+def _plain(_: _Show, snapshot: Snapshot) -> None:
+    mu_s = snapshot.friction.mu_s
+    active = ", ".join(alarm.name.value for alarm in snapshot.alarms if alarm.active)
+    print(  # noqa: T201 - the view of a demo without a terminal
+        f"cycle {snapshot.cycle}: mu_s {mu_s.value:.4f} ± {mu_s.std:.4f}, batch {snapshot.batch.batch_id}"
+        f"{', ' + active if active else ''}",
+        flush=True,
+    )
+
+
+def _nothing(_: _Show, __: Snapshot) -> None:
+    """Draw nothing: the summary, if anything, is all that is asked for."""
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,175 @@
+"""What the demo runs on: a simulator in a process of its own, and a cell made to talk to it."""
+
+import contextlib
+import json
+import math
+import secrets
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.scada import Role
+from impactcell.scada.users import User, with_password, write_users
+from impactcell.service.factory import cell_design
+from impactcell.service.warmup import rehearse
+from impactcell.settings import Cell, read_cell
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+SCENARIOS = ("demo", "new-effect", "positioning")
+USER = "demo"
+HAPPENINGS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
+PREFERRED_PORT = 4840
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A cell whose module answers, and the user who may look at it.
+
+    Attributes
+    ----------
+    cell : Cell
+    story : tuple of (int, str)
+        What happens in the cell: from which cycle on, and in words.
+    password : str
+        Of the user `demo`; made anew for each demo.
+    last_target_m : float
+        Where the last part should go; nan where cycles come without end.
+    """
+
+    cell: Cell
+    story: tuple[tuple[int, str], ...]
+    password: str
+    last_target_m: float = math.nan
+
+
+@contextlib.contextmanager
+def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
+    """Start the simulator with a scenario of `config/sim`; what it needs is gone afterwards.
+
+    Raises
+    ------
+    SettingsError
+        There is no such scenario.
+    ImpactCellError
+        The simulator did not start.
+    """
+    source = CONFIG / "sim" / f"{scenario}.yaml"
+    if scenario not in SCENARIOS:
+        raise SettingsError(f"there is no scenario '{scenario}'; choose one of {', '.join(SCENARIOS)}")
+    if not source.is_file():
+        raise SettingsError(f"the demo needs a checkout of the project: there is no {source}")
+    directory = Path(tempfile.mkdtemp(prefix="impactcell-demo-"))
+    try:
+        content = yaml.safe_load(source.read_text(encoding="utf-8"))
+        content["register_map"] = str((source.parent / content["register_map"]).resolve())
+        content = paced(content, cycles)
+        played = directory / "scenario.yaml"
+        played.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+        password = secrets.token_urlsafe(9)
+        write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
+        rehearse(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
+        with _simulator(played) as port:
+            cell = read_cell(_placed(scenario, directory, port))
+            yield Stage(cell, story(content), password, last_target_m(content))
+    finally:
+        shutil.rmtree(directory, ignore_errors=True)
+
+
+def paced(content: dict, cycles: int | None) -> dict:  # type: ignore[type-arg]
+    """Move what happens in a scenario to where a demo of `cycles` cycles has it in view."""
+    if cycles is None:
+        return content
+    last = max([1, *(entry[key] for section, key in HAPPENINGS for entry in content.get(section, []))])
+    scale = min(1.0, 0.9 * cycles / last)
+    moved = {
+        section: [{**entry, key: max(1, round(entry[key] * scale))} for entry in content[section]]
+        for section, key in HAPPENINGS
+        if section in content
+    }
+    return {**content, **moved}
+
+
+def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-arg]
+    """Tell what a scenario does, from which cycle on."""
+    told = [(1, "the surface wears: mu_s grows slowly")] if content.get("wear") else []
+    if content.get("positioning"):
+        told.append((1, "parts come one after the other and are tapped to their targets"))
+    told += [
+        (
+            batch["from_cycle"],
+            f"batch {batch['id']} is on the table"
+            + ("" if batch.get("announced", True) else ", and the PLC says nothing of it"),
+        )
+        for batch in content.get("batches", [])
+        if batch["from_cycle"] > 1
+    ]
+    told += [
+        (deviation["cycle"], f"cycle {deviation['cycle']} is odd: a {deviation['kind']} along its stroke")
+        for deviation in content.get("deviations", [])
+    ]
+    told += [
+        (entry["from_cycle"], f"a new effect acts in the plant: {', '.join(entry['effects'])}")
+        for entry in content.get("appearances", [])
+    ]
+    return tuple(sorted(told))
+
+
+def last_target_m(content: dict) -> float:  # type: ignore[type-arg]
+    """Find where the last part of a scenario should go; nan where no parts come."""
+    tasks = content.get("positioning", {}).get("tasks", [])
+    return float(tasks[-1]["target_m"]) if tasks else math.nan
+
+
+@contextlib.contextmanager
+def _simulator(scenario: Path) -> Iterator[int]:
+    errors = (scenario.parent / "simulator.log").open("w+", encoding="utf-8")
+    process = subprocess.Popen(  # noqa: S603 - our own simulator
+        [sys.executable, "-m", "simulator", "serve", str(scenario)],
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        text=True,
+        cwd=CONFIG.parent,
+    )
+    try:
+        assert process.stdout is not None  # noqa: S101 - a pipe was asked for
+        line = process.stdout.readline()
+        if not line:
+            process.wait(timeout=5)
+            errors.seek(0)
+            raise ImpactCellError(f"the simulator did not start: {errors.read().strip()}")
+        yield int(json.loads(line)["port"])
+    finally:
+        process.terminate()
+        process.communicate()
+        errors.close()
+
+
+def _placed(scenario: str, directory: Path, port: int) -> Path:
+    """Write the scenario's cell file anew: for this module, with all that it writes in `directory`."""
+    source = CONFIG / "cells" / f"{scenario}.yaml"
+    content = yaml.safe_load(source.read_text(encoding="utf-8"))
+    model = directory / "model.yaml"
+    shutil.copy(source.parent / content["model"], model)
+    content["model"] = str(model)
+    content["module"]["port"] = port
+    content["module"]["register_map"] = str((source.parent / content["module"]["register_map"]).resolve())
+    content["opcua"]["endpoint"] = f"opc.tcp://127.0.0.1:{_free_port()}/impactcell"
+    path = directory / "cell.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def _free_port() -> int:
+    """Prefer the customary port of OPC UA; any free one where it is taken."""
+    for port in (PREFERRED_PORT, 0):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)) as free:
+            return int(free.getsockname()[1])
+    raise ImpactCellError("no free port on loopback")

@@ -1,0 +1,1 @@
+"""What the workflow works on: shots and blocks with covariates, checked, grouped and split."""

@@ -1,0 +1,1 @@
+"""A set of shots fitted by the plant: predictions, least squares, derivatives, intervals."""

@@ -1,0 +1,181 @@
+"""Predictions of the plant for a whole set of shots, in the layout of `Shots`."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from impactcell.campaign import Excitation
+from impactcell.discrepancy.data.shots import Index, Shots
+from impactcell.physics import Strike
+from impactcell.physics import memory_layout as at
+from impactcell.physics.integrator import integrate_all
+from impactcell.physics.law_table import assemble, columns
+from impactcell.records import Samples
+
+LONGEST_S = 60.0
+
+
+def _integrate_shots(
+    rows: Samples,
+    laws: at.Whole,
+    drive: Samples,
+    drive_bounds: at.Whole,
+    horizon: float,
+    cursors: at.Whole,
+    times: Samples,
+    out: Samples,
+    figures: Samples,
+) -> None:
+    none, no_kinds = np.empty(0), np.empty(0, dtype=np.int64)
+    integrate_all(
+        rows,
+        laws,
+        drive,
+        drive_bounds,
+        horizon,
+        at.TO_LAST_SAMPLE,
+        cursors.copy(),
+        times,
+        out,
+        no_kinds,
+        none,
+        figures,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Local:
+    """What every shot has of its own, each of shape (n,).
+
+    Attributes
+    ----------
+    log_factor : ndarray
+        Logarithm of the shot's friction factor.
+    mass_kg : ndarray
+    speed_m_s : ndarray
+        Initial speed; nan where an actuator strikes.
+    shift_m : ndarray
+        Added to the positions: error of the first sample, which a free slide counts from.
+    """
+
+    log_factor: Samples
+    mass_kg: Samples
+    speed_m_s: Samples
+    shift_m: Samples
+
+    def of(self, places: Index) -> "Local":
+        """Return the numbers of some of the shots."""
+        return Local(*(getattr(self, one.name)[places] for one in fields(self)))
+
+    def put(self, places: Index, other: "Local") -> "Local":
+        """Return the same numbers but for those of some shots, which are taken from `other`."""
+        made = {one.name: getattr(self, one.name).copy() for one in fields(self)}
+        for name, values in made.items():
+            values[places] = getattr(other, name)
+        return Local(**made)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """State of the part and of the actuator at every sample, shape (N,) each, along the shot."""
+
+    advance_m: Samples
+    speed_m_s: Samples
+    travel_m: Samples
+
+
+class Forward:
+    """The plant's answers for one set of shots.
+
+    Parameters
+    ----------
+    shots : Shots
+    batches : int
+        How many batches the whole campaign has; a part of it may show fewer.
+    """
+
+    def __init__(self, shots: Shots, batches: int) -> None:
+        self.shots = shots
+        free = shots.excitation is not Excitation.TAP
+        taps = [
+            Strike(
+                velocity_m_s=1.0 if free else shot.velocity_m_s,
+                mass_kg=shot.mass_kg if math.isfinite(shot.mass_kg) else 1.0,
+                stroke_m=shots.stroke_m,
+                direction=shot.direction,
+                start_m=shot.start_m,
+                dwell_s=shot.dwell_s,
+                shot=shot.place,
+                shots=shot.shots,
+                batch=shot.batch,
+            )
+            for shot in shots.items
+        ]
+        self._columns = columns(taps)
+        self.batches = batches
+        self._times = shots.times
+        self._cursors = np.zeros((len(taps), at.CURSORS), dtype=np.int64)
+        for i, shot in enumerate(shots.items):
+            place = int(shots.bounds[i])
+            for channel in range(3):
+                self._cursors[i, channel] = place
+                place += len(shot.times[channel])
+                self._cursors[i, at.CHANNELS + channel] = place
+        drives = [np.concatenate(shot.drive) for shot in shots.items]
+        self._drive = np.concatenate(drives)
+        self._drive_bounds = np.concatenate([[0], np.cumsum([len(one) for one in drives])]).astype(np.int64)
+
+    def names(self, effects: tuple[str, ...]) -> tuple[str, ...]:
+        """Parameters of a row: nominal four, then those of the effects."""
+        return assemble(effects, self.batches).names
+
+    def rows(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Samples:
+        """Rows for the integrator; `parameters` has shape (P,) or (n, P)."""
+        taps = self._columns | {"mass_kg": local.mass_kg, "initial_speed_m_s": local.speed_m_s}
+        table = np.broadcast_to(parameters, (len(self.shots), parameters.shape[-1]))
+        rows = assemble(effects, self.batches).rows(table, self.shots.gravity_m_s2, taps)
+        factor = np.exp(local.log_factor)
+        rows[:, at.MU_S] *= factor
+        rows[:, at.MU_K] *= factor
+        return rows
+
+    def samples(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Samples:
+        """Predicted samples, shape (N,); not finite where the plant has no answer."""
+        out = np.empty(self._times.size)
+        figures = np.empty((len(self.shots), at.FIGURES))
+        rows = self.rows(effects, parameters, local)
+        laws = assemble(effects, self.batches).laws
+        _integrate_shots(
+            rows, laws, self._drive, self._drive_bounds, LONGEST_S, self._cursors, self._times, out, figures
+        )
+        if local.shift_m.any():
+            out += np.repeat(local.shift_m, np.diff(self.shots.bounds))
+        return out
+
+    def course(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Course:
+        """Follow what the part does at every sample's time, whatever channel the sample belongs to."""
+        order = _sorted_within(self.shots, self._times)
+        times = self._times[order]
+        found = np.empty((3, times.size))
+        figures = np.empty((len(self.shots), at.FIGURES))
+        rows = self.rows(effects, parameters, local)
+        laws = assemble(effects, self.batches).laws
+        for k, channel in enumerate((at.POSITION, at.PART_VELOCITY, at.ACTUATOR)):
+            cursors = np.zeros_like(self._cursors)
+            cursors[:, channel] = self.shots.bounds[:-1]
+            cursors[:, at.CHANNELS + channel] = self.shots.bounds[1:]
+            _integrate_shots(
+                rows, laws, self._drive, self._drive_bounds, LONGEST_S, cursors, times, found[k], figures
+            )
+        back = np.empty_like(order)
+        back[order] = np.arange(order.size)
+        sign = np.repeat(self._columns["direction"], np.diff(self.shots.bounds))
+        return Course(*(sign * found[k][back] for k in range(3)))
+
+
+def _sorted_within(shots: Shots, times: Samples) -> at.Whole:
+    """Order that sorts the samples of every shot by time."""
+    owner = np.repeat(np.arange(len(shots)), np.diff(shots.bounds))
+    order: at.Whole = np.lexsort((times, owner)).astype(np.int64)
+    return order

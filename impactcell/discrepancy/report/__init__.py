@@ -1,0 +1,1 @@
+"""What the workflow hands over: `result.json`, figures and one page."""

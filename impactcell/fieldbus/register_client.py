@@ -1,0 +1,147 @@
+"""Registers by name, over a client: neighbouring registers are read in as few requests as may be."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from impactcell.errors import ProtocolError
+from impactcell.fieldbus.codec import MAX_WRITE
+from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Words
+from impactcell.fieldbus.request_batching import PartialBlock
+from impactcell.fieldbus.transport import ModbusClient
+
+_TORN_READS: Final = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Neighbouring registers that are read together."""
+
+    table: str
+    address: int
+    count: int
+    fields: tuple[tuple[Register, slice], ...]
+
+    @classmethod
+    def of(cls, registers: Sequence[Register]) -> Self:
+        """Make the block from the first to the last of `registers`, which are in the order of addresses."""
+        first = registers[0].address
+        fields = tuple((each, slice(each.address - first, each.end - first)) for each in registers)
+        return cls(registers[0].table, first, registers[-1].end - first, fields)
+
+    def decode(self, words: Words) -> dict[str, Value]:
+        """Values in its words, by name."""
+        return {register.name: register.decode(words[where]) for register, where in self.fields}
+
+
+def plan(registers: Iterable[Register], max_registers: int) -> tuple[Block, ...]:
+    """Group registers into blocks of at most `max_registers`, cut only between values.
+
+    A value that is larger than that is a block of its own.
+    """
+    blocks: list[list[Register]] = []
+    for register in sorted(registers, key=lambda r: (r.table, r.address)):
+        last = blocks[-1] if blocks else None
+        if last and last[0].table == register.table and register.end - last[0].address <= max_registers:
+            last.append(register)
+        else:
+            blocks.append([register])
+    return tuple(Block.of(group) for group in blocks)
+
+
+class MappedDevice:
+    """A device whose registers have names."""
+
+    def __init__(self, client: ModbusClient, registers: RegisterMap) -> None:
+        self.client = client
+        self.registers = registers
+        self._header = Block.of(registers.header())
+        self._plans: dict[tuple[str, ...], tuple[Block, ...]] = {}
+        self._last: dict[tuple[str, ...], tuple[list[bytes], dict[str, Value]]] = {}
+
+    async def values(self, names: tuple[str, ...]) -> Mapping[str, Value]:
+        """Read registers and decode them, in SI; those that the map does not have are left out.
+
+        What shows the same words as before comes back as the very same mapping.
+        """
+        blocks = self._blocks(names)
+        raw = [words.tobytes() for words in await self._read(blocks)]
+        last = self._last.get(names)
+        if last is None or last[0] != raw:  # nearly always a poll finds all unchanged
+            found: dict[str, Value] = {}
+            for i, block in enumerate(blocks):
+                if block.count > self.client.link.max_registers:
+                    raw[i] = await self._settled(block, raw[i])
+                found |= block.decode(np.frombuffer(raw[i], WIRE))
+            last = self._last[names] = (raw, found)
+        return last[1]
+
+    def part(self, name: str, values: int) -> PartialBlock:
+        """Give the first `values` values of a register as a block that is still to be read."""
+        register = self.registers[name]
+        return self.client.block(register.address, values * register.words_per_value, register.table)
+
+    async def words(self, name: str, values: int) -> Words:
+        """Read the words of the first `values` values of a register."""
+        part = self.part(name, values)
+        await self.client.complete(part)
+        return part.words()
+
+    async def header(self, slot: int | None = None) -> tuple[dict[str, Value], Words]:
+        """Read the window's header: its values, and its words from `window_sequence` to the first array.
+
+        With `slot` that is selected right before; a device that is busy meanwhile may still show another.
+        """
+        header = self._header
+        words = np.zeros(header.count, dtype=WIRE)
+        blocks = self._blocks(tuple(register.name for register, _ in header.fields))
+        select = self.registers["slot_select"]
+        write = None if slot is None else (select.address, select.encode(slot))
+        for block, part in zip(blocks, await self._read(blocks, write), strict=True):
+            words[block.address - header.address :][: block.count] = part
+        return header.decode(words), words
+
+    async def write(self, values: Mapping[str, ArrayLike | str]) -> None:
+        """Write registers; neighbours go out in one request, so that the device takes them together."""
+        registers = [self.registers[name] for name in values]
+        for block in _runs(registers):
+            words = [register.encode(values[register.name]) for register in block]
+            await self.client.write(block[0].address, np.concatenate(words))
+
+    def _blocks(self, names: tuple[str, ...]) -> tuple[Block, ...]:
+        blocks = self._plans.get(names)
+        if blocks is None:
+            present = [self.registers[name] for name in names if name in self.registers]
+            blocks = self._plans[names] = plan(present, self.client.link.max_registers)
+        return blocks
+
+    async def _read(self, blocks: Iterable[Block], write: tuple[int, Words] | None = None) -> list[Words]:
+        parts = [self.client.block(block.address, block.count, block.table) for block in blocks]
+        await self.client.complete(*parts, write=write)
+        return [part.words() for part in parts]
+
+    async def _settled(self, block: Block, raw: bytes) -> bytes:
+        """Read a block that takes several requests until two readings agree; `raw` is the first."""
+        for _ in range(_TORN_READS):
+            before, raw = raw, (await self._read([block]))[0].tobytes()
+            if before == raw:
+                return raw
+        raise ProtocolError(
+            f"{self.client.link}: {block.count} registers from {block.address} "
+            "change faster than they can be read"
+        )
+
+
+def _runs(registers: list[Register]) -> list[list[Register]]:
+    """Group registers that lie side by side, at most as many as one request can write."""
+    runs: list[list[Register]] = []
+    for register in sorted(registers, key=lambda r: r.address):
+        last = runs[-1] if runs else None
+        if last and last[-1].end == register.address and register.end - last[0].address <= MAX_WRITE:
+            last.append(register)
+        else:
+            runs.append([register])
+    return runs

@@ -1,0 +1,161 @@
+"""One typed door to numba, so that strict type checking reaches through compiled code."""
+
+# ruff: noqa: ARG001  # an intrinsic's arguments are read from its signature, not by name
+
+import functools
+import hashlib
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
+
+import numpy as np
+from llvmlite import ir
+from numba import cfunc, njit, types
+from numba.core.caching import FunctionCache
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+Reals = NDArray[np.float64]
+Wholes = NDArray[np.int64]
+pointer_to: Any = types.CPointer
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Numbers(Protocol):
+    """Bare pointer to floating-point numbers; an array will do where nothing is compiled."""
+
+    def __getitem__(self, index: int, /) -> float: ...
+    def __setitem__(self, index: int, value: float, /) -> None: ...
+
+
+class Integers(Protocol):
+    """Bare pointer to whole numbers."""
+
+    def __getitem__(self, index: int, /) -> int: ...
+    def __setitem__(self, index: int, value: int, /) -> None: ...
+
+
+Law = Callable[[float, float, float, float, Numbers], float]
+"""A law of the plant: four numbers and the parameters of its effect in, one number out."""
+
+_POINTERS: dict[Law, Any] = {}
+
+
+@functools.cache
+def _digest(room: Path) -> str:
+    """Digest of the sources of a room, its inner rooms included, and of the numerics beside this file."""
+    hashed = hashlib.sha256()
+    for folder in (Path(__file__).parent, room):
+        for source in sorted(folder.rglob("*.py")):
+            hashed.update(source.read_bytes())
+    return hashed.hexdigest()
+
+
+def _room(function: Callable[..., Any]) -> Path:
+    """Folder next below the package that a function's file lies in."""
+    source, package = Path(inspect.getfile(function)).resolve(), Path(__file__).resolve().parents[1]
+    inside = source.is_relative_to(package) and len(source.relative_to(package).parts) > 1
+    return package / source.relative_to(package).parts[0] if inside else source.parent
+
+
+class _Cache(FunctionCache):
+    """Machine code on disk, used again only while every source in the room of the function is the same.
+
+    By itself numba looks at the function's own file, and would go on using code into which an older
+    version of a function from another file has been compiled.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        self._digest = _digest(_room(function))
+
+    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+        return (*super()._index_key(signature, codegen), self._digest)  # type: ignore[no-untyped-call]
+
+
+def _can_cache(function: Callable[..., Any]) -> bool:
+    """Whether there is a place to keep machine code; a read-only installation without a home has none."""
+    try:
+        FunctionCache(function)  # type: ignore[no-untyped-call]
+    except RuntimeError:
+        return False
+    return True
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` to machine code on its first call, cached on disk between processes.
+
+    IEEE arithmetic is kept (no fast-math): NaN and infinity mean the same as in Python, and a
+    replay gives the same bits. What it calls of other compiled functions lies in its room or in this one.
+    """
+    dispatcher: Any = njit(error_model="numpy", nogil=True)(function)
+    if _can_cache(function):
+        dispatcher._cache = _Cache(function)  # noqa: SLF001  # what njit(cache=True) does, with the plain cache
+    return cast("Callable[P, R]", dispatcher)
+
+
+def address(law: Law) -> int:
+    """Compile `law` to a C function of fixed signature and return where it lies.
+
+    Compiled code calls it through `invoke`, so that code which combines laws is compiled once and not once
+    for each combination. Cached on disk like everything else.
+    """
+    if law not in _POINTERS:
+        double = types.float64
+        signature = double(double, double, double, double, pointer_to(double))
+        _POINTERS[law] = cfunc(signature, cache=_can_cache(law))(law)
+    return int(_POINTERS[law].address)
+
+
+@intrinsic
+def _invoke(_context, where, first, second, third, fourth, data, offset):  # type: ignore[no-untyped-def]
+    double = types.float64
+    signature = double(types.int64, double, double, double, double, pointer_to(double), types.int64)
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        where, first, second, third, fourth, data, offset = arguments
+        number = ir.DoubleType()
+        kind = ir.FunctionType(number, [number] * 4 + [number.as_pointer()])
+        function = builder.inttoptr(where, kind.as_pointer())
+        return builder.call(function, [first, second, third, fourth, builder.gep(data, [offset])])
+
+    return signature, generate
+
+
+@intrinsic
+def _pointer(_context, array):  # type: ignore[no-untyped-def]
+    signature = pointer_to(array.dtype)(array)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.make_array(signature.args[0])(context, builder, arguments[0]).data
+
+    return signature, generate
+
+
+@intrinsic
+def _offset(_context, data, count):  # type: ignore[no-untyped-def]
+    signature = data(data, types.int64)
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.gep(arguments[0], [arguments[1]])
+
+    return signature, generate
+
+
+invoke = cast("Callable[[int, float, float, float, float, Numbers, int], float]", _invoke)
+"""Call the law at an address with four numbers and the parameters from `row[offset]` on."""
+
+numbers = cast("Callable[[Reals], Numbers]", _pointer)
+"""Bare pointer to a contiguous array's data, for compiled code only.
+
+Indexed like the array, but without bounds, shape or reference count, whose upkeep would cost more than the
+arithmetic in functions as small as those of a plant. Whoever makes one keeps the array alive.
+"""
+
+integers = cast("Callable[[Wholes], Integers]", _pointer)
+"""The same for whole numbers."""
+
+offset = cast("Callable[[Numbers, int], Numbers]", _offset)
+"""Pointer `count` elements further on."""

@@ -1,0 +1,262 @@
+"""Polynomials through stretches of samples, and running means: every capture needs many of them.
+
+A polynomial of degree p through values y at times t is fitted in u = (t - origin) / scale by its normal
+equations, sum_i u_i^(j+k) c_k = sum_i u_i^j y_i, solved by Cholesky's factor L. With |u| <= 1 and p <= 3 they
+lose at most some five digits of sixteen, which noise does not see.
+"""
+
+import math
+
+import numpy as np
+
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+
+GROWTH = 1.3
+"""Factor by which windows grow."""
+MOST_WINDOWS = 64
+
+
+@compiled
+def survey(times: Samples, values: Samples) -> tuple[int, bool, float, float, int]:
+    """Look through a channel once.
+
+    Returns
+    -------
+    bad : int
+        Samples that are not numbers.
+    ascending : bool
+        Whether times increase.
+    lowest, highest : float
+    plateau : int
+        The most values in a row that stand exactly at the highest.
+    """
+    bad, ascending = 0, True
+    lowest, highest = np.inf, -np.inf
+    plateau, run, latest = 0, 0, 0
+    before = -np.inf
+    for i in range(len(values)):
+        time, value = times[i], values[i]
+        if not math.isfinite(time + value):
+            bad += 1
+        if not time > before:
+            ascending = False
+        before = time
+        lowest = min(lowest, value)
+        if value >= highest:
+            run = run + 1 if value == highest and latest == i - 1 else 1
+            plateau = run if value > highest else max(plateau, run)
+            highest, latest = value, i
+    return bad, ascending, lowest, highest, plateau
+
+
+@compiled
+def running_mean(values: Samples, width: int) -> Samples:
+    """Mean of `width` values about each, fewer at the ends."""
+    n = len(values)
+    before = width // 2
+    after = width - before
+    sums = np.empty(n + 1)
+    sums[0] = 0.0
+    for i in range(n):
+        sums[i + 1] = sums[i] + values[i]
+    mean = np.empty(n)
+    for i in range(n):
+        if before <= i <= n - after:
+            mean[i] = (sums[i + after] - sums[i - before]) / width
+        else:
+            first, last = max(i - before, 0), min(i + after, n)
+            mean[i] = (sums[last] - sums[first]) / (last - first)
+    return mean
+
+
+def mean(values: Samples) -> float:
+    """Give numpy's mean of a few values, in less time."""
+    return float(np.add.reduce(values)) / len(values)
+
+
+def median(values: Samples) -> float:
+    """Give numpy's median of a few values, in less time."""
+    ordered, half = values.copy(), len(values) // 2
+    ordered.sort()
+    return float(ordered[half] if len(values) % 2 else 0.5 * (ordered[half - 1] + ordered[half]))
+
+
+@compiled
+def middle_second_difference(values: Samples) -> float:
+    """Median of the absolute second differences of three values and more, by quickselect (Hoare 1961)."""
+    n = len(values) - 2
+    found = np.empty(n)
+    for i in range(n):
+        found[i] = abs((values[i + 2] - values[i + 1]) - (values[i + 1] - values[i]))
+    half, low, high = n // 2, 0, n - 1
+    while low < high:
+        pivot = found[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while found[i] < pivot:
+                i += 1
+            while found[j] > pivot:
+                j -= 1
+            if i <= j:
+                found[i], found[j] = found[j], found[i]
+                i += 1
+                j -= 1
+        if half <= j:
+            high = j
+        elif half >= i:
+            low = i
+        else:
+            break
+    if n % 2:
+        return float(found[half])
+    return float(0.5 * (np.max(found[:half]) + found[half]))
+
+
+@compiled
+def polynomial(
+    times: Samples, values: Samples, origin_s: float, scale_s: float, degree: int
+) -> tuple[Samples, Samples, float]:
+    """Fit a polynomial of at most third degree in u = (t - origin) / scale.
+
+    Returns
+    -------
+    coefficients : ndarray, shape (degree + 1,)
+        Lowest power first; nan where the samples do not determine them.
+    factor : ndarray, shape (degree + 1, degree + 1)
+        Cholesky's factor L of the normal equations, for `spread`.
+    squares : float
+        Sum of squares of the residuals.
+    """
+    size = degree + 1
+    power, right = np.zeros(7), np.zeros(4)
+    base, total = values[0], 0.0  # taken off first: what is left is small, and so are its squares' errors
+    for i in range(len(times)):
+        u = (times[i] - origin_s) / scale_s
+        y = values[i] - base
+        u2 = u * u
+        u3 = u2 * u
+        power[0] += 1.0
+        power[1] += u
+        power[2] += u2
+        power[3] += u3
+        power[4] += u2 * u2
+        power[5] += u2 * u3
+        power[6] += u3 * u3
+        right[0] += y
+        right[1] += u * y
+        right[2] += u2 * y
+        right[3] += u3 * y
+        total += y * y
+    factor = np.zeros((size, size))
+    for j in range(size):
+        for k in range(j + 1):
+            left = power[j + k]
+            for m in range(k):
+                left -= factor[j, m] * factor[k, m]
+            factor[j, k] = math.sqrt(left) if j == k else left / factor[k, k]
+    solved = right[:size].copy()
+    for j in range(size):
+        for k in range(j):
+            solved[j] -= factor[j, k] * solved[k]
+        solved[j] /= factor[j, j]
+        total -= solved[j] * solved[j]
+    for j in range(size - 1, -1, -1):
+        for k in range(j + 1, size):
+            solved[j] -= factor[k, j] * solved[k]
+        solved[j] /= factor[j, j]
+    solved[0] += base
+    return solved, factor, max(total, 0.0)
+
+
+@compiled
+def spread(factor: Samples, u: float) -> float:
+    """Give the standard deviation of the polynomial's value at `u`, in those of one sample."""
+    size = len(factor)
+    column = np.empty(size)
+    power, total = 1.0, 0.0
+    for j in range(size):
+        column[j] = power
+        for k in range(j):
+            column[j] -= factor[j, k] * column[k]
+        column[j] /= factor[j, j]
+        total += column[j] * column[j]
+        power *= u
+    return math.sqrt(total)
+
+
+@compiled
+def value_at(coefficients: Samples, u: float) -> float:
+    """Value of a polynomial, its coefficients lowest power first."""
+    value = 0.0
+    for j in range(len(coefficients) - 1, -1, -1):
+        value = value * u + coefficients[j]
+    return value
+
+
+@compiled
+def _top(cubic: Samples, low: float, high: float) -> float:
+    """Where a cubic is largest between two ends."""
+    best = low if value_at(cubic, low) > value_at(cubic, high) else high
+    # The zero of the derivative c1 + 2 c2 u + 3 c3 u² at which the second derivative is negative.
+    c1, c2, c3 = cubic[1], cubic[2], cubic[3]
+    inside = c2 * c2 - 3.0 * c1 * c3
+    if inside > 0.0:
+        root = math.sqrt(inside)
+        u = c1 / (root - c2) if c2 < 0.0 else (-c2 - root) / (3.0 * c3) if c3 != 0.0 else low
+        if low < u < high and value_at(cubic, u) > value_at(cubic, best):
+            best = u
+    return best
+
+
+@compiled
+def widest_cubic(
+    times: Samples,
+    values: Samples,
+    sigma: float,
+    at_s: float,
+    left: float,
+    right: float,
+    narrowest_s: float,
+    widest_s: float,
+    step_s: float,
+) -> tuple[bool, float, float]:
+    """Maximum of a cubic over the widest window about `at_s` in which its residuals are noise.
+
+    Lepski's rule: windows grow until the residuals, or the maximum against those of narrower windows, show
+    more than noise. A window reaches `left` and `right` of its half width to either side of its centre, which
+    follows the maximum where both are 1; `step_s` is the time between samples.
+
+    Returns
+    -------
+    found : bool
+    value, std : float
+        The maximum and its standard deviation from the noise `sigma` of one sample.
+    """
+    found, value, std = False, np.nan, np.nan
+    highest, lowest = np.inf, -np.inf
+    half, centre = narrowest_s, at_s
+    for _ in range(MOST_WINDOWS):
+        if half > widest_s and found:
+            break
+        first = np.searchsorted(times, centre - left * half - 0.01 * step_s)
+        last = np.searchsorted(times, centre + right * half + 0.01 * step_s, side="right")
+        if last - first < 6:
+            half *= GROWTH
+            if half > 4.0 * widest_s:
+                break
+            continue
+        cubic, factor, squares = polynomial(times[first:last], values[first:last], centre, half, 3)
+        freedom = last - first - 4
+        if not squares / sigma**2 <= freedom + 3.0 * math.sqrt(2.0 * freedom):
+            break
+        u = _top(cubic, (times[first] - centre) / half, (times[last - 1] - centre) / half)
+        top = value_at(cubic, u)
+        if top > highest or top < lowest:
+            break
+        found, value, std = True, top, sigma * spread(factor, u)
+        highest, lowest = min(highest, top + 2.0 * std), max(lowest, top - 2.0 * std)
+        if left == 1.0 and right == 1.0:
+            centre = min(max(centre + half * u, at_s - half), at_s + half)
+        half *= GROWTH
+    return found, value, std

@@ -1,0 +1,169 @@
+"""Small symmetric problems, compiled: for tens of rows a library call costs more than the work."""
+
+import math
+
+import numpy as np
+
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+
+ROUNDING = 1e-14  # of a diagonal element: what is left of it below this is rounding
+
+
+@compiled
+def factor(matrix: Samples) -> Samples:
+    """Lower Cholesky factor of a positive semidefinite matrix.
+
+    A pivot of which only rounding is left is infinite: its unknown is solved as zero.
+    """
+    n = len(matrix)
+    lower = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            left = matrix[i, j]
+            for k in range(j):
+                left -= lower[i, k] * lower[j, k]
+            if i == j:
+                lower[i, i] = math.sqrt(left) if left > ROUNDING * matrix[i, i] else math.inf
+            else:
+                lower[i, j] = left / lower[j, j]
+    return lower
+
+
+@compiled
+def part(matrix: Samples, top: int, bottom: int, left: int, right: int) -> Samples:
+    """Copy of the rows `top` .. `bottom` - 1 in the columns `left` .. `right` - 1."""
+    found = np.empty((bottom - top, right - left))
+    for i in range(bottom - top):
+        for j in range(right - left):
+            found[i, j] = matrix[top + i, left + j]
+    return found
+
+
+@compiled
+def product(A: Samples, B: Samples) -> Samples:
+    """Give A' B, shapes (k, n) and (k, m)."""
+    found = np.zeros((A.shape[1], B.shape[1]))
+    for k in range(len(A)):
+        for i in range(A.shape[1]):
+            for j in range(B.shape[1]):
+                found[i, j] += A[k, i] * B[k, j]
+    return found
+
+
+@compiled
+def triangle(matrix: Samples) -> Samples:
+    """Lower triangle of a symmetric matrix, by rows: what is kept of one between cycles."""
+    kept, p = np.empty(len(matrix) * (len(matrix) + 1) // 2), 0
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            kept[p] = matrix[i, j]
+            p += 1
+    return kept
+
+
+@compiled
+def square(kept: Samples) -> Samples:
+    """Symmetric matrix of a lower triangle."""
+    n, p = int(math.sqrt(2.0 * len(kept))), 0
+    matrix = np.empty((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            matrix[i, j] = matrix[j, i] = kept[p]
+            p += 1
+    return matrix
+
+
+@compiled
+def forward(lower: Samples, right: Samples) -> Samples:
+    """Solve L X = R, shapes (n, n) and (n, k)."""
+    n, width = right.shape
+    found = right.copy()
+    for i in range(n):
+        for k in range(i):
+            share = lower[i, k]
+            for c in range(width):
+                found[i, c] -= share * found[k, c]
+        for c in range(width):
+            found[i, c] /= lower[i, i]
+    return found
+
+
+@compiled
+def backward(lower: Samples, right: Samples) -> Samples:
+    """Solve L' X = R, shapes (n, n) and (n, k)."""
+    n, width = right.shape
+    found = right.copy()
+    for i in range(n - 1, -1, -1):
+        for c in range(width):
+            found[i, c] /= lower[i, i]
+        for k in range(i):
+            share = lower[i, k]
+            for c in range(width):
+                found[k, c] -= share * found[i, c]
+    return found
+
+
+@compiled
+def solved(matrix: Samples, right: Samples) -> Samples:
+    """Solve M x = r for a symmetric positive definite matrix, shapes (n, n) and (n,)."""
+    lower = factor(matrix)
+    return backward(lower, forward(lower, right.reshape((len(right), 1)))).reshape(len(right))
+
+
+@compiled
+def inverse(matrix: Samples) -> Samples:
+    """Inverse of a symmetric positive definite matrix."""
+    lower = factor(matrix)
+    return backward(lower, forward(lower, np.eye(len(matrix))))
+
+
+@compiled
+def marginal(
+    matrix: Samples, vector: Samples, inner: Samples, cross: Samples, along: Samples
+) -> tuple[Samples, Samples]:
+    """Information on some unknowns with others, of which `inner`, `cross` and `along` tell, integrated out.
+
+    Parameters
+    ----------
+    matrix, vector : ndarray, shapes (n, n), (n,)
+        Information on the unknowns kept.
+    inner, cross, along : ndarray, shapes (k, k), (k, n), (k,)
+        Information on the others, that which both share, and its vector.
+
+    Returns
+    -------
+    matrix, vector : ndarray
+        M - X' N^-1 X and h - X' N^-1 a.
+    """
+    n, k = len(vector), len(along)
+    right = np.empty((k, n + 1))
+    for c in range(k):
+        for i in range(n):
+            right[c, i] = cross[c, i]
+        right[c, n] = along[c]
+    half = forward(factor(inner), right)
+    left, rest = matrix.copy(), vector.copy()
+    for c in range(k):
+        for i in range(n):
+            share = half[c, i]
+            rest[i] -= share * half[c, n]
+            for j in range(n):
+                left[i, j] -= share * half[c, j]
+    return left, rest
+
+
+@compiled
+def varied(components: Samples, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
+    """Information (G^-1 + C C')^-1 and its vector: what is left of G when the unknowns vary by C.
+
+    Shapes (n, k), (n, n) and (n,).
+    """
+    k = components.shape[1]
+    cross, inner, along = product(components, matrix), np.eye(k), np.zeros(k)
+    for c in range(k):
+        for i in range(len(vector)):
+            along[c] += components[i, c] * vector[i]
+            for d in range(k):
+                inner[c, d] += cross[c, i] * components[i, d]
+    return marginal(matrix, vector, inner, cross, along)

@@ -1,0 +1,206 @@
+"""Logins: identity tokens in, actors out; guessing passwords becomes slow.
+
+Checking a password takes tens of milliseconds on purpose. It happens in threads of its own, one at a time
+for each address, so that somebody who guesses neither stops the server nor delays others.
+"""
+
+import asyncio
+import logging
+import struct
+import time
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final
+
+from asyncua import ua
+from asyncua.crypto import uacrypto
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import padding, rsa
+
+from impactcell.errors import AccessError
+from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain
+from impactcell.scada.interface import Actor
+from impactcell.scada.users import User, Users, verify
+
+_log = logging.getLogger(__name__)
+
+FREE_ATTEMPTS: Final = 4
+FIRST_DELAY_S: Final = 0.25
+LONGEST_DELAY_S: Final = 8.0
+FORGET_S: Final = 900.0
+KNOWN_ADDRESSES: Final = 4_096
+MAX_PASSWORD_BYTES: Final = 1_024
+
+_OAEP: Final = {
+    "http://www.w3.org/2001/04/xmlenc#rsa-oaep": hashes.SHA1,
+    "http://opcfoundation.org/UA/security/rsa-oaep-sha2-256": hashes.SHA256,
+}
+_SIGNATURES: Final = {
+    "http://www.w3.org/2001/04/xmldsig-more#rsa-sha256": uacrypto.verify_sha256,
+    "http://opcfoundation.org/UA/security/rsa-pss-sha2-256": uacrypto.verify_pss_sha256,
+}
+
+
+class _Address:
+    """What is known of one address: wrong passwords since the last right one, by user name."""
+
+    __slots__ = ("last_s", "lock", "wrong")
+
+    def __init__(self) -> None:
+        self.wrong: dict[str, int] = {}
+        self.last_s = 0.0
+        self.lock = asyncio.Lock()
+
+
+class Throttle:
+    """Delays answers to an address from its fifth wrong password on: 0.25 s, doubled each time, up to 8 s."""
+
+    def __init__(self) -> None:
+        self._addresses: OrderedDict[str, _Address] = OrderedDict()
+
+    def of(self, address: str) -> _Address:
+        """Look up an address; the longest unseen is forgotten when there are too many."""
+        known = self._addresses.setdefault(address, _Address())
+        self._addresses.move_to_end(address)
+        now = time.monotonic()
+        if now - known.last_s > FORGET_S:
+            known.wrong.clear()
+        known.last_s = now
+        while len(self._addresses) > KNOWN_ADDRESSES:
+            self._addresses.popitem(last=False)
+        return known
+
+    @staticmethod
+    def delay(wrong: int) -> float:
+        """Delay of the answer when `wrong` passwords, this one included, were wrong.
+
+        >>> [Throttle.delay(n) for n in (4, 5, 6, 50)]
+        [0.0, 0.25, 0.5, 8.0]
+        """
+        if wrong <= FREE_ATTEMPTS:
+            return 0.0
+        doublings = min(wrong - FREE_ATTEMPTS - 1, 16)
+        return min(FIRST_DELAY_S * 2.0**doublings, LONGEST_DELAY_S)
+
+
+class Logins:
+    """Turns identity tokens into actors."""
+
+    def __init__(self, users: Users, trust: TrustList) -> None:
+        self._users = users
+        self._trust = trust
+        self._throttle = Throttle()
+        self._pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="argon2")
+
+    def close(self) -> None:
+        """End the threads."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def users(self) -> dict[str, User]:
+        """Users as the file has them now; nobody, while it cannot be read."""
+        try:
+            return self._users.current()
+        except AccessError as error:
+            _log.error("nobody can log in: %s", error)
+            return {}
+
+    async def identify(
+        self,
+        token: Any,
+        signature: ua.SignatureData,
+        nonce: bytes,
+        address: str,
+        *,
+        encrypted: bool,
+    ) -> Actor:
+        """Find out who a token stands for.
+
+        Raises
+        ------
+        FaultError
+            BadIdentityTokenRejected (a kind that is not taken), BadIdentityTokenInvalid (malformed, or made
+            for another nonce), BadUserSignatureInvalid, or BadUserAccessDenied (wrong password, unknown
+            user).
+        """
+        if isinstance(token, ua.UserNameIdentityToken):
+            return await self._by_password(token, nonce, address, encrypted=encrypted)
+        if isinstance(token, ua.X509IdentityToken):
+            return self._by_certificate(token, signature, nonce, address)
+        raise FaultError(ua.StatusCodes.BadIdentityTokenRejected)
+
+    async def _by_password(
+        self, token: ua.UserNameIdentityToken, nonce: bytes, address: str, *, encrypted: bool
+    ) -> Actor:
+        password = self._decrypt(token, nonce, encrypted=encrypted)
+        name = token.UserName or ""
+        known = self._throttle.of(address)
+        async with known.lock:
+            user = self.users().get(name)
+            right = await asyncio.get_running_loop().run_in_executor(self._pool, verify, user, password)
+            if right and user is not None:
+                known.wrong.pop(name, None)
+                return Actor(user.name, user.role, address)
+            known.wrong[name] = known.wrong.get(name, 0) + 1
+            wrong = sum(known.wrong.values())
+            _log.warning("wrong password for %r from %s, number %d", name, address, wrong)
+            await asyncio.sleep(Throttle.delay(wrong))
+        raise FaultError(ua.StatusCodes.BadUserAccessDenied)
+
+    def _decrypt(self, token: ua.UserNameIdentityToken, nonce: bytes, *, encrypted: bool) -> str:
+        secret = token.Password or b""
+        if token.EncryptionAlgorithm:
+            algorithm = _OAEP.get(token.EncryptionAlgorithm)
+            if algorithm is None:
+                raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
+            secret = self._open(secret, algorithm(), nonce)
+        elif not encrypted:
+            raise FaultError(ua.StatusCodes.BadIdentityTokenRejected)
+        if len(secret) > MAX_PASSWORD_BYTES:
+            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
+        try:
+            return secret.decode("utf-8")
+        except UnicodeDecodeError:
+            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid) from None
+
+    def _open(self, secret: bytes, algorithm: hashes.HashAlgorithm, nonce: bytes) -> bytes:
+        """Decrypt a secret in the old format of Part 4, 7.40.2.2: length, password, nonce."""
+        key: rsa.RSAPrivateKey = self._trust.private_key
+        block = key.key_size // 8
+        if not secret or len(secret) % block or len(secret) > 8 * block:
+            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
+        scheme = padding.OAEP(mgf=padding.MGF1(algorithm), algorithm=algorithm, label=None)
+        try:
+            plain = b"".join(
+                key.decrypt(secret[at : at + block], scheme) for at in range(0, len(secret), block)
+            )
+            length = struct.unpack_from("<I", plain)[0]
+        except (ValueError, struct.error):
+            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid) from None
+        body = plain[4 : 4 + length]
+        # asyncua takes a password made for any nonce, so that one that was listened to could be sent again.
+        if len(body) != length or length < len(nonce) or body[length - len(nonce) :] != nonce:
+            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
+        return body[: length - len(nonce)]
+
+    def _by_certificate(
+        self, token: ua.X509IdentityToken, signature: ua.SignatureData, nonce: bytes, address: str
+    ) -> Actor:
+        try:
+            data = first_of_chain(token.CertificateData or b"")
+            certificate = uacrypto.x509_from_der(data)
+        except ValueError:
+            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid) from None
+        check = _SIGNATURES.get(signature.Algorithm or "")
+        if check is None or not signature.Signature:
+            raise FaultError(ua.StatusCodes.BadUserSignatureInvalid)
+        try:
+            check(certificate, self._trust.own_certificate + nonce, signature.Signature)
+        except (uacrypto.InvalidSignature, ValueError, TypeError, AttributeError):
+            raise FaultError(ua.StatusCodes.BadUserSignatureInvalid) from None
+        self.users()
+        user = self._users.by_certificate(fingerprint(data))
+        if user is None or not self._trust.is_valid_now(certificate):
+            _log.warning("unknown user certificate %s from %s", fingerprint(data), address)
+            raise FaultError(ua.StatusCodes.BadUserAccessDenied)
+        return Actor(user.name, user.role, address)

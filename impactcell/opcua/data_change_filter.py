@@ -1,0 +1,159 @@
+"""Whether a new value is worth a notification: triggers, deadbands, index ranges (Part 4, 7.22.2 and 7.27).
+
+Mended: asyncua measures a deadband from the last sample, so that a slow drift is never reported; it does not
+know percent deadbands, takes NaN for a change every time, and ignores index ranges.
+"""
+
+import math
+from typing import Any, Final
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+
+from impactcell.opcua.binary_codec import FaultError
+
+_NUMBERS: Final = (
+    "SByte",
+    "Byte",
+    "Int16",
+    "UInt16",
+    "Int32",
+    "UInt32",
+    "Int64",
+    "UInt64",
+    "Float",
+    "Double",
+)
+NUMERIC: Final = frozenset(ua.VariantType[name] for name in _NUMBERS)
+
+
+def same(one: Any, other: Any) -> bool:
+    """Compare two values; a NaN equals a NaN."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, float) and isinstance(other, float) and math.isnan(one):
+        return math.isnan(other)
+    return bool(one == other)
+
+
+class ChangeFilter:
+    """Decides which values of one monitored item are reported."""
+
+    __slots__ = ("_deadband", "_last", "_trigger")
+
+    def __init__(self, trigger: ua.DataChangeTrigger, deadband: float) -> None:
+        self._trigger = trigger
+        self._deadband = deadband
+        self._last: ua.DataValue | None = None
+
+    def fresh(self) -> "ChangeFilter":
+        """Make the same filter with nothing reported yet."""
+        return ChangeFilter(self._trigger, self._deadband)
+
+    def passes(self, data: ua.DataValue) -> bool:
+        """Whether to report a value; what was reported is what the next one is compared with."""
+        last = self._last
+        if last is None or self._differs(last, data):
+            self._last = data
+            return True
+        return False
+
+    def _differs(self, last: ua.DataValue, data: ua.DataValue) -> bool:
+        if last.StatusCode != data.StatusCode:
+            return True
+        if self._trigger == ua.DataChangeTrigger.Status:
+            return False
+        if (
+            self._trigger == ua.DataChangeTrigger.StatusValueTimestamp
+            and last.SourceTimestamp != data.SourceTimestamp
+        ):
+            return True
+        one, other = last.Value.Value, data.Value.Value
+        if self._deadband <= 0.0:
+            return not same(one, other)
+        if isinstance(one, list) and isinstance(other, list):
+            return len(one) != len(other) or any(map(self._beyond, one, other))
+        return self._beyond(one, other)
+
+    def _beyond(self, one: Any, other: Any) -> bool:
+        if same(one, other):
+            return False
+        distance = abs(one - other)
+        # A step to or from NaN or infinity is always one.
+        return not distance <= self._deadband
+
+
+def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, wanted: Any) -> ChangeFilter:
+    """Make the filter a client asks for.
+
+    Raises
+    ------
+    FaultError
+        BadFilterNotAllowed, BadMonitoredItemFilterUnsupported or BadDeadbandFilterInvalid.
+    """
+    if wanted is None or isinstance(wanted, ua.ExtensionObject):
+        return ChangeFilter(ua.DataChangeTrigger.StatusValue, 0.0)
+    # asyncua exports a subclass of what it decodes, so the exported name would let nothing through.
+    if not isinstance(wanted, ua.uaprotocol_auto.DataChangeFilter):
+        raise FaultError(ua.StatusCodes.BadFilterNotAllowed)
+    if wanted.DeadbandType == ua.DeadbandType.None_:
+        return ChangeFilter(wanted.Trigger, 0.0)
+    held = space.read_attribute_value(node, ua.AttributeIds.Value)
+    if attribute != ua.AttributeIds.Value or held.Value is None or held.Value.VariantType not in NUMERIC:
+        raise FaultError(ua.StatusCodes.BadFilterNotAllowed)
+    deadband = float(wanted.DeadbandValue)
+    if not deadband >= 0.0:
+        raise FaultError(ua.StatusCodes.BadDeadbandFilterInvalid)
+    if wanted.DeadbandType == ua.DeadbandType.Percent:
+        span = _eu_span(space, node)
+        if span is None:
+            raise FaultError(ua.StatusCodes.BadMonitoredItemFilterUnsupported)
+        if deadband > 100.0:
+            raise FaultError(ua.StatusCodes.BadDeadbandFilterInvalid)
+        deadband = deadband / 100.0 * span
+    return ChangeFilter(wanted.Trigger, deadband)
+
+
+def _eu_span(space: AddressSpace, node: ua.NodeId) -> float | None:
+    for reference in space[node].references:
+        if reference.IsForward and reference.BrowseName == ua.QualifiedName("EURange", 0):
+            found = space.read_attribute_value(reference.NodeId, ua.AttributeIds.Value).Value.Value
+            return float(found.High - found.Low)
+    return None
+
+
+def parse_range(text: str | None) -> tuple[int, int] | None:
+    """Read an index range of one dimension, `3` or `2:5`, both ends included; None for no range.
+
+    >>> parse_range("2:5"), parse_range("3"), parse_range(None)
+    ((2, 5), (3, 3), None)
+
+    Raises
+    ------
+    FaultError
+        BadIndexRangeInvalid.
+    """
+    if not text:
+        return None
+    first, colon, last = text.partition(":")
+    if not (first.isascii() and first.isdigit() and (not colon or (last.isascii() and last.isdigit()))):
+        raise FaultError(ua.StatusCodes.BadIndexRangeInvalid)
+    low, high = int(first), int(last) if colon else int(first)
+    if colon and high <= low:
+        raise FaultError(ua.StatusCodes.BadIndexRangeInvalid)
+    return low, high
+
+
+def cut(data: ua.DataValue, span: tuple[int, int] | None) -> ua.DataValue:
+    """Cut a range out of an array, string or byte string; BadIndexRangeNoData where nothing is left of it."""
+    if span is None or data.Value is None:
+        return data
+    value = data.Value.Value
+    part = value[span[0] : span[1] + 1] if isinstance(value, list | str | bytes) else None
+    if not part:
+        nothing = ua.StatusCode(ua.StatusCodes.BadIndexRangeNoData)
+        return ua.DataValue(
+            None, nothing, SourceTimestamp=data.SourceTimestamp, ServerTimestamp=data.ServerTimestamp
+        )
+    variant = ua.Variant(part, data.Value.VariantType, is_array=data.Value.is_array)
+    return ua.DataValue(variant, data.StatusCode, data.SourceTimestamp, data.ServerTimestamp)

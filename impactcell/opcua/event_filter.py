@@ -1,0 +1,209 @@
+"""Event filters: which events a client wants, and which of their fields (Part 4, 7.7 and 7.22.3).
+
+Mended: asyncua's OfType matches the very type only, so that a filter for ConditionType lets no alarm
+through; it logs an exception for every operand it does not know, and follows operands that refer to each
+other without end.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+
+from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.type_instances import supertypes
+
+Path = tuple[str, ...]
+NULL: Final = ua.Variant()
+MAX_CLAUSES: Final = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """An event as it happened.
+
+    Attributes
+    ----------
+    kind : NodeId
+        Its type.
+    fields : mapping
+        Browse path below the type, names only, to value; the empty path is the ConditionId.
+    notifiers : frozenset of NodeId
+        Nodes that report it.
+    unfiltered : bool
+        True for the events around a refresh, which pass every filter.
+    """
+
+    kind: ua.NodeId
+    fields: Mapping[Path, ua.Variant]
+    notifiers: frozenset[ua.NodeId]
+    unfiltered: bool = False
+
+
+def _ordered(compare: Callable[[Any, Any], bool]) -> Callable[..., bool | None]:
+    def operator(one: Any, other: Any) -> bool | None:
+        if one is None or other is None:
+            return None
+        try:
+            return compare(one, other)
+        except TypeError:
+            return None
+
+    return operator
+
+
+def _not(value: bool | None) -> bool | None:  # noqa: FBT001
+    return None if value is None else not value
+
+
+def _and(one: bool | None, other: bool | None) -> bool | None:  # noqa: FBT001
+    if one is False or other is False:
+        return False
+    return None if one is None or other is None else True
+
+
+def _or(one: bool | None, other: bool | None) -> bool | None:  # noqa: FBT001
+    if one is True or other is True:
+        return True
+    return None if one is None or other is None else False
+
+
+def _between(value: Any, low: Any, high: Any) -> bool | None:
+    at_least = _ordered(lambda a, b: a >= b)
+    return _and(at_least(value, low), at_least(high, value))
+
+
+def _like(value: Any, pattern: Any) -> bool | None:
+    if isinstance(value, ua.LocalizedText):
+        value = value.Text
+    return like(value, pattern) if isinstance(value, str) and isinstance(pattern, str) else None
+
+
+def like(text: str, pattern: str) -> bool:
+    r"""Match the LIKE patterns of Part 4, table 120: % any characters, _ one, [a-f] [^c] sets, \\ escapes.
+
+    >>> like("WearLimit", "Wear%"), like("cell-3", "cell-[1-2]")
+    (True, False)
+    """
+    out, at = "", 0
+    while at < len(pattern):
+        sign = pattern[at]
+        if sign == "\\" and at + 1 < len(pattern):
+            at += 1
+            out += re.escape(pattern[at])
+        elif sign == "%":
+            out += ".*"
+        elif sign == "_":
+            out += "."
+        elif sign == "[" and "]" in pattern[at + 2 :]:
+            end = pattern.index("]", at + 2)
+            out += "[" + pattern[at + 1 : end].replace("\\", r"\\").replace("[", r"\[") + "]"
+            at = end
+        else:
+            out += re.escape(sign)
+        at += 1
+    try:
+        return re.fullmatch(out, text, re.DOTALL) is not None
+    except re.error:
+        return False
+
+
+_OPERATORS: Final[Mapping[ua.FilterOperator, tuple[int, int, Callable[..., bool | None]]]] = {
+    ua.FilterOperator.Equals: (2, 2, _ordered(lambda a, b: bool(a == b))),
+    ua.FilterOperator.IsNull: (1, 1, lambda a: a is None),
+    ua.FilterOperator.GreaterThan: (2, 2, _ordered(lambda a, b: a > b)),
+    ua.FilterOperator.LessThan: (2, 2, _ordered(lambda a, b: a < b)),
+    ua.FilterOperator.GreaterThanOrEqual: (2, 2, _ordered(lambda a, b: a >= b)),
+    ua.FilterOperator.LessThanOrEqual: (2, 2, _ordered(lambda a, b: a <= b)),
+    ua.FilterOperator.Like: (2, 2, _like),
+    ua.FilterOperator.Not: (1, 1, _not),
+    ua.FilterOperator.Between: (3, 3, _between),
+    ua.FilterOperator.InList: (2, MAX_CLAUSES, lambda a, *rest: None if a is None else a in rest),
+    ua.FilterOperator.And: (2, 2, _and),
+    ua.FilterOperator.Or: (2, 2, _or),
+}
+
+
+class EventFilter:
+    """What one monitored item wants of events.
+
+    Raises
+    ------
+    FaultError
+        BadEventFilterInvalid: no filter, no fields, or a where clause that cannot be evaluated.
+    """
+
+    def __init__(self, space: AddressSpace, wanted: Any) -> None:
+        if not isinstance(wanted, ua.EventFilter):
+            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
+        if not 0 < len(wanted.SelectClauses) <= MAX_CLAUSES:
+            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
+        self._space = space
+        self._elements = wanted.WhereClause.Elements or []
+        if len(self._elements) > MAX_CLAUSES:
+            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
+        for index, element in enumerate(self._elements):
+            self._check(index, element)
+        self._paths = [self._path(clause) for clause in wanted.SelectClauses]
+        self.result = ua.EventFilterResult()
+        self.result.SelectClauseResults = [self._known(clause) for clause in wanted.SelectClauses]
+
+    def _check(self, index: int, element: ua.ContentFilterElement) -> None:
+        operands = element.FilterOperands or []
+        if element.FilterOperator == ua.FilterOperator.OfType:
+            fits = len(operands) == 1 and isinstance(operands[0], ua.LiteralOperand)
+        elif element.FilterOperator in _OPERATORS:
+            least, most, _ = _OPERATORS[element.FilterOperator]
+            fits = least <= len(operands) <= most
+        else:
+            fits = False
+        for operand in operands:
+            if isinstance(operand, ua.ElementOperand):
+                # An operand refers forward only: so no two can refer to each other.
+                fits = fits and index < operand.Index < len(self._elements)
+            elif not isinstance(operand, ua.LiteralOperand | ua.SimpleAttributeOperand | ua.AttributeOperand):
+                fits = False
+        if not fits:
+            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
+
+    def _known(self, clause: ua.SimpleAttributeOperand) -> ua.StatusCode:
+        known = clause.TypeDefinitionId in self._space
+        return ua.StatusCode(ua.StatusCodes.Good if known else ua.StatusCodes.BadTypeDefinitionInvalid)
+
+    @staticmethod
+    def _path(clause: ua.SimpleAttributeOperand) -> Path | None:
+        names = tuple(name.Name for name in clause.BrowsePath or [])
+        if not names:
+            return () if clause.AttributeId == ua.AttributeIds.NodeId else None
+        return names if clause.AttributeId == ua.AttributeIds.Value else None
+
+    def select(self, event: Event) -> ua.EventFieldList:
+        """Take the wanted fields out of an event; a field that it does not have is null."""
+        fields = ua.EventFieldList()
+        fields.EventFields = [NULL if path is None else event.fields.get(path, NULL) for path in self._paths]
+        return fields
+
+    def passes(self, event: Event) -> bool:
+        """Whether the client wants to hear of an event."""
+        return event.unfiltered or not self._elements or self._element(0, event) is True
+
+    def _element(self, index: int, event: Event) -> bool | None:
+        element = self._elements[index]
+        operands = [self._operand(operand, event) for operand in element.FilterOperands]
+        if element.FilterOperator == ua.FilterOperator.OfType:
+            return operands[0] in supertypes(self._space, event.kind)
+        return _OPERATORS[element.FilterOperator][2](*operands)
+
+    def _operand(self, operand: Any, event: Event) -> Any:
+        if isinstance(operand, ua.ElementOperand):
+            return self._element(operand.Index, event)
+        if isinstance(operand, ua.LiteralOperand):
+            return operand.Value.Value if operand.Value is not None else None
+        if isinstance(operand, ua.AttributeOperand):
+            names = tuple(part.TargetName.Name for part in operand.BrowsePath.Elements or [])
+            return event.fields.get(names, NULL).Value
+        path = self._path(operand)
+        return None if path is None else event.fields.get(path, NULL).Value

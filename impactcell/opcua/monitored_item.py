@@ -1,0 +1,223 @@
+"""Monitored items: what waits to be told to a subscriber.
+
+Mended: asyncua drops from a full queue without the overflow bit, ignores discardOldest, queues nothing
+while an item only samples, and looks through all items to find one.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+
+from impactcell.opcua.binary_codec import FaultError, encode
+from impactcell.opcua.data_change_filter import ChangeFilter, change_filter, cut, parse_range
+from impactcell.opcua.event_filter import Event, EventFilter
+from impactcell.opcua.node_values import Sample, Values
+from impactcell.opcua.type_instances import read
+from impactcell.scada.interface import Limits
+
+OVERFLOW: Final = 0x0480
+"""Bits of a status code: it describes a DataValue, and values before it were lost."""
+LEAST_EVENTS: Final = 100
+OVERFLOW_EVENT: Final = ua.NodeId(ua.ObjectIds.EventQueueOverflowEventType)
+
+Ready = Callable[["DataItem | EventItem"], None]
+
+
+def with_overflow(data: ua.DataValue) -> ua.DataValue:
+    """Mark a value as the first after lost ones."""
+    code = data.StatusCode.value if data.StatusCode is not None else 0
+    return ua.DataValue(
+        data.Value, ua.StatusCode(code | OVERFLOW), data.SourceTimestamp, data.ServerTimestamp
+    )
+
+
+class DataItem:
+    """Reports the values of one attribute."""
+
+    def __init__(
+        self,
+        item_id: int,
+        request: ua.MonitoredItemCreateRequest,
+        timestamps: ua.TimestampsToReturn,
+        space: AddressSpace,
+        values: Values,
+        limits: Limits,
+        ready: Ready,
+    ) -> None:
+        target = request.ItemToMonitor
+        self.id = item_id
+        self._node, self._attribute = target.NodeId, target.AttributeId
+        self._values, self._space, self._limits, self._ready = values, space, limits, ready
+        self._range = parse_range(target.IndexRange)
+        self._queue: deque[Sample] = deque()
+        self.mode = request.MonitoringMode
+        self._configure(request.RequestedParameters, timestamps)
+        if self._attribute == ua.AttributeIds.Value:
+            values.watch(self._node, self.offer)
+        if self.mode != ua.MonitoringMode.Disabled:
+            self.offer_present()
+
+    def _configure(self, wanted: ua.MonitoringParameters, timestamps: ua.TimestampsToReturn) -> None:
+        self._filter: ChangeFilter = change_filter(self._space, self._node, self._attribute, wanted.Filter)
+        self.handle: int = wanted.ClientHandle
+        self._timestamps = timestamps
+        self._size = min(max(wanted.QueueSize, 1), self._limits.queue_per_item)
+        self._discard_oldest: bool = wanted.DiscardOldest
+
+    def modify(self, wanted: ua.MonitoringParameters, timestamps: ua.TimestampsToReturn) -> None:
+        """Change filter, queue and handle; values that wait stay, as far as the queue holds them."""
+        self._configure(wanted, timestamps)
+        while len(self._queue) > self._size:
+            self._queue.popleft()
+
+    @property
+    def revised(self) -> tuple[int, Any]:
+        """Size of the queue and result of the filter, as the client is told."""
+        return self._size, None
+
+    def offer_present(self) -> None:
+        """Report the present value, whatever was reported before."""
+        self._filter = self._filter.fresh()
+        self.offer(Sample(self._space.read_attribute_value(self._node, self._attribute)))
+
+    def offer(self, sample: Sample) -> None:
+        """Take in a value that was written."""
+        if self.mode == ua.MonitoringMode.Disabled:
+            return
+        if self._range is not None:
+            sample = Sample(cut(sample.data, self._range))
+        if not self._filter.passes(sample.data):
+            return
+        queue = self._queue
+        if len(queue) >= self._size:
+            if self._discard_oldest or self._size == 1:
+                queue.popleft()
+                queue.append(sample)
+                if self._size > 1:
+                    queue[0] = Sample(with_overflow(queue[0].data))
+            else:
+                queue[-1] = Sample(with_overflow(sample.data))
+        else:
+            queue.append(sample)
+        self._ready(self)
+
+    @property
+    def waiting(self) -> int:
+        """Number of values that wait to be reported."""
+        return len(self._queue) if self.mode == ua.MonitoringMode.Reporting else 0
+
+    def take(self, most: int) -> list[tuple[int, bytes]]:
+        """Take up to `most` values, encoded, with the client's handle."""
+        queue = self._queue
+        return [
+            (self.handle, queue.popleft().encoded(self._timestamps)) for _ in range(min(most, len(queue)))
+        ]
+
+    def set_mode(self, mode: ua.MonitoringMode) -> None:
+        """Report, only sample, or do nothing."""
+        before, self.mode = self.mode, mode
+        if mode == ua.MonitoringMode.Disabled:
+            self._queue.clear()
+        elif before == ua.MonitoringMode.Disabled:
+            self.offer_present()
+        if self.waiting:
+            self._ready(self)
+
+    def close(self) -> None:
+        """Watch no longer."""
+        self._values.unwatch(self._node, self.offer)
+        self._queue.clear()
+
+
+class EventItem:
+    """Reports the events of one notifier."""
+
+    def __init__(
+        self,
+        item_id: int,
+        request: ua.MonitoredItemCreateRequest,
+        space: AddressSpace,
+        limits: Limits,
+        ready: Ready,
+    ) -> None:
+        self.id = item_id
+        self.notifier = request.ItemToMonitor.NodeId
+        self._space, self._limits, self._ready = space, limits, ready
+        notifies = read(space, self.notifier, ua.AttributeIds.EventNotifier)
+        if notifies is None or not notifies & ua.EventNotifier.SubscribeToEvents.mask:
+            raise FaultError(ua.StatusCodes.BadAttributeIdInvalid)
+        self._queue: deque[bytes] = deque()
+        self._overflowed = False
+        self.mode = request.MonitoringMode
+        self._configure(request.RequestedParameters)
+
+    def _configure(self, wanted: ua.MonitoringParameters) -> None:
+        self._filter = EventFilter(self._space, wanted.Filter)
+        self.handle: int = wanted.ClientHandle
+        size = wanted.QueueSize or self._limits.events_per_item
+        self._size = min(max(size, LEAST_EVENTS), self._limits.events_per_item)
+
+    def modify(self, wanted: ua.MonitoringParameters, _timestamps: ua.TimestampsToReturn) -> None:
+        """Change filter, queue and handle."""
+        self._configure(wanted)
+
+    @property
+    def revised(self) -> tuple[int, Any]:
+        """Size of the queue and result of the filter, as the client is told."""
+        return self._size, self._filter.result
+
+    def offer(self, event: Event) -> None:
+        """Take in an event."""
+        if self.mode == ua.MonitoringMode.Disabled or not self._filter.passes(event):
+            return
+        if len(self._queue) >= self._size:
+            self._queue.popleft()
+            if not self._overflowed:
+                # One event that tells of the loss stands where the first lost one stood.
+                self._overflowed = True
+                self._queue.popleft()
+                self._queue.appendleft(self._encode(Event(OVERFLOW_EVENT, overflow_fields(), frozenset())))
+        self._queue.append(self._encode(event))
+        self._ready(self)
+
+    def _encode(self, event: Event) -> bytes:
+        fields = self._filter.select(event)
+        fields.ClientHandle = self.handle
+        return encode(fields)
+
+    @property
+    def waiting(self) -> int:
+        """Number of events that wait to be reported."""
+        return len(self._queue) if self.mode == ua.MonitoringMode.Reporting else 0
+
+    def take(self, most: int) -> list[bytes]:
+        """Take up to `most` events, encoded."""
+        taken = [self._queue.popleft() for _ in range(min(most, len(self._queue)))]
+        self._overflowed = self._overflowed and bool(self._queue)
+        return taken
+
+    def set_mode(self, mode: ua.MonitoringMode) -> None:
+        """Report, only collect, or do nothing."""
+        self.mode = mode
+        if mode == ua.MonitoringMode.Disabled:
+            self._queue.clear()
+        if self.waiting:
+            self._ready(self)
+
+    def close(self) -> None:
+        """Forget what waits."""
+        self._queue.clear()
+
+
+def overflow_fields() -> dict[tuple[str, ...], ua.Variant]:
+    """Fields of the event that tells that others were lost."""
+    return {
+        ("EventType",): ua.Variant(OVERFLOW_EVENT, ua.VariantType.NodeId),
+        ("SourceNode",): ua.Variant(ua.NodeId(ua.ObjectIds.Server), ua.VariantType.NodeId),
+        ("SourceName",): ua.Variant("Server", ua.VariantType.String),
+        ("Message",): ua.Variant(ua.LocalizedText("Events were lost."), ua.VariantType.LocalizedText),
+        ("Severity",): ua.Variant(500, ua.VariantType.UInt16),
+    }

@@ -1,0 +1,152 @@
+"""From the type of a request to the one who answers it, and from what goes wrong to a status code.
+
+Mended: asyncua answers most faults of a request with BadInternalError and some not at all, serves a session's
+requests on any channel, and looks at no limit of operations.
+"""
+
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from asyncua import ua
+
+from impactcell.opcua.binary_codec import (
+    DecodingError,
+    FaultError,
+    StrictBuffer,
+    decode,
+    decode_type,
+    encode,
+    service_fault,
+)
+from impactcell.opcua.sessions import Session, Sessions
+from impactcell.opcua.tcp_connection import Connection
+from impactcell.scada.interface import Actor
+
+_log = logging.getLogger(__name__)
+
+MAX_OPERATIONS: Final = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What comes with a request."""
+
+    connection: Connection
+    header: ua.RequestHeader
+    request_id: int
+    found_session: Session | None = None
+
+    @property
+    def session(self) -> Session:
+        """Session of the request; only services that need one ask for it."""
+        if self.found_session is None:
+            raise FaultError(ua.StatusCodes.BadSessionIdInvalid)
+        return self.found_session
+
+    @property
+    def actor(self) -> Actor:
+        """User behind the request."""
+        actor = self.session.actor
+        if actor is None:
+            raise FaultError(ua.StatusCodes.BadSessionNotActivated)
+        return actor
+
+
+Handler = Callable[[Context, Any], Awaitable[Any]]
+"""Answers with a response object, with encoded bytes, or with None where the answer comes later."""
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """One service: the structure its parameters come in, and who answers."""
+
+    parameters: type | None
+    handler: Handler
+    needs_session: bool = True
+
+
+def request_id(name: str) -> int:
+    """Look up the identifier of the binary encoding of a request.
+
+    >>> request_id("Read")
+    631
+    """
+    return int(getattr(ua.ObjectIds, f"{name}Request_Encoding_DefaultBinary"))
+
+
+class Dispatcher:
+    """Answers requests of all connections."""
+
+    def __init__(
+        self, sessions: Sessions, services: Mapping[str, Service], lost: Callable[[Connection], None]
+    ) -> None:
+        self._sessions = sessions
+        self._services = {request_id(name): service for name, service in services.items()}
+        self._lost = lost
+
+    def disconnected(self, connection: Connection) -> None:
+        """Pass on that a connection has gone."""
+        self._lost(connection)
+
+    async def handle(self, connection: Connection, request_id: int, body: bytes) -> None:
+        """Answer one request.
+
+        Raises
+        ------
+        DecodingError
+            The message has no header that could be answered.
+        """
+        buffer = StrictBuffer(body)
+        kind = decode_type(buffer)
+        header = decode(ua.RequestHeader, buffer)
+        handle = header.RequestHandle
+        try:
+            answer = await self._answer(connection, request_id, kind, header, buffer)
+        except FaultError as fault:
+            answer = service_fault(handle, fault.code)
+        except DecodingError as error:
+            _log.warning("request from %s: %s", connection.address, error)
+            answer = service_fault(handle, ua.StatusCodes.BadDecodingError)
+        except Exception:  # noqa: BLE001 - a fault of ours in one request must not end the others
+            _log.exception("request %s from %s", kind, connection.address)
+            answer = service_fault(handle, ua.StatusCodes.BadInternalError)
+        if answer is None:
+            return
+        if not isinstance(answer, bytes):
+            answer.ResponseHeader.RequestHandle = handle
+            answer = encode(answer)
+        connection.respond(request_id, handle, answer)
+
+    async def _answer(
+        self,
+        connection: Connection,
+        request_id: int,
+        kind: ua.NodeId,
+        header: ua.RequestHeader,
+        body: StrictBuffer,
+    ) -> Any:
+        service = self._services.get(kind.Identifier) if kind.NamespaceIndex == 0 else None
+        if service is None:
+            raise FaultError(ua.StatusCodes.BadServiceUnsupported)
+        session = None
+        if service.needs_session:
+            session = self._sessions.resolve(header.AuthenticationToken, connection)
+        parameters = decode(service.parameters, body) if service.parameters is not None else body
+        return await service.handler(Context(connection, header, request_id, session), parameters)
+
+
+def bounded(operations: list[Any] | None, limit: int = MAX_OPERATIONS) -> list[Any]:
+    """Check the operations of one request.
+
+    Raises
+    ------
+    FaultError
+        BadNothingToDo or BadTooManyOperations.
+    """
+    if not operations:
+        raise FaultError(ua.StatusCodes.BadNothingToDo)
+    if len(operations) > limit:
+        raise FaultError(ua.StatusCodes.BadTooManyOperations)
+    return operations

@@ -1,0 +1,228 @@
+"""One secure channel: who may open it, what it lets through, when it ends.
+
+Mended: asyncua opens a channel to any certificate and looks at it only when a session is made, renews for
+any lifetime, accepts a second Issue on an open channel, and mixes up the two buffer sizes of Hello and
+Acknowledge.
+"""
+
+import hashlib
+import time
+from collections.abc import Sequence
+from typing import Final
+
+from asyncua import ua
+from asyncua.common.connection import SecureConnection, TransportLimits
+from asyncua.common.utils import Buffer
+from asyncua.crypto.security_policies import SecurityPolicyFactory, SecurityPolicyNone
+from asyncua.crypto.uacrypto import InvalidSignature
+
+from impactcell.opcua.binary_codec import DecodingError, FaultError, StrictBuffer, decode, decode_type, encode
+from impactcell.opcua.trust_list import TrustList, UntrustedError
+
+CHUNK: Final = 65_536
+MIN_CHUNK: Final = 8_192
+MIN_LIFETIME_MS: Final = 60_000
+MAX_LIFETIME_MS: Final = 3_600_000
+NONCE_BYTES: Final = 32
+GRACE: Final = 1.25
+"""A security token is honoured this much longer than its lifetime (Part 4, 5.5.2)."""
+
+
+class ChannelError(Exception):
+    """The connection cannot go on: the code goes out in an Error message, then it is closed."""
+
+    def __init__(self, code: int, reason: str) -> None:
+        super().__init__(reason)
+        self.code = code
+
+
+class Channels:
+    """What all channels share: policies on offer, the trust list, the counter of channels."""
+
+    def __init__(
+        self, policies: Sequence[SecurityPolicyFactory], trust: TrustList, message_bytes: int
+    ) -> None:
+        self.policies = list(policies)
+        self.trust = trust
+        self.message_bytes = message_bytes
+        self._last_id = 0
+
+    def get_new_channel_id(self) -> int:
+        """Give a number no other channel of this server has; asyncua calls it by this name."""
+        self._last_id += 1
+        return self._last_id
+
+    def limits(self) -> TransportLimits:
+        """Limits before Hello has been heard."""
+        return TransportLimits(CHUNK, CHUNK, self.message_bytes // MIN_CHUNK + 1, self.message_bytes)
+
+
+class Channel:
+    """The secure channel of one connection."""
+
+    def __init__(self, shared: Channels) -> None:
+        self._shared = shared
+        self._limits = shared.limits()
+        self._secure = SecureConnection(SecurityPolicyNone(), self._limits)
+        self._secure.set_policy_factories(shared.policies)
+        self._max_response = 0
+        self._max_response_chunks = 0
+        self.expires = float("inf")
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a token has been issued."""
+        return bool(self._secure.is_open())
+
+    @property
+    def policy(self) -> object:
+        """Security policy in use, as asyncua's class."""
+        return self._secure.security_policy
+
+    @property
+    def policy_uri(self) -> str:
+        """URI of the security policy in use."""
+        return str(self._secure.security_policy.URI)
+
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether messages are signed and encrypted."""
+        return bool(self._secure.security_policy.Mode == ua.MessageSecurityMode.SignAndEncrypt)
+
+    @property
+    def peer_certificate(self) -> bytes | None:
+        """Client's certificate, DER; None without security."""
+        certificate: bytes | None = getattr(self._secure.security_policy, "peer_certificate", None)
+        return certificate or None
+
+    def hello(self, body: bytes) -> bytes:
+        """Answer Hello with Acknowledge."""
+        message = decode(ua.Hello, StrictBuffer(body))
+        if message.EndpointUrl and len(message.EndpointUrl) > 4096:
+            raise ChannelError(
+                ua.StatusCodes.BadTcpEndpointUrlInvalid, "an endpoint URL of more than 4096 characters"
+            )
+        if min(message.ReceiveBufferSize, message.SendBufferSize) < MIN_CHUNK:
+            raise ChannelError(
+                ua.StatusCodes.BadConnectionRejected, f"buffers smaller than {MIN_CHUNK} bytes"
+            )
+        self._limits.max_recv_buffer = min(message.SendBufferSize, CHUNK)
+        self._limits.max_send_buffer = min(message.ReceiveBufferSize, CHUNK)
+        self._max_response = message.MaxMessageSize
+        self._max_response_chunks = message.MaxChunkCount
+        answer = ua.Acknowledge()
+        answer.ReceiveBufferSize = self._limits.max_recv_buffer
+        answer.SendBufferSize = self._limits.max_send_buffer
+        answer.MaxMessageSize = self._limits.max_message_size
+        answer.MaxChunkCount = self._limits.max_chunk_count
+        data: bytes = ua.ua_binary.uatcp_to_binary(ua.MessageType.Acknowledge, answer)
+        return data
+
+    def receive(self, header: ua.Header, body: bytes) -> ua.Message | None:
+        """Take in one chunk; the message, once it is complete.
+
+        Raises
+        ------
+        ChannelError
+            The chunk breaks the protocol or fails its security checks.
+        """
+        if header.MessageType == ua.MessageType.SecureOpen:
+            self._check_open(StrictBuffer(body))
+        elif not self.is_open or time.monotonic() > self.expires:
+            raise ChannelError(ua.StatusCodes.BadSecureChannelClosed, "no open channel")
+        try:
+            return self._secure.receive_from_header_and_body(header, StrictBuffer(body))
+        except ua.UaStatusCodeError as error:
+            code = error.code
+            if code == ua.StatusCodes.BadRequestTooLarge:
+                code = ua.StatusCodes.BadTcpMessageTooLarge
+            raise ChannelError(code, "a message beyond the limits") from error
+        except (InvalidSignature, ua.UaError, ValueError, TypeError, OverflowError, IndexError) as error:
+            raise ChannelError(ua.StatusCodes.BadSecurityChecksFailed, f"security checks: {error}") from error
+
+    def _check_open(self, body: Buffer) -> None:
+        security = decode(ua.AsymmetricAlgorithmHeader, body)
+        if self.is_open:
+            if security.SecurityPolicyURI != self.policy_uri:
+                raise ChannelError(ua.StatusCodes.BadSecurityPolicyRejected, "another policy on renewal")
+        elif security.SecurityPolicyURI == SecurityPolicyNone.URI:
+            return
+        if security.SecurityPolicyURI == SecurityPolicyNone.URI:
+            return
+        if not any(policy.matches(security.SecurityPolicyURI) for policy in self._shared.policies):
+            raise ChannelError(
+                ua.StatusCodes.BadSecurityPolicyRejected, f"policy {security.SecurityPolicyURI}"
+            )
+        certificate = security.SenderCertificate
+        if not certificate:
+            raise ChannelError(ua.StatusCodes.BadSecurityChecksFailed, "no certificate")
+        own = self._shared.trust.own_certificate
+        if security.ReceiverCertificateThumbPrint != hashlib.sha1(own, usedforsecurity=False).digest():
+            raise ChannelError(ua.StatusCodes.BadCertificateInvalid, "meant for another certificate")
+        try:
+            self._shared.trust.check(certificate)
+        except UntrustedError as error:
+            # Part 4, 6.1.3: the client is told no more than this; the reason stays in our log.
+            raise ChannelError(
+                ua.StatusCodes.BadSecurityChecksFailed, f"client certificate: {error}"
+            ) from error
+
+    def open(self, message: ua.Message) -> bytes:
+        """Issue or renew the security token; the response, ready to send."""
+        body = StrictBuffer(bytes(message.body()))
+        if decode_type(body) != ua.NodeId(ua.ObjectIds.OpenSecureChannelRequest_Encoding_DefaultBinary):
+            raise ChannelError(
+                ua.StatusCodes.BadTcpMessageTypeInvalid, "an OPN message without a request to open"
+            )
+        # The structure begins with the type that has just been read.
+        request = decode(ua.OpenSecureChannelRequest, StrictBuffer(bytes(message.body())))
+        parameters = request.Parameters
+        renew = parameters.RequestType == ua.SecurityTokenRequestType.Renew
+        if renew != self.is_open:
+            raise ChannelError(
+                ua.StatusCodes.BadSecureChannelIdInvalid, "issue on an open channel, or renew on none"
+            )
+        if parameters.SecurityMode != self._secure.security_policy.Mode:
+            if renew or self._secure.security_policy.URI == SecurityPolicyNone.URI:
+                raise ChannelError(ua.StatusCodes.BadSecurityModeRejected, f"mode {parameters.SecurityMode}")
+            raise ChannelError(ua.StatusCodes.BadSecurityModeRejected, "only SignAndEncrypt is offered")
+        if self.is_encrypted and len(parameters.ClientNonce or b"") < NONCE_BYTES:
+            raise ChannelError(ua.StatusCodes.BadNonceInvalid, "a nonce that is too short")
+        parameters.RequestedLifetime = min(
+            max(parameters.RequestedLifetime, MIN_LIFETIME_MS), MAX_LIFETIME_MS
+        )
+        self.expires = time.monotonic() + parameters.RequestedLifetime / 1e3 * GRACE
+        response = ua.OpenSecureChannelResponse()
+        response.Parameters = self._secure.open(parameters, self._shared)
+        response.ResponseHeader.RequestHandle = request.RequestHeader.RequestHandle
+        data: bytes = self._secure.message_to_binary(
+            encode(response), message_type=ua.MessageType.SecureOpen, request_id=message.request_id()
+        )
+        return data
+
+    def wrap(self, body: bytes, request_id: int) -> bytes:
+        """Turn a response into bytes to send.
+
+        Raises
+        ------
+        FaultError
+            The response is larger than the client takes.
+        """
+        too_large = self._max_response and len(body) > self._max_response
+        if too_large or (
+            self._max_response_chunks and len(body) > self._max_response_chunks * self._plain_chunk
+        ):
+            raise FaultError(ua.StatusCodes.BadResponseTooLarge)
+        data: bytes = self._secure.message_to_binary(body, request_id=request_id)
+        return data
+
+    @property
+    def _plain_chunk(self) -> int:
+        return int(self._limits.max_send_buffer) - 256
+
+    def close(self) -> None:
+        """Accept no further message."""
+        self._secure.close()
+
+
+__all__ = ["Channel", "ChannelError", "Channels", "DecodingError"]

@@ -1,0 +1,260 @@
+"""The running server: listener, services and clock put together."""
+
+import asyncio
+import contextlib
+import logging
+import os
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+from asyncua import ua
+from asyncua.crypto.security_policies import SecurityPolicyFactory
+
+from impactcell import __version__
+from impactcell.errors import AccessError
+from impactcell.opcua.attribute_service import Attributes
+from impactcell.opcua.authentication import Logins
+from impactcell.opcua.binary_codec import bound_null_arrays
+from impactcell.opcua.endpoints import POLICIES, PRODUCT_NAME, PRODUCT_URI, Endpoints
+from impactcell.opcua.history_paging import PAGE
+from impactcell.opcua.history_processed import AGGREGATES
+from impactcell.opcua.history_service import MOST_NODES
+from impactcell.opcua.method_service import Calls
+from impactcell.opcua.monitored_item_service import MonitoredItems
+from impactcell.opcua.node_values import Values
+from impactcell.opcua.request_dispatch import MAX_OPERATIONS, Dispatcher, Service
+from impactcell.opcua.secure_channel import Channels
+from impactcell.opcua.session_service import Access
+from impactcell.opcua.sessions import MAX_CONTINUATIONS, Sessions
+from impactcell.opcua.subscription_service import Monitoring
+from impactcell.opcua.tcp_connection import Connection
+from impactcell.opcua.trust_list import TrustList
+from impactcell.opcua.view_service import Views
+from impactcell.scada.interface import Actor, ServerSettings
+from impactcell.scada.users import Users
+
+_log = logging.getLogger(__name__)
+
+BACKLOG: Final = 1_024
+CLOCK_S: Final = 1.0
+
+
+class Host:
+    """Everything between the socket and the address space.
+
+    Raises
+    ------
+    AccessError
+        Certificate, key or users file are absent or unusable.
+    """
+
+    def __init__(self, settings: ServerSettings, space: Any, values: Values) -> None:
+        bound_null_arrays()
+        self._settings = settings
+        self._space = space
+        self._values = values
+        self._trust = TrustList(settings.pki, settings.application_uri)
+        self._logins = Logins(Users(settings.users), self._trust)
+        self._sessions = Sessions(settings.limits)
+        self._endpoints = Endpoints(settings, self._trust.own_certificate)
+        self._connections: set[Connection] = set()
+        self._listener: asyncio.Server | None = None
+        self._clock: asyncio.Task[None] | None = None
+        self._started = datetime.now(UTC)
+        self.monitoring = Monitoring(settings.limits)
+        self.calls = Calls(space)
+        self._dispatcher: Dispatcher | None = None
+
+    @property
+    def port(self) -> int:
+        """Port the server listens on."""
+        return self._endpoints.port
+
+    async def start(self, history: Mapping[str, Service]) -> None:
+        """Listen.
+
+        Raises
+        ------
+        AccessError
+            The address cannot be listened on.
+        """
+        settings = self._settings
+        if not self._logins.users():
+            _log.warning(
+                "OPC UA: nobody can log in: %s names no user; add one with `impactcell users add`",
+                settings.users,
+            )
+        if settings.allow_none:
+            _log.warning(
+                "OPC UA sessions without encryption are allowed (allow_sessions_without_encryption); "
+                "use this for trials only"
+            )
+        access = Access(
+            self._endpoints,
+            self._sessions,
+            self.monitoring,
+            self._logins,
+            self._trust,
+            settings.limits,
+            allow_none=settings.allow_none,
+        )
+        services: dict[str, Service] = {
+            **access.services(),
+            **Attributes(self._space, self.calls.may_call).services(),
+            **Views(self._space).services(),
+            **self.calls.services(),
+            **self.monitoring.services(),
+            **MonitoredItems(self._space, self._values, settings.limits, self.monitoring).services(),
+            **history,
+        }
+        dispatcher = Dispatcher(self._sessions, services, self._lost)
+        factories = [
+            SecurityPolicyFactory(
+                POLICIES[policy][0],
+                ua.MessageSecurityMode.SignAndEncrypt,
+                self._trust.certificate,
+                self._trust.private_key,
+            )
+            for policy in settings.policies
+        ]
+        channels = Channels(factories, self._trust, settings.limits.message_bytes)
+        self._describe_server()
+        url = urlsplit(settings.endpoint)
+        try:
+            self._listener = await asyncio.get_running_loop().create_server(
+                lambda: Connection(dispatcher, channels, settings.limits, self._connections),
+                url.hostname,
+                url.port or 0,
+                backlog=BACKLOG,
+            )
+        except (OSError, ValueError) as error:
+            number = getattr(error, "errno", None)
+            reason = os.strerror(number) if number is not None and number > 0 else str(error)
+            raise AccessError(
+                f"OPC UA server: cannot listen on {settings.endpoint} ({reason}); choose another endpoint, "
+                "or end what uses it"
+            ) from error
+        self._endpoints.port = self._listener.sockets[0].getsockname()[1]
+        self._clock = asyncio.get_running_loop().create_task(self._run_clock(), name="opcua clock")
+        _log.info("OPC UA server listens on %s (port %d)", settings.endpoint, self.port)
+
+    async def stop(self) -> None:
+        """Close every connection and stop listening."""
+        if self._listener is not None:
+            self._listener.close()
+        if self._clock is not None:
+            self._clock.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._clock
+        self.monitoring.close()
+        for connection in tuple(self._connections):
+            connection.fail(ua.StatusCodes.BadServerHalted, "server stops")
+            connection.close()
+            await connection.wait_closed()
+        if self._listener is not None:
+            await self._listener.wait_closed()
+        self._logins.close()
+
+    def _lost(self, connection: Connection) -> None:
+        # A session with subscriptions waits for its client to come back; one without has nothing to
+        # come back to.
+        for session in self._sessions.detach(connection):
+            if not self.monitoring.of(session):
+                self._sessions.remove(session)
+
+    async def _run_clock(self) -> None:
+        while True:
+            self._tick()
+            await asyncio.sleep(CLOCK_S)
+
+    def _tick(self) -> None:
+        now = datetime.now(UTC)
+        ids = ua.ObjectIds
+        self._values.put(ua.NodeId(ids.Server_ServerStatus_CurrentTime), now, ua.VariantType.DateTime, now)
+        status = ua.ServerStatusDataType(
+            StartTime=self._started,
+            CurrentTime=now,
+            State=ua.ServerState.Running,
+            BuildInfo=self._build_info(),
+        )
+        self._values.put(ua.NodeId(ids.Server_ServerStatus), status, ua.VariantType.ExtensionObject, now)
+        for session in self._sessions.expired():
+            _log.info("session %r timed out", session.name)
+            self.monitoring.end_session(session, delete=False)
+            self._sessions.remove(session)
+        self._follow_users()
+
+    def _follow_users(self) -> None:
+        """End the sessions of users who are no longer in the users file, and follow changes of role."""
+        sessions = [session for session in self._sessions.all() if session.actor is not None]
+        if not sessions:
+            return
+        users = self._logins.users()
+        for session in sessions:
+            actor = session.actor
+            user = users.get(actor.user) if actor is not None else None
+            if actor is None or user is None:
+                _log.warning("user of session %r is gone; session ended", session.name)
+                self.monitoring.end_session(session, delete=True)
+                self._sessions.remove(session)
+            elif user.role is not actor.role:
+                session.actor = Actor(actor.user, user.role, actor.address)
+
+    def _build_info(self) -> ua.BuildInfo:
+        info = ua.BuildInfo()
+        info.ProductUri = PRODUCT_URI
+        info.ManufacturerName = PRODUCT_NAME
+        info.ProductName = PRODUCT_NAME
+        info.SoftwareVersion = __version__
+        info.BuildNumber = __version__
+        info.BuildDate = self._started
+        return info
+
+    def _describe_server(self) -> None:
+        ids, kinds, now = ua.ObjectIds, ua.VariantType, self._started
+        limits = self._settings.limits
+        entries: list[tuple[int, Any, ua.VariantType]] = [
+            (ids.Server_ServerArray, [self._settings.application_uri], kinds.String),
+            (ids.Server_ServiceLevel, 255, kinds.Byte),
+            (ids.Server_Auditing, False, kinds.Boolean),
+            (ids.Server_ServerStatus_StartTime, now, kinds.DateTime),
+            (ids.Server_ServerStatus_State, int(ua.ServerState.Running), kinds.Int32),
+            (ids.Server_ServerStatus_BuildInfo, self._build_info(), kinds.ExtensionObject),
+            (ids.Server_ServerStatus_BuildInfo_ProductUri, PRODUCT_URI, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_ProductName, PRODUCT_NAME, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_ManufacturerName, PRODUCT_NAME, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_SoftwareVersion, __version__, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_BuildNumber, __version__, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_BuildDate, now, kinds.DateTime),
+            (ids.Server_ServerCapabilities_MaxBrowseContinuationPoints, MAX_CONTINUATIONS, kinds.UInt16),
+            (ids.Server_ServerCapabilities_MaxHistoryContinuationPoints, MAX_CONTINUATIONS, kinds.UInt16),
+            (ids.Server_ServerCapabilities_MaxQueryContinuationPoints, 0, kinds.UInt16),
+            (ids.Server_ServerCapabilities_MaxSessions, limits.sessions, kinds.UInt32),
+            (ids.Server_ServerCapabilities_MaxSubscriptions, limits.subscriptions, kinds.UInt32),
+            (
+                ids.Server_ServerCapabilities_MinSupportedSampleRate,
+                limits.publishing_interval_s * 1e3,
+                kinds.Double,
+            ),
+            (
+                ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerHistoryReadData,
+                MOST_NODES,
+                kinds.UInt32,
+            ),
+            (ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead, MAX_OPERATIONS, kinds.UInt32),
+            (ids.HistoryServerCapabilities_AccessHistoryDataCapability, True, kinds.Boolean),
+            (ids.HistoryServerCapabilities_AccessHistoryEventsCapability, True, kinds.Boolean),
+            (ids.HistoryServerCapabilities_MaxReturnDataValues, PAGE, kinds.UInt32),
+            (ids.HistoryServerCapabilities_MaxReturnEventValues, PAGE, kinds.UInt32),
+        ]
+        for number, value, kind in entries:
+            node = ua.NodeId(number)
+            if node in self._space:
+                self._values.put(node, value, kind, now)
+
+
+def aggregate_functions() -> list[ua.NodeId]:
+    """List the aggregates that the server shows among its capabilities."""
+    return list(AGGREGATES)

@@ -1,0 +1,210 @@
+"""Sessions: who is behind a request, over which channel, for how long.
+
+Mended: asyncua numbers its authentication tokens (the next one can be guessed), never looks at the token a
+request carries, lets any trusted client take over any session, keeps one session per connection and forgets
+the rest, and limits sessions only by the thousand.
+"""
+
+import asyncio
+import logging
+import os
+import time
+from collections import OrderedDict, deque
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from asyncua import ua
+
+from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.tcp_connection import Connection
+from impactcell.scada.interface import Actor, Limits
+
+_log = logging.getLogger(__name__)
+
+MIN_TIMEOUT_S: Final = 10.0
+MAX_CONTINUATIONS: Final = 20
+
+
+@dataclass(frozen=True, slots=True)
+class PublishRequest:
+    """A Publish request that waits for something to say."""
+
+    request_id: int
+    handle: int
+    results: list[ua.StatusCode]
+    expires: float
+
+
+class Continuations:
+    """Continuation points of one session; the oldest gives way when there are too many."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[bytes, Any] = OrderedDict()
+
+    def keep(self, state: object) -> bytes:
+        """Keep what is needed to read on, and name it."""
+        while len(self._kept) >= MAX_CONTINUATIONS:
+            self._kept.popitem(last=False)
+        point = os.urandom(16)
+        self._kept[point] = state
+        return point
+
+    def take(self, point: bytes) -> Any:
+        """Take what was kept.
+
+        Raises
+        ------
+        FaultError
+            BadContinuationPointInvalid.
+        """
+        if point not in self._kept:
+            raise FaultError(ua.StatusCodes.BadContinuationPointInvalid)
+        return self._kept.pop(point)
+
+
+@dataclass(eq=False, slots=True)
+class Session:
+    """One session; it outlives its connection until its timeout."""
+
+    session_id: ua.NodeId
+    token: ua.NodeId
+    name: str
+    connection: Connection | None
+    policy_uri: str
+    certificate: bytes | None
+    client_nonce: bytes
+    timeout_s: float
+    nonce: bytes = b""
+    actor: Actor | None = None
+    last_seen: float = field(default_factory=time.monotonic)
+    publish_requests: deque[PublishRequest] = field(default_factory=deque)
+    browse: Continuations = field(default_factory=Continuations)
+    history: Continuations = field(default_factory=Continuations)
+    closed: bool = False
+
+    @property
+    def is_activated(self) -> bool:
+        """Whether a user has logged in."""
+        return self.actor is not None
+
+    def renew_nonce(self) -> bytes:
+        """Make the nonce the client has to sign next."""
+        self.nonce = os.urandom(32)
+        return self.nonce
+
+
+class Sessions:
+    """All sessions of the server."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._sessions: dict[ua.NodeId, Session] = {}
+
+    def __len__(self) -> int:
+        return len(self._sessions)
+
+    @staticmethod
+    def clock() -> float:
+        """Time that `last_seen` counts in, seconds."""
+        return time.monotonic()
+
+    def all(self) -> list[Session]:
+        """Every session that is not closed."""
+        return list(self._sessions.values())
+
+    def create(
+        self, connection: Connection, name: str, timeout_ms: float, nonce: bytes, certificate: bytes | None
+    ) -> Session:
+        """Make a session.
+
+        Raises
+        ------
+        FaultError
+            BadTooManySessions.
+        """
+        if len(self._sessions) >= self._limits.sessions:
+            self._make_room()
+        longest = self._limits.session_timeout_s
+        wanted = timeout_ms / 1e3 if timeout_ms > 0 else longest
+        session = Session(
+            session_id=ua.NodeId(os.urandom(16), 1, ua.NodeIdType.ByteString),
+            token=ua.NodeId(os.urandom(32), 0, ua.NodeIdType.ByteString),
+            name=name or "",
+            connection=connection,
+            policy_uri=connection.channel.policy_uri,
+            certificate=certificate,
+            client_nonce=nonce,
+            timeout_s=min(max(wanted, MIN_TIMEOUT_S), longest),
+        )
+        session.renew_nonce()
+        self._sessions[session.token] = session
+        return session
+
+    def _make_room(self) -> None:
+        # Part 4, 5.6.2: a session that was never activated gives way, so that nobody is locked out by
+        # clients that only create sessions.
+        idle = [session for session in self._sessions.values() if not session.is_activated]
+        if not idle:
+            raise FaultError(ua.StatusCodes.BadTooManySessions)
+        oldest = min(idle, key=lambda session: session.last_seen)
+        if time.monotonic() - oldest.last_seen < 1.0:
+            raise FaultError(ua.StatusCodes.BadTooManySessions)
+        self.remove(oldest)
+
+    def find(self, token: ua.NodeId) -> Session:
+        """Find a session by its authentication token.
+
+        Raises
+        ------
+        FaultError
+            BadSessionIdInvalid.
+        """
+        session = self._sessions.get(token)
+        if session is None:
+            raise FaultError(ua.StatusCodes.BadSessionIdInvalid)
+        return session
+
+    def resolve(self, token: ua.NodeId, connection: Connection) -> Session:
+        """Find the session a request belongs to; it must be active and bound to the channel of the request.
+
+        Raises
+        ------
+        FaultError
+            BadSessionIdInvalid, BadSecureChannelIdInvalid or BadSessionNotActivated.
+        """
+        session = self.find(token)
+        if session.connection is not connection:
+            raise FaultError(ua.StatusCodes.BadSecureChannelIdInvalid)
+        if not session.is_activated:
+            self.remove(session)
+            raise FaultError(ua.StatusCodes.BadSessionNotActivated)
+        session.last_seen = time.monotonic()
+        return session
+
+    def remove(self, session: Session) -> None:
+        """Forget a session."""
+        session.closed = True
+        session.publish_requests.clear()
+        self._sessions.pop(session.token, None)
+
+    def detach(self, connection: Connection) -> list[Session]:
+        """Take a lost connection off its sessions; those that no user had logged in to are forgotten."""
+        lost = [session for session in self._sessions.values() if session.connection is connection]
+        for session in lost:
+            session.connection = None
+            session.publish_requests.clear()
+            if not session.is_activated:
+                self.remove(session)
+        return [session for session in lost if session.is_activated]
+
+    def expired(self) -> list[Session]:
+        """Sessions that have not been heard of for longer than their timeout."""
+        now = time.monotonic()
+        return [s for s in self._sessions.values() if now - s.last_seen > s.timeout_s]
+
+
+async def every(period_s: float, work: Any) -> None:
+    """Call `work` for ever, once a period."""
+    while True:
+        await asyncio.sleep(period_s)
+        work()

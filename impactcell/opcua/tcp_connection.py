@@ -1,0 +1,242 @@
+"""One TCP connection: frames in, frames out, and an Error message for whatever is wrong.
+
+Mended: asyncua leaves a malformed Hello unanswered, closes without a word on most faults, keeps what it
+cannot parse in its buffer for ever, waits without end for a peer that sends half a message, and lets the
+output of a client that does not read grow without bound.
+"""
+
+import asyncio
+import contextlib
+import logging
+import socket
+import struct
+from typing import Final, Protocol, cast
+
+from asyncua import ua
+
+from impactcell.opcua.binary_codec import DecodingError, FaultError, encode, service_fault
+from impactcell.opcua.secure_channel import CHUNK, Channel, ChannelError, Channels
+from impactcell.scada.interface import Limits
+
+_log = logging.getLogger(__name__)
+
+HEADER: Final = struct.Struct("<3scI")
+HELLO_BYTES: Final = 8_192
+QUEUED_CHUNKS: Final = 64
+LINGER_S: Final = 1.0
+UNSENT_BYTES: Final = 16 * 1024 * 1024
+CHUNK_KINDS: Final = (b"F", b"C", b"A")
+SECURE: Final = (b"OPN", b"MSG", b"CLO")
+
+
+class Peer(Protocol):
+    """What handles the requests of a connection."""
+
+    async def handle(self, connection: "Connection", request_id: int, body: bytes) -> None:
+        """Answer one request."""
+
+    def disconnected(self, connection: "Connection") -> None:
+        """Learn that the connection has gone."""
+
+
+class Connection(asyncio.Protocol):
+    """The server's end of one TCP connection."""
+
+    def __init__(
+        self, peer: Peer, channels: Channels, limits: Limits, open_connections: "set[Connection]"
+    ) -> None:
+        self._peer = peer
+        self._limits = limits
+        self._open_connections = open_connections
+        self._buffer = bytearray()
+        self._frames: asyncio.Queue[tuple[ua.Header, bytes] | None] = asyncio.Queue()
+        self._transport: asyncio.Transport | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._greeted = False
+        self._paused = False
+        self._discards = False
+        self.channel = Channel(channels)
+        self.address = ""
+        self.local_address: tuple[str, int] | None = None
+        self.has_session = False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take the connection, or refuse it where there are too many."""
+        self._transport = cast("asyncio.Transport", transport)
+        name = self._transport.get_extra_info("peername")
+        self.address = str(name[0]) if name else ""
+        self.local_address = self._transport.get_extra_info("sockname")
+        if len(self._open_connections) >= self._limits.connections:
+            self.fail(ua.StatusCodes.BadTcpServerTooBusy, f"{self._limits.connections} connections already")
+            return
+        wire = self._transport.get_extra_info("socket")
+        if wire is not None:
+            # A peer that has vanished without a word is found within 30 s.
+            wire.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            for option, value in (("TCP_KEEPIDLE", 15), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
+                if hasattr(socket, option):
+                    wire.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        self._open_connections.add(self)
+        loop = asyncio.get_running_loop()
+        self._task = loop.create_task(self._serve(), name=f"opcua {self.address}")
+        self._timer = loop.call_later(self._limits.hello_s, self._too_slow)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection; sessions and subscriptions live on."""
+        self._open_connections.discard(self)
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._task is not None:
+            self._task.cancel()
+            self._peer.disconnected(self)
+        self._transport = None
+        if exc is not None:
+            _log.info("connection from %s lost: %s", self.address, exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Cut the stream into frames."""
+        if self._discards:
+            return
+        self._buffer += data
+        try:
+            while len(self._buffer) >= HEADER.size:
+                kind, chunk, size = HEADER.unpack_from(self._buffer)
+                self._check_header(kind, chunk, size)
+                if len(self._buffer) < size:
+                    break
+                start = 12 if kind in SECURE else 8
+                header = ua.Header(
+                    kind, chunk, int.from_bytes(self._buffer[8:12], "little") if start == 12 else 0
+                )
+                header.header_size, header.body_size, header.packet_size = start, size - start, size
+                self._frames.put_nowait((header, bytes(self._buffer[start:size])))
+                del self._buffer[:size]
+        except ChannelError as error:
+            self.fail(error.code, str(error))
+            return
+        if self._frames.qsize() > QUEUED_CHUNKS and not self._paused and self._transport is not None:
+            self._transport.pause_reading()
+            self._paused = True
+
+    def _check_header(self, kind: bytes, chunk: bytes, size: int) -> None:
+        if not self._greeted:
+            if kind != b"HEL":
+                raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"{kind!r} in place of Hello")
+            limit = HELLO_BYTES
+        elif kind in SECURE:
+            limit = CHUNK
+        else:
+            raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of type {kind!r}")
+        if chunk not in CHUNK_KINDS or (kind != b"MSG" and chunk != b"F"):
+            raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a chunk of type {chunk!r}")
+        if size > limit:
+            raise ChannelError(ua.StatusCodes.BadTcpMessageTooLarge, f"a chunk of {size} bytes")
+        if size < (16 if kind in SECURE else 8):
+            raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of {size} bytes")
+        self._greeted = True
+
+    async def _serve(self) -> None:
+        while (frame := await self._frames.get()) is not None:
+            if self._paused and self._frames.qsize() < QUEUED_CHUNKS // 2 and self._transport is not None:
+                self._paused = False
+                self._transport.resume_reading()
+            try:
+                await self._take(*frame)
+            except ChannelError as error:
+                self.fail(error.code, str(error))
+            except DecodingError as error:
+                self.fail(ua.StatusCodes.BadDecodingError, str(error))
+            except Exception:  # noqa: BLE001 - one connection's fault must not end the others
+                _log.exception("request from %s", self.address)
+                self.fail(ua.StatusCodes.BadInternalError, "internal error")
+
+    async def _take(self, header: ua.Header, body: bytes) -> None:
+        if header.MessageType == b"HEL":
+            self._send(self.channel.hello(body))
+            self._rearm(self._limits.activation_s)
+            return
+        message = self.channel.receive(header, body)
+        if message is None:
+            return
+        if header.MessageType == b"OPN":
+            self._send(self.channel.open(message))
+        elif header.MessageType == b"CLO":
+            self.close()
+        else:
+            await self._peer.handle(self, message.request_id(), bytes(message.body()))
+
+    def activated(self) -> None:
+        """Let the connection stay: a session lives on it."""
+        self.has_session = True
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _rearm(self, delay_s: float) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        if not self.has_session:
+            self._timer = asyncio.get_running_loop().call_later(delay_s, self._too_slow)
+
+    def _too_slow(self) -> None:
+        self.fail(ua.StatusCodes.BadTimeout, "no session in time")
+
+    def respond(self, request_id: int, handle: int, body: bytes) -> None:
+        """Send a response, or a fault where the client cannot take it."""
+        try:
+            data = self.channel.wrap(body, request_id)
+        except FaultError as fault:
+            data = self.channel.wrap(service_fault(handle, fault.code), request_id)
+        self._send(data)
+
+    def _send(self, data: bytes) -> None:
+        transport = self._transport
+        if transport is None or transport.is_closing():
+            return
+        transport.write(data)
+        if transport.get_write_buffer_size() > UNSENT_BYTES:
+            _log.warning("%s does not read what it asked for; connection dropped", self.address)
+            transport.abort()
+
+    def fail(self, code: int, reason: str) -> None:
+        """Send an Error message and close."""
+        if self._transport is not None and not self._transport.is_closing():
+            level = logging.INFO if code == ua.StatusCodes.BadServerHalted else logging.WARNING
+            _log.log(level, "connection from %s closed: %s", self.address, reason)
+            message = ua.ErrorMessage(ua.StatusCode(code), ua.StatusCode(code).name)
+            body = encode(message)
+            self._transport.write(HEADER.pack(b"ERR", b"F", HEADER.size + len(body)) + body)
+            self._linger(self._transport)
+        self.channel.close()
+        self._frames.put_nowait(None)
+
+    def _linger(self, transport: asyncio.Transport) -> None:
+        # Closing while the peer still sends would reset the connection, and the Error message might be lost:
+        # what comes is thrown away until the peer has closed its end too.
+        if self._discards:
+            return
+        self._discards = True
+        if self._paused:
+            transport.resume_reading()
+        try:
+            transport.write_eof()
+        except OSError:
+            # The peer has gone already.
+            transport.abort()
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = asyncio.get_running_loop().call_later(LINGER_S, transport.abort)
+
+    def close(self) -> None:
+        """Close once everything is sent; requests that wait are dropped."""
+        self.channel.close()
+        if self._transport is not None:
+            self._transport.close()
+        self._frames.put_nowait(None)
+
+    async def wait_closed(self) -> None:
+        """Wait until the task of the connection has ended."""
+        if self._task is not None:
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._task

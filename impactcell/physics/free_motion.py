@@ -1,0 +1,48 @@
+"""Acceleration of a part that slides freely, by what depends on its speed and not on where it is."""
+
+import numpy as np
+
+from impactcell.physics.effect import LawKind
+from impactcell.physics.effects import LIBRARY
+from impactcell.physics.law_table import assemble, parameter_vector
+from impactcell.physics.plant import Plant, Strike
+from impactcell.records import Samples
+
+
+def acts_on_speed(identifier: str) -> bool:
+    """Whether an effect accelerates a free part, friction that changes from place to place apart."""
+    return not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(LIBRARY[identifier].laws)
+
+
+def acceleration(plant: Plant, tap: Strike, speed_m_s: Samples) -> Samples:
+    """Evaluate the laws of a plant's effects for a free part, mu_k itself left out.
+
+    Along the tap, a = s sum_i F_i(x_0, s v, m, g) / m - g sum_j dmu_j(v), with s its direction, F the laws
+    of `LawKind.BODY` and dmu those of `LawKind.KINETIC`. A force that depends on the place is taken where
+    the part lay.
+
+    Parameters
+    ----------
+    plant : Plant
+    tap : Strike
+        Its mass, direction and place.
+    speed_m_s : ndarray, shape (n,)
+        Along the tap, not negative.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Along the tap, m/s².
+    """
+    program = assemble(tuple(plant.effects))
+    values = parameter_vector(plant, program)
+    mass, g, sign = tap.mass_kg, plant.gravity_m_s2, tap.direction
+    total = np.zeros(len(speed_m_s))
+    for identifier, spans in zip(program.effects, program.spans, strict=True):
+        laws, p = LIBRARY[identifier].laws, [values[first] for first, _ in spans]
+        body, kinetic = laws.get(LawKind.BODY), laws.get(LawKind.KINETIC)
+        if body is not None:
+            total += [sign * body(tap.start_m, sign * v, mass, g, p) / mass for v in speed_m_s.tolist()]
+        if kinetic is not None:
+            total -= [g * kinetic(v, 0.0, 0.0, 0.0, p) for v in speed_m_s.tolist()]
+    return total

@@ -1,0 +1,202 @@
+"""From a plant with effects and a tap to the flat arrays that compiled code works on."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from impactcell.errors import PhysicsError
+from impactcell.numerics.jit import address
+from impactcell.physics import memory_layout as at
+from impactcell.physics.effect import Covariates, Effect, LawKind
+from impactcell.physics.effects import LIBRARY
+from impactcell.physics.plant import Plant, Strike
+from impactcell.records import Samples
+
+NOMINAL_NAMES = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
+MOST_STATES = at.WIDTH - at.EXTRA
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    """Effects at work, their laws as compiled code finds them, and where their parameters lie.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters in the order of a parameter vector: the nominal four, then `effect.parameter`, with
+        `[1]`, `[2]`, ... behind it where there is one for each batch after the first.
+    laws : ndarray
+        See `impactcell.physics.memory_layout`.
+    width : int
+        Length of a row.
+    """
+
+    effects: tuple[str, ...]
+    batches: int
+    names: tuple[str, ...]
+    spans: tuple[tuple[tuple[int, int], ...], ...]
+    laws: at.Whole
+    width: int
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel to another process by name: addresses of laws mean nothing there."""
+        return assemble, (self.effects, self.batches)
+
+    def rows(self, parameters: Samples, gravity_m_s2: float, taps: Mapping[str, Samples]) -> Samples:
+        """One row a tap, shape (n, width), from parameters of shape (n, len(names)) and the taps' columns."""
+        n = parameters.shape[0]
+        rows = np.empty((n, self.width))
+        rows[:, at.STIFFNESS : at.MU_K + 1] = parameters[:, :4]
+        rows[:, at.MASS] = taps["mass_kg"]
+        rows[:, at.GRAVITY] = gravity_m_s2
+        rows[:, at.VELOCITY] = taps["velocity_m_s"]
+        rows[:, at.STROKE] = taps["stroke_m"]
+        rows[:, at.DIRECTION] = taps["direction"]
+        rows[:, at.START] = taps["start_m"]
+        rows[:, at.HALTS_AT_SEPARATION] = taps["halts_at_separation"]
+        rows[:, at.INITIAL_SPEED] = taps["initial_speed_m_s"]
+        rows[:, at.NOMINAL :] = parameters[:, 4:]
+        shots: Covariates | None = None
+        for identifier, spans in zip(self.effects, self.spans, strict=True):
+            effect = LIBRARY[identifier]
+            if effect.between is None:
+                continue
+            if shots is None:
+                shots = Covariates(*(taps[name] for name in Covariates._fields))
+            columns = [
+                parameters[:, begin:end] if parameter.per_batch else parameters[:, begin]
+                for (begin, end), parameter in zip(spans, effect.parameters, strict=True)
+            ]
+            factors = effect.between(columns, shots)
+            rows[:, at.MU_S] *= factors.mu_s
+            rows[:, at.MU_K] *= factors.mu_k
+            rows[:, at.MASS] *= factors.mass
+        return rows
+
+
+@lru_cache(maxsize=256)
+def assemble(effects: tuple[str, ...], batches: int = 1) -> Program:
+    """Lay out the laws and parameters of a set of effects, in their given order.
+
+    Raises
+    ------
+    PhysicsError
+        For an effect that the library does not have, or one named twice.
+    """
+    names = list(NOMINAL_NAMES)
+    spans: list[tuple[tuple[int, int], ...]] = []
+    lists: dict[int, list[tuple[int, int, int]]] = {kind: [] for kind in range(at.KINDS)}
+    if len(set(effects)) != len(effects):
+        raise PhysicsError(f"an effect is named twice among {', '.join(effects)}")
+    for identifier in effects:
+        effect = known(identifier)
+        mine: list[tuple[int, int]] = []
+        for parameter in effect.parameters:
+            begin = len(names)
+            if parameter.per_batch:
+                names += [f"{identifier}.{parameter.name}[{i}]" for i in range(1, batches)]
+            else:
+                names.append(f"{identifier}.{parameter.name}")
+            mine.append((begin, len(names)))
+        spans.append(tuple(mine))
+        for place, law in effect.laws.items():
+            first = mine[0][0] - len(NOMINAL_NAMES) + at.NOMINAL
+            lists[int(place)].append((effect.order, address(law), first))
+    for single in (LawKind.REACH, LawKind.LAG, LawKind.DELAY, LawKind.STICK):
+        if len(lists[single]) > 1:
+            raise PhysicsError(f"two effects both set the plant's {single.name.lower()}; use one of them")
+    if len(lists[LawKind.LOSS]) > MOST_STATES:
+        raise PhysicsError(f"at most {MOST_STATES} effects with a state of their own")
+    starts: list[int] = []
+    entries: list[int] = []
+    for kind in range(at.KINDS):
+        starts.append(at.KINDS + 1 + len(entries))
+        for _, where, first in sorted(lists[kind], key=lambda entry: entry[0]):
+            entries += [where, first]
+    starts.append(at.KINDS + 1 + len(entries))
+    return Program(
+        effects=effects,
+        batches=batches,
+        names=tuple(names),
+        spans=tuple(spans),
+        laws=np.array(starts + entries, dtype=np.int64),
+        width=at.NOMINAL + len(names) - len(NOMINAL_NAMES),
+    )
+
+
+def known(identifier: str) -> Effect:
+    """Look an effect up; raises `PhysicsError` with what there is."""
+    if identifier not in LIBRARY:
+        raise PhysicsError(f"no effect is called {identifier!r}; there are {', '.join(LIBRARY)}")
+    return LIBRARY[identifier]
+
+
+def parameter_vector(plant: Plant, program: Program, batches: int = 1) -> Samples:
+    """Parameters of `plant` in the order of `program.names`; effects it lacks are at their null value.
+
+    Raises
+    ------
+    PhysicsError
+        For a parameter that its effect does not have, one out of its range, or a wrong number of batches.
+    """
+    values = [plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k]
+    for identifier in program.effects:
+        given = plant.effects.get(identifier, {})
+        effect = LIBRARY[identifier]
+        unknown = set(given) - {parameter.name for parameter in effect.parameters}
+        if unknown:
+            raise PhysicsError(
+                f"{identifier} has no parameter {', '.join(sorted(unknown))}; "
+                f"it has {', '.join(parameter.name for parameter in effect.parameters)}"
+            )
+        for parameter in effect.parameters:
+            neutral = parameter.typical if math.isnan(parameter.null) else parameter.null
+            value = given.get(parameter.name, neutral)
+            several = list(value) if isinstance(value, Sequence) else [value]
+            if parameter.per_batch:
+                several += [neutral] * (batches - 1 - len(several))
+                several = several[: batches - 1]
+            for one in several:
+                if not parameter.lower <= one <= parameter.upper:
+                    raise PhysicsError(
+                        f"{identifier}: {parameter.name} is {one}, outside "
+                        f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
+                    )
+            values += several
+    return np.array(values, dtype=np.float64)
+
+
+def columns(taps: Sequence[Strike]) -> dict[str, Samples]:
+    """Columns of `rows` from taps, each of shape (n,); they strike, so there is no initial speed."""
+    made = {
+        name: np.array([getattr(tap, name) for tap in taps], dtype=np.float64)
+        for name in (
+            "velocity_m_s",
+            "mass_kg",
+            "stroke_m",
+            "direction",
+            "halts_at_separation",
+            "start_m",
+            "dwell_s",
+            "shot",
+            "shots",
+            "batch",
+        )
+    }
+    made["initial_speed_m_s"] = np.full(len(taps), np.nan)
+    return made
+
+
+def parameter_range(name: str) -> tuple[float, float, float]:
+    """Lower and upper end of a parameter's range, and its typical magnitude, by its name in `names`."""
+    if "." not in name:
+        typical = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.2, "mu_k": 0.15}[name]
+        return 0.0, math.inf, typical
+    identifier, rest = name.split(".", 1)
+    for parameter in LIBRARY[identifier].parameters:
+        if parameter.name == rest.partition("[")[0]:
+            return parameter.lower, parameter.upper, parameter.typical
+    raise PhysicsError(f"no parameter is called {name}")

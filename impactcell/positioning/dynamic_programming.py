@@ -1,0 +1,238 @@
+"""Expected cost to go against the remaining distance, by dynamic programming.
+
+With W(r) the expected number of taps from a remaining distance r, and D_a the displacement of tap a,
+
+    W(r) = 0                                                   for |r| <= tolerance
+    W(r) = min_a 1 + E W(r - D_a) + penalty P(D_a > r + tolerance)  beyond
+
+(Bellman). The penalty is the Lagrange multiplier of the bound on overshoot: what one overshoot may cost
+in taps. Since a part is only ever pushed towards the target, W(r) needs W at smaller r only, and one
+sweep from the tolerance outwards is exact on its grid. The probability of an overshoot under the optimal
+choice is swept along with it, so that the bound can be held for the whole task.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+
+STALL_PENALTY = 60.0  # taps that a tap which moves nothing costs: it stops a sequence
+STALL_M = 2e-7
+AIMS = np.array([-0.4, 0.0, 0.4, 0.8, 1.4, 2.2])  # short of the target, in tolerances
+FAR = 0.7  # a tap whose median leaves this much more to do than the best is not weighed
+SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
+
+
+class CostToGo(NamedTuple):
+    """W and the overshoot probability at remaining distances 0, step, 2 step, ... (m), shape (n,)."""
+
+    step_m: float
+    cost: Samples
+    overshoot: Samples
+
+
+@compiled
+def beyond(z: float) -> float:
+    """P(Z > z) of a standard normal Z."""
+    half: float = 0.5 * math.erfc(0.7071067811865476 * z)
+    return half
+
+
+@compiled
+def ahead(step: float, values: Samples, known: int, r: float) -> float:
+    """Interpolate `values`, of which `known` are there; beyond them, the mean slope of their second half."""
+    place = r / step
+    n = int(place)
+    if n + 1 < known:
+        return float(values[n] + (place - n) * (values[n + 1] - values[n]))
+    last = known - 1
+    half = last // 2
+    slope = (values[last] - values[half]) / (last - half) if last > half else 0.0
+    return float(values[last] + slope * (place - last))
+
+
+@compiled
+def expect(
+    remaining: float, moved: Samples, z: Samples, mass: Samples, tolerance: float, penalty: float,
+    step: float, cost: Samples, overshoot: Samples, known: int, bound: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Weigh one tap: expected cost and overshoot probability of it and all that follow it.
+
+    Parameters
+    ----------
+    moved : ndarray, shape (q,)
+        Displacement at the nodes `z`; between them it is interpolated.
+    mass : ndarray, shape (q - 1,)
+        Normal probability between neighbouring nodes.
+    known : int
+        How many points of `cost` and `overshoot` are known. A tap that leaves the part beyond them, or
+        where it was, leads back to the question that is being asked.
+    bound : float
+        A cost above which the answer does not matter: inf is returned as soon as it is passed.
+    """
+    total, risk, again = 1.0, 0.0, 0.0
+    intervals = mass.size
+    whole = known == cost.size
+    reached = step * (known - 1)
+    for turn in range(intervals):  # from the middle outwards: the bound is passed early
+        q = intervals // 2 + (turn + 1) // 2 * (1 if turn % 2 == 0 else -1)
+        a, b = remaining - moved[q], remaining - moved[q + 1]
+        near, far = min(a, b), max(a, b)
+        if near > tolerance:
+            r = 0.5 * (a + b)
+            if moved[q] <= STALL_M and moved[q + 1] <= STALL_M:
+                again += mass[q]
+                total += mass[q] * STALL_PENALTY
+            elif whole or r <= reached:
+                total += mass[q] * ahead(step, cost, known, r)
+                risk += mass[q] * ahead(step, overshoot, known, min(r, reached))
+            else:
+                again += mass[q]
+        elif far < -tolerance:
+            total += mass[q] * penalty
+            risk += mass[q]
+        elif far > tolerance or near < -tolerance:
+            # z at which the remaining distance crosses +tolerance and -tolerance, linear between nodes
+            slope = (z[q + 1] - z[q]) / (b - a)
+            if near < -tolerance:
+                cut = z[q] + (-tolerance - a) * slope
+                part = beyond(z[q]) - beyond(cut) if a < b else beyond(cut) - beyond(z[q + 1])
+                total += part * penalty
+                risk += part
+            if far > tolerance:
+                cut = z[q] + (tolerance - a) * slope
+                part = beyond(cut) - beyond(z[q + 1]) if a < b else beyond(z[q]) - beyond(cut)
+                r = min(0.5 * (tolerance + far), reached)
+                if r > tolerance:
+                    total += part * ahead(step, cost, known, r)
+                    risk += part * ahead(step, overshoot, known, r)
+                else:
+                    again += part
+        if total > bound:
+            return math.inf, 1.0
+    if again > 0.9:
+        return math.inf, 1.0
+    return total / (1.0 - again), risk / (1.0 - again)
+
+
+@compiled
+def taps_by_displacement(table: Samples, targets: Samples, z: Samples) -> Samples:
+    """For each displacement wanted, the taps that spread least about it: shape (targets, SLOTS, nodes), m.
+
+    Strokes between those of the table are interpolated. A slot without a tap holds nan.
+    """
+    nodes = z.size
+    middle = nodes // 2
+    best = np.full((targets.size, SLOTS, nodes), math.nan)
+    score = np.full((targets.size, SLOTS), math.inf)
+    row = np.empty(nodes)
+    for i in range(table.shape[0]):
+        for j in range(table.shape[1] - 1):
+            a, b = table[i, j, middle], table[i, j + 1, middle]
+            if a > 0.0 and b > 0.0 and a != b and not math.isnan(table[i, j].sum() + table[i, j + 1].sum()):
+                n = np.searchsorted(targets, min(a, b))
+                while n < targets.size and targets[n] <= max(a, b):
+                    part = (targets[n] - a) / (b - a)
+                    square, reach = 0.0, 0.0
+                    for q in range(nodes):
+                        row[q] = table[i, j, q] + part * (table[i, j + 1, q] - table[i, j, q])
+                        if abs(z[q]) < 2.0:
+                            square += (row[q] - targets[n]) ** 2
+                        if abs(z[q]) < 3.5:
+                            reach = max(reach, row[q] - targets[n])
+                    for s in range(SLOTS):
+                        value = square if s == 0 else reach
+                        if value < score[n, s]:
+                            score[n, s] = value
+                            best[n, s] = row
+                    n += 1
+    for n in range(targets.size):
+        if best[n, 0, 0] == best[n, 1, 0] and best[n, 0, nodes - 1] == best[n, 1, nodes - 1]:
+            best[n, 1] = math.nan  # one and the same tap
+    return best
+
+
+@compiled
+def sweep(
+    grid: Samples, targets: Samples, taps: Samples, aims: Samples, z: Samples, mass: Samples,
+    tolerance: float, penalty: float, step: float, cost: Samples, overshoot: Samples,
+) -> None:  # fmt: skip
+    """Fill `cost` and `overshoot`, solving on `grid` from the tolerance outwards and interpolating."""
+    nodes = z.size
+    row = np.empty(nodes)
+    known = int(tolerance / step) + 1  # zero inside the tolerance
+    before, cost_before, risk_before = tolerance, 1.0, 0.0
+    for n in range(grid.size):
+        r = grid[n]
+        best, risk = math.inf, 1.0
+        last = np.searchsorted(targets, r + tolerance)
+        for backward in range(last):
+            m = last - 1 - backward
+            if targets[m] < 0.2 * r and targets[m] < 0.5 * targets[targets.size - 1]:
+                break
+            left = r - targets[m]
+            if left > tolerance and 1.0 + ahead(step, cost, known, left) > best + FAR:
+                continue
+            for s in range(SLOTS):
+                if not math.isnan(taps[m, s, 0]):
+                    c, p = expect(
+                        r, taps[m, s], z, mass, tolerance, penalty, step, cost, overshoot, known, best
+                    )  # fmt: skip
+                    if c < best:
+                        best, risk = c, p
+        for aim in aims:
+            wanted = r - aim * tolerance
+            m = np.searchsorted(targets, wanted)
+            if wanted <= 0.0 or m == 0 or m >= targets.size:
+                continue
+            part = (wanted - targets[m - 1]) / (targets[m] - targets[m - 1])
+            for s in range(SLOTS):
+                before_it = taps[m - 1, s] if not math.isnan(taps[m - 1, s, 0]) else taps[m - 1, 0]
+                behind_it = taps[m, s] if not math.isnan(taps[m, s, 0]) else taps[m, 0]
+                for q in range(nodes):
+                    row[q] = before_it[q] + part * (behind_it[q] - before_it[q])
+                if not math.isnan(row[0]):
+                    c, p = expect(r, row, z, mass, tolerance, penalty, step, cost, overshoot, known, best)
+                    if c < best:
+                        best, risk = c, p
+        if best == math.inf:  # nothing helps from here: as costly as an overshoot
+            best, risk = penalty, 1.0
+        if n == 0:
+            cost_before, risk_before = best, risk
+        while known < cost.size and known * step <= r:
+            part = (known * step - before) / (r - before)
+            cost[known] = cost_before + part * (best - cost_before)
+            overshoot[known] = risk_before + part * (risk - risk_before)
+            known += 1
+        before, cost_before, risk_before = r, best, risk
+
+
+def spacing(first: float, last: float, step: float, ratio: float) -> Samples:
+    """Increasing grid from `first` to `last` with steps of at least `step`, and of `ratio` further out."""
+    points = [first]
+    while points[-1] < last:
+        points.append(points[-1] + max(step, ratio * points[-1]))
+    return np.array(points)
+
+
+def between(z: Samples) -> Samples:
+    """Probability between neighbouring nodes, shape (q - 1,); the tails go to the outermost intervals."""
+    below = np.array([1.0 - beyond(float(v)) for v in z])
+    below[0], below[-1] = 0.0, 1.0
+    return np.diff(below)
+
+
+def cost_to_go(table: Samples, z: Samples, tolerance: float, penalty: float) -> CostToGo:
+    """Sweep for one part: `table` (m) as from `spread_table`, shape (velocities, strokes, nodes)."""
+    furthest = float(np.nanmax(table[:, :, z.size // 2]))
+    step = max(0.5 * tolerance, 2.5e-4 * furthest)
+    grid = spacing(1.25 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
+    targets = spacing(min(0.5 * tolerance, 5e-6), furthest, 0.25 * tolerance, 0.03)
+    targets = targets[targets <= furthest]
+    taps = taps_by_displacement(table, targets, z)
+    cost, overshoot = np.zeros(int(grid[-1] / step)), np.zeros(int(grid[-1] / step))
+    sweep(grid, targets, taps, AIMS, z, between(z), tolerance, penalty, step, cost, overshoot)
+    return CostToGo(step, cost, overshoot)

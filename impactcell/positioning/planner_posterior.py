@@ -1,0 +1,141 @@
+"""What the planner believes of a cell: friction, contact and scatter, with their uncertainty.
+
+Parameters are Gaussian in logarithms, where a plant that is 10 % off is 0.1 off::
+
+    theta = (ln mu_k, ln k, ln b, ln(mu_s / mu_k), k_v)
+
+and each tap has a friction factor of its own, 1 + sigma z, z ~ N(0, 1), on mu_s and mu_k alike; sigma²
+is inverse-gamma. The displacement folds over as friction varies by more than some 10 %, so that one
+observation may have two explanations: friction that is not known better than that is a sum of narrower
+Gaussians, weighted by how well each foretold what happened (`impactcell.positioning.posterior_update`).
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.records import Samples
+
+FRICTION, STIFFNESS, DAMPING, RATIO, VISCOUS = range(5)
+LEARNED_STD = np.array([0.015, 0.03, 0.05, 0.02, 3.0])  # left after a handful of taps
+BATCH_STD = 0.08  # of friction, after a batch step whose size the tracker has not measured yet
+LEVEL_STD = 0.007  # the tracker's level is believed no better than this: successive levels are correlated
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Belief:
+    """Sum of Gaussians over the parameters and inverse-gamma over the variance of the friction factor.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (c,)
+        Probability of each component.
+    means : ndarray, shape (c, 5)
+    covs : ndarray, shape (c, 5, 5)
+    shape, rate : float
+        Of the inverse-gamma distribution of sigma².
+    taps : int
+        Displacements learned from.
+    surprise : float
+        Last normalised innovation, with its sign.
+    """
+
+    weights: Samples
+    means: Samples
+    covs: Samples
+    shape: float = 12.0
+    rate: float = field(default=11.0 * 0.03**2)
+    taps: int = 0
+    surprise: float = 0.0
+
+    @property
+    def scatter(self) -> float:
+        """Predictive standard deviation of a tap's friction factor."""
+        return math.sqrt(self.rate / (self.shape - 1.0))
+
+    @property
+    def mean(self) -> Samples:
+        """Mean of the parameters, shape (5,)."""
+        mean: Samples = self.weights @ self.means
+        return mean
+
+    @property
+    def cov(self) -> Samples:
+        """Covariance of the parameters, shape (5, 5)."""
+        apart = self.means - self.mean
+        cov: Samples = np.einsum("c,cij->ij", self.weights, self.covs) + (apart.T * self.weights) @ apart
+        return cov
+
+    @property
+    def mu_k(self) -> float:
+        """Kinetic coefficient, median."""
+        return math.exp(float(self.mean[FRICTION]))
+
+
+def gaussian(belief: Belief, mean: Samples, cov: Samples) -> Belief:
+    """Belief with one Gaussian over the parameters in place of what it had."""
+    return replace(belief, weights=np.ones(1), means=mean[None], covs=cov[None])
+
+
+def prior(
+    stiffness: float, damping: float, mu_s: float, mu_k: float, viscous: float, friction_std: float = 0.35
+) -> Belief:
+    """Belief before the first tap: contact within some 10 %, friction within a factor of 1.4.
+
+    Parameters
+    ----------
+    stiffness, damping, mu_s, mu_k, viscous : float
+        Nominal values, SI.
+    friction_std : float
+        Of ln mu_k.
+    """
+    mean = np.array(
+        [
+            math.log(mu_k),
+            math.log(stiffness),
+            math.log(max(damping, 1e-3 * math.sqrt(stiffness))),
+            math.log(max(mu_s / mu_k, 1.0)),
+            viscous,
+        ]
+    )
+    std = np.array([friction_std, 0.12, 0.13, 0.03, 0.5 + 0.15 * viscous])
+    return Belief(np.ones(1), mean[None], np.diag(std**2)[None])
+
+
+def foreseen(belief: Belief) -> Belief:
+    """Belief as the next taps will leave it, for what is to be expected of the taps after them.
+
+    One strike tells friction about as well as the scatter allows, and a few tell the contact; to plan as
+    if nothing were learned any more would forbid the first tap of a new cell.
+    """
+    mean, cov = belief.mean, belief.cov
+    factor = np.minimum(1.0, LEARNED_STD / np.sqrt(np.diag(cov)))
+    return gaussian(belief, mean, cov * np.outer(factor, factor))
+
+
+def told_friction(belief: Belief, mu_k: float, std: float, *, batch_changed: bool) -> Belief:
+    """Belief after the tracker reported its level of the kinetic coefficient.
+
+    The tracker's level is itself an average over the cycles this belief has learned from, so the two are
+    not fused as if they were independent: the better informed replaces the other (Jeffrey's rule), and
+    the tracker prevails where they contradict each other. After a batch change friction starts afresh,
+    and what had been learned together with it keeps only its own uncertainty.
+    """
+    mean, cov = belief.mean, belief.cov
+    level, own = math.log(mu_k), float(cov[FRICTION, FRICTION])
+    variance = (std / mu_k) ** 2 + LEVEL_STD**2
+    difference = level - float(mean[FRICTION])
+    contradicts = difference**2 > 9.0 * (own + variance)
+    if batch_changed or contradicts:
+        variance += BATCH_STD**2 if batch_changed else 0.09 * difference**2
+        mean[FRICTION] = level
+        cov[FRICTION, :] = cov[:, FRICTION] = 0.0
+        cov[FRICTION, FRICTION] = variance
+        return replace(gaussian(belief, mean, cov), surprise=0.0)
+    if variance >= own:
+        return belief
+    regression = cov[:, FRICTION] / own
+    mean = mean + regression * difference
+    cov = cov - np.outer(regression, regression) * (own - variance)
+    return gaussian(belief, mean, cov)

@@ -1,0 +1,243 @@
+"""One positioning task as a state machine: events in, what is to be done out; nothing is done here.
+
+::
+
+    IDLE ──begin──► COMMANDING ──commanded──► WAITING ──observed──► COMMANDING … ──► SETTLED
+                        │                        │
+                        └── abort ──► IDLE       ├── abort ──► IDLE
+                        └── failed ─► FAULTED    └── failed, moved nothing, out of its band ──► FAULTED
+
+`begin` may follow IDLE, SETTLED and FAULTED. Every transition is a pure function of sequence and event, but
+for the planner, which learns from each observation.
+"""
+
+import enum
+import math
+from dataclasses import dataclass, replace
+
+from impactcell.errors import PositioningError
+from impactcell.positioning.planner import TapPlanner
+from impactcell.positioning.safety_limits import Limits, released
+from impactcell.positioning.tap import Tap, Unreachable
+from impactcell.records import Evidence, PositioningState
+
+BAND_SIGMAS = 3.29  # the band of a displacement holds 99.9 %
+MOST_TAPS = 200  # of one task; a task that needs more is not converging
+
+
+class Phase(enum.Enum):
+    """Where a task stands."""
+
+    IDLE = "idle"
+    COMMANDING = "commanding"
+    WAITING = "waiting"
+    SETTLED = "settled"
+    FAULTED = "faulted"
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What the sequence has to know of the cell.
+
+    Attributes
+    ----------
+    name : str
+    limits : Limits
+    resolution_m : float
+        Of the encoder.
+    two_sided : bool
+        Actuators on both ends.
+    """
+
+    name: str
+    limits: Limits
+    resolution_m: float
+    two_sided: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A task between two events.
+
+    Attributes
+    ----------
+    tap : Tap or None
+        To be commanded (COMMANDING), or commanded and not yet observed (WAITING).
+    taps : int
+        Commanded in this task.
+    reason : str
+        Why it is IDLE, SETTLED or FAULTED.
+    evidence : Evidence or None
+        Of the fault, for the alarm.
+    """
+
+    phase: Phase = Phase.IDLE
+    target_m: float = math.nan
+    position_m: float = math.nan
+    mass_kg: float = math.nan
+    tap: Tap | None = None
+    taps: int = 0
+    reason: str = ""
+    evidence: Evidence | None = None
+
+    @property
+    def remaining_m(self) -> float:
+        """Target minus position."""
+        return self.target_m - self.position_m
+
+    @property
+    def running(self) -> bool:
+        """Whether a tap is to be commanded or awaited."""
+        return self.phase in {Phase.COMMANDING, Phase.WAITING}
+
+    def published(self) -> PositioningState:
+        """Return the task as it is published."""
+        tap = self.tap if self.running else None
+        return PositioningState(
+            target_m=self.target_m,
+            remaining_m=self.remaining_m,
+            next_velocity_m_s=math.nan if tap is None else tap.velocity_m_s,
+            next_stroke_m=math.nan if tap is None else tap.stroke_m,
+            running=self.running,
+            taps=self.taps,
+            reason=self.reason,
+        )
+
+
+def begin(
+    sequence: Sequence,
+    cell: Cell,
+    planner: TapPlanner,
+    *,
+    target_m: float,
+    position_m: float,
+    mass_kg: float,
+    trained: bool,
+) -> Sequence:
+    """Start a task; SETTLED at once where the part is in place already.
+
+    Parameters
+    ----------
+    target_m, position_m : float
+        Along +1.
+    mass_kg : float
+        nan where it is not known.
+    trained : bool
+        Whether the friction estimator has a level to plan from.
+
+    Raises
+    ------
+    PositioningError
+        A task is running, the target lies behind the part or beyond its travel, the tolerance is finer than
+        the encoder, position or mass are not known, the estimator is not trained, or no tap reaches the
+        target. Nothing has been commanded.
+    """
+    name = cell.name
+    if sequence.running:
+        raise PositioningError(
+            f"{name}: a task to {sequence.target_m * 1e3:.3f} mm is running; abort it first"
+        )
+    if not math.isfinite(target_m):
+        raise PositioningError(f"{name}: the target must be a position in mm, not {target_m}")
+    if not math.isfinite(position_m):
+        raise PositioningError(f"{name}: the position of the part is not known")
+    low, high = cell.limits.travel_m
+    if not low <= target_m <= high:
+        raise PositioningError(
+            f"{name}: target {target_m * 1e3:.3f} mm is beyond the travel "
+            f"of {low * 1e3:g} to {high * 1e3:g} mm"
+        )
+    if planner.tolerance_m < cell.resolution_m:
+        raise PositioningError(
+            f"{name}: a tolerance of {planner.tolerance_m * 1e6:g} µm is finer than the encoder's "
+            f"{cell.resolution_m * 1e6:g} µm; raise positioning.tolerance_um"
+        )
+    if not cell.two_sided and target_m < position_m - planner.tolerance_m:
+        raise PositioningError(
+            f"{name}: target {target_m * 1e3:.3f} mm lies behind the part at {position_m * 1e3:.3f} mm, "
+            "and this cell strikes from one side only"
+        )
+    if not (math.isfinite(mass_kg) and mass_kg > 0.0):
+        raise PositioningError(
+            f"{name}: the mass of the part is not known; state it in the cell file or register"
+        )
+    if not trained:
+        raise PositioningError(f"{name}: friction is not known yet; let the estimator see some cycles first")
+    fresh = Sequence(Phase.IDLE, target_m, position_m, mass_kg)
+    begun = _plan(fresh, cell, planner)
+    if begun.phase is Phase.FAULTED:
+        raise PositioningError(f"{name}: {begun.reason}")
+    return begun
+
+
+def commanded(sequence: Sequence) -> Sequence:
+    """Go on after the module has accepted the tap; its outcome is awaited."""
+    if sequence.phase is not Phase.COMMANDING:
+        return sequence
+    return replace(sequence, phase=Phase.WAITING, taps=sequence.taps + 1)
+
+
+def observed(sequence: Sequence, cell: Cell, planner: TapPlanner, position_m: float) -> Sequence:
+    """Go on after the tap has moved the part to `position_m`: next tap, SETTLED, or FAULTED with evidence."""
+    tap = sequence.tap
+    if sequence.phase is not Phase.WAITING or tap is None:
+        return sequence
+    if not math.isfinite(position_m):
+        return failed(sequence, f"{cell.name}: the module reported no position after tap {sequence.taps}")
+    moved = (position_m - sequence.position_m) * tap.direction
+    planner.observe(tap, moved, sequence.mass_kg)
+    lies = replace(sequence, position_m=position_m, tap=None)
+    half = 0.5 * (tap.highest_m - tap.lowest_m)
+    evidence = Evidence(
+        statistic=abs(moved - tap.expected_m) / half * BAND_SIGMAS if half > 0.0 else math.inf,
+        threshold=BAND_SIGMAS,
+        size=moved - tap.expected_m,
+        size_std=half / BAND_SIGMAS,
+    )
+    if moved < cell.resolution_m:
+        return failed(lies, f"{cell.name}: tap {sequence.taps} moved nothing", evidence)
+    below, above = tap.lowest_m - cell.resolution_m, tap.highest_m + cell.resolution_m
+    if not below <= moved <= above:
+        return failed(
+            lies,
+            f"{cell.name}: tap {sequence.taps} moved the part by {moved * 1e3:.4f} mm, outside "
+            f"the 99.9 % band of {tap.lowest_m * 1e3:.4f} to {tap.highest_m * 1e3:.4f} mm",
+            evidence,
+        )
+    if sequence.taps >= MOST_TAPS:
+        return failed(lies, f"{cell.name}: not in place after {MOST_TAPS} taps")
+    return _plan(lies, cell, planner)
+
+
+def failed(sequence: Sequence, reason: str, evidence: Evidence | None = None) -> Sequence:
+    """Stop with an alarm: link lost, command refused or not answered, or a tap that did not do its work."""
+    if not sequence.running:
+        return sequence
+    return replace(sequence, phase=Phase.FAULTED, tap=None, reason=reason, evidence=evidence)
+
+
+def aborted(sequence: Sequence, by: str) -> Sequence:
+    """Stop because a person or the PLC says so; not a fault. An outstanding tap is to be cancelled."""
+    if not sequence.running:
+        return sequence
+    return replace(sequence, phase=Phase.IDLE, tap=None, reason=f"aborted by {by}")
+
+
+def _plan(sequence: Sequence, cell: Cell, planner: TapPlanner) -> Sequence:
+    answer = planner.next_tap(sequence.remaining_m, sequence.mass_kg)
+    if answer is None:
+        return replace(sequence, phase=Phase.SETTLED, tap=None, reason="in place")
+    if isinstance(answer, Unreachable):
+        return replace(
+            sequence,
+            phase=Phase.FAULTED,
+            tap=None,
+            reason=f"{cell.name}: {answer.reason}",
+            evidence=Evidence(),
+        )
+    force = planner.force(answer, sequence.mass_kg)
+    try:
+        tap = released(answer, cell.limits, sequence.position_m, force, cell.name)
+    except PositioningError as refused:
+        return replace(sequence, phase=Phase.FAULTED, tap=None, reason=str(refused), evidence=Evidence())
+    return replace(sequence, phase=Phase.COMMANDING, tap=tap)

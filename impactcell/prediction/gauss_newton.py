@@ -1,0 +1,210 @@
+"""Gauss-Newton descent of a tap's posterior on one side of the kink of immediate breakaway."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impactcell.errors import PhysicsError
+from impactcell.numerics.jit import Wholes, compiled
+from impactcell.prediction.linearised_model import JUST_STICKING, PARAMETERS, RATIO, Linear, Response
+from impactcell.prediction.posterior import Side
+from impactcell.records import Samples
+
+Indices = NDArray[np.intp]
+
+MOST_STEPS = 25
+SETTLED = 0.02
+"""Length of a step, in posterior standard deviations, below which the fit is at its minimum. This and
+`NO_GAIN` are for residuals of the size of the noise; where they are larger, so are these."""
+LONGEST_IN_STD = 4.0
+"""Longest step, in standard deviations of the prior: farther away the linear model says nothing."""
+NO_GAIN = 0.005
+"""Change of half a sum of squares that means nothing: a kink that passes a sample makes Gauss-Newton go to
+and fro by less."""
+
+
+TO_AND_FRO = 0.1
+"""The same of a step that was refused: where the smaller ones after it mean nothing either, a kink passes
+samples, and the minimum lies within less than half a standard deviation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Belief:
+    """Prior in theta: mean, and one over its standard deviation; 0 where nothing is known.
+
+    Attributes
+    ----------
+    mean, weight : ndarray, shape (4,)
+    free : ndarray of int
+        Indices of what is fitted; all else stays at its mean.
+    """
+
+    mean: Samples
+    weight: Samples
+    free: Indices
+
+    def cost(self, theta: Samples) -> float:
+        """Half the sum of squares of the prior."""
+        away = self.weight * (theta - self.mean)
+        return 0.5 * float(away @ away)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Minimum:
+    """Where a descent ended, and the linear model there.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (4,)
+    side : int
+    linear : Linear
+    cost : float
+        Half the sum of squares, data and prior.
+    settled : bool
+        False where the steps came to an end before the minimum did.
+    """
+
+    theta: Samples
+    side: int
+    linear: Linear
+    cost: float
+    settled: bool = True
+
+    @property
+    def residual(self) -> Samples:
+        """The data's residuals, shape (n,)."""
+        return self.linear.residual
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares of the data's residuals."""
+        return self.linear.chi2
+
+    def as_side(self, known: Belief, misfit: float = 1.0) -> Side:
+        """Give the quadratic about the minimum, the data's weight divided by `misfit` squared.
+
+        Raises
+        ------
+        LinAlgError
+            The data and the prior do not determine it.
+        """
+        away = self.theta - known.mean
+        step, covariance, length, log_determinant = _solved(
+            self.linear.normal, self.linear.slope, known.weight, away, known.free, misfit, 0.0
+        )
+        if not math.isfinite(log_determinant):
+            raise np.linalg.LinAlgError("the curvature is not positive")
+        cost = 0.5 * (self.chi2 / misfit**2 - length) + known.cost(self.theta)
+        return Side(self.theta + step, covariance, cost, -log_determinant, self.side)
+
+
+@compiled
+def _solved(
+    normal: Samples,
+    slope: Samples,
+    weight: Samples,
+    away: Samples,
+    free: Wholes,
+    misfit: float,
+    damping: float,
+) -> tuple[Samples, Samples, float, float]:
+    """Gauss-Newton step from a point that lies `away` from the prior's mean.
+
+    The diagonal is damped after Levenberg and Marquardt, the data's weight divided by `misfit` squared.
+
+    Returns
+    -------
+    step : ndarray, shape (4,)
+        To the quadratic's minimum where nothing is damped.
+    inverse : ndarray, shape (4, 4)
+        Of the damped curvature; 0 for what is not fitted.
+    length : float
+        Of the step, in variances. Without damping also twice what the cost falls by.
+    log_determinant : float
+        Of the damped curvature; nan where it is not positive.
+    """
+    size = len(free)
+    curvature, factor = np.empty((size, size)), np.zeros((size, size))
+    gradient = np.empty(size)
+    log_determinant = 0.0
+    for j in range(size):
+        row = free[j]
+        gradient[j] = slope[row] / misfit**2 + weight[row] ** 2 * away[row]
+        for k in range(size):
+            curvature[j, k] = normal[row, free[k]] / misfit**2
+        curvature[j, j] += weight[row] ** 2
+    for j in range(size):  # Cholesky's factor L
+        for k in range(j + 1):
+            left = curvature[j, k] * (1.0 + damping if j == k else 1.0)
+            for m in range(k):
+                left -= factor[j, m] * factor[k, m]
+            factor[j, k] = math.sqrt(left) if j == k else left / factor[k, k]
+        log_determinant += 2.0 * math.log(factor[j, j])
+    columns = np.zeros((size, size))
+    for j in range(size):  # of the inverse of L
+        columns[j, j] = 1.0 / factor[j, j]
+        for k in range(j + 1, size):
+            for m in range(j, k):
+                columns[k, j] -= factor[k, m] * columns[m, j]
+            columns[k, j] /= factor[k, k]
+    inverse, step = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    for j in range(size):
+        for k in range(size):
+            for m in range(max(j, k), size):
+                inverse[free[j], free[k]] += columns[m, j] * columns[m, k]
+            step[free[j]] -= inverse[free[j], free[k]] * gradient[k]
+    length = 0.0
+    for j in range(size):
+        for k in range(size):
+            length += step[free[j]] * curvature[j, k] * step[free[k]]
+    return step, inverse, length, log_determinant
+
+
+def descend(response: Response, known: Belief, start: Samples, side: int) -> Minimum:
+    """Find the minimum of data and prior, with the model of one side continued across the kink.
+
+    Below the kink (`side` -1) the model is that of immediate breakaway. Above it (`side` +1) the residuals
+    are continued linearly along mu_k/mu_s from the kink.
+    """
+    longest = np.minimum(0.5, LONGEST_IN_STD / np.maximum(known.weight, 1e-12))
+    best = _at(response, known, start, side)
+    damping, refused = 0.0, math.inf
+    for _ in range(MOST_STEPS):
+        found, away = best.linear, best.theta - known.mean
+        step, _, length, _ = _solved(found.normal, found.slope, known.weight, away, known.free, 1.0, damping)
+        if not math.isfinite(length):
+            break
+        noise = max(2.0 * best.cost / response.size, 1.0)
+        if length < SETTLED**2 * noise and damping <= 1e-3:
+            return best
+        moved = best.theta + np.minimum(np.maximum(step, -longest), longest)
+        try:
+            tried = _at(response, known, moved, side)
+        except PhysicsError:
+            tried = replace(best, cost=math.inf)
+        if tried.cost <= best.cost + NO_GAIN * noise:
+            gain = best.cost - tried.cost
+            settled = abs(gain) < NO_GAIN * noise and (damping <= 1e-2 or refused < TO_AND_FRO * noise)
+            refused = math.inf if gain > TO_AND_FRO * noise else refused
+            best = tried
+            if settled:
+                return best
+            damping = 0.0 if damping < 1e-2 else 0.1 * damping
+        else:
+            refused = tried.cost - best.cost
+            damping = max(10.0 * damping, 1e-2)
+            if damping > 1e8:
+                break
+    return replace(best, settled=False)
+
+
+def _at(response: Response, known: Belief, theta: Samples, side: int) -> Minimum:
+    """Give the linear model at `theta`, that above the kink continued linearly below it."""
+    at, beyond = theta, 0.0
+    if side > 0 and (below := response.kink(theta) - JUST_STICKING) < 0.0:
+        at, beyond = theta.copy(), -below
+        at[RATIO] += below
+    found = response.linear(at, side, beyond)
+    return Minimum(theta, side, found, 0.5 * found.chi2 + known.cost(theta))

@@ -1,0 +1,240 @@
+"""The plant of a campaign: k, b and mu_k/mu_s shared by all taps, one friction a tap, fitted together.
+
+Least squares on the waveforms of all taps. Each tap's mu_k is eliminated from the normal equations, so the
+cost grows with the number of taps, not with its cube.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
+from impactcell.physics import Plant
+from impactcell.prediction.feature_extraction import checked, displacement, peak_force
+from impactcell.prediction.linearised_model import (
+    DAMPING,
+    MU_K,
+    RATIO,
+    STIFFNESS,
+    Linear,
+    Response,
+    parameters,
+    respond,
+)
+from impactcell.prediction.model import Model, Prior
+from impactcell.prediction.phase_reweighting import DOUBTED, LATER, Indices, doubt, phases
+from impactcell.prediction.slide_features import Slide, slide
+from impactcell.prediction.waveform import fit
+from impactcell.records import Capture, Samples
+
+SHARED = slice(RATIO, DAMPING + 1)
+USUAL_RATIO = 0.76
+WEAKLY = np.array([0.3, 1.0, 1.0])
+"""Standard deviations of ln(mu_k/mu_s, k, b) about the start: they only hold what no tap shows."""
+BY_CONTACT = np.array([0.3, 3e-4, 2e-3])
+"""The same where k and b of the contact alone are believed more than the model of the whole tap."""
+MOST_STEPS = 40
+SETTLED = 0.02
+NO_GAIN = 0.05
+"""Change of half a sum of squares over all taps that means nothing."""
+LEAST_RATIO_STD = 1e-3
+ROUNDS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlantFit:
+    """Outcome of a joint fit.
+
+    Attributes
+    ----------
+    model : Model
+        Nominal plant and priors, without predictors.
+    used : tuple of int
+        Cycle numbers of the taps that the fit could use.
+    gap : float
+        RMS of all residuals in blocks, 1 = noise.
+    """
+
+    model: Model
+    used: tuple[int, ...]
+    gap: float
+
+
+def fit_plant(captures: Sequence[Capture], gravity_m_s2: float, name: str = "fitted") -> PlantFit:
+    """Fit k, b and mu_k/mu_s, with k_v = 0, to the taps of a campaign.
+
+    Raises
+    ------
+    PredictionError
+        No tap can be used, or the fit does not settle.
+    """
+    taps, faults = [], []
+    for capture in captures:
+        try:
+            taps.append((capture, slide(capture), peak_force(checked(capture.force, "force"))))
+        except (PredictionError, PhysicsError) as fault:
+            faults.append(f"shot {capture.cycle}: {fault}")
+    if not taps:
+        raise PredictionError(
+            f"no tap of the campaign can be used; {faults[0] if faults else 'there is none'}"
+        )
+    contacts = np.array([contact_constants(capture, slid) for capture, slid, _ in taps])
+    stiffness, damping = np.median(contacts, axis=0).tolist()
+    frictions = [max(slid.deceleration.value / gravity_m_s2, 1e-3) for _, slid, _ in taps]
+    mean = float(np.mean(frictions))
+    start = Plant(stiffness, max(damping, 1.0), mean / USUAL_RATIO, mean, gravity_m_s2)
+    responses, thetas, parts = [], [], []
+    for (capture, slid, _), mu_k in zip(taps, frictions, strict=True):
+        plant = replace(start, mu_k=mu_k, mu_s=mu_k / USUAL_RATIO)
+        try:
+            responses.append(respond(capture, plant, slid.separation_s))
+            thetas.append(parameters(plant))
+            parts.append(phases(responses[-1], slid.separation_s, slid.stop_s))
+        except PhysicsError as fault:
+            faults.append(f"shot {capture.cycle}: {fault}")
+    if not responses:
+        raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
+    found, covariance, chi2 = _joint(responses, np.array(thetas), thetas[0][SHARED], WEAKLY)
+    count = sum(response.size for response in responses)
+    misfit = math.sqrt(chi2 / max(count - len(found) - 3, 1))
+    if misfit > DOUBTED:
+        anchored = found.copy()
+        anchored[:, STIFFNESS], anchored[:, DAMPING] = math.log(stiffness), math.log(max(damping, 1.0))
+        found, covariance = _doubting(responses, anchored, parts)
+    mu_k = float(np.exp(found[:, MU_K]).mean())
+    ratio, stiffness, damping = np.exp(found[0, SHARED]).tolist()
+    stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
+    plant = Plant(stiffness, damping, mu_k / ratio, mu_k, gravity_m_s2)
+    prior = Prior(stds[1] * stiffness, stds[2] * damping, max(stds[0] * ratio, LEAST_RATIO_STD))
+    model = Model(name, plant, prior)
+    scatter = ratio_scatter([capture for capture, _, _ in taps], model)
+    model = replace(model, prior=replace(prior, ratio_std=math.hypot(prior.ratio_std, scatter)))
+    return PlantFit(model, tuple(capture.cycle for capture, _, _ in taps), misfit)
+
+
+def contact_constants(capture: Capture, slid: Slide) -> tuple[float, float]:
+    """K and b by regressing the force of the first contact on indentation and its rate.
+
+    The rate comes from a spline-free derivative of the position: a polynomial over the contact, which is
+    smooth enough for a start.
+    """
+    force, position = checked(capture.force, "force"), displacement(capture)
+    end = min(slid.separation_s, capture.stroke_m / capture.velocity_m_s)
+    inside = (position.time_s > 0.0) & (position.time_s < end)
+    if inside.sum() < 12:
+        raise PredictionError(f"shot {capture.cycle}: too few position samples within the contact")
+    times = position.time_s[inside]
+    moved = capture.direction * position.values[inside]
+    basis = np.polynomial.Chebyshev.fit(times, moved, min(9, len(times) // 4))
+    near = (force.time_s >= times[0]) & (force.time_s <= times[-1])
+    at = force.time_s[near]
+    indentation = capture.velocity_m_s * at - basis(at)
+    rate = np.maximum(capture.velocity_m_s - basis.deriv()(at), 0.0)
+    design = np.column_stack([indentation, rate])
+    (stiffness, damping), *_ = np.linalg.lstsq(design, force.values[near])
+    return float(stiffness), float(damping)
+
+
+def weigh(capture: Capture, slid: Slide) -> float:
+    """Mass of the part, kg, from its momentum: the force's impulse is m (x'(t_2) - x'(t_1) + a (t_2 - t_1)).
+
+    Between the middle of the contact, when the part slips, and its loss; a is the deceleration of the slide.
+    """
+    force, position = checked(capture.force, "force"), displacement(capture)
+    end, start = slid.separation_s, 0.4 * slid.separation_s
+    inside = (position.time_s > 0.5 * start) & (position.time_s < end + 0.25 * (slid.stop_s - end))
+    moved = capture.direction * position.values[inside]
+    path = np.polynomial.Chebyshev.fit(
+        position.time_s[inside], moved, min(12, max(4, int(inside.sum()) // 6))
+    )
+    speed = path.deriv()
+    at = np.linspace(start, end, 2001)
+    impulse = float(np.trapezoid(np.interp(at, force.time_s, force.values), at))
+    return impulse / float(speed(end) - speed(start) + slid.deceleration.value * (end - start))
+
+
+def ratio_scatter(captures: Sequence[Capture], model: Model) -> float:
+    """Scatter of mu_k/mu_s from tap to tap beyond its estimates' errors, from the taps that show mu_s."""
+    wide = replace(model, prior=replace(model.prior, ratio_std=0.2))
+    values, variances = [], []
+    for capture in captures:
+        try:
+            found = fit(capture, wide)
+        except (PredictionError, PhysicsError):
+            continue
+        std = found.mu_s_std / found.mu_s
+        if found.immediate < 0.01 and std < 0.05:
+            values.append(found.mu_k / found.mu_s)
+            variances.append((std * values[-1]) ** 2)
+    if len(values) < 5:
+        return 0.0
+    weights = 1.0 / np.array(variances)
+    mean = float(np.average(values, weights=weights))
+    excess = float(weights @ (np.array(values) - mean) ** 2) - (len(values) - 1)
+    return math.sqrt(max(excess / float(weights.sum() - (weights**2).sum() / weights.sum()), 0.0))
+
+
+def _joint(
+    responses: Sequence[Response], thetas: Samples, anchor: Samples, spread: Samples
+) -> tuple[Samples, Samples, float]:
+    """Minimise over the shared parameters, held to `anchor` within `spread`, and every tap's mu_k."""
+    prior = np.diag(1.0 / spread**2)
+    linear, cost = _all_linear(responses, thetas)
+    damping = 0.0
+    for _ in range(MOST_STEPS):
+        curvature, gradient = prior.copy(), prior @ (thetas[0, SHARED] - anchor)
+        own = []
+        for one in linear:
+            h, cross, g = float(one.normal[MU_K, MU_K]), one.normal[SHARED, MU_K], float(one.slope[MU_K])
+            curvature += one.normal[SHARED, SHARED] - np.outer(cross, cross) / h
+            gradient += one.slope[SHARED] - cross * (g / h)
+            own.append((h, cross, g))
+        step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
+        if float(step @ curvature @ step) < SETTLED**2:
+            return thetas, np.asarray(np.linalg.inv(curvature)), 2.0 * cost
+        step = np.clip(step, -0.3, 0.3)
+        while True:
+            moved = thetas.copy()
+            moved[:, SHARED] += step
+            moved[:, MU_K] -= np.array([(g + cross @ step) / h for h, cross, g in own])
+            try:
+                new_linear, new_cost = _all_linear(responses, moved)
+            except PhysicsError:
+                new_cost = math.inf
+            if new_cost <= cost + NO_GAIN:
+                break
+            step = 0.3 * step
+            if float(np.abs(step).max()) < 1e-9:
+                raise NotConvergedError("the plant could not be fitted to the campaign")
+        settled = abs(new_cost - cost) < NO_GAIN
+        thetas, linear, cost = moved, new_linear, new_cost
+        if settled:
+            return thetas, np.asarray(np.linalg.inv(curvature)), 2.0 * cost
+    raise NotConvergedError("the plant could not be fitted to the campaign")
+
+
+def _doubting(
+    responses: Sequence[Response], thetas: Samples, parts: Sequence[Indices]
+) -> tuple[Samples, Samples]:
+    """Fit again, with each phase of the tap believed as far as the model describes it there.
+
+    k and b stay with the regression of force on indentation, which needs no law of friction, and mu_s with
+    the first quarter of the contact, where all is slow and laws that depend on speed say little.
+    """
+    covariance = np.zeros((3, 3))
+    anchor = thetas[0, SHARED].copy()
+    for _ in range(ROUNDS):
+        linear, _ = _all_linear(responses, thetas)
+        doubted = [
+            response.doubted(doubt(one.residual, phase) * LATER[phase])
+            for response, one, phase in zip(responses, linear, parts, strict=True)
+        ]
+        thetas, covariance, _ = _joint(doubted, thetas, anchor, BY_CONTACT)
+    return thetas, covariance
+
+
+def _all_linear(responses: Sequence[Response], thetas: Samples) -> tuple[list[Linear], float]:
+    linear = [response.linear(theta) for response, theta in zip(responses, thetas, strict=True)]
+    return linear, 0.5 * sum(one.chi2 for one in linear)

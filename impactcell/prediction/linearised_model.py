@@ -1,0 +1,288 @@
+"""What the model says a capture should be: blocks of force and position for given parameters, and residuals.
+
+theta = ln(mu_k, mu_k / mu_s, k, b). Relative steps in it are of one size whatever the units.
+"""
+
+import math
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.errors import PhysicsError
+from impactcell.numerics.jit import compiled
+from impactcell.physics import Ensemble, EventKind, Plant, Strike, strike
+from impactcell.prediction.block_averaging import (
+    FINE_FORCE_BLOCK_S,
+    FINE_POSITION_BLOCK_S,
+    FORCE_BLOCK_S,
+    NOTHING,
+    POSITION_BLOCK_S,
+    Blocks,
+    blocks,
+)
+from impactcell.prediction.feature_extraction import displacement
+from impactcell.records import Capture, Samples
+
+MU_K, RATIO, STIFFNESS, DAMPING = range(4)
+PARAMETERS = 4
+JUST_STICKING = 1e-7
+"""z above which the model is that of a part that sticks first."""
+AWAY = np.array([1.0, -1.0, 1.0, -1.0])
+"""Senses of small steps in theta that do not make a part slip that sticks."""
+STEP = 1e-5
+STEPS_OUT = AWAY * STEP
+STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT)])
+KINK_SPAN_S = 1.5e-4
+
+
+def commanded(capture: Capture) -> Strike:
+    """Turn a capture's command into a tap for the model; without a stroke the actuator halts by itself."""
+    return Strike(
+        velocity_m_s=capture.velocity_m_s,
+        mass_kg=capture.mass_kg,
+        stroke_m=capture.stroke_m,
+        direction=capture.direction,
+        halts_at_separation=math.isinf(capture.stroke_m),
+        start_m=capture.start_m,
+        dwell_s=capture.dwell_s,
+    )
+
+
+def with_parameters(plant: Plant, theta: Samples) -> Plant:
+    """Give a plant the parameters `theta`, shape (4,)."""
+    mu_k, ratio, stiffness, damping = np.exp(theta).tolist()
+    return replace(
+        plant, stiffness_n_per_m=stiffness, damping_n_s_per_m=damping, mu_s=mu_k / ratio, mu_k=mu_k
+    )
+
+
+def parameters(plant: Plant) -> Samples:
+    """Nominal parameters of a plant, shape (4,)."""
+    return np.log(
+        [plant.mu_k, plant.mu_k / plant.mu_s, plant.stiffness_n_per_m, max(plant.damping_n_s_per_m, 1e-6)]
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linear:
+    """Normalised residuals, data minus model, and what their derivative by theta makes of them.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (n,)
+    normal : ndarray, shape (4, 4)
+        Product of the derivative with itself.
+    slope : ndarray, shape (4,)
+        Product of the derivative with the residuals.
+    chi2 : float
+        Sum of squares of the residuals.
+    """
+
+    residual: Samples
+    normal: Samples
+    slope: Samples
+    chi2: float
+
+
+class Response:
+    """A capture in blocks, and the model that should reproduce them.
+
+    Parameters
+    ----------
+    plant : Plant
+        Its effects and gravity are kept; its four nominal parameters are those asked for.
+    tap : Strike
+    force, position : Blocks
+    """
+
+    def __init__(self, plant: Plant, tap: Strike, force: Blocks, position: Blocks) -> None:
+        self.tap = tap
+        self.force_time_s, self.position_time_s = force.time_s, position.time_s
+        self.size = len(force.values) + len(position.values)
+        self._values = np.concatenate([force.values, position.values])
+        self._weights = 1.0 / np.concatenate([force.std, position.std])
+        self._weight_n = tap.mass_kg * plant.gravity_m_s2
+        copies = PARAMETERS + 1
+        self._ensemble = Ensemble(
+            [tap] * copies,
+            tuple(plant.effects),
+            force_time_s=[force.time_s] * copies,
+            position_time_s=[position.time_s] * copies,
+            gravity_m_s2=plant.gravity_m_s2,
+        )
+        self._scatters = force.scatter, position.scatter
+        self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
+
+    def doubted(self, factor: Samples) -> "Response":
+        """Give the same response with the standard deviation of each residual multiplied, shape (n,)."""
+        other = copy(self)
+        other._weights = self._weights / factor  # noqa: SLF001  # its own copy
+        return other
+
+    def gap(self, residual: Samples) -> float:
+        """RMS of the residuals of single samples over the noise of their sensor, from those of the blocks.
+
+        Within a block the model is taken as straight, which it is to a hundredth of the noise; blocks about a
+        jump, whose means say nothing, are left out.
+        """
+        model = self._values - residual / self._weights
+        split = len(self.force_time_s)
+        total = count = 0.0
+        for times, scatter, part in (
+            (self.force_time_s, self._scatters[0], slice(None, split)),
+            (self.position_time_s, self._scatters[1], slice(split, None)),
+        ):
+            if len(times) > 2:
+                squares, used = _squares(
+                    times, model[part], residual[part], self._weights[part], scatter.count, scatter.times,
+                    scatter.values, scatter.both, scatter.noise_std,
+                )  # fmt: skip
+                total += squares
+                count += used
+        return math.sqrt(total / count)
+
+    def kink(self, theta: Samples) -> float:
+        """Give z = ln(mu_s m g / (b v)), positive where the part sticks first."""
+        ahead = float(theta[MU_K] - theta[RATIO] - theta[DAMPING])
+        return ahead + math.log(self._weight_n / self.tap.velocity_m_s)
+
+    def linear(self, theta: Samples, side: int = 0, beyond: float = 0.0) -> Linear:
+        """Residuals and their normal equations at `theta`.
+
+        The derivative is that of a step which leads away from the kink into the side that sticks.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (4,)
+        side : int
+            -1: as if breakaway were immediate, whatever mu_s. 0 or +1: as the parameters say.
+        beyond : float
+            How far mu_k/mu_s is to lie beyond `theta`: the residuals are continued linearly.
+
+        Raises
+        ------
+        PhysicsError
+            The motion is not finite with these parameters.
+        """
+        rows = np.exp(theta + STEPS)
+        mu_k, damping = rows[:, MU_K], rows[:, DAMPING]
+        mu_s = mu_k / rows[:, RATIO]
+        if side < 0:
+            mu_s = np.minimum(mu_s, damping * self.tap.velocity_m_s / self._weight_n * (1.0 - 1e-7))
+        table = self._table.copy()
+        table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
+        traces = self._ensemble.traces(table)
+        found = _compared(traces.force_n, traces.position_m, self._values, self._weights, STEPS_OUT, beyond)
+        if not math.isfinite(found[3]):
+            raise PhysicsError("the motion is not finite with these parameters")
+        return Linear(*found)
+
+
+def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
+    """Average a capture over blocks, fine where `plant` has its events and contact was lost.
+
+    Parameters
+    ----------
+    capture : Capture
+        With a position channel, a mass and a velocity; its force may be missing.
+    plant : Plant
+        Near enough for its events to tell where the kinks are.
+    separation_s : float
+        Last loss of contact as read off the force; nan where it was not.
+    """
+    tap = commanded(capture)
+    motion = strike(plant, tap)
+    kinks = [event.time_s for event in motion.events]
+    if math.isfinite(separation_s):
+        kinks.append(separation_s)
+    spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
+    halt = tap.stroke_m / tap.velocity_m_s
+    edges = [halt] if math.isfinite(halt) else []
+    force = NOTHING
+    if capture.force is not None:
+        force = blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
+        jumps = [event.time_s for event in motion.events if event.kind is EventKind.CONTACT]
+        if jumps:
+            force = replace(force, std=force.std * _straddling(force.time_s, jumps))
+    position = blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
+    return Response(plant, tap, force, position)
+
+
+@compiled
+def _compared(
+    force: Samples, position: Samples, values: Samples, weights: Samples, steps: Samples, beyond: float
+) -> tuple[Samples, Samples, Samples, float]:
+    """Fields of `Linear` from blocks of the model at theta and, one after the other, beside it.
+
+    Parameters
+    ----------
+    force, position : ndarray, shape ((p + 1) force blocks,), ((p + 1) position blocks,)
+    values, weights : ndarray, shape (n,)
+    steps : ndarray, shape (p,)
+        Which way, and how far, each parameter was moved.
+    beyond : float
+        How far to continue along the ratio.
+    """
+    split, size = len(force) // (PARAMETERS + 1), len(values)
+    residual, derivative = np.empty(size), np.empty(PARAMETERS)
+    normal, slope = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    chi2 = 0.0
+    for i in range(size):
+        model, row, width = (force, i, split) if i < split else (position, i - split, size - split)
+        at = model[row]
+        for k in range(PARAMETERS):
+            derivative[k] = (at - model[(k + 1) * width + row]) * weights[i] / steps[k]
+        miss = (values[i] - at) * weights[i] + derivative[RATIO] * beyond
+        residual[i] = miss
+        chi2 += miss * miss
+        for k in range(PARAMETERS):
+            slope[k] += derivative[k] * miss
+            for m in range(k + 1):
+                normal[k, m] += derivative[k] * derivative[m]
+    for k in range(PARAMETERS):
+        for m in range(k):
+            normal[m, k] = normal[k, m]
+    return residual, normal, slope, chi2
+
+
+@compiled
+def _squares(
+    times: Samples,
+    model: Samples,
+    residual: Samples,
+    weights: Samples,
+    count: Samples,
+    spread: Samples,
+    scatter: Samples,
+    both: Samples,
+    noise_std: float,
+) -> tuple[float, float]:
+    """Sum of squares of single samples over their noise, and their number, blocks about a jump left out.
+
+    The model's slope in a block comes from its neighbours; beside a jump from the one this side of it.
+    `spread`, `scatter` and `both` are the sums of `Scatter`.
+    """
+    last = len(model) - 1
+    total, used = 0.0, 0.0
+    for i in range(last + 1):
+        if not weights[i] * noise_std > 0.5 * math.sqrt(count[i]):
+            continue
+        before, after = max(i - 1, 0), min(i + 1, last)
+        left = (model[before + 1] - model[before]) / (times[before + 1] - times[before])
+        right = (model[after] - model[after - 1]) / (times[after] - times[after - 1])
+        across = (model[after] - model[before]) / (times[after] - times[before])
+        least = 2.0 * min(abs(left), abs(right))
+        slope = min(max(across, -least), least) if left * right > 0.0 else 0.0
+        within = scatter[i] - 2.0 * slope * both[i] + slope * slope * spread[i]
+        total += residual[i] * residual[i] + within / noise_std**2
+        used += count[i]
+    return total, used
+
+
+def _straddling(times: Samples, jumps: list[float]) -> Samples:
+    """Factor that takes blocks about a jump out of the fit: their means depend on where in them it lies."""
+    factor = np.ones_like(times)
+    for jump in jumps:
+        factor[np.abs(times - jump) < 2.0 * FINE_FORCE_BLOCK_S] = 1e3
+    return factor

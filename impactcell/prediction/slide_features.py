@@ -1,0 +1,133 @@
+"""The free slide as read off a capture: distance from the last loss of contact to rest, and deceleration."""
+
+import cmath
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
+from impactcell.numerics.local_polynomial import mean, median, polynomial, spread, value_at
+from impactcell.prediction.feature_extraction import (
+    Reading,
+    checked,
+    displacement,
+    loss_of_contact,
+    noise_std,
+)
+from impactcell.records import Capture, Samples
+
+
+@dataclass(frozen=True, slots=True)
+class Slide:
+    """The free slide as read off a capture.
+
+    Attributes
+    ----------
+    distance : Reading
+        From the last loss of contact to rest, m, positive along the tap.
+    separation_s, stop_s : float
+    deceleration : Reading
+        Mean deceleration of the slide, m/s².
+    """
+
+    distance: Reading
+    separation_s: float
+    stop_s: float
+    deceleration: Reading
+
+
+def slide(capture: Capture) -> Slide:
+    """Read the free slide: where contact was last lost, where the part came to rest, and how it braked.
+
+    Raises
+    ------
+    CaptureError
+        A channel cannot be used.
+    NoBreakawayError, NoSeparationError, NoStopError
+        The part did not move, did not leave the actuator, or had not come to rest when the record ended.
+    """
+    position = displacement(capture)
+    sigma = noise_std(position)
+    times = position.time_s
+    moved = capture.direction * position.values
+    tail = max(5, len(moved) // 50)
+    if abs(mean(moved[-tail:]) - mean(moved[:tail])) < 6.0 * sigma:
+        raise NoBreakawayError(f"the part moved less than {6.0 * sigma:.3g} m")
+    separation = loss_of_contact(checked(capture.force, "force"))
+    separation_s = separation.value
+    if separation_s >= times[-tail]:
+        raise NoSeparationError("contact was lost only when the position record ended")
+    start = _level(times, moved, separation_s, sigma)
+    rest, stop_s, deceleration = _rest(times, moved, separation_s, sigma)
+    speed = max(deceleration.value, 0.0) * (stop_s - separation_s)
+    error = math.hypot(rest.std, start.std, speed * separation.std)
+    return Slide(Reading(rest.value - start.value, error), separation_s, stop_s, deceleration)
+
+
+def _rest(
+    times: Samples, moved: Samples, separation_s: float, sigma: float
+) -> tuple[Reading, float, Reading]:
+    """Level at rest, time of rest, mean deceleration; a parabola through the slide tells when it stopped."""
+    tail = max(5, len(moved) // 50)
+    final = median(moved[-tail:])
+    first = int(times.searchsorted(separation_s, "right"))
+    sliding = final - moved[first:] > 8.0 * sigma
+    if np.count_nonzero(sliding) < 8:
+        raise NoStopError("the slide is too short for its position samples")
+    last = len(times) - 1 - int(sliding[::-1].argmax())
+    inside = slice(first, last + 1)
+    origin, span = separation_s, float(times[last] - separation_s)
+    cubic, factor, _ = polynomial(times[inside], moved[inside], origin, span, 3)
+    _, c1, c2, c3 = cubic.tolist()
+    last_speed, braking = c1 + 2.0 * c2 + 3.0 * c3, -(2.0 * c2 + 6.0 * c3)
+    # The zero of the speed next after the last sample that still moved is the stop.
+    near = [root.real for root in _zeros(c1, 2.0 * c2, 3.0 * c3) if abs(root.imag) < 0.2]
+    near = [root for root in near if 0.7 < root < 1.6]
+    if near:
+        stop = min(near, key=lambda root: abs(root - 1.0))
+    else:  # cut off on the way, or braked otherwise than a cubic says
+        stop = 1.0 + (last_speed / braking if braking > 0.0 else math.inf if last_speed > 0.0 else 0.0)
+    stop_s = origin + span * max(stop, 1.0)
+    quiet = (last + len(times)) // 2  # what lies after it is at rest, if anything is
+    if stop_s > times[-1] and not _still(times[quiet:], moved[quiet:], sigma):
+        left = 1e3 * last_speed / span
+        raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
+    stop_s = min(stop_s, float(times[-1]))
+    after = moved[times.searchsorted(stop_s, "right") if stop_s < times[-1] else quiet :]
+    if len(after) >= 3:
+        rest = Reading(mean(after), sigma / math.sqrt(len(after)))
+    else:
+        rest = Reading(value_at(cubic, stop), sigma * spread(factor, 1.0))
+    parabola, factor, _ = polynomial(times[inside], moved[inside], origin, span, 2)
+    # The inverse of the normal equations has 1 / L² in its last place: the variance of the highest power.
+    deceleration = Reading(-2.0 * float(parabola[2]) / span**2, 2.0 * sigma / float(factor[2, 2]) / span**2)
+    return rest, float(stop_s), deceleration
+
+
+def _zeros(c0: float, c1: float, c2: float) -> tuple[complex, ...]:
+    """Zeros of c0 + c1 u + c2 u², complex ones too."""
+    if c2 == 0.0:
+        return (-c0 / c1,) if c1 else ()
+    root = cmath.sqrt(c1 * c1 - 4.0 * c0 * c2)
+    return (-c1 + root) / (2.0 * c2), (-c1 - root) / (2.0 * c2)
+
+
+def _still(times: Samples, moved: Samples, sigma: float) -> bool:
+    """Whether a stretch of positions shows no motion, long enough to tell."""
+    if len(times) < 30:
+        return False
+    slope = float(np.polyfit(times - times.mean(), moved, 1)[0])
+    return abs(slope) < 5.0 * sigma / math.sqrt(float(np.square(times - times.mean()).sum()))
+
+
+def _level(times: Samples, values: Samples, at_s: float, sigma: float) -> Reading:
+    """Value of a smooth channel at a time, from a cubic through its neighbourhood."""
+    for half in (2e-3, 4e-3, 8e-3):
+        first = int(times.searchsorted(at_s - half, "left"))
+        last = int(times.searchsorted(at_s + half, "right"))
+        if last - first >= 8:
+            scale = max(at_s - float(times[first]), float(times[last - 1]) - at_s)
+            cubic, factor, _ = polynomial(times[first:last], values[first:last], at_s, scale, 3)
+            return Reading(float(cubic[0]), sigma * spread(factor, 0.0))
+    return Reading(float(np.interp(at_s, times, values)), sigma)

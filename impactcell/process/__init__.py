@@ -1,0 +1,1 @@
+"""What a program does with its terminal, its log, its signals and its service manager."""

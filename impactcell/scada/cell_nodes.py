@@ -1,0 +1,202 @@
+"""The address space: types and units from the NodeSet2 files, one object per cell made from them."""
+
+from collections.abc import Callable
+from dataclasses import fields
+from importlib.resources import as_file, files
+from typing import Any, Final
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+
+from impactcell.errors import SettingsError
+from impactcell.opcua.type_instances import (
+    HAS_TYPE_DEFINITION,
+    instantiate,
+    link,
+    read,
+    set_attribute,
+    targets,
+)
+from impactcell.records import AlarmName
+from impactcell.scada.interface import CellDescription, Machine
+from impactcell.scada.node_table import CYCLE, HISTORY
+
+TYPES_URI: Final = "urn:impactcell:ua"
+CELLS_URI: Final = "urn:impactcell:cells"
+MACHINERY_URI: Final = "http://opcfoundation.org/UA/Machinery/"
+NODESETS: Final = ("Di.Subset", "Machinery.Subset", "ImpactCell")
+
+AGGREGATES: Final = (
+    ua.ObjectIds.AggregateFunction_Average,
+    ua.ObjectIds.AggregateFunction_Minimum,
+    ua.ObjectIds.AggregateFunction_Maximum,
+    ua.ObjectIds.AggregateFunction_Count,
+)
+
+_CONDITION_OPTIONS: Final = frozenset(
+    {
+        "ConfirmedState",
+        "Confirm",
+        "SuppressedState",
+        "OutOfServiceState",
+        "ShelvingState",
+        "MaxTimeShelved",
+        "EnabledState/TransitionTime",
+        "EnabledState/EffectiveDisplayName",
+        "ActiveState/TransitionTime",
+    }
+)
+_IDENTIFICATION: Final = {
+    "".join(part.capitalize() for part in f.name.split("_")): f.name for f in fields(Machine)
+}
+
+
+async def load_types(server: Any) -> None:
+    """Load the shipped NodeSet2 files into an asyncua server and name the namespace of the cells."""
+    for name in NODESETS:
+        with as_file(files("impactcell.scada") / "model" / f"{name}.NodeSet2.xml") as path:
+            await server.import_xml(str(path))
+    await server.register_namespace(CELLS_URI)
+
+
+class CellSpace:
+    """The nodes of one cell.
+
+    Attributes
+    ----------
+    node : NodeId
+        The cell itself, source and notifier of its events.
+    kind : NodeId
+        Its type.
+    folder : NodeId
+        The folder that holds all cells.
+    """
+
+    def __init__(self, server: Any, uris: list[str], description: CellDescription) -> None:
+        if not description.name or "/" in description.name:
+            raise SettingsError(
+                f"cell {description.name!r}: a name is not empty and has no '/', it is part of NodeIds"
+            )
+        self.description = description
+        self._space = server.iserver.aspace
+        self._cells = uris.index(CELLS_URI)
+        self._types = uris.index(TYPES_URI)
+        self.node = ua.NodeId(description.name, self._cells)
+        if self.node in self._space:
+            raise SettingsError(f"cell {description.name!r} is there twice")
+        self.kind = self._named(
+            ua.NodeId(ua.ObjectIds.BaseObjectType), "ImpactCellType", ua.ObjectIds.HasSubtype
+        )
+        self.folder = parent = self._named(
+            ua.NodeId(ua.ObjectIds.ObjectsFolder), "ImpactCells", ua.ObjectIds.Organizes
+        )
+        instantiate(
+            self._space,
+            self.kind,
+            self.node,
+            ua.QualifiedName(description.name, self._cells),
+            f"Cell {description.name}.",
+            self._wanted,
+        )
+        notifies = ua.EventNotifier.SubscribeToEvents.mask | ua.EventNotifier.HistoryRead.mask
+        set_attribute(self._space, self.node, ua.AttributeIds.EventNotifier, notifies, ua.VariantType.Byte)
+        link(self._space, parent, ua.NodeId(ua.ObjectIds.Organizes), self.node)
+        link(self._space, parent, ua.NodeId(ua.ObjectIds.HasNotifier), self.node)
+        machines = ua.NodeId(1001, uris.index(MACHINERY_URI))
+        link(self._space, machines, ua.NodeId(ua.ObjectIds.Organizes), self.node)
+        for alarm in AlarmName:
+            link(self._space, self.node, ua.NodeId(ua.ObjectIds.HasCondition), self.path(alarm.value))
+        self._identify(description.machine)
+        self._set_ranges()
+        self._set_history()
+
+    def path(self, path: str) -> ua.NodeId:
+        """NodeId of a node of the cell by its path, as `Wear/Level`."""
+        return ua.NodeId(f"{self.description.name}/{path}", self._cells)
+
+    def compute(self, path: str, value: Callable[[], ua.DataValue]) -> None:
+        """Let a variable be computed whenever it is read."""
+        held = self._space[self.path(path)].attributes[ua.AttributeIds.Value]
+        held.value_callback = lambda _node, _attribute: value()
+
+    def alarm_type(self, alarm: AlarmName) -> ua.NodeId:
+        """Event type of a condition."""
+        return targets(self._space[self.path(alarm.value)], HAS_TYPE_DEFINITION)[0]
+
+    def _named(self, parent: ua.NodeId, name: str, reference: int) -> ua.NodeId:
+        for found in self._space[parent].references:
+            if found.ReferenceTypeId == ua.NodeId(reference) and found.BrowseName == ua.QualifiedName(
+                name, self._types
+            ):
+                return found.NodeId
+        raise LookupError(f"the NodeSet2 file has no {name}")
+
+    def _wanted(self, path: str) -> bool:
+        head, _, rest = path.partition("/")
+        if head == "Identification":
+            field = _IDENTIFICATION.get(rest)
+            return field is not None and getattr(self.description.machine, field) is not None
+        return rest in _CONDITION_OPTIONS and head in {alarm.value for alarm in AlarmName}
+
+    def _identify(self, machine: Machine) -> None:
+        for name, field in _IDENTIFICATION.items():
+            value = getattr(machine, field)
+            if value is None:
+                continue
+            node = self.path(f"Identification/{name}")
+            kind = ua.VariantType(read(self._space, node, ua.AttributeIds.DataType).Identifier)
+            if kind is ua.VariantType.LocalizedText:
+                value = ua.LocalizedText(value)
+            set_attribute(self._space, node, ua.AttributeIds.Value, value, kind)
+
+    def _set_ranges(self) -> None:
+        for path, row in CYCLE.items():
+            if row.eu_range is not None:
+                low, high = row.eu_range(self.description.ranges)
+                set_attribute(
+                    self._space,
+                    self.path(f"{path}/EURange"),
+                    ua.AttributeIds.Value,
+                    ua.Range(low, high),
+                    ua.VariantType.ExtensionObject,
+                )
+
+    def _set_history(self) -> None:
+        for path in HISTORY:
+            node = self.path(path)
+            set_attribute(
+                self._space, node, ua.AttributeIds.Historizing, value=True, kind=ua.VariantType.Boolean
+            )
+            settings = self.path(f"{path}/HA Configuration")
+            instantiate(
+                self._space,
+                ua.NodeId(ua.ObjectIds.HistoricalDataConfigurationType),
+                settings,
+                ua.QualifiedName("HA Configuration", 0),
+                "How the history of this variable is kept and aggregated.",
+            )
+            link(self._space, node, ua.NodeId(ua.ObjectIds.HasHistoricalConfiguration), settings)
+            defaults: tuple[tuple[str, object, ua.VariantType], ...] = (
+                ("Stepped", True, ua.VariantType.Boolean),
+                ("AggregateConfiguration/TreatUncertainAsBad", True, ua.VariantType.Boolean),
+                ("AggregateConfiguration/PercentDataBad", 100, ua.VariantType.Byte),
+                ("AggregateConfiguration/PercentDataGood", 100, ua.VariantType.Byte),
+                ("AggregateConfiguration/UseSlopedExtrapolation", False, ua.VariantType.Boolean),
+            )
+            for name, value, kind in defaults:
+                place = ua.NodeId(f"{settings.Identifier}/{name}", settings.NamespaceIndex)
+                set_attribute(self._space, place, ua.AttributeIds.Value, value, kind)
+
+
+def cell_notifiers(cell: CellSpace) -> frozenset[ua.NodeId]:
+    """Nodes that report the events of a cell: itself, the folder of the cells, the server."""
+    return frozenset({cell.node, cell.folder, ua.NodeId(ua.ObjectIds.Server)})
+
+
+def method_declarations(space: AddressSpace, kind: ua.NodeId) -> dict[str, ua.NodeId]:
+    """Methods of a type, by name."""
+    return {
+        reference.BrowseName.Name: reference.NodeId
+        for reference in space[kind].references
+        if reference.IsForward and reference.NodeClass == ua.NodeClass.Method
+    }

@@ -1,0 +1,1 @@
+"""Frozen dataclasses written down and read back to the same bits."""

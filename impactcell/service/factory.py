@@ -1,0 +1,123 @@
+"""From a cell's files to the values that the parts of the service are made with."""
+
+from dataclasses import replace
+
+from impactcell import __version__
+from impactcell.alarms import AlarmSettings, RuleSettings
+from impactcell.alarms.rules import DEFAULT_RULES
+from impactcell.cell import CellDesign
+from impactcell.cell.preprocessing import Known
+from impactcell.fieldbus.link import ModuleLink, TlsFiles
+from impactcell.journal.retention import Retention
+from impactcell.records import AlarmName
+from impactcell.scada import CellDescription, Limits, Machine, Ranges, ServerSettings
+from impactcell.settings import Cell
+from impactcell.settings.sections import Journal
+from impactcell.tracking import BatchKnowledge, TrackerSettings
+from impactcell.tracking.signature.tracker import SignatureSettings
+
+MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
+
+_CYCLE_RULES = (AlarmName.WEAR_LIMIT, AlarmName.BATCH_SHIFT, AlarmName.DEVIANT_CYCLE, AlarmName.MODEL_GAP)
+
+
+def cell_design(cell: Cell) -> CellDesign:
+    """How the cell is computed."""
+    settings = cell.settings
+    stroke_mm = settings.actuator.stroke_mm
+    return CellDesign(
+        name=cell.name,
+        model=cell.model,
+        tracker=TrackerSettings(
+            wear_limit=settings.alarms.wear_limit,
+            batch=BatchKnowledge(settings.tracking.batch),
+            false_alarm_cycles=settings.alarms.false_alarm_cycles,
+        ),
+        signature=SignatureSettings(
+            length_m=settings.signature.length_mm * MM,
+            points=settings.signature.points,
+            learned_cycles=settings.signature.learning_cycles,
+            false_alarm_cycles=settings.alarms.false_alarm_cycles,
+        ),
+        alarms=alarm_settings(cell),
+        known=Known(
+            mass_kg=settings.part.mass_kg,
+            stroke_m=None if stroke_mm is None else stroke_mm * MM,
+            force_noise_std_n=settings.sensors.force_noise_std_n,
+            position_noise_std_m=settings.sensors.position_noise_std_um * UM,
+        ),
+        false_alarm_cycles=settings.alarms.false_alarm_cycles,
+    )
+
+
+def alarm_settings(cell: Cell) -> AlarmSettings:
+    """When the cell calls a person; what the YAML leaves out keeps its default."""
+    chosen = cell.settings.alarms
+
+    def rule(name: AlarmName, default: RuleSettings) -> RuleSettings:
+        if name not in _CYCLE_RULES:
+            return default
+        on, off = chosen.on_delay_cycles, chosen.off_delay_cycles
+        return replace(
+            default,
+            on_delay=default.on_delay if on is None else on,
+            off_delay=default.off_delay if off is None else off,
+        )
+
+    rules = {name: rule(name, default) for name, default in DEFAULT_RULES.items()}
+    return AlarmSettings(rules, wear_on=chosen.wear_probability_on, wear_off=chosen.wear_probability_off)
+
+
+def module_link(cell: Cell) -> ModuleLink:
+    """How the module is reached."""
+    module = cell.settings.module
+    tls = module.tls
+    return ModuleLink(
+        host=module.host,
+        port=module.port,
+        device_id=module.device_id,
+        window=module.window,
+        max_registers=module.max_registers_per_request,
+        pause_s=module.pause_between_requests_ms * 1e-3,
+        timeout_s=module.timeout_ms * 1e-3,
+        tls=None if tls is None else TlsFiles(tls.ca_certificate, tls.certificate, tls.key),
+    )
+
+
+def retention(journal: Journal) -> Retention:
+    """Say what the journal keeps."""
+    return Retention(journal.retain_days, journal.retain_captures_days, int(journal.max_size_mb * 2**20))
+
+
+def server_settings(cell: Cell) -> ServerSettings:
+    """How the OPC UA server of the cell, and of those that share its endpoint, is reached."""
+    opcua = cell.settings.opcua
+    return ServerSettings(
+        endpoint=opcua.endpoint,
+        pki=opcua.certificates_dir,
+        users=opcua.users_file,
+        allow_none=opcua.allow_sessions_without_encryption,
+        limits=Limits(sessions=opcua.max_sessions),
+    )
+
+
+def cell_description(cell: Cell) -> CellDescription:
+    """Nameplate and ranges of the cell as SCADA sees them."""
+    settings = cell.settings
+    plate, actuator = settings.identification, settings.actuator
+    travel_m = settings.positioning.travel_mm * MM if settings.positioning else None
+    ranges = Ranges(
+        velocity_m_s=actuator.max_velocity_mm_per_min * MM_PER_MIN, stroke_m=actuator.max_stroke_mm * MM
+    )
+    return CellDescription(
+        cell.name,
+        Machine(
+            manufacturer=plate.manufacturer,
+            serial_number=plate.serial_number or cell.name,
+            product_instance_uri=plate.product_instance_uri or f"urn:impactcell:{cell.name}",
+            model=plate.model,
+            location=plate.location or None,
+            software_revision=__version__,
+        ),
+        ranges if travel_m is None else replace(ranges, target_m=(0.0, travel_m)),
+    )

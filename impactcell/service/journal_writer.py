@@ -1,0 +1,117 @@
+"""What a cell wants kept, written in order; it waits in memory while the journal cannot be written."""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable
+
+from impactcell.errors import JournalError
+from impactcell.fieldbus.capture_ring import Mark
+from impactcell.journal.retention import Retention
+from impactcell.journal.store import Journal
+from impactcell.process.cell_logger import CellLogger
+
+BACKLOG = 64
+"""Entries kept in memory while the journal cannot be written."""
+CHECKPOINT_EVERY = 24
+"""Cycles after which the journal's log goes into its file: before SQLite, at 1000 pages, would make a cycle
+wait for that."""
+THIN_EVERY = 256
+"""Cycles between two looks at what the journal may drop."""
+
+Entry = Callable[[Journal], None]
+
+
+class Keeper:
+    """Writes a cell's entries into its journal; used from the cell's thread only.
+
+    Parameters
+    ----------
+    cell : str
+    journal : Journal or None
+        None keeps nothing over a restart.
+    keep : Retention
+
+    Attributes
+    ----------
+    fault : str
+        Why something was not stored, or is not yet; empty while all is.
+    """
+
+    def __init__(self, cell: str, journal: Journal | None, keep: Retention) -> None:
+        self.journal = journal
+        self.fault = ""
+        self._keep = keep
+        self._log = CellLogger(logging.getLogger(__name__), cell)
+        self._waiting: deque[Entry] = deque()
+        self._since_thinned, self._since_checkpoint = THIN_EVERY, CHECKPOINT_EVERY
+
+    @property
+    def durable(self) -> Mark | None:
+        """The last cycle that is safely stored; None where there is none."""
+        position = None if self.journal is None else self.journal.position()
+        return None if position is None else Mark(position.session, position.cycle)
+
+    @property
+    def waits(self) -> bool:
+        """Whether something could not be written yet."""
+        return bool(self._waiting)
+
+    @property
+    def untidy(self) -> bool:
+        """Whether `tidy` is due."""
+        return self.journal is not None and self._since_checkpoint >= CHECKPOINT_EVERY and not self._waiting
+
+    def cycle(self, entry: Entry) -> None:
+        """Write a cycle."""
+        self._since_thinned += 1
+        self._since_checkpoint += 1
+        self.store(entry)
+
+    def tidy(self, time_ns: int) -> None:
+        """Do what no cycle has to wait for: empty the log, and drop what has become too old or too much."""
+        if self.journal is None:
+            return
+        self._since_checkpoint = 0
+        now_ns = time.time_ns()
+        try:
+            if self._since_thinned >= THIN_EVERY:
+                self._since_thinned = 0
+                # A module's clock that runs ahead must not make everything look old; 0 is no time at all.
+                if self.journal.thin(self._keep, min(time_ns or now_ns, now_ns)):
+                    self._since_thinned = THIN_EVERY
+            else:
+                self.journal.checkpoint()
+        except JournalError as error:
+            self.fault = str(error)
+
+    def store(self, entry: Entry) -> None:
+        """Write `entry` after all that could not be written before: no state may be ahead of its cycles."""
+        if self.journal is None:
+            return
+        self._waiting.append(entry)
+        if len(self._waiting) > BACKLOG:
+            self._waiting.popleft()
+            self._log.error("the journal cannot be written; its oldest waiting entry is lost")
+        self.retry()
+
+    def retry(self) -> None:
+        """Write what waits, as far as the journal takes it."""
+        fault = ""
+        while self._waiting and self.journal is not None:
+            try:
+                self._waiting[0](self.journal)
+            except JournalError as error:
+                if error.retry:
+                    self.fault = str(error)
+                    return
+                # What can never be stored must not keep what can from being stored.
+                fault = str(error)
+                self._log.error("an entry of the journal is lost: %s", error)
+            self._waiting.popleft()
+        self.fault = fault
+
+    def close(self) -> None:
+        """Close the journal."""
+        if self.journal is not None:
+            self.journal.close()

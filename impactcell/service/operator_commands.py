@@ -1,0 +1,76 @@
+"""What people do over OPC UA, applied to the cells and written into their audit trails."""
+
+import json
+import time
+from collections.abc import Mapping
+
+from impactcell import cell as core
+from impactcell.alarms import Event, Occurrence
+from impactcell.errors import PositioningError
+from impactcell.journal.store import AuditEntry
+from impactcell.records import Alarm, AlarmName
+from impactcell.scada import Actor, RefusedError
+from impactcell.service.cell_task import RunningCell
+
+
+class CellActions:
+    """Implements `scada.Actions` for the running cells."""
+
+    def __init__(self, cells: Mapping[str, RunningCell]) -> None:
+        self._cells = cells
+
+    def _cell(self, cell: str) -> RunningCell:
+        if cell not in self._cells:
+            raise RefusedError("BadInvalidState", f"{cell}: does not run, its journal cannot be opened")
+        return self._cells[cell]
+
+    async def start_batch(self, cell: str, batch_id: str, *, expected: bool, actor: Actor) -> None:
+        """Begin another batch of material."""
+        audit = _audit(actor, "StartBatch", BatchId=batch_id, Expected=expected)
+        await self._cell(cell).worker.change(
+            lambda state: core.start_batch(state, batch_id, expected=expected), audit
+        )
+
+    async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
+        """Learn the wear level anew after worn parts were replaced."""
+        await self._cell(cell).worker.change(core.renew_surface, _audit(actor, "ResetWear", Comment=comment))
+
+    async def set_target(self, cell: str, target_m: float, actor: Actor) -> None:
+        """Start a positioning task."""
+        try:
+            await self._cell(cell).set_target(target_m, _audit(actor, "SetTarget", Target=target_m * 1e3))
+        except PositioningError as error:
+            raise RefusedError("BadInvalidState", str(error)) from error
+
+    async def abort_positioning(self, cell: str, actor: Actor) -> None:
+        """End the positioning task that runs."""
+        try:
+            await self._cell(cell).abort_positioning(_audit(actor, "AbortPositioning"))
+        except PositioningError as error:
+            raise RefusedError("BadInvalidState", str(error)) from error
+
+    async def act_on_condition(
+        self,
+        cell: str,
+        alarm: AlarmName,
+        event: Event,
+        actor: Actor,
+        *,
+        comment: str = "",
+        shelve_s: float = 0.0,
+    ) -> Alarm:
+        """Apply an action through the life cycle in `impactcell.alarms`; the new state of the condition."""
+        audit = _audit(actor, event.value, Condition=alarm.value, Comment=comment, Seconds=shelve_s)
+        occurrence = Occurrence(
+            event, time_ns=audit.time_ns, user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
+        )
+        done = await self._cell(cell).worker.act(alarm, occurrence, audit)
+        if done.refusal is not None:
+            raise RefusedError(done.refusal.value, f"{cell}: {alarm.value}: {done.refusal.value}")
+        return done.alarm
+
+
+def _audit(actor: Actor, action: str, **arguments: object) -> AuditEntry:
+    given = {name: value for name, value in arguments.items() if value not in ("", 0.0)}
+    user = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
+    return AuditEntry(time.time_ns(), user, action, json.dumps(given), "Good")

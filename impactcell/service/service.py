@@ -1,0 +1,224 @@
+"""The whole process: every cell a task, cells of one endpoint on one OPC UA server, signals, readiness."""
+
+import asyncio
+import contextlib
+import gc
+import logging
+import signal
+import sys
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+
+from impactcell import cell as core
+from impactcell.alarms import Finding
+from impactcell.errors import JournalError
+from impactcell.process import log_lines, systemd
+from impactcell.process.cell_logger import CellLogger
+from impactcell.process.signals import signalled
+from impactcell.records import AlarmName
+from impactcell.scada import Server
+from impactcell.service.cell_task import Observer, RunningCell
+from impactcell.service.factory import cell_description, cell_design, server_settings
+from impactcell.service.history_source import JournalHistory
+from impactcell.service.monitoring import CellHealth, Monitoring, absent
+from impactcell.service.operator_commands import CellActions
+from impactcell.settings import Cell
+
+log = logging.getLogger("impactcell.service")
+
+SWITCH_S = 0.001
+"""How long a cell's thread may keep the interpreter while the event loop waits for it, which it does some
+twenty times a capture: Python's own 5 ms would be felt."""
+RESTART_S = 1.0
+"""A cell that met a fault of ours is begun anew after this long."""
+AGAIN_S, AGAIN_AT_MOST_S = 1.0, 30.0
+"""A journal that cannot be opened is tried again after the first, each time after twice as long, and at last
+every so often as the second says."""
+
+
+class Service:
+    """Runs cells until told to stop.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+    observe : callable, optional
+        Called with the cell's name and each snapshot, after it was published.
+
+    A cell whose journal cannot be opened is told and waits, without values, until it can; the others run.
+
+    Raises
+    ------
+    JournalError
+        No journal can be opened, and trying again cannot help; nothing has been started.
+    """
+
+    def __init__(self, cells: Sequence[Cell], observe: Observer | None = None) -> None:
+        self._cells = tuple(cells)
+        self._observe = observe
+        self.running: dict[str, RunningCell] = {}
+        self.endpoints: dict[str, str] = {}
+        """Where each cell is to be found, once `run` has started."""
+
+    async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
+        """Run until `stop` is set; `started` is called when every endpoint listens."""
+        self._begin()
+        async with contextlib.AsyncExitStack() as stack:
+            await stack.enter_async_context(self._monitoring())
+            servers = {}
+            for endpoint in dict.fromkeys(cell.settings.opcua.endpoint for cell in self._cells):
+                servers[endpoint] = await stack.enter_async_context(self._server(endpoint))
+            for cell in self._cells:
+                self.endpoints[cell.name] = servers[cell.settings.opcua.endpoint].endpoint
+            tasks = [
+                asyncio.create_task(
+                    self._keep_running(cell, servers[cell.settings.opcua.endpoint]), name=cell.name
+                )
+                for cell in self._cells
+            ]
+            tasks.append(asyncio.create_task(_watchdog(), name="watchdog"))
+            systemd.notify("READY=1")
+            if started is not None:
+                started()
+            try:
+                await stop.wait()
+            finally:
+                systemd.notify("STOPPING=1")
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+                await asyncio.gather(*(running.close() for running in self.running.values()))
+
+    def _begin(self) -> None:
+        """Make every cell that can run."""
+        faults: list[JournalError] = []
+        for cell in self._cells:
+            try:
+                self.running[cell.name] = RunningCell(cell, self._observe)
+            except JournalError as error:
+                faults.append(error)
+        if faults and not self.running and not any(fault.retry for fault in faults):
+            raise JournalError("\n".join(map(str, faults)))
+
+    def _health(self) -> list[CellHealth]:
+        cells = [(cell.name, self.running.get(cell.name)) for cell in self._cells]
+        return [absent(name) if running is None else running.health for name, running in cells]
+
+    async def reload(self) -> None:
+        """Read every cell's files again; see `RunningCell.reload`."""
+        systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
+        for running in tuple(self.running.values()):
+            await running.reload()
+        systemd.notify("READY=1")
+
+    def _server(self, endpoint: str) -> Server:
+        cells = [cell for cell in self._cells if cell.settings.opcua.endpoint == endpoint]
+        return Server(
+            server_settings(cells[0]),
+            [cell_description(cell) for cell in cells],
+            JournalHistory(self.running),
+            CellActions(self.running),
+        )
+
+    @contextlib.asynccontextmanager
+    async def _monitoring(self) -> AsyncIterator[None]:
+        wanted = dict.fromkeys(cell.settings.monitoring for cell in self._cells)
+        listeners = [one for one in wanted if one is not None]
+        with contextlib.ExitStack() as stack:
+            for one in listeners:
+                http = stack.enter_context(Monitoring(one.host, one.port, self._health))
+                log.info("health and metrics at http://%s:%d", http.host, http.port)
+            yield
+
+    async def _keep_running(self, cell: Cell, server: Server) -> None:
+        """Begin a cell anew after a fault of ours, so that it stops neither itself nor the others."""
+        logger = CellLogger(log, cell.name)
+        while True:
+            try:
+                if cell.name not in self.running:
+                    await self._open(cell, server)
+                    logger.info("its journal can be opened now; the cell runs")
+                await self.running[cell.name].run(server)
+            except asyncio.CancelledError:
+                raise
+            except Exception:
+                logger.exception("a fault of this program; the cell is begun anew in %g s", RESTART_S)
+                with contextlib.suppress(KeyError):
+                    server.mark_bad(cell.name, time.time_ns())
+                await asyncio.sleep(RESTART_S)
+
+    async def _open(self, cell: Cell, server: Server) -> None:
+        """Make a cell as soon as its journal can be opened; each reason why it cannot is told once."""
+        reason, again_s = "", AGAIN_S
+        while True:
+            # In a thread: a disk may take its time, and the others go on.
+            opening = asyncio.create_task(asyncio.to_thread(RunningCell, cell, self._observe))
+            try:
+                self.running[cell.name] = await asyncio.shield(opening)
+                return await self.running[cell.name].reload()  # its files may be others by now
+            except asyncio.CancelledError:
+                with contextlib.suppress(JournalError):
+                    self.running[cell.name] = await opening  # to be closed
+                raise
+            except JournalError as error:
+                if str(error) != reason:
+                    reason = str(error)
+                    _tell_fault(cell, server, reason)
+            await asyncio.sleep(again_s)
+            again_s = min(2.0 * again_s, AGAIN_AT_MOST_S)
+
+
+def run(cells: Sequence[Cell]) -> None:
+    """Run the service until SIGTERM or Ctrl-C; SIGHUP reloads.
+
+    Raises
+    ------
+    SettingsError, JournalError
+        The service cannot start.
+    KeyboardInterrupt
+        Ended by Ctrl-C, after a clean shutdown.
+    """
+    log_lines.configure()
+    sys.setswitchinterval(SWITCH_S)
+    try:
+        interrupted = asyncio.run(_until_signalled(Service(cells)))
+    finally:
+        gc.freeze()  # the interpreter's end would look through everything once more, for most of a second
+    if interrupted:
+        raise KeyboardInterrupt
+
+
+async def _until_signalled(service: Service) -> bool:
+    loop, stop = asyncio.get_running_loop(), asyncio.Event()
+    reloads: set[asyncio.Task[None]] = set()
+
+    def reload() -> None:
+        task = loop.create_task(service.reload())
+        reloads.add(task)
+        task.add_done_callback(reloads.discard)
+
+    loop.add_signal_handler(signal.SIGHUP, reload)
+    with signalled(stop) as came:
+        await service.run(stop, lambda: _say_started(service))
+    return signal.SIGINT in came
+
+
+def _say_started(service: Service) -> None:
+    for cell, endpoint in service.endpoints.items():
+        log.info("cell=%s at %s", cell, endpoint)
+
+
+def _tell_fault(cell: Cell, server: Server, reason: str) -> None:
+    """Log why a cell does not run, and raise its alarm; once it runs, it shows its own."""
+    log.error("cell=%s waits until its journal can be opened: %s", cell.name, reason)
+    design = cell_design(cell)
+    fault = Finding(AlarmName.JOURNAL_FAULT, holds=True, message=reason)
+    for alarm in core.find(design, core.initial_state(design), fault, time.time_ns())[1]:
+        server.alarm(cell.name, alarm)
+
+
+async def _watchdog() -> None:
+    interval_s = systemd.watchdog_interval_s()
+    while interval_s is not None:
+        systemd.notify("WATCHDOG=1")
+        await asyncio.sleep(interval_s)

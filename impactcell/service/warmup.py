@@ -1,0 +1,74 @@
+"""A few cycles of the cell's own model before the first real one, so that all is compiled when it comes."""
+
+import gc
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell import cell as core
+from impactcell.cell import CellDesign
+from impactcell.journal.capture_codec import encode_capture
+from impactcell.physics import Strike, strike
+from impactcell.records import Capture, Channel, PositioningState, uniform_times
+
+CYCLES = 8
+FORCE_HZ, POSITION_HZ = 100_000.0, 10_000.0
+
+_one_at_a_time = threading.Lock()
+_rehearsed: set[tuple[object, ...]] = set()
+
+
+def rehearse(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
+    """Take cycles of the nominal plant through the whole pipeline, and forget them; `stop` ends it early.
+
+    Once a process is enough for all cells that need the same code: many that start together are not kept from
+    their modules by each other.
+    """
+    kind = (*design.model.plant.effects, design.tracker.batch, design.known.stroke_m is None)
+    with _one_at_a_time:
+        if kind not in _rehearsed and _rehearse(design, stop):
+            _rehearsed.add(kind)
+            # What has been loaded and compiled by now stays: looking through all of it for garbage would hold
+            # up a cycle for a tenth of a second now and then.
+            gc.collect()
+            gc.freeze()
+
+
+def _rehearse(design: CellDesign, stop: Callable[[], bool]) -> bool:
+    hurried = replace(design, signature=replace(design.signature, learned_cycles=2))
+    state = core.initial_state(hurried)
+    for cycle in range(1, CYCLES + 1):
+        if stop():
+            return False
+        capture = _capture(hurried, cycle)
+        state = core.step(hurried, state, capture, PositioningState()).state
+        encode_capture(capture)
+    return True
+
+
+def _capture(design: CellDesign, cycle: int) -> Capture:
+    tap = Strike(
+        velocity_m_s=0.06,
+        mass_kg=design.known.mass_kg or 18.9,
+        stroke_m=design.known.stroke_m or float("inf"),
+        halts_at_separation=design.known.stroke_m is None,
+    )
+    motion = strike(design.model.plant, tap)
+    random = np.random.default_rng(cycle)
+    force_s = uniform_times(0.0, FORCE_HZ, int(motion.separation_s * 1.2 * FORCE_HZ))
+    position_s = uniform_times(0.0, POSITION_HZ, int((motion.stop_s * 1.1 + 0.005) * POSITION_HZ))
+    force = motion.sample(force_s).force_n + random.normal(0.0, design.known.force_noise_std_n, len(force_s))
+    position = motion.sample(position_s).position_m + random.normal(
+        0.0, design.known.position_noise_std_m, len(position_s)
+    )
+    return Capture(
+        cycle=cycle,
+        velocity_m_s=tap.velocity_m_s,
+        mass_kg=tap.mass_kg,
+        force=Channel(force_s, force, resolution=1e-3),
+        position=Channel(position_s, position),
+        stroke_m=tap.stroke_m,
+        time_ns=cycle * 10**9,
+    )

@@ -1,0 +1,262 @@
+"""Model files: what `impactcell calibrate` writes and a cell's YAML names."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.physics import Plant
+from impactcell.physics.effects import LIBRARY
+from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predictor, Prior, Sensitivity
+from impactcell.settings import yaml_loader
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+Interval = tuple[FiniteFloat, FiniteFloat]
+
+HEADER = """\
+# A model of impactcell: plant, how well it is known, and the predictors calibrated to it.
+# Equation (4): F_p = friction_n mu_s + velocity_n_s_per_m v
+# Equation (5): d = square_m u^square_power (limit - mu_s)^2 + offset_m u^offset_power, u = v / (0.1 m/s)
+"""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ParameterFile(_Part):
+    """A parameter of an effect, with its 95 % interval where one is known."""
+
+    value: FiniteFloat
+    ci95: Interval | None = None
+
+
+class PlantFile(_Part):
+    """The plant of equations (1)-(3) and the effects beside them."""
+
+    stiffness_n_per_m: Positive
+    damping_n_s_per_m: NotNegative
+    mu_s: Positive
+    mu_k: Positive
+    gravity_m_s2: Positive = 9.81
+    effects: dict[str, dict[str, FiniteFloat | ParameterFile | list[FiniteFloat]]] = {}
+
+
+class PriorFile(_Part):
+    """Standard deviations about the plant's values."""
+
+    stiffness_std_n_per_m: Positive
+    damping_std_n_s_per_m: Positive
+    ratio_std: Positive
+
+
+class ForceFile(_Part):
+    """Equation (4)."""
+
+    friction_n: Positive
+    velocity_n_s_per_m: FiniteFloat
+    rms: NotNegative
+
+
+class DistanceFile(_Part):
+    """Equation (5)."""
+
+    limit: Positive
+    square_m: Positive
+    square_power: FiniteFloat
+    offset_m: FiniteFloat
+    offset_power: FiniteFloat
+    rms: NotNegative
+
+
+class SensitivityFile(_Part):
+    """Relative error of mu_s per relative error of what is taken as known."""
+
+    stiffness: FiniteFloat = 0.0
+    damping: FiniteFloat = 0.0
+    ratio: FiniteFloat = 0.0
+
+
+class PredictorFile(_Part):
+    """Equations (4) and (5) for one mass."""
+
+    mass_kg: Positive
+    mu_s_range: Interval
+    velocity_range_m_s: Interval
+    force: ForceFile
+    distance: DistanceFile
+    force_sensitivity: SensitivityFile = SensitivityFile()
+    distance_sensitivity: SensitivityFile = SensitivityFile()
+
+
+class ModelFile(_Part):
+    """A whole model file."""
+
+    format: Literal[1]
+    name: Annotated[str, Field(min_length=1)]
+    plant: PlantFile
+    prior: PriorFile
+    stroke_m: Positive | None = None
+    predictors: list[PredictorFile] = []
+    provenance: dict[str, str] = {}
+
+    @model_validator(mode="after")
+    def _one_predictor_a_tap(self) -> Self:
+        ranges = sorted((one.mass_kg, *one.velocity_range_m_s) for one in self.predictors)
+        for (mass, _, last), (next_mass, first, _) in pairwise(ranges):
+            if mass == next_mass and first < last:
+                raise ValueError(f"two predictors for {mass:.6g} kg have velocities in common")
+        return self
+
+
+def read_model(path: Path) -> Model:
+    """Read a model file.
+
+    Raises
+    ------
+    SettingsError
+        Listing every fault as `file:line:column: message`.
+    """
+    file, positions = yaml_loader.read(path, ModelFile)
+    faults = []
+    for identifier, parameters in file.plant.effects.items():
+        place = ("plant", "effects", identifier)
+        if identifier not in LIBRARY:
+            near = yaml_loader.nearest(identifier, LIBRARY)
+            faults.append(
+                yaml_loader.complaint(path, positions.key(place), f"no effect {identifier!r}; {near}")
+            )
+            continue
+        known = [parameter.name for parameter in LIBRARY[identifier].parameters]
+        faults += [
+            yaml_loader.complaint(
+                path,
+                positions.key((*place, name)),
+                f"{identifier} has no parameter {name!r}; {yaml_loader.nearest(name, known)}",
+            )
+            for name in parameters
+            if name not in known
+        ]
+    if faults:
+        raise SettingsError("\n".join(faults))
+    try:
+        return _from_file(file)
+    except ImpactCellError as fault:
+        raise SettingsError(yaml_loader.complaint(path, positions.value(("plant",)), str(fault))) from fault
+
+
+def write_model(model: Model, path: Path) -> None:
+    """Write a model file, whole or not at all; the same model gives the same bytes.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be written.
+    """
+    text = HEADER + yaml.safe_dump(_to_mapping(model), sort_keys=False, allow_unicode=True, width=110)
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except OSError as fault:
+        part.unlink(missing_ok=True)
+        raise SettingsError(f"{path}: cannot be written: {fault.strerror}") from fault
+
+
+def _from_file(file: ModelFile) -> Model:
+    effects: dict[str, dict[str, float | Sequence[float]]] = {}
+    intervals: dict[str, dict[str, tuple[float, float]]] = {}
+    for identifier, parameters in file.plant.effects.items():
+        effects[identifier] = {}
+        for name, given in parameters.items():
+            if isinstance(given, ParameterFile):
+                effects[identifier][name] = given.value
+                if given.ci95 is not None:
+                    intervals.setdefault(identifier, {})[name] = given.ci95
+            else:
+                effects[identifier][name] = tuple(given) if isinstance(given, list) else given
+    plant = Plant(
+        stiffness_n_per_m=file.plant.stiffness_n_per_m,
+        damping_n_s_per_m=file.plant.damping_n_s_per_m,
+        mu_s=file.plant.mu_s,
+        mu_k=file.plant.mu_k,
+        gravity_m_s2=file.plant.gravity_m_s2,
+        effects=effects,
+    )
+    predictors = tuple(
+        Predictor(
+            mass_kg=one.mass_kg,
+            mu_s_range=one.mu_s_range,
+            velocity_range_m_s=one.velocity_range_m_s,
+            force=ForceForm(**one.force.model_dump()),
+            distance=DistanceForm(**one.distance.model_dump()),
+            force_sensitivity=Sensitivity(**one.force_sensitivity.model_dump()),
+            distance_sensitivity=Sensitivity(**one.distance_sensitivity.model_dump()),
+        )
+        for one in sorted(file.predictors, key=lambda one: (one.mass_kg, one.velocity_range_m_s))
+    )
+    return Model(
+        name=file.name,
+        plant=plant,
+        prior=Prior(**file.prior.model_dump()),
+        predictors=predictors,
+        stroke_m=math.inf if file.stroke_m is None else file.stroke_m,
+        intervals=intervals,
+        provenance=file.provenance,
+    )
+
+
+def _to_mapping(model: Model) -> dict[str, object]:
+    plant, prior = model.plant, model.prior
+
+    def parameter(effect: str, name: str, value: float | Sequence[float]) -> object:
+        if isinstance(value, Sequence):
+            return _floats(value)
+        interval = model.intervals.get(effect, {}).get(name)
+        return float(value) if interval is None else {"value": float(value), "ci95": _floats(interval)}
+
+    mapping: dict[str, object] = {
+        "format": 1,
+        "name": model.name,
+        "plant": {
+            "stiffness_n_per_m": float(plant.stiffness_n_per_m),
+            "damping_n_s_per_m": float(plant.damping_n_s_per_m),
+            "mu_s": float(plant.mu_s),
+            "mu_k": float(plant.mu_k),
+            "gravity_m_s2": float(plant.gravity_m_s2),
+            "effects": {
+                effect: {name: parameter(effect, name, value) for name, value in parameters.items()}
+                for effect, parameters in plant.effects.items()
+            },
+        },
+        "prior": _slots(prior),
+        "stroke_m": None if math.isinf(model.stroke_m) else float(model.stroke_m),
+        "predictors": [
+            {
+                "mass_kg": float(one.mass_kg),
+                "mu_s_range": _floats(one.mu_s_range),
+                "velocity_range_m_s": _floats(one.velocity_range_m_s),
+                "force": _slots(one.force),
+                "distance": _slots(one.distance),
+                "force_sensitivity": _slots(one.force_sensitivity),
+                "distance_sensitivity": _slots(one.distance_sensitivity),
+            }
+            for one in model.predictors
+        ],
+        "provenance": dict(model.provenance),
+    }
+    return mapping
+
+
+def _floats(values: Sequence[float]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _slots(record: Prior | ForceForm | DistanceForm | Sensitivity) -> dict[str, float]:
+    return {name: float(getattr(record, name)) for name in type(record).__slots__}

@@ -1,0 +1,1 @@
+"""Whether the model still explains the captures."""

@@ -1,0 +1,208 @@
+"""Is a cycle deviant? T^2 on the principal components, noise-whitened SPE, and a scan over shapes.
+
+A cycle's information vector y = h - G m, m the material's mean known to a covariance V, has covariance
+G + G (V + C C') G when normal: sensor noise, the mean's own error and the components C. With
+P = (G^-1 + V + C C')^-1 and u = P G^-1 y a shape s in friction is seen with the score s' u / sqrt(s' P s).
+T^2 and SPE find what was not thought of; the scan over bumps, ripples, level and tilt comes close to the
+oracle that knows the shape. Each gets a share w of the false alarms; together their p-value is the weighted
+harmonic mean 1 / sum(w / p) (Wilson 2019, PNAS 116:1195), which for small ones is the averaged likelihood
+ratio, the best that can be done without knowing which of them it will be.
+
+The variation is itself learned from n cycles. What is tested against a covariance of k learned dimensions
+varies 1 + 2 k / n times as much as it says (Reed, Mallett & Brennan 1974, IEEE Trans. AES 10:853), and the
+share of a score that comes from it follows Student's t.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc, fdtrc
+
+from impactcell.numerics import small_linalg
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+from impactcell.tracking.signature import (
+    deviation_shapes,
+    deviation_size,
+    friction_profile,
+    matched_filter_scan,
+)
+from impactcell.tracking.signature import reference as references
+from impactcell.tracking.signature.pca_variation import MODES
+from impactcell.tracking.signature.reference import Reference
+
+COMPONENTS = 3  # principal components of T^2
+KINDS = ("t_squared", "spe", *matched_filter_scan.FAMILIES)
+SHARES = (0.02, 0.02, 0.08, 0.08, 0.42, 0.38)
+LEAST_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
+INVISIBLE = 1e-9  # components smaller than this against the noise
+SMALLEST = 1e-300  # p-value
+RARE = 0.01  # p-value below which a shape is sized: no cell may be set to more false alarms
+LARGEST = 0.5  # shapes that even half of the friction would not show are not looked for
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """How normal a cycle is.
+
+    Attributes
+    ----------
+    p_value : float
+        Of the whole test, all shares together.
+    t_squared, spe : float
+    spe_freedom : int
+        Degrees of freedom of `spe`.
+    kind : str
+        Which part of the test says most.
+    at_m : float
+        Where the cycle deviates most.
+    size, size_std : float
+        Friction of the likeliest family of shapes, and its standard deviation, by `sizing`; nan where the
+        p-value is not below `RARE`. A cycle that T^2 or SPE says most of is sized as a bump.
+    """
+
+    p_value: float
+    t_squared: float
+    spe: float
+    spe_freedom: int
+    kind: str
+    at_m: float
+    size: float
+    size_std: float
+
+
+def judge(reference: Reference, slide: friction_profile.Information, grid_m: Samples) -> Verdict:
+    """Test one cycle against its material's reference."""
+    cycles = float(reference.variation.cycles)
+    looked = deviation_shapes.shapes(float(grid_m[-1]), len(grid_m))
+    rows, across, waves = looked.within(slide.reached_m, len(slide.vector))
+    t_squared, spe, freedom, scale, p_scan, centre, least, wider, P, u = _tested(
+        reference.matrix,
+        reference.strength,
+        reference.mean,
+        reference.components,
+        reference.met,
+        reference.varied,
+        reference.weight,
+        cycles,
+        reference.spe_sum,
+        float(max(reference.spe_count, 1)),
+        slide.matrix,
+        slide.vector,
+        slide.seen,
+        rows,
+        across,
+        waves,
+    )
+    chi_squared = float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0
+    p_values = (_hotelling(t_squared, int(cycles)), chi_squared, *p_scan.tolist())
+    odds = [share / max(p, SMALLEST) for share, p in zip(SHARES, p_values, strict=True)]
+    most = odds.index(max(odds))
+    at = float(grid_m[centre]) if centre >= 0 else math.nan
+    p_value, size, std = 1.0 / sum(odds), math.nan, math.nan
+    if p_value < RARE:
+        family = most - 2 if most >= 2 else deviation_size.BUMP
+        size, std = deviation_size.sized(family, P, u, grid_m, slide.reached_m, least, wider)
+    return Verdict(p_value, t_squared, spe, freedom, KINDS[most], at, size, std)
+
+
+@compiled
+def _tested(
+    pooled: Samples,
+    strength: float,
+    mean: Samples,
+    components: Samples,
+    met: Samples,
+    varied: Samples,
+    weight: float,
+    cycles: float,
+    spe_sum: float,
+    spe_count: float,
+    matrix: Samples,
+    vector: Samples,
+    seen: int,
+    rows: Samples,
+    across: int,
+    waves: int,
+) -> tuple[float, float, int, float, Samples, int, float, float, Samples, Samples]:
+    """T^2, SPE, its freedom and the scale of the noise, what `scan.scan` finds, and what it was told."""
+    n = min(seen, references.judged(met, varied, weight, cycles))
+    known, own = references.deviating(matrix, vector, mean, n, seen)
+    G, y = references.unsure(known, own, pooled, strength)
+    C = small_linalg.part(components, 0, n, 0, MODES)
+    t_squared, spe, freedom = _squares(G, y, C, COMPONENTS)
+    # variation beyond the modes, or noise that was declared too low, widens everything once it is certain
+    usual_spe = spe_sum / spe_count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * spe_count))
+    scale = max(1.0, usual_spe)
+    P, u = small_linalg.varied(C, G, y)
+    least = 30.0 / (LARGEST * references.usual(mean, n)) ** 2
+    shown, wider = small_linalg.part(rows, 0, len(rows), 0, n), scale * (1.0 + 2.0 * MODES / cycles)
+    p_values, centre = matched_filter_scan.scan(shown, P, u, C, across, waves, least, wider, cycles)
+    return t_squared, spe, freedom, scale, p_values, centre, least, wider, P, u
+
+
+@compiled
+def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, float, int]:
+    """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom.
+
+    Whitened by a Cholesky factor that takes the best known direction next and ends where nothing is known.
+    """
+    n, k = C.shape
+    # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
+    left, rest = small_linalg.varied(small_linalg.part(C, 0, n, leading, k), G, y)
+    image = small_linalg.product(left, small_linalg.part(C, 0, n, 0, leading))
+    whitened, inside, column = np.zeros(n), np.zeros((n, leading)), np.empty(n)
+    freedom, whole = 0, 0.0
+    for k in range(n):
+        best = 0
+        for i in range(n):
+            if left[i, i] > left[best, best]:
+                best = i
+        if left[best, best] < LEAST_INFORMATION:
+            break
+        root = math.sqrt(left[best, best])
+        whitened[k] = rest[best] / root
+        for j in range(leading):
+            inside[k, j] = image[best, j] / root
+        for i in range(n):
+            column[i] = left[i, best] / root
+        for i in range(n):
+            rest[i] -= column[i] * whitened[k]
+            for j in range(n):
+                left[i, j] -= column[i] * column[j]
+            for j in range(leading):
+                image[i, j] -= column[i] * inside[k, j]
+        whole += whitened[k] ** 2
+        freedom += 1
+    gram = small_linalg.product(inside, inside)
+    along, sizes = np.zeros(leading), np.empty(leading)
+    for a in range(leading):
+        sizes[a] = math.sqrt(gram[a, a])
+        for k in range(n):
+            along[a] += inside[k, a] * whitened[k]
+    if freedom <= leading or sizes.min() < INVISIBLE:
+        return 0.0, whole, freedom
+    for a in range(leading):
+        along[a] /= sizes[a]
+        for b in range(leading):
+            gram[a, b] /= sizes[a] * sizes[b]
+    spread = gram.copy()
+    for a in range(leading):
+        for b in range(leading):
+            for c in range(leading):
+                spread[a, b] += gram[a, c] * sizes[c] ** 2 * gram[c, b]
+    t_squared, left_over = 0.0, whole
+    seen, noise = small_linalg.solved(spread, along), small_linalg.solved(gram, along)
+    for a in range(leading):
+        t_squared += along[a] * seen[a]
+        left_over -= along[a] * noise[a]
+    return t_squared, max(left_over, 0.0), freedom - leading
+
+
+def _hotelling(t_squared: float, cycles: int) -> float:
+    """p-value of T^2 when the components were learned from `cycles` cycles."""
+    n, k = cycles, COMPONENTS
+    if n <= k + 1:
+        return 1.0
+    return float(fdtrc(k, n - k, t_squared * (n - k) / (k * (n - 1.0))))

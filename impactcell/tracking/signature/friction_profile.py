@@ -1,0 +1,298 @@
+"""Friction along one slide as a linear Gaussian problem, solved exactly.
+
+While the part slides, x'' = -g mu(x) - (k_v / m) x' + a, with a what else the model knows of. Position
+itself is measured to a micrometre, where friction changes over tenths of a millimetre, so the measured x may
+stand as the argument of mu. With mu(x) = sum_j beta_j B_j(x), cubic B-splines on the grid, position is linear
+in what is unknown::
+
+    x(t) + (k_v / m) int (x - x_0) dt - int int a dt dt
+        = x_0 + v_0 t - g sum_j beta_j W_j(t) + e,   W_j'' = B_j(x(t))
+
+x_0 and v_0 are integrated out; what is left of the slide are an information matrix G and vector h:
+log likelihood = -1/2 beta' G beta + h' beta. This is the Rauch-Tung-Striebel smoother of an integrated
+random walk in x (Wecker & Ansley 1983, JASA 78:81) without its first-order errors in time.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from impactcell.numerics import small_linalg
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+from impactcell.tracking.signature.slide_segment import Slide
+
+Acceleration = Callable[[Samples], Samples]
+
+FINE_STEPS = 300  # of the double integral over a slide, at least
+STRENGTHS = np.logspace(-9.0, 9.0, 37)  # of the smoothing searched, over that which weighs like the data
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Information:
+    """What one slide says of the spline coefficients.
+
+    Attributes
+    ----------
+    matrix, vector : ndarray
+        G and h, shapes (j, j) and (j,).
+    reached_m : float
+        How far the part slid.
+    seen : int
+        Coefficients of the splines it met; rows of G and h beyond are zero.
+    """
+
+    matrix: Samples
+    vector: Samples
+    reached_m: float
+    seen: int
+
+
+def information(
+    slide: Slide,
+    grid_m: Samples,
+    gravity_m_s2: float,
+    viscous_per_mass: float = 0.0,
+    acceleration: Acceleration | None = None,
+) -> Information:
+    """Turn a slide into information on the coefficients of the cubic B-splines of a uniform grid.
+
+    Parameters
+    ----------
+    grid_m : ndarray, shape (g,)
+        Uniform; friction beyond its ends is that at the ends. There are g + 2 coefficients.
+    viscous_per_mass : float
+        k_v / m where the model knows it, 1/s.
+    acceleration : callable, optional
+        Speeds along the tap, m/s, to the acceleration along it, m/s², that the model knows beside friction
+        and k_v.
+    """
+    moved_m = np.zeros(len(slide.time_s)) if acceleration is None else _moved(slide, acceleration)
+    seen = _information(
+        slide.time_s, slide.distance_m, moved_m, slide.variance, grid_m, gravity_m_s2, viscous_per_mass
+    )
+    return Information(*seen)
+
+
+def _moved(slide: Slide, acceleration: Acceleration) -> Samples:
+    """Distance that an acceleration makes in the time of a slide, which passes a parabola's speeds or so."""
+    t, span = slide.time_s, slide.time_s[-1]
+    cubic = np.polynomial.Polynomial.fit(t, slide.distance_m, 3, domain=[0.0, span], window=[0.0, 1.0])
+    a = acceleration(np.maximum(cubic.deriv()(t), 0.0))
+    step = np.diff(t)
+    speed = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * step)])
+    ahead = speed[:-1] * step + (2.0 * a[:-1] + a[1:]) * step**2 / 6.0
+    moved: Samples = np.concatenate([[0.0], np.cumsum(ahead)])
+    return moved
+
+
+@lru_cache(maxsize=64)
+def on_grid(points: int) -> Samples:
+    """Matrix from g + 2 coefficients to friction at the g grid points, shape (g, g + 2)."""
+    matrix = np.zeros((points, points + 2))
+    for i in range(points):
+        matrix[i, i : i + 3] = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+    matrix.flags.writeable = False
+    return matrix
+
+
+@lru_cache(maxsize=8)
+def shape_coefficients(points: int) -> Samples:
+    """Matrix that takes shapes on the grid, as rows, to those of their coefficients, shape (g, g + 2)."""
+    matrix: Samples = np.asarray(np.linalg.pinv(on_grid(points)).T, dtype=np.float64)
+    matrix.flags.writeable = False
+    return matrix
+
+
+@compiled
+def roughness(coefficients: int) -> Samples:
+    """Penalty D of second differences, shape (j, j)."""
+    penalty = np.zeros((coefficients, coefficients))
+    difference = (1.0, -2.0, 1.0)
+    for k in range(coefficients - 2):
+        for i in range(3):
+            for j in range(3):
+                penalty[k + i, k + j] += difference[i] * difference[j]
+    return penalty
+
+
+def smooth(seen: Information, grid_m: Samples) -> tuple[Samples, float]:
+    """Posterior mean of the coefficients seen under exp(-lambda/2 beta' D beta), and the likeliest lambda.
+
+    lambda is weighted by its restricted likelihood. Coefficients beyond follow the last ones in a straight
+    line, at no penalty, so that they may be left out.
+    """
+    mean, strength, _, _ = _smoothed(seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, STRENGTHS)
+    return mean, strength
+
+
+def friction(seen: Information, grid_m: Samples) -> tuple[Samples, Samples]:
+    """Friction and its standard deviation on the grid, by `smooth`; nan where the part did not get."""
+    _, _, value, std = _smoothed(seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, STRENGTHS)
+    return value, std
+
+
+@compiled
+def _smoothed(
+    matrix: Samples, vector: Samples, n: int, reached: float, grid: Samples, strengths: Samples
+) -> tuple[Samples, float, Samples, Samples]:
+    """Mean and strength of `smooth`, and what `friction` gives."""
+    rough, within, trace = roughness(n), small_linalg.part(matrix, 0, n, 0, n), 0.0
+    for i in range(n):
+        trace += within[i, i]
+    scale = trace / (6.0 * (n - 2))  # of D the trace is 6 (n - 2)
+    for i in range(n):
+        for j in range(n):
+            rough[i, j] *= scale
+            within[i, j] += rough[i, j]
+    # both matrices diagonal at once: base = L L', scale D = L Q diag(e) Q' L', matrix has 1 - e
+    lower = small_linalg.factor(within)
+    half = small_linalg.forward(lower, rough)
+    share, axes = np.linalg.eigh(small_linalg.forward(lower, half.T.copy()))
+    vectors = small_linalg.backward(lower, axes)
+    many = len(strengths)
+    inner, means, inverse = np.zeros(n), np.empty((n, many)), np.empty((n, many))
+    fit, determinant = (n - 2) * np.log(strengths), np.ones(many)
+    for i in range(n):
+        # level and slope are not penalised; rounding must not say otherwise
+        own = min(max(share[i], 0.0), 1.0) if i > 1 else 0.0
+        for j in range(n):
+            inner[i] += vectors[j, i] * vector[j]
+        for k in range(many):
+            diagonal = (1.0 - own) + strengths[k] * own
+            inverse[i, k] = 1.0 / diagonal
+            means[i, k] = inner[i] * inverse[i, k]
+            fit[k] += inner[i] * means[i, k]
+            determinant[k] *= diagonal
+        if i % 16 == 15 or i == n - 1:  # the product of more of them might be too large a number
+            fit -= np.log(determinant)
+            determinant[:] = 1.0
+    best = int(fit.argmax())
+    # averaged over what lambda may be: the most likely one alone smooths away features it should doubt
+    weight = np.exp(0.5 * (fit - fit[best]))
+    weight /= weight.sum()
+    mean, spread = np.zeros(n), np.zeros((n, n))
+    for i in range(n):
+        for k in range(many):
+            mean[i] += weight[k] * means[i, k]
+            spread[i, i] += weight[k] * inverse[i, k]
+        for k in range(many):
+            means[i, k] = (means[i, k] - mean[i]) * math.sqrt(weight[k])
+    spread += means @ means.T
+    value, std = np.full(len(grid), np.nan), np.full(len(grid), np.nan)
+    at = np.empty((n - 2, n))
+    for k in range(n - 2):
+        for j in range(n):
+            at[k, j] = (vectors[k, j] + 4.0 * vectors[k + 1, j] + vectors[k + 2, j]) / 6.0
+    image = at @ spread
+    for k in range(n - 2):
+        if grid[k] <= reached:
+            variance, value[k] = 0.0, 0.0
+            for j in range(n):
+                value[k] += at[k, j] * mean[j]
+                variance += at[k, j] * image[k, j]
+            std[k] = math.sqrt(max(variance, 0.0))
+    return vectors @ mean, strengths[best] * scale, value, std
+
+
+@compiled
+def _information(
+    t: Samples,
+    x: Samples,
+    moved: Samples,
+    variance: float,
+    grid: Samples,
+    gravity: float,
+    viscous_per_mass: float,
+) -> tuple[Samples, Samples, float, int]:
+    """Fields of `Information`."""
+    points, first = len(grid), grid[0]
+    spacing = grid[1] - first
+    columns = _columns(t, x, first, spacing, points, gravity, viscous_per_mass)
+    columns[:, -1] -= moved
+    _project(t, columns)
+    seen = columns.shape[1] - 1
+    products = columns.T @ columns
+    matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
+    for i in range(seen):
+        vector[i] = products[i, seen] / variance
+        for j in range(i + 1):
+            matrix[i, j] = matrix[j, i] = products[i, j] / variance
+    return matrix, vector, x[-1], seen
+
+
+@compiled
+def _columns(
+    t: Samples, x: Samples, first: float, spacing: float, points: int, gravity: float, viscous_per_mass: float
+) -> Samples:
+    """Columns of the coefficients met, and position last, at the blocks, shape (n, s + 1).
+
+    Every B-spline is integrated twice along the path: trapezium, then the exact second integral of it.
+    x_0 and v_0 are integrated out, which projects the columns 1 and t away; so the integrals may start
+    anywhere.
+    """
+    n, furthest = len(t), 0.0
+    for k in range(n):
+        furthest = max(furthest, (x[k] - first) / spacing)
+    seen = min(int(furthest), points - 2) + 4
+    columns = np.empty((n, seen + 1))
+    speed, place = np.zeros(seen), np.zeros(seen)
+    before, now = np.empty(4), np.empty(4)
+    parts = max(1, FINE_STEPS // n)
+    travelled = 0.0
+    cell = _splines(x[0], first, spacing, points, before)
+    for k in range(n):
+        if k > 0:
+            step = (t[k] - t[k - 1]) / parts
+            for part in range(parts):
+                # between blocks the path bends by less than a micrometre, which friction does not notice
+                at = x[k - 1] + (x[k] - x[k - 1]) * (part + 1.0) / parts
+                other = _splines(at, first, spacing, points, now)
+                for i in range(seen):
+                    place[i] += step * speed[i]
+                for i in range(4):
+                    place[cell + i] += step**2 / 3.0 * before[i]
+                    speed[cell + i] += step / 2.0 * before[i]
+                    place[other + i] += step**2 / 6.0 * now[i]
+                    speed[other + i] += step / 2.0 * now[i]
+                    before[i] = now[i]
+                cell = other
+            travelled += (x[k] + x[k - 1]) / 2.0 * (t[k] - t[k - 1])
+        for i in range(seen):
+            columns[k, i] = -gravity * place[i]
+        columns[k, seen] = x[k] + viscous_per_mass * travelled
+    return columns
+
+
+@compiled
+def _splines(x: float, first: float, spacing: float, points: int, out: Samples) -> int:
+    """Values of the four B-splines that are not zero at a place; gives the first of them."""
+    place = min(max((x - first) / spacing, 0.0), points - 1.0)
+    cell = min(int(place), points - 2)
+    u = place - cell
+    out[0] = (1.0 - u) ** 3 / 6.0
+    out[1] = (3.0 * u**3 - 6.0 * u**2 + 4.0) / 6.0
+    out[2] = (-3.0 * u**3 + 3.0 * u**2 + 3.0 * u + 1.0) / 6.0
+    out[3] = u**3 / 6.0
+    return cell
+
+
+@compiled
+def _project(t: Samples, columns: Samples) -> None:
+    """Take mean and slope over time out of every column, in place."""
+    n, width = columns.shape
+    centre, square = t.mean(), 0.0
+    mean, slope = np.zeros(width), np.zeros(width)
+    for k in range(n):
+        square += (t[k] - centre) ** 2
+        for i in range(width):
+            mean[i] += columns[k, i]
+            slope[i] += (t[k] - centre) * columns[k, i]
+    mean /= n
+    slope /= square
+    for k in range(n):
+        for i in range(width):
+            columns[k, i] -= mean[i] + slope[i] * (t[k] - centre)

@@ -1,0 +1,168 @@
+"""The filter within a cycle: position samples in blocks, constant gain once the covariance has converged.
+
+State [position, velocity, acceleration], acceleration a random walk of spectral density q (Bar-Shalom,
+Li & Kirubarajan 2001, section 6.2.3)::
+
+    x_{k+1} = F x_k + w,  F = [[1, T, T^2/2], [0, 1, T], [0, 0, 1]],  w ~ N(0, Q)
+    z_k = [1, 0, 0] x_k + e,  e ~ N(0, sigma^2)
+
+The same state after the same samples, in however many blocks they came.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+
+CONVERGED = 1e-12  # relative change of the gain a sample, held for as many samples as follow
+STEADY_SAMPLES = 50
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InCycleFilter:
+    """State between blocks.
+
+    Attributes
+    ----------
+    interval_s : float
+        Time between samples.
+    position_std : float
+        Noise of a sample, metres.
+    density : float
+        Spectral density of the acceleration's random walk, m^2 / s^5.
+    mean : ndarray, shape (3,)
+    covariance : ndarray, shape (3, 3)
+    gain : ndarray, shape (3,)
+        Of the last sample.
+    steady : int
+        For how many samples the gain has not changed; constant from `STEADY_SAMPLES` on.
+    """
+
+    interval_s: float
+    position_std: float
+    density: float
+    mean: Samples
+    covariance: Samples
+    gain: Samples
+    steady: int = 0
+
+
+def start(
+    interval_s: float,
+    position_std: float,
+    density: float,
+    mean: Samples | None = None,
+    covariance: Samples | None = None,
+) -> InCycleFilter:
+    """Begin before the first sample; by default within ten sigma of 0, velocity and acceleration open."""
+    return InCycleFilter(
+        interval_s,
+        position_std,
+        density,
+        np.zeros(3) if mean is None else np.array(mean, dtype=np.float64),
+        np.diag([100.0 * position_std**2, 1.0, 100.0])
+        if covariance is None
+        else np.array(covariance, dtype=np.float64),
+        np.zeros(3),
+    )
+
+
+def process_noise(interval_s: float, density: float) -> Samples:
+    """Covariance Q of one step, shape (3, 3)."""
+    T = interval_s
+    return density * np.array(
+        [
+            [T**5 / 20.0, T**4 / 8.0, T**3 / 6.0],
+            [T**4 / 8.0, T**3 / 3.0, T**2 / 2.0],
+            [T**3 / 6.0, T**2 / 2.0, T],
+        ]
+    )
+
+
+def filter_block(state: InCycleFilter, position_m: Samples) -> tuple[InCycleFilter, Samples]:
+    """Filter one block of samples.
+
+    Parameters
+    ----------
+    position_m : ndarray, shape (n,)
+
+    Returns
+    -------
+    state : InCycleFilter
+        After the block.
+    filtered : ndarray, shape (n, 3)
+        Position, velocity and acceleration after each sample.
+    """
+    filtered = np.empty((len(position_m), 3))
+    mean, covariance, gain = state.mean.copy(), state.covariance.copy(), state.gain.copy()
+    noise = process_noise(state.interval_s, state.density)
+    steady = _filter(
+        np.ascontiguousarray(position_m, dtype=np.float64),
+        state.interval_s,
+        state.position_std**2,
+        noise,
+        mean,
+        covariance,
+        gain,
+        state.steady,
+        filtered,
+    )
+    fresh = InCycleFilter(state.interval_s, state.position_std, state.density, mean, covariance, gain, steady)
+    return fresh, filtered
+
+
+@compiled
+def _filter(
+    z: Samples,
+    T: float,
+    variance: float,
+    noise: Samples,
+    mean: Samples,
+    covariance: Samples,
+    gain: Samples,
+    steady: int,
+    out: Samples,
+) -> int:
+    n = len(z)
+    x, v, a = mean[0], mean[1], mean[2]
+    half = 0.5 * T * T
+    k = 0
+    while k < n and steady < STEADY_SAMPLES:
+        p = covariance
+        # P = F P F' + Q, written out; P is symmetric
+        p00 = p[0, 0] + 2.0 * T * p[0, 1] + 2.0 * half * p[0, 2] + T * T * p[1, 1]
+        p00 += 2.0 * T * half * p[1, 2] + half * half * p[2, 2] + noise[0, 0]
+        p01 = (
+            p[0, 1] + T * p[0, 2] + T * p[1, 1] + (T * T + half) * p[1, 2] + half * T * p[2, 2] + noise[0, 1]
+        )
+        p02 = p[0, 2] + T * p[1, 2] + half * p[2, 2] + noise[0, 2]
+        p11 = p[1, 1] + 2.0 * T * p[1, 2] + T * T * p[2, 2] + noise[1, 1]
+        p12 = p[1, 2] + T * p[2, 2] + noise[1, 2]
+        p22 = p[2, 2] + noise[2, 2]
+        s = p00 + variance
+        k0, k1, k2 = p00 / s, p01 / s, p02 / s
+        change = max(abs(k0 - gain[0]) / k0, abs(k1 - gain[1]) / abs(k1), abs(k2 - gain[2]) / abs(k2))
+        steady = steady + 1 if change < CONVERGED else 0
+        gain[0], gain[1], gain[2] = k0, k1, k2
+        # 1 - k0 = variance / s, written so that nothing cancels
+        left = variance / s
+        covariance[0, 0], covariance[1, 1], covariance[2, 2] = left * p00, p11 - k1 * p01, p22 - k2 * p02
+        covariance[0, 1] = covariance[1, 0] = left * p01
+        covariance[0, 2] = covariance[2, 0] = left * p02
+        covariance[1, 2] = covariance[2, 1] = p12 - k1 * p02
+        x, v = x + T * v + half * a, v + T * a
+        e = z[k] - x
+        x, v, a = x + k0 * e, v + k1 * e, a + k2 * e
+        out[k, 0], out[k, 1], out[k, 2] = x, v, a
+        k += 1
+    k0, k1, k2 = gain[0], gain[1], gain[2]
+    while k < n:
+        x, v = x + T * v + half * a, v + T * a
+        e = z[k] - x
+        x, v, a = x + k0 * e, v + k1 * e, a + k2 * e
+        out[k, 0], out[k, 1], out[k, 2] = x, v, a
+        k += 1
+    mean[0], mean[1], mean[2] = x, v, a
+    return steady

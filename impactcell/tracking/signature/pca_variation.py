@@ -1,0 +1,195 @@
+"""How cycles of one material differ from its mean: a covariance in few modes, learned without bias.
+
+A cycle deviates from the mean m of its material by B a, a ~ N(0, Lambda), B the lowest cosines along the
+grid. From a cycle with information G is seen d = B' (h - G m) sqrt(w / (w + 1)), m resting on w cycles: its
+covariance is K Lambda K + K, K = B' G B. With T = (I + K)^-1, W = T K, in units of the first guess of a,
+the equations::
+
+    sum over cycles of  T d d' T - T K T' - W Lambda W = 0
+
+are linear in Lambda and right in the mean (C. R. Rao 1971, J. Multivariate Analysis 1:257, with the first
+guess as weights), so that two sums are all that is kept, and slides may end in different places. Eigenvalues
+that noise alone could have made, in units of the noise, are zero: else the modes swallow what they should
+tell apart. Added is what the cycles could not have seen, the standard error of a variation of none; where no
+slide has reached that is the first guess.
+
+That error is of cycles which count alike and may know the modes very differently, as after taps of different
+velocities. Where W and T of all of them commute it is sqrt(2) (sum T^2 W^2)^(1/2) / sum W^2; its inverse is
+taken as (A V^-1 A)^(1/2) / sqrt(2), A = sum W^2, V = sum (T W)^2, which for cycles that all know alike is
+sqrt(n / 2) K.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from impactcell.numerics import small_linalg
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+
+MODES = 6
+PAIRS = MODES * (MODES + 1) // 2
+FIRST_SPREAD = 0.05  # of the friction itself: how much cycles vary before anything is known
+RIDGE = 0.5  # cycles' worth of weight on no variation at all, where nothing was seen
+
+Sums = tuple[Samples, Samples, Samples, Samples]
+"""Of `Variation`: weights, moments, seen, noise."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variation:
+    """Sums over cycles, in units of the first guess `scale` of each mode.
+
+    Attributes
+    ----------
+    cycles : int
+        Cycles learned from.
+    scale : ndarray, shape (6,)
+        First guess of the modes' standard deviations, friction.
+    weights : ndarray, shape (231,)
+        Sum of tr(E_p W E_q W), E_p the symmetric unit matrices: the lower triangle by rows.
+    moments : ndarray, shape (21,)
+        Sum of tr E_p (T d d' T - T K T').
+    seen, noise : ndarray, shape (6, 6)
+        Sums of W^2 and of (T W)' T W.
+    """
+
+    cycles: int = 0
+    scale: Samples = field(default_factory=lambda: np.zeros(MODES))
+    weights: Samples = field(default_factory=lambda: np.zeros(PAIRS * (PAIRS + 1) // 2))
+    moments: Samples = field(default_factory=lambda: np.zeros(PAIRS))
+    seen: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
+    noise: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
+
+
+def guess(friction: float) -> Variation:
+    """Before the first cycle, from the friction's own size."""
+    scale = FIRST_SPREAD * abs(friction) / np.arange(1.0, MODES + 1.0)
+    fresh = Variation(scale=scale)
+    _add(np.eye(MODES), np.zeros((MODES, MODES)), RIDGE, fresh.weights, fresh.moments)
+    return fresh
+
+
+@compiled
+def taken(
+    B: Samples,
+    matrix: Samples,
+    vector: Samples,
+    weight: float,
+    weights: Samples,
+    moments: Samples,
+    seen: Samples,
+    noise: Samples,
+) -> Sums:
+    """Take one cycle into the four sums.
+
+    Parameters
+    ----------
+    B : ndarray, shape (s, 6)
+        Modes in units of their first guess, on the first s coefficients.
+    matrix, vector : ndarray, shapes (s, s), (s,)
+        Information G of the cycle on them, and h - G m.
+    weight : float
+        Cycles that m rests on.
+    """
+    B = small_linalg.part(B, 0, len(vector), 0, MODES)
+    K = small_linalg.product(small_linalg.product(matrix, B), B)
+    along = np.zeros((MODES, 1))
+    for i in range(len(vector)):
+        for k in range(MODES):
+            along[k, 0] += B[i, k] * vector[i]
+    lost = K.copy()
+    for i in range(MODES):
+        lost[i, i] += 1.0
+    T = small_linalg.inverse(lost)
+    r, W, TKT = (
+        small_linalg.product(T, along),
+        small_linalg.product(T, K),
+        small_linalg.product(T, small_linalg.product(K, T)),
+    )
+    share = weight / (weight + 1.0)
+    weights, moments = weights.copy(), moments.copy()
+    for i in range(MODES):
+        for k in range(MODES):
+            W[i, k] = W[k, i] = (W[i, k] + W[k, i]) / 2.0
+            TKT[i, k] = share * r[i, 0] * r[k, 0] - TKT[i, k]
+    TW = small_linalg.product(T, W)
+    _add(W, TKT, 1.0, weights, moments)
+    return weights, moments, seen + small_linalg.product(W, W), noise + small_linalg.product(TW, TW)
+
+
+@compiled
+def spread(weights: Samples, moments: Samples, seen: Samples, noise: Samples, cycles: int) -> Samples:
+    """Lambda, shape (6, 6)."""
+    found, upper, p = np.empty((MODES, MODES)), small_linalg.solved(small_linalg.square(weights), moments), 0
+    for i in range(MODES):
+        for j in range(i, MODES):
+            found[i, j] = found[j, i] = upper[p]
+            p += 1
+    half = small_linalg.forward(small_linalg.factor(noise), seen)
+    squares, turned = np.linalg.eigh(small_linalg.product(half, half))
+    each, lost = np.eye(MODES) / cycles, np.eye(MODES)
+    for k in range(MODES):
+        known = math.sqrt(max(squares[k], 0.0))
+        for i in range(MODES):
+            for j in range(MODES):
+                both = known * turned[i, k] * turned[j, k]
+                each[i, j] += both / math.sqrt(cycles)
+                lost[i, j] += both / math.sqrt(2.0)
+    # in units of the noise of one cycle
+    root = small_linalg.factor(each)
+    values, vectors = np.linalg.eigh(small_linalg.product(small_linalg.product(found, root), root))
+    # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
+    edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0
+    for k in range(MODES):
+        for i in range(MODES):
+            vectors[i, k] *= math.sqrt(values[k]) if values[k] > edge else 0.0
+    back = small_linalg.backward(root, vectors)
+    # noise in n cycles hides a variance of sqrt(2 / n) of its own
+    whole = small_linalg.inverse(lost)
+    for i in range(MODES):
+        for j in range(MODES):
+            for k in range(MODES):
+                whole[i, j] += back[i, k] * back[j, k]
+    return whole
+
+
+@compiled
+def components(Lambda: Samples, B: Samples) -> Samples:
+    """Principal components as columns, largest first, scaled to their standard deviations, shape (j, 6)."""
+    values, vectors = np.linalg.eigh(Lambda)
+    found = np.zeros((len(B), MODES))
+    for i in range(len(B)):
+        for c in range(MODES):
+            for k in range(MODES):
+                found[i, c] += B[i, k] * vectors[k, MODES - 1 - c]
+            found[i, c] *= math.sqrt(max(values[MODES - 1 - c], 0.0))
+    return found
+
+
+@lru_cache(maxsize=8)
+def cosines(coefficients: int) -> Samples:
+    """Lowest cosines along the grid, of unit mean square, shape (j, 6)."""
+    place = (np.arange(coefficients) + 0.5) / coefficients
+    modes = np.cos(math.pi * np.outer(place, np.arange(MODES)))
+    unit: Samples = modes / np.sqrt((modes**2).mean(axis=0))
+    return unit
+
+
+@compiled
+def _add(W: Samples, seen: Samples, share: float, weights: Samples, moments: Samples) -> None:
+    """Add tr(E_p W E_q W) and tr(E_p seen) to the sums."""
+    n = len(W)
+    p = at = 0
+    for i in range(n):
+        for j in range(i, n):
+            twice = 1.0 if i == j else 2.0
+            moments[p] += share * twice * seen[i, j]
+            p += 1
+            for k in range(i + 1):
+                for m in range(k, n if k < i else j + 1):
+                    both = 0.5 if k == m else 1.0
+                    weights[at] += share * twice * both * (W[i, k] * W[j, m] + W[i, m] * W[j, k])
+                    at += 1

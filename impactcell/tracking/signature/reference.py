@@ -1,0 +1,266 @@
+"""What friction along the stroke usually looks like: the mean of a material, and how cycles differ from it.
+
+A cycle's deviation from its material's mean is a mixed model (Laird & Ware 1982, Biometrics 38:963)::
+
+    beta_c = m + B a_c,   a_c ~ N(0, Lambda)
+
+Lambda: see `pca_variation`; it outlives a change of material. The mean is the generalised
+least-squares one under a roughness penalty, slowly forgetting, so that wear does not pass for deviance.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.numerics import small_linalg
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+from impactcell.tracking.signature import friction_profile, pca_variation
+from impactcell.tracking.signature.pca_variation import MODES, Variation
+
+MEMORY = 300.0  # cycles the mean remembers
+SMOOTHED_AT = (0.0, 4.0, 16.0, 64.0)  # weights at which the mean's smoothing is settled anew
+FEWEST = 8.0  # cycles that have met a place before the mean is known there
+FEWEST_VARIED = 25.0  # cycles from which variation was learned at a place before cycles are judged there
+CONTINUES = 0.15  # of the friction itself: its steps from coefficient to coefficient where it is unknown
+LEAST = 1e-3  # friction below this is none
+VAGUE = 1.0  # information on each coefficient beforehand: friction is known to about 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """Pooled information of the present material, and how cycles vary.
+
+    Attributes
+    ----------
+    weight : float
+        Cycles the mean rests on.
+    matrix, vector : ndarray
+        Pooled information on the mean's coefficients: the lower triangle by rows, and shape (j,).
+    mean : ndarray, shape (j,)
+    strength : float
+        Smoothing of the mean.
+    variation : Variation
+    components : ndarray, shape (j, 6)
+        Principal components of the variation as columns, largest first, scaled to their standard deviations.
+    met : ndarray, shape (j,)
+        Cycles of this material that slid over each coefficient.
+    varied : ndarray, shape (j,)
+        Cycles of any material from which variation was learned there.
+    spe_sum : float
+        Summed SPE over its degrees of freedom, of judged normal cycles.
+    spe_count : int
+    """
+
+    weight: float = 0.0
+    matrix: Samples = field(default_factory=lambda: np.zeros(0))
+    vector: Samples = field(default_factory=lambda: np.zeros(0))
+    mean: Samples = field(default_factory=lambda: np.zeros(0))
+    strength: float = 0.0
+    variation: Variation = field(default_factory=Variation)
+    components: Samples = field(default_factory=lambda: np.zeros((0, MODES)))
+    met: Samples = field(default_factory=lambda: np.zeros(0))
+    varied: Samples = field(default_factory=lambda: np.zeros(0))
+    spe_sum: float = 0.0
+    spe_count: int = 0
+
+
+def empty(coefficients: int) -> Reference:
+    """Before the first cycle."""
+    triangle, line = np.zeros(coefficients * (coefficients + 1) // 2), np.zeros(coefficients)
+    components = np.zeros((coefficients, MODES))
+    return Reference(matrix=triangle, vector=line, mean=line, met=line, varied=line, components=components)
+
+
+def restart(reference: Reference) -> Reference:
+    """Another material: its mean is learned anew, how cycles vary is kept."""
+    triangle, line = np.zeros_like(reference.matrix), np.zeros_like(reference.vector)
+    return replace(reference, weight=0.0, matrix=triangle, vector=line, met=line)
+
+
+@compiled
+def reach(met: Samples, weight: float) -> int:
+    """Coefficients, from the first on, that enough cycles have met for the mean to be known there."""
+    n = 0
+    for cycles in met:
+        n += 1 if cycles >= min(weight, FEWEST) else 0
+    return n
+
+
+@compiled
+def judged(met: Samples, varied: Samples, weight: float, cycles: float) -> int:
+    """Coefficients, from the first on, where cycles can be judged: mean and variation are known."""
+    n = 0
+    for learned in varied:
+        n += 1 if learned >= min(cycles, FEWEST_VARIED) else 0
+    return min(reach(met, weight), n)
+
+
+@compiled
+def usual(mean: Samples, n: int) -> float:
+    """Friction of the material over its first n coefficients."""
+    total = 0.0
+    for i in range(n):
+        total += mean[i]
+    return max(abs(total / n), LEAST)
+
+
+@compiled
+def deviating(matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int) -> tuple[Samples, Samples]:
+    """Leave of a cycle what it says of its first n coefficients, of `seen`: information, and h - G m.
+
+    Friction beyond is no better known than that it goes on from where it was, in steps of a share `CONTINUES`
+    of itself: a longer slide tells neither deviance nor how cycles vary.
+    """
+    own = np.empty(seen)
+    for i in range(seen):
+        own[i] = vector[i]
+        for j in range(seen):
+            own[i] -= matrix[i, j] * mean[j]
+    known = small_linalg.part(matrix, 0, n, 0, n)
+    if seen <= n:
+        return known, own
+    continues = 1.0 / (CONTINUES * usual(mean, n)) ** 2
+    inner, cross = small_linalg.part(matrix, n, seen, n, seen), small_linalg.part(matrix, n, seen, 0, n)
+    known[n - 1, n - 1] += continues
+    cross[0, n - 1] -= continues
+    for i in range(seen - n):
+        inner[i, i] += continues
+        if i > 0:
+            inner[i - 1, i - 1] += continues
+            inner[i, i - 1] -= continues
+            inner[i - 1, i] -= continues
+    return small_linalg.marginal(known, own[:n], inner, cross, own[n:])
+
+
+@compiled
+def unsure(matrix: Samples, vector: Samples, pooled: Samples, strength: float) -> tuple[Samples, Samples]:
+    """Information (G^-1 + V)^-1 and its vector, V the covariance of the mean's error."""
+    precise = precision(pooled, strength)
+    n, j = len(vector), len(precise)
+    beyond, cross = small_linalg.part(precise, n, j, n, j), small_linalg.part(precise, n, j, 0, n)
+    known, _ = small_linalg.marginal(
+        small_linalg.part(precise, 0, n, 0, n), vector, beyond, cross, np.zeros(j - n)
+    )
+    for i in range(n):
+        for k in range(n):
+            known[i, k] += matrix[i, k]
+    return small_linalg.marginal(matrix, vector, known, matrix, vector)
+
+
+@compiled
+def precision(pooled: Samples, strength: float) -> Samples:
+    """Inverse covariance of the mean's coefficients from their pooled information, shape (j, j)."""
+    matrix = small_linalg.square(pooled)
+    rough = friction_profile.roughness(len(matrix))
+    for i in range(len(matrix)):
+        matrix[i, i] += VAGUE
+        for j in range(len(matrix)):
+            matrix[i, j] += strength * rough[i, j]
+    return matrix
+
+
+def learn(
+    reference: Reference,
+    slide: friction_profile.Information,
+    grid_m: Samples,
+    settled: float,
+    spe: float | None = None,
+) -> Reference:
+    """Take one normal cycle into the reference.
+
+    Parameters
+    ----------
+    settled : float
+        Cycles, at least 1, before which the mean is too rough to show how a cycle differs from it.
+    spe : float or None
+        SPE of a judged cycle over its degrees of freedom.
+    """
+    known, components, strength = reference.variation, reference.components, reference.strength
+    total = len(slide.vector)
+    varies = reference.weight >= settled
+    if not varies and reference.weight == 0.0 and known.cycles == 0:
+        first, _ = friction_profile.smooth(slide, grid_m)
+        known = pca_variation.guess(float(np.median(first)))
+        components = pca_variation.components(np.eye(MODES), pca_variation.cosines(total) * known.scale)
+    cycles = known.cycles + 1 if varies else known.cycles
+    matrix, vector, mean, components, met, varied, sums = _learned(
+        reference.matrix,
+        reference.vector,
+        reference.mean,
+        strength,
+        components,
+        reference.met,
+        reference.varied,
+        reference.weight,
+        (known.weights, known.moments, known.seen, known.noise),
+        cycles,
+        known.scale,
+        pca_variation.cosines(total),
+        slide.matrix,
+        slide.vector,
+        slide.seen,
+        varies,
+    )
+    if reference.weight in SMOOTHED_AT:
+        pooled = friction_profile.Information(small_linalg.square(matrix), vector, slide.reached_m, total)
+        _, strength = friction_profile.smooth(pooled, grid_m)
+        mean = small_linalg.solved(precision(matrix, strength), vector)
+    return Reference(
+        min(reference.weight + 1.0, MEMORY),
+        matrix,
+        vector,
+        mean,
+        strength,
+        Variation(cycles, known.scale, *sums),
+        components,
+        met,
+        varied,
+        reference.spe_sum if spe is None else reference.spe_sum + spe,
+        reference.spe_count if spe is None else reference.spe_count + 1,
+    )
+
+
+@compiled
+def _learned(
+    pooled: Samples,
+    summed: Samples,
+    mean: Samples,
+    strength: float,
+    components: Samples,
+    met: Samples,
+    varied: Samples,
+    weight: float,
+    sums: pca_variation.Sums,
+    cycles: int,
+    scale: Samples,
+    cosines: Samples,
+    matrix: Samples,
+    vector: Samples,
+    seen: int,
+    varies: bool,  # noqa: FBT001  # compiled code takes its arguments by position
+) -> tuple[Samples, Samples, Samples, Samples, Samples, Samples, pca_variation.Sums]:
+    """All that a reference keeps with one cycle more, which says less of the mean the more cycles vary."""
+    met, varied, pooled, summed = met.copy(), varied.copy(), pooled.copy(), summed.copy()
+    if varies:
+        n, B = min(reach(met, weight), seen), cosines.copy()
+        for i in range(len(B)):
+            for k in range(MODES):
+                B[i, k] *= scale[k]
+        known, own = deviating(matrix, vector, mean, n, seen)
+        sums = pca_variation.taken(B, known, own, weight, *sums)
+        components = pca_variation.components(pca_variation.spread(*sums, cycles), B)
+        for i in range(min(n, seen - 1)):
+            varied[i] += 1.0
+    kept = 1.0 - 1.0 / MEMORY if weight >= MEMORY else 1.0
+    vary = small_linalg.part(components, 0, seen, 0, MODES)
+    left, rest = small_linalg.varied(vary, small_linalg.part(matrix, 0, seen, 0, seen), vector[:seen])
+    p = 0
+    for i in range(len(summed)):
+        met[i] = met[i] * kept + (1.0 if i < seen - 1 else 0.0)
+        summed[i] = summed[i] * kept + (rest[i] if i < seen else 0.0)
+        for j in range(i + 1):
+            pooled[p] = pooled[p] * kept + (left[i, j] if i < seen else 0.0)
+            p += 1
+    mean = small_linalg.solved(precision(pooled, strength), summed)
+    return pooled, summed, mean, components, met, varied, sums

@@ -1,0 +1,1 @@
+"""Friction over time (wear) and over batches (material)."""

@@ -1,0 +1,160 @@
+"""How noisy the estimates really are: the factor between their own standard deviation and the data's.
+
+The factor comes from differences of successive estimates, which neither wear nor a batch step moves:
+E (z_n - z_{n-1})^2 = kappa^2 (s_n^2 + s_{n-1}^2). It is the maximum-likelihood one of a contaminated normal,
+by incremental EM; a winsorised one beside it pulls it up quickly where the declared scale is far too small.
+How much wider or narrower than usual an estimate is, it declares itself, as far as that has been borne out
+(`impactcell.tracking.wear_batch.declared_std_calibration`).
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+from impactcell.tracking.wear_batch import declared_std_calibration as beliefs
+
+CLIP = 2.5
+# E min(e^2, c^2) of a standard normal e, c = 2.5: what winsorising takes away
+_DENSITY = math.exp(-0.5 * CLIP**2) / math.sqrt(2.0 * math.pi)
+_INSIDE = math.erf(CLIP / math.sqrt(2.0))
+CONSISTENCY = _INSIDE - 2.0 * CLIP * _DENSITY + CLIP**2 * (1.0 - _INSIDE)
+UNSCALED = 6.0  # differences before a guessed scale is good enough to know an outlier
+ROUGH_BIAS = 1.25  # by which outliers may raise the winsorised factor
+MEMORY = 5000.0  # cycles after which the factor forgets
+DECLARED_WEIGHT = 10.0  # differences that a declared standard deviation counts for
+GUESSED_RELATIVE_STD = 0.01  # where no standard deviation was ever declared: of the value itself
+CONTRADICTED = 2.0  # a factor beyond this, or below its inverse, says the declared scale is no guide
+SMALLEST_GUESS = 1e-6
+SMALLEST_FACTOR = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Noise:
+    """Factor of the noise and what it was learned from.
+
+    Attributes
+    ----------
+    factor : float
+        kappa squared.
+    weight : float
+        Number of differences it rests on.
+    rough : float
+        The winsorised one.
+    usual_std : float
+        Mean of those declared, over so many; nan before one was.
+    last_value, last_std : float
+        The estimate before, with the standard deviation that it declared; nan before the first.
+    identical : int
+        How many values in a row have been the same.
+    guessed : bool
+        No standard deviation was ever declared; the scale was guessed and is learned.
+    belief : ndarray
+        How far the declared standard deviations are believed, see `declared_std_calibration`.
+    """
+
+    factor: float = 1.0
+    weight: float = DECLARED_WEIGHT
+    rough: float = 1.0
+    usual_std: float = math.nan
+    last_value: float = math.nan
+    last_std: float = math.nan
+    identical: int = 0
+    guessed: bool = False
+    belief: Samples = field(default_factory=beliefs.unknown)
+
+
+def in_a_row(noise: Noise, value: float) -> int:
+    """Count how many values in a row have been the same, with this one."""
+    return noise.identical + 1 if value == noise.last_value else 1
+
+
+def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[Noise, float]:
+    """Take in an estimate, and its difference from the one before into the factor unless it comes late.
+
+    Returns
+    -------
+    noise : Noise
+    std : float
+        Declared standard deviation, or in its place the usual one, or a guess to be corrected.
+    """
+    std, usual, weight, guessed = declared, noise.usual_std, noise.weight, noise.guessed
+    if declared > 0.0 and math.isfinite(declared):
+        usual = std if math.isnan(usual) else usual + (std - usual) / (weight + 1.0)
+    elif not math.isnan(usual):
+        std = usual
+    else:
+        std = usual = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
+        weight, guessed = 0.0, True
+    identical = in_a_row(noise, value)
+    fresh = replace(noise, weight=weight, usual_std=usual, guessed=guessed, identical=identical)
+    if late:
+        return fresh, std
+    fresh = replace(fresh, last_value=value, last_std=std)
+    return (fresh if math.isnan(noise.last_value) else _compared(fresh, noise)), std
+
+
+def _compared(noise: Noise, before: Noise) -> Noise:
+    """Learn from the difference of the last estimate from the one before."""
+    square, weight = (noise.last_value - before.last_value) ** 2, min(noise.weight + 1.0, MEMORY)
+    stds, usual = (noise.last_std, before.last_std), noise.usual_std
+    squared = square / sum(beliefs.spread(noise.belief, std, usual) ** 2 for std in stds)
+    if noise.guessed and weight <= UNSCALED:
+        # nothing to judge outliers by yet: the plain mean
+        factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
+        return replace(noise, factor=factor, rough=factor, weight=weight)
+    clipped = min(squared, CLIP**2 * noise.rough) / CONSISTENCY
+    rough = max(noise.rough + (clipped - noise.rough) / weight, SMALLEST_FACTOR)
+    own = squared * beliefs.counted(squared, noise.factor)
+    factor = max(noise.factor + (own - noise.factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
+    usual_square = square / (2.0 * noise.factor * usual**2)
+    belief = beliefs.learned(noise.belief, usual_square, *stds, usual, weight)
+    return replace(noise, factor=factor, rough=rough, weight=weight, belief=belief)
+
+
+def variance(noise: Noise, std: float) -> float:
+    """Variance of an estimate that declares `std`; wider while a guessed scale rests on few differences."""
+    doubt = 1.0 + 4.0 / max(noise.weight, 1.0) if noise.guessed else 1.0
+    return float(noise.factor * doubt * beliefs.spread(noise.belief, std, noise.usual_std) ** 2)
+
+
+def variances(noise: Noise, stds: Samples) -> Samples:
+    """Variances of the estimates of a history, whose noise is now known."""
+    return noise.factor * _unscaled(noise, stds)
+
+
+def moved(noise: Noise, since: Noise, stds: Samples) -> tuple[float, float]:
+    """Factors, at least one, by which variances of these estimates have moved together, and apart (rms)."""
+    ratios = np.log(variances(noise, stds) / variances(since, stds))
+    return math.exp(abs(np.mean(ratios))), math.exp(np.std(ratios))
+
+
+def _unscaled(noise: Noise, stds: Samples) -> Samples:
+    """Variances before the factor."""
+    return np.array([beliefs.spread(noise.belief, std, noise.usual_std) for std in stds]) ** 2
+
+
+def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:
+    """Fit the factor to all of the first values at once, for following it up from a wrong one takes long."""
+    unscaled = _unscaled(noise, stds)
+    squared = np.diff(values) ** 2 / (unscaled[1:] + unscaled[:-1])
+    # by the median, which outliers hardly move: that of a squared standard normal is 0.4549
+    start = max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
+    factor = _fit(squared, start, 0.0 if noise.guessed else DECLARED_WEIGHT)
+    if not 1.0 / CONTRADICTED < factor < CONTRADICTED:
+        # what was declared is plainly wrong, and is no longer to weigh against the data
+        factor = _fit(squared, start, 0.0)
+    return replace(noise, factor=factor, rough=factor)
+
+
+@compiled
+def _fit(squared: Samples, factor: float, before: float) -> float:
+    """Fit the factor to squared differences by EM, with `before` differences at a factor of one."""
+    for _ in range(30):
+        total = 0.0
+        for one in squared:
+            total += one * beliefs.counted(one, factor)
+        factor = max((before + total) / (before + len(squared)), SMALLEST_FACTOR)
+    return factor

@@ -1,0 +1,139 @@
+"""What goes into one cycle of tracking, what is kept between cycles, and what comes out."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from impactcell.records import BatchState, Evidence, FrictionEstimate, Samples, WearState
+from impactcell.tracking.wear_batch.input_validation import Clock
+from impactcell.tracking.wear_batch.noise_identification import History
+from impactcell.tracking.wear_batch.noise_scale import Noise
+from impactcell.tracking.wear_batch.process_noise_adaptation import Monitor
+from impactcell.tracking.wear_batch.run_length_bank import WIDTH
+from impactcell.tracking.wear_batch.wear_filter import WearFilter
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What one cycle brings: mu_s, its standard deviation (nan where there is none), what the PLC says."""
+
+    cycle: int
+    mu_s: float
+    mu_s_std: float
+    time_ns: int = 0
+    batch_id: str | None = None
+    expected_change: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        cycle: int,
+        time_ns: int,
+        estimate: FrictionEstimate,
+        batch_id: str | None,
+        *,
+        expected: bool = False,
+    ) -> "Reading":
+        """Take the published mu_s of an estimate."""
+        return cls(cycle, estimate.mu_s.value, estimate.mu_s.std, time_ns, batch_id, expected)
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """The last batch shift: index of its first cycle, size in mu_s, and how it was found."""
+
+    cycle: int
+    size: float
+    size_std: float
+    found_at: int = 0
+    statistic: float = math.nan
+    threshold: float = math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackerState:
+    """All that is kept between cycles; `impactcell.serialization.message_pack` writes it bit for bit.
+
+    Attributes
+    ----------
+    clock : Clock
+        Which cycles have been seen, and when.
+    filter : WearFilter or None
+        The filter that believes the PLC's batch ids.
+    bank : ndarray, shape (k, 22)
+        Run-length hypotheses, see `impactcell.tracking.wear_batch.run_length_bank`.
+    outliers : tuple of float
+        Outliers among the bank's readings, and how many readings, both fading.
+    accepted, accepted_before : int
+        Indices of the last two cycles at which the bank's shift was reported.
+    batch_start, batch_count : int
+        Index at which the PLC's present batch began, and how many there have been.
+    tested : bool
+        The present known batch has been reported as shifted, or was expected to be.
+    replayed : Noise
+        As it was when the first cycles were last gone over with it.
+    """
+
+    clock: Clock = field(default_factory=Clock)
+    noise: Noise = field(default_factory=Noise)
+    filter: WearFilter | None = None
+    bank: Samples = field(default_factory=lambda: np.zeros((0, WIDTH)))
+    outliers: tuple[float, float] = (0.0, 0.0)
+    accepted: int = 0
+    accepted_before: int = 0
+    batch_id: str | None = None
+    previous_batch: str | None = None
+    batch_start: int = 0
+    batch_count: int = 0
+    tested: bool = True
+    shift: Shift | None = None
+    first: int = 0
+    replayed: Noise = field(default_factory=Noise)
+    history: History | None = None
+    monitor: Monitor = field(default_factory=Monitor)
+    level_variance: float = 0.0
+    slope_variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracked:
+    """Outcome of one cycle.
+
+    Attributes
+    ----------
+    shift : Evidence or None
+        Set at the one cycle at which a batch shift is found.
+    expected : bool
+        The PLC announced a batch change with this cycle: the alarm is to stay silent.
+    innovation : float
+        Measurement minus prediction in standard deviations; nan if not used.
+    used : bool
+        Whether the reading went into the state.
+    notes : tuple of str
+        What was wrong with the reading, and what was done about it.
+    """
+
+    state: TrackerState
+    wear: WearState
+    batch: BatchState
+    shift: Evidence | None
+    expected: bool
+    innovation: float
+    used: bool
+    notes: tuple[str, ...]
+
+
+def initial_state() -> TrackerState:
+    """State before the first cycle."""
+    return TrackerState()
+
+
+def reset_wear(state: TrackerState) -> TrackerState:
+    """State after the surface was renewed: the next cycle is a new reference; the noise stays learned."""
+    return TrackerState(
+        clock=state.clock,
+        noise=state.noise,
+        level_variance=state.level_variance,
+        slope_variance=state.slope_variance,
+    )

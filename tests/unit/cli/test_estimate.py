@@ -1,0 +1,147 @@
+"""`impactcell estimate` on campaigns of the simulator's plant and on the sample campaigns."""
+
+import csv
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell.campaign import Campaign, Excitation, Sensor, write
+from impactcell.cli.estimate import COLUMNS, estimate
+from impactcell.errors import CampaignError, PredictionError
+from impactcell.records import Capture, Channel
+from tests.taps import Tap
+
+PROTOTYPE = Path(__file__).resolve().parents[3] / "config" / "cells" / "prototype.yaml"
+SENSORS = {"force": Sensor(1e4, 0.4), "position": Sensor(1e4, 1.5e-6)}
+COVARIATES = ("shot", "velocity_mm_per_min", "mass_kg", "direction")
+
+
+def taps(viscous: bool = False) -> list[Tap]:
+    rng = np.random.default_rng(1)
+    return [
+        Tap(
+            velocity / 6e4, 0.2 * (1 + 0.01 * rng.normal()), mass_kg=mass, stroke_m=1.5e-3, direction=sign,
+            stiffness=6.6e5, damping=430.0, **({} if viscous else {"effects": {}}),
+        )
+        for velocity in (2500, 3500, 4500, 5500)
+        for mass in (18.9, 25.2)
+        for sign in (1, -1)
+    ]  # fmt: skip
+
+
+def captures(made: list[Tap]) -> list[Capture]:
+    rng = np.random.default_rng(2)
+    return [tap.capture(rng, cycle=number) for number, tap in enumerate(made, 1)]
+
+
+def campaign(directory: Path, shots: list[Capture], **changes: object) -> Path:
+    whole = Campaign(Excitation.TAP, tuple(shots), stroke_m=1.5e-3, sensors=SENSORS, columns=COVARIATES)
+    write(replace(whole, **changes), directory)  # type: ignore[arg-type]
+    return directory
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_plant_is_fitted_and_every_shot_estimated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = taps()
+    estimate(campaign(tmp_path / "c", captures(made)), None, tmp_path / "out.csv")
+    found = rows(tmp_path / "out.csv")
+    assert tuple(found[0]) == COLUMNS
+    assert [row["shot"] for row in found] == [str(n) for n in range(1, len(made) + 1)]
+    for column, most in (
+        ("mu_s", 0.01),
+        ("mu_s_force", 0.03),
+        ("mu_s_distance", 0.05),
+        ("mu_s_combined", 0.03),
+    ):
+        errors = [abs(float(row[column]) / tap.mu_s - 1.0) for row, tap in zip(found, made, strict=True)]
+        assert np.mean(errors) < most, column
+    assert all(abs(float(row["mu_k"]) / tap.mu_k - 1.0) < 2e-3 for row, tap in zip(found, made, strict=True))
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "plant fitted to 16 of 16 shots" in captured.err
+
+
+def test_a_cells_model_is_used_and_rows_go_to_standard_output(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = [Tap(4000 / 6e4, stroke_m=1.5e-3), Tap(5500 / 6e4, 0.22, stroke_m=1.5e-3)]
+    estimate(campaign(tmp_path / "c", captures(made)), PROTOTYPE, None)
+    found = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    for row, tap in zip(found, made, strict=True):
+        assert float(row["mu_s"]) == pytest.approx(tap.mu_s, rel=0.06)
+        assert float(row["mu_s_combined"]) == pytest.approx(tap.mu_s, rel=0.02)
+        assert row["quality"] == "good"
+
+
+def test_an_empty_mass_is_fitted(tmp_path: Path) -> None:
+    made = taps()[:8]
+    shots = [replace(shot, mass_kg=math.nan) if shot.cycle % 4 == 0 else shot for shot in captures(made)]
+    estimate(campaign(tmp_path / "c", shots), None, tmp_path / "out.csv")
+    for row, tap in zip(rows(tmp_path / "out.csv"), made, strict=True):
+        assert float(row["mu_s_combined"]) == pytest.approx(tap.mu_s, rel=0.1)
+
+
+def test_one_bad_shot_is_a_row_that_says_why(tmp_path: Path) -> None:
+    shots = captures(taps())
+    force = shots[3].force
+    assert force is not None
+    shots[3] = replace(shots[3], force=replace(force, values=np.minimum(force.values, 60.0)))
+    estimate(campaign(tmp_path / "c", shots), None, tmp_path / "out.csv")
+    found = rows(tmp_path / "out.csv")
+    assert found[3]["quality"] == "bad"
+    assert "clipped" in found[3]["reason"]
+    assert found[3]["mu_s"] == ""
+    assert all(row["quality"] != "bad" for row in found if row["shot"] != "4")
+
+
+def test_free_slides_show_mu_k_only(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    times = np.arange(80) / 148.0
+    moved = np.where(times < 0.3 / 2.0, 0.3 * times - times**2, 0.0225)
+    shot = Capture(1, math.nan, 1.0, None, Channel(times, -moved + rng.normal(0, 1e-4, 80)))
+    estimate(
+        campaign(tmp_path / "c", [shot], excitation=Excitation.FREE_SLIDE, columns=("shot",)),
+        None,
+        tmp_path / "o.csv",
+    )
+    (row,) = rows(tmp_path / "o.csv")
+    assert float(row["mu_k"]) == pytest.approx(2.0 / 9.81, abs=4.0 * float(row["mu_k_std"]))
+    assert row["mu_s"] == ""
+    assert (row["quality"], row["mu_k_quality"]) == ("bad", "good")
+
+
+def test_what_cannot_be_used_is_named(tmp_path: Path) -> None:
+    with pytest.raises(CampaignError):
+        estimate(tmp_path / "nowhere")
+    shots = captures(taps()[:2])
+    with pytest.raises(CampaignError, match="cannot be written"):
+        estimate(campaign(tmp_path / "c", shots), PROTOTYPE, tmp_path / "no" / "out.csv")
+    bare = [replace(shot, force=None) for shot in shots]
+    with pytest.raises(PredictionError, match="no tap of the campaign can be used"):
+        estimate(campaign(tmp_path / "d", bare, sensors={"position": SENSORS["position"]}))
+
+
+@pytest.mark.shared_data
+@pytest.mark.parametrize(("name", "most"), [("no-effect", 0.01), ("one-effect", 0.03)])
+def test_the_sample_campaigns(name: str, most: float, shared_data: Path, tmp_path: Path) -> None:
+    directory = shared_data / "sample-campaigns" / name
+    estimate(directory, None, tmp_path / "out.csv")
+    truth = {
+        shot["shot"]: shot
+        for shot in json.loads(directory.with_name(f"{name}.truth.json").read_text())["shots"]
+    }
+    errors = [
+        abs(float(row["mu_s"]) / truth[int(row["shot"])]["mu_s"] - 1) for row in rows(tmp_path / "out.csv")
+    ]
+    assert len(errors) == 60
+    assert np.mean(errors) < most

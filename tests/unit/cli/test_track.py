@@ -1,0 +1,134 @@
+"""`impactcell track`: series with known truth, and every fault of a file at its line."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from impactcell.cli.track import track
+from impactcell.errors import SeriesError
+
+STD = 0.002
+
+
+def write(path, mu_s, std=STD, batch=None, cycles=None):
+    cycles = range(len(mu_s)) if cycles is None else cycles
+    lines = ["cycle,mu_s,mu_s_std" + (",batch" if batch is not None else "")]
+    for i, (cycle, value) in enumerate(zip(cycles, mu_s, strict=True)):
+        own = "" if std is None else f"{std:.6f}"
+        lines.append(f"{cycle},{value:.7f},{own}" + (f",{batch[i]}" if batch is not None else ""))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def run(capsys, *args, **kwargs):
+    track(*args, as_json=True, **kwargs)
+    return json.loads(capsys.readouterr().out)
+
+
+def truth(n=1500, slope=2e-6, step=0.006, at=900, seed=1):
+    mu_s = 0.2 + slope * np.arange(n) + STD * np.random.default_rng(seed).normal(size=n)
+    mu_s[at:] += step
+    mu_s[::101] += 0.02
+    return mu_s
+
+
+@pytest.mark.parametrize("batch", ["known", "unknown"])
+def test_slope_and_shift_of_a_known_series(tmp_path, capsys, batch):
+    ids = ["A" if i < 900 else "B" for i in range(1500)]
+    found = run(capsys, write(tmp_path / "s.csv", truth(), batch=ids), batch)
+    assert abs(found["slope_per_cycle"] - 2e-6) < 3.0 * found["slope_std"]
+    (shift,) = found["alarms"]
+    assert shift["alarm"] == "BatchShift"
+    assert abs(shift["change_cycle"] - 900) <= 2
+    assert 900 <= shift["cycle"] < 915
+    assert abs(shift["size"] - 0.006) < 3.0 * shift["size_std"]
+
+
+def test_the_wear_limit(tmp_path, capsys):
+    mu_s = truth(4000, slope=5e-6, step=0.0)
+    found = run(capsys, write(tmp_path / "s.csv", mu_s), limit=0.21)
+    (worn,) = found["alarms"]
+    assert worn["alarm"] == "WearLimit"
+    assert 2000 <= worn["cycle"] < 2400
+    assert abs(worn["change_cycle"] - 2000) < 250
+    assert found["cycles_to_limit"] == 0.0
+
+
+def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
+    rng = np.random.default_rng(2)
+    kept = np.sort(rng.choice(600, 450, replace=False))
+    mu_s = 0.2 + STD * rng.normal(size=450) + 1e-5 * kept
+    path = write(tmp_path / "s.csv", mu_s, std=None, cycles=kept)
+    lines = path.read_text().splitlines()
+    lines[50] = f"{kept[49]},,"
+    path.write_text("\n".join(lines) + "\n")
+    found = run(capsys, path)
+    assert abs(found["slope_per_cycle"] - 1e-5) < 3.0 * found["slope_std"]
+    assert found["alarms"] == []
+    assert found["cycles"] == 449
+    assert found["notes"] == [{"cycle": int(kept[49]), "note": "mu_s is missing, the cycle is not used"}]
+
+
+@pytest.mark.parametrize("n", [3, 24, 40])
+def test_a_few_dozen_cycles(tmp_path, capsys, n):
+    mu_s = 0.2 + STD * np.random.default_rng(n).normal(size=n)
+    found = run(capsys, write(tmp_path / "s.csv", mu_s))
+    assert abs(found["slope_per_cycle"]) < 3.5 * found["slope_std"]
+    assert found["alarms"] == []
+    assert math.isfinite(found["level_std"])
+
+
+def test_the_text_form(tmp_path, capsys):
+    track(write(tmp_path / "s.csv", truth()), limit=0.3)
+    out = capsys.readouterr().out
+    assert "1500 cycles used" in out
+    assert "BatchShift at cycle 90" in out
+
+
+def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
+    track(write(tmp_path / "s.csv", truth()[:4] * 0.0 + 0.2), limit=0.3)
+    out = capsys.readouterr().out
+    assert "never" in out
+    assert "inf" not in out
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", ":1: empty"),
+        ("cycle,mu\n1,0.2\n", ":1: no column `mu_s`"),
+        ("cycle,mu_s,mu_s\n1,0.2,0.2\n", ":1: column `mu_s` is there 2 times"),
+        ("cycle,mu_s,mu_s_std\n", ":2: no cycles"),
+        ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2\n", ":3: 2 cells, but the header has 3"),
+        ("cycle,mu_s,mu_s_std\n1.5,0.2,0.1\n", ":2: cycle `1.5` is not a whole number"),
+        ("cycle,mu_s,mu_s_std\nx,0.2,0.1\n", ":2: cycle `x` is not a whole number"),
+        ("cycle,mu_s,mu_s_std\ninf,0.2,0.1\n", ":2: cycle `inf` is not a whole number"),
+        ("cycle,mu_s,mu_s_std\n1,abc,0.1\n", ":2: mu_s `abc` is not a number"),
+        (
+            "cycle,mu_s,mu_s_std\n1,nan,0.1\n2,inf,0.1\n",
+            "only 0 of 2 cycles can be used, it takes 2; mu_s is",
+        ),
+    ],
+)
+def test_faults_of_a_file(tmp_path, text, message):
+    path = tmp_path / "s.csv"
+    path.write_text(text)
+    with pytest.raises(SeriesError) as error:
+        track(path)
+    assert str(error.value).startswith(str(path))
+    assert message in str(error.value)
+
+
+def test_other_faults(tmp_path):
+    with pytest.raises(SeriesError, match="cannot be read"):
+        track(tmp_path / "none.csv")
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SeriesError, match="not a CSV file"):
+        track(tmp_path / "b.csv")
+    path = write(tmp_path / "s.csv", truth(50, at=0))
+    with pytest.raises(SeriesError, match="needs a column `batch`"):
+        track(path, "known")
+    with pytest.raises(SeriesError, match="say known or unknown"):
+        track(path, "maybe")

@@ -1,0 +1,186 @@
+"""Positioning commands: made once, refused in words, and safe across a lost connection."""
+
+import asyncio
+import contextlib
+import math
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+import numpy as np
+import pytest
+
+from impactcell.errors import PositioningError
+from impactcell.fieldbus.acquisition import Module
+from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.registers import RegisterMap, Words
+from impactcell.fieldbus.tap_commands import Positioner, TapCommand
+from simulator.modbus_server import ModbusServer
+from simulator.scripted import ScriptedDevice
+
+COMMAND = TapCommand(velocity_m_s=0.05, stroke_m=0.0012, direction=-1)
+
+
+class PositioningDevice(ScriptedDevice):
+    """Acts on a change of `command_sequence`, as the map says."""
+
+    def __init__(self, registers: RegisterMap) -> None:
+        super().__init__(registers, session=5)
+        self.put("positioning_state", 1)
+        self.taps: list[tuple[float, float, int]] = []
+        self.result = 2
+        self.on_command: Callable[[], None] = lambda: None
+
+    def write(self, address: int, words: Words) -> None:
+        before = self.get("command_sequence")
+        super().write(address, words)
+        if self.get("command_sequence") not in (0, before):
+            self.taps.append(
+                (self.get("command_velocity"), self.get("command_stroke"), self.get("command_direction"))
+            )
+            self.put("command_accepted", self.get("command_sequence"))
+            self.put("command_result", self.result)
+            if self.result == 2:
+                cycle = self.complete({"force": np.zeros(3), "position": np.zeros(3)}, velocity=0.05)
+                self.put("command_cycle", cycle)
+            self.on_command()
+        if self.get("command_abort"):
+            self.put("command_result", 5)
+            self.put("command_abort", 0)
+
+
+@asynccontextmanager
+async def ready(
+    fpga: RegisterMap, device: ScriptedDevice, patience_s: float = 20.0
+) -> AsyncIterator[tuple[ModbusServer, Module, Positioner]]:
+    """A module whose captures are being taken, as the service does."""
+    async with (
+        ModbusServer(device) as server,
+        Module("cell-1", ModuleLink(port=server.port, timeout_s=5.0), fpga) as module,
+    ):
+
+        async def follow() -> None:
+            async with contextlib.aclosing(module.captures()) as receptions:
+                async for _ in receptions:
+                    pass
+
+        following = asyncio.create_task(follow())
+        await module.wait_connected()
+        try:
+            yield server, module, Positioner(module, patience_s)
+        finally:
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)
+
+
+async def test_a_tap_is_made_once_and_tells_its_cycle(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    async with ready(fpga, device) as (_, _, positioner):
+        assert await positioner.tap(COMMAND) == 1
+        assert await positioner.tap(COMMAND) == 2
+    assert len(device.taps) == 2
+    assert device.taps[0] == pytest.approx((0.05, 0.0012, -1), rel=1e-6)
+
+
+async def test_an_answer_lost_with_the_connection_does_not_repeat_the_tap(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    async with ready(fpga, device) as (server, _, positioner):
+        device.on_command = server.drop_clients
+        assert await positioner.tap(COMMAND) == 1
+    assert len(device.taps) == 1
+
+
+@pytest.mark.parametrize(
+    ("result", "told"),
+    [(3, "refused value"), (4, "refused state"), (5, "aborted"), (6, "fault"), (77, r"unknown \(77\)")],
+)
+async def test_a_refusal_is_told_in_words(fpga: RegisterMap, result: int, told: str) -> None:
+    device = PositioningDevice(fpga)
+    device.result = result
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match=f"cell-1: tap 1: {told}"):
+            await positioner.tap(COMMAND)
+
+
+async def test_a_module_that_is_not_ready_gets_no_command(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    device.put("positioning_state", 3)
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="module takes no command, it is fault"):
+            await positioner.tap(COMMAND)
+    assert device.taps == []
+
+
+async def test_what_does_not_read_back_is_not_commanded(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    stroke = fpga["command_stroke"]
+    device.on_read.append((stroke.address, lambda: device.put("command_stroke", 0.9)))
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(
+            PositioningError, match=r"register command_stroke \(142\) does not show what was written"
+        ):
+            await positioner.tap(COMMAND)
+    assert device.taps == []
+
+
+async def test_a_restart_in_the_middle_ends_the_command(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    device.result = 1
+
+    def restart() -> None:
+        device.start(session=6)
+        device.put("command_accepted", 0)
+
+    device.on_command = restart
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="started anew during tap 1"):
+            await positioner.tap(COMMAND)
+
+
+async def test_an_abort_ends_what_is_being_executed(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    device.result = 1
+    commanded = asyncio.Event()
+    device.on_command = commanded.set
+    async with ready(fpga, device) as (_, _, positioner):
+        tap = asyncio.create_task(positioner.tap(COMMAND))
+        await commanded.wait()
+        await positioner.abort()
+        with pytest.raises(PositioningError, match="aborted"):
+            await tap
+
+
+async def test_a_tap_without_an_end_is_given_up(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    device.result = 1
+    async with ready(fpga, device, patience_s=1.0) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="may have been struck"):
+            await positioner.tap(COMMAND)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        TapCommand(0.0, 0.001, 1),
+        TapCommand(math.nan, 0.001, 1),
+        TapCommand(0.05, math.inf, 1),
+        TapCommand(0.05, -0.001, 1),
+        TapCommand(0.05, 0.001, 0),
+    ],
+)
+async def test_impossible_taps_are_refused_before_anything_is_written(
+    fpga: RegisterMap, command: TapCommand
+) -> None:
+    device = PositioningDevice(fpga)
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="cell-1: tap"):
+            await positioner.tap(command)
+    assert device.taps == []
+
+
+async def test_a_map_without_positioning_is_said(fpga: RegisterMap) -> None:
+    kept = {name: register for name, register in fpga.registers.items() if not name.startswith("command")}
+    bare = RegisterMap("bare", kept)
+    async with ready(bare, ScriptedDevice(bare)) as (_, _, positioner):
+        assert not positioner.available
+        with pytest.raises(PositioningError, match="map bare has no positioning registers"):
+            await positioner.tap(COMMAND)

@@ -1,0 +1,258 @@
+"""Trust list, users file and their commands, with certificates made by `cryptography` itself."""
+
+import datetime as dt
+import io
+import stat
+import sys
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import rsa
+from cryptography.x509.oid import NameOID
+
+from impactcell.cli import access
+from impactcell.errors import AccessError
+from impactcell.opcua.certificates import make_certificate
+from impactcell.opcua.trust_list import TrustList, UntrustedError, application_uris, der, first_of_chain
+from impactcell.scada import Role
+from impactcell.scada.users import User, Users, read_users, verify, with_password, write_users
+
+URI = "urn:test:trust"
+_KEYS: list[rsa.RSAPrivateKey] = []
+
+
+def key(number: int) -> rsa.RSAPrivateKey:
+    while len(_KEYS) <= number:
+        _KEYS.append(rsa.generate_private_key(public_exponent=65537, key_size=2048))
+    return _KEYS[number]
+
+
+def certificate(
+    name: str,
+    own: int,
+    issuer: tuple[str, int] | None = None,
+    *,
+    ca: bool = False,
+    days: int = 10,
+    hash_=None,
+) -> x509.Certificate:
+    now = dt.datetime.now(dt.UTC)
+    issuer_name, issuer_key = issuer or (name, own)
+
+    def named(text: str) -> x509.Name:
+        return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, text)])
+
+    return (
+        x509.CertificateBuilder()
+        .subject_name(named(name))
+        .issuer_name(named(issuer_name))
+        .public_key(key(own).public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - dt.timedelta(days=20))
+        .not_valid_after(now + dt.timedelta(days=days))
+        .add_extension(x509.BasicConstraints(ca=ca, path_length=None), critical=True)
+        .sign(key(issuer_key), hash_ or hashes.SHA256())
+    )
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("pki")
+    TrustList(directory, URI)
+    return directory
+
+
+@pytest.fixture
+def pki(made: Path) -> Path:
+    for folder in ("trusted", "issuers", "revoked", "rejected"):
+        for path in (made / folder).iterdir():
+            path.unlink()
+    return made
+
+
+def put(pki: Path, folder: str, found: x509.Certificate) -> None:
+    (pki / folder / f"{found.serial_number}.der").write_bytes(der(found))
+
+
+def test_a_server_without_a_certificate_makes_its_own(pki: Path) -> None:
+    trust = TrustList(pki, URI)
+    assert application_uris(trust.own_certificate) == [URI]
+    assert stat.S_IMODE((pki / "own" / "key.pem").stat().st_mode) == 0o600
+    with pytest.raises(AccessError, match="application URI"):
+        TrustList(pki, "urn:another")
+
+
+def test_directly_trusted_and_not(pki: Path) -> None:
+    trust, client = TrustList(pki, URI), certificate("client", 0)
+    with pytest.raises(UntrustedError):
+        trust.check(der(client))
+    assert [p.read_bytes() for p in (pki / "rejected").iterdir()] == [der(client)]
+    put(pki, "trusted", client)
+    trust.check(der(client))
+    trust.check(der(client) + der(certificate("ca", 1, ca=True)))
+
+
+def test_chains_and_revocation(pki: Path) -> None:
+    trust = TrustList(pki, URI)
+    root = certificate("root", 1, ca=True)
+    middle = certificate("middle", 2, ("root", 1), ca=True)
+    client = certificate("client", 0, ("middle", 2))
+    put(pki, "trusted", root)
+    with pytest.raises(UntrustedError, match="nor issued"):
+        trust.check(der(client))
+    put(pki, "issuers", middle)
+    trust.check(der(client))
+    now = dt.datetime.now(dt.UTC)
+    revoked = (
+        x509.RevokedCertificateBuilder().serial_number(client.serial_number).revocation_date(now).build()
+    )
+    listed = (
+        x509.CertificateRevocationListBuilder()
+        .issuer_name(client.issuer)
+        .last_update(now)
+        .next_update(now + dt.timedelta(days=1))
+        .add_revoked_certificate(revoked)
+        .sign(key(2), hashes.SHA256())
+    )
+    from cryptography.hazmat.primitives.serialization import Encoding
+
+    (pki / "revoked" / "middle.crl").write_bytes(listed.public_bytes(Encoding.DER))
+    with pytest.raises(UntrustedError, match="revoked"):
+        trust.check(der(client))
+
+
+@pytest.mark.parametrize("what", ["expired", "no authority", "forged", "noise"])
+def test_what_is_refused(pki: Path, what: str) -> None:
+    trust = TrustList(pki, URI)
+    if what == "expired":
+        found = der(expired := certificate("client", 0, days=-1))
+        put(pki, "trusted", expired)
+    elif what == "no authority":
+        put(pki, "trusted", certificate("friend", 1))
+        found = der(certificate("client", 0, ("friend", 1)))
+    elif what == "forged":
+        put(pki, "trusted", certificate("root", 1, ca=True))
+        found = der(certificate("client", 0, ("root", 2)))
+    else:
+        found = b"\x30\x03abc"
+    with pytest.raises(UntrustedError):
+        trust.check(found)
+
+
+def test_rejected_certificates_do_not_pile_up(pki: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("impactcell.opcua.trust_list.KEPT_REJECTED", 3)
+    trust = TrustList(pki, URI)
+    for _ in range(5):
+        with pytest.raises(UntrustedError):
+            trust.check(der(certificate("client", 0)))
+    assert len(list((pki / "rejected").iterdir())) == 3
+
+
+def test_first_of_chain() -> None:
+    one, two = der(certificate("one", 0)), der(certificate("two", 1))
+    assert first_of_chain(one + two) == one
+    with pytest.raises(ValueError, match="DER"):
+        first_of_chain(b"")
+
+
+def test_users_file_round_trip_and_permissions(tmp_path: Path) -> None:
+    file = tmp_path / "users.yaml"
+    anna = with_password(User("anna", Role.ENGINEER), "correct horse")
+    write_users(file, {"anna": anna, "line": User("line", Role.OBSERVER, certificate="AB")})
+    assert read_users(file)["anna"] == anna
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    assert "correct horse" not in file.read_text()
+    assert anna.password is not None
+    assert anna.password.startswith("$argon2id$")
+    assert verify(anna, "correct horse")
+    assert not verify(anna, "correct hors")
+    assert not verify(None, "")
+    assert not verify(User("x", Role.OBSERVER, "no hash"), "no hash")
+    users = Users(file)
+    assert users.by_certificate("AB") is not None
+    write_users(file, {})
+    assert users.current() == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("users: 1", "not a users file"),
+        ("- a", "not a users file"),
+        ("users: [1]", "has no name"),
+        ("users: [{name: a, role: king, password: x}]", "role is one of"),
+        ("users: [{name: a, role: observer}]", "neither password nor certificate"),
+        ("users: [{name: a, role: observer, password: 3}]", "are text"),
+        ("users: [{name: a, role: observer, password: x, admin: true}]", "does not know admin"),
+        (
+            "users: [{name: a, role: observer, password: x}, {name: a, role: observer, password: x}]",
+            "twice",
+        ),
+        ("users: [", "not YAML"),
+    ],
+)
+def test_bad_users_files(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "users.yaml"
+    file.write_text(text)
+    with pytest.raises(AccessError, match=message):
+        read_users(file)
+
+
+def test_user_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "users.yaml"
+
+    def typed(password: str) -> None:
+        monkeypatch.setattr(sys, "stdin", io.StringIO(password + "\n"))
+
+    typed("long enough")
+    access.add_user(file, "anna", "engineer")
+    assert verify(read_users(file)["anna"], "long enough")
+    typed("short")
+    with pytest.raises(AccessError, match="at least 8"):
+        access.add_user(file, "bert")
+    with pytest.raises(AccessError, match="not a role"):
+        access.add_user(file, "bert", "king")
+    own, _ = make_certificate("line", "urn:line", [])
+    path = tmp_path / "line.der"
+    path.write_bytes(der(own))
+    access.add_user(file, "line", "operator", path)
+    access.list_users(file, rights=True)
+    out = capsys.readouterr().out
+    assert "anna\tengineer\tpassword" in out
+    assert "line\toperator\tcertificate" in out
+    assert "| node | right |" in out
+    access.remove_user(file, "anna")
+    assert "anna" not in read_users(file)
+    with pytest.raises(AccessError, match="no user"):
+        access.remove_user(file, "anna")
+    with pytest.raises(AccessError, match="is not there"):
+        access.list_users(tmp_path / "none.yaml")
+
+
+def test_certificate_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pki = tmp_path / "pki"
+    access.make_certs(pki, URI, ["cell.example.org"])
+    with pytest.raises(AccessError, match="already"):
+        access.make_certs(pki, URI)
+    client = certificate("client", 0)
+    with pytest.raises(UntrustedError):
+        TrustList(pki, URI).check(der(client))
+    rejected = next((pki / "rejected").iterdir())
+    access.list_certs(pki)
+    assert "rejected" in capsys.readouterr().out
+    access.trust_cert(rejected)
+    TrustList(pki, URI).check(der(client))
+    assert not rejected.exists()
+    other = tmp_path / "other.der"
+    other.write_bytes(der(certificate("other", 1)))
+    with pytest.raises(AccessError, match="--pki"):
+        access.trust_cert(other)
+    access.trust_cert(other, pki)
+    with pytest.raises(AccessError, match="no certificate"):
+        access.trust_cert(pki / "own" / "key.pem", pki)
+    with pytest.raises(AccessError, match="is not there"):
+        access.list_certs(tmp_path / "none")

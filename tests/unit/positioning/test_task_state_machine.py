@@ -1,0 +1,202 @@
+"""The state machine of a task: what is refused, what stops it, and that nothing else can happen."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from impactcell.errors import PositioningError
+from impactcell.positioning import Limits, Tap, TapPlanner
+from impactcell.positioning.safety_limits import released
+from impactcell.positioning.task_state_machine import (
+    Cell,
+    Phase,
+    Sequence,
+    aborted,
+    begin,
+    commanded,
+    failed,
+    observed,
+)
+
+LIMITS = Limits(velocity_m_s=0.1, stroke_m=1.5e-3, travel_m=(0.0, 60e-3))
+CELL = Cell("press 3", LIMITS, resolution_m=1e-6)
+GOOD = {"target_m": 20e-3, "position_m": 2e-3, "mass_kg": 12.0, "trained": True}
+
+
+def planner() -> TapPlanner:
+    made = TapPlanner(tolerance_m=50e-6)
+    made.observe_friction(0.19, 0.004)
+    return made
+
+
+def waiting() -> tuple[Sequence, TapPlanner]:
+    made = planner()
+    return commanded(begin(Sequence(), CELL, made, **GOOD)), made
+
+
+def test_a_task_from_start_to_end() -> None:
+    made = planner()
+    sequence = begin(Sequence(), CELL, made, **GOOD)
+    assert sequence.phase is Phase.COMMANDING
+    while sequence.running:
+        assert sequence.tap is not None
+        state = sequence.published()
+        assert state.running
+        assert state.next_velocity_m_s == sequence.tap.velocity_m_s
+        sequence = commanded(sequence)
+        assert sequence.phase is Phase.WAITING
+        sequence = observed(sequence, CELL, made, sequence.position_m + sequence.tap.expected_m)
+    assert sequence.phase is Phase.SETTLED
+    assert abs(sequence.remaining_m) <= 50e-6
+    assert made.belief.taps == sequence.taps == sequence.published().taps
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"target_m": 1e-3}, "lies behind the part"),
+        ({"target_m": 61e-3}, "beyond the travel"),
+        ({"target_m": -1e-3}, "beyond the travel"),
+        ({"target_m": math.nan}, "must be a position"),
+        ({"position_m": math.nan}, "position of the part is not known"),
+        ({"mass_kg": math.nan}, "mass of the part is not known"),
+        ({"mass_kg": 0.0}, "mass of the part is not known"),
+        ({"trained": False}, "friction is not known yet"),
+        ({"mass_kg": 5000.0}, "moves a part of 5000.0 kg"),
+    ],
+)
+def test_refuses_with_the_reason(change: dict[str, float], message: str) -> None:
+    with pytest.raises(PositioningError, match=message) as refusal:
+        begin(Sequence(), CELL, planner(), **{**GOOD, **change})
+    assert str(refusal.value).startswith("press 3: ")
+
+
+def test_refuses_a_tolerance_below_the_encoder() -> None:
+    with pytest.raises(PositioningError, match="finer than the encoder"):
+        begin(Sequence(), replace(CELL, resolution_m=100e-6), planner(), **GOOD)
+
+
+def test_refuses_a_second_task() -> None:
+    sequence, made = waiting()
+    with pytest.raises(PositioningError, match="is running"):
+        begin(sequence, CELL, made, **GOOD)
+
+
+def test_in_place_already() -> None:
+    sequence = begin(Sequence(), CELL, planner(), **{**GOOD, "target_m": 2.02e-3})
+    assert sequence.phase is Phase.SETTLED
+    assert sequence.taps == 0
+
+
+def test_two_sided_goes_back() -> None:
+    made = TapPlanner(tolerance_m=50e-6, two_sided=True)
+    cell = replace(CELL, two_sided=True)
+    sequence = begin(Sequence(), cell, made, **{**GOOD, "target_m": 10e-3, "position_m": 20e-3})
+    assert sequence.tap is not None
+    assert sequence.tap.direction == -1
+
+
+def test_a_tap_that_moved_nothing_stops_with_an_alarm() -> None:
+    sequence, made = waiting()
+    stopped = observed(sequence, CELL, made, sequence.position_m)
+    assert stopped.phase is Phase.FAULTED
+    assert "moved nothing" in stopped.reason
+    assert stopped.evidence is not None
+    assert stopped.tap is None
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_displacement_outside_its_band_stops_with_evidence(side: float) -> None:
+    sequence, made = waiting()
+    tap = sequence.tap
+    assert tap is not None
+    moved = tap.highest_m * 1.05 if side > 0.0 else tap.lowest_m * 0.95
+    stopped = observed(sequence, CELL, made, sequence.position_m + moved)
+    assert stopped.phase is Phase.FAULTED
+    assert "outside the 99.9 % band" in stopped.reason
+    assert stopped.evidence is not None
+    assert stopped.evidence.threshold == pytest.approx(3.29)
+    assert stopped.evidence.size == pytest.approx(moved - tap.expected_m)
+    inside = observed(sequence, CELL, made, sequence.position_m + 0.999 * tap.expected_m)
+    assert inside.phase in {Phase.COMMANDING, Phase.SETTLED}
+
+
+def test_a_lost_link_and_an_abort_at_any_moment() -> None:
+    sequence, made = waiting()
+    commanding = begin(Sequence(), CELL, made, **GOOD)
+    for running in (sequence, commanding):
+        lost = failed(running, "press 3: link lost")
+        assert lost.phase is Phase.FAULTED
+        assert lost.reason == "press 3: link lost"
+        stopped = aborted(running, "operator")
+        assert stopped.phase is Phase.IDLE
+        assert stopped.tap is None
+        assert begin(stopped, CELL, made, **GOOD).phase is Phase.COMMANDING
+        assert begin(lost, CELL, made, **GOOD).phase is Phase.COMMANDING
+    assert observed(aborted(sequence, "PLC"), CELL, made, 9e-3).phase is Phase.IDLE  # a late answer
+
+
+def test_no_position_is_a_fault() -> None:
+    sequence, made = waiting()
+    assert observed(sequence, CELL, made, math.nan).phase is Phase.FAULTED
+
+
+@pytest.mark.parametrize(
+    ("tap", "force", "message"),
+    [
+        (Tap(0.11, 1e-3), 10.0, "0.11 m/s is not allowed"),
+        (Tap(0.05, 1.6e-3), 10.0, "stroke of 1.6 mm"),
+        (Tap(0.05, math.nan), 10.0, "stroke"),
+        (Tap(math.nan, 1e-3), 10.0, "not allowed"),
+        (Tap(0.05, 1e-3, direction=0), 10.0, "direction"),
+        (Tap(0.05, 1e-3, highest_m=20e-3), 300.0, "300 N"),
+        (Tap(0.05, 1e-3, highest_m=20e-3), math.nan, "not allowed"),
+        (Tap(0.05, 1e-3, highest_m=41e-3), 10.0, "61.000 mm"),
+        (Tap(0.05, 1e-3, direction=-1, highest_m=21e-3), 10.0, "-1.000 mm"),
+    ],
+)
+def test_limits_are_the_last_gate(tap: Tap, force: float, message: str) -> None:
+    with pytest.raises(PositioningError, match=message):
+        released(tap, replace(LIMITS, force_n=200.0), 20e-3, force, "press 3")
+
+
+EVENTS = st.lists(
+    st.one_of(
+        st.sampled_from(["begin", "commanded", "failed", "aborted", "nothing", "nan"]),
+        st.floats(0.0, 3.0),
+    ),
+    max_size=12,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(EVENTS)
+def test_any_course_of_events_keeps_the_invariants(events: list[str | float]) -> None:
+    made, sequence = planner(), Sequence()
+    for event in events:
+        before = sequence
+        if event == "begin":
+            try:
+                sequence = begin(sequence, CELL, made, **GOOD)
+            except PositioningError:
+                assert sequence == before
+        elif event == "commanded":
+            sequence = commanded(sequence)
+        elif event == "failed":
+            sequence = failed(sequence, "gone")
+        elif event == "aborted":
+            sequence = aborted(sequence, "operator")
+        else:
+            share = {"nothing": 0.0, "nan": math.nan}.get(event, event) if isinstance(event, str) else event
+            reach = sequence.tap.expected_m if sequence.tap else 0.0
+            sequence = observed(sequence, CELL, made, sequence.position_m + share * reach)
+        assert sequence.running == (sequence.tap is not None)
+        assert sequence.running or sequence.phase is Phase.IDLE or sequence.reason
+        if sequence.tap is not None:
+            assert sequence.tap.velocity_m_s <= LIMITS.velocity_m_s
+            assert sequence.tap.stroke_m <= LIMITS.stroke_m
+        if sequence.phase is Phase.WAITING and before.phase is not Phase.WAITING:
+            assert event == "commanded"

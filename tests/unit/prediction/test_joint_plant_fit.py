@@ -1,0 +1,69 @@
+"""The plant of a campaign: found from the simulator's taps, with and without a law that the model lacks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from impactcell.errors import PredictionError
+from impactcell.prediction.joint_plant_fit import contact_constants, fit_plant, weigh
+from impactcell.prediction.slide_features import slide
+from impactcell.records import Capture
+from tests.taps import Tap
+
+DRAG = {"quadratic_drag": {"drag_coefficient_n_s2_per_m2": 45.0}}
+
+
+def campaign(seed: int, effects: dict[str, dict[str, float]]) -> list[Capture]:
+    rng = np.random.default_rng(seed)
+    taps = [
+        Tap(
+            velocity / 6e4, 0.21 * (1 + 0.012 * rng.normal()), 0.8, mass, 1.5e-3, sign,
+            stiffness=7.1e5, damping=520.0, effects=effects,
+        )
+        for velocity in (2000, 3000, 4500, 6000)
+        for mass in (18.9, 25.2)
+        for sign in (1, -1)
+    ]  # fmt: skip
+    return [tap.capture(rng, cycle=number) for number, tap in enumerate(taps, 1)]
+
+
+def test_the_plant_is_found_within_its_error() -> None:
+    found = fit_plant(campaign(1, {}), 9.81)
+    plant, prior = found.model.plant, found.model.prior
+    assert found.used == tuple(range(1, 17))
+    assert 0.95 < found.gap < 1.05
+    assert abs(plant.stiffness_n_per_m - 7.1e5) < 4.0 * prior.stiffness_std_n_per_m
+    assert abs(plant.damping_n_s_per_m - 520.0) < 4.0 * prior.damping_std_n_s_per_m
+    assert abs(found.model.ratio - 0.8) < 4.0 * prior.ratio_std
+    assert prior.stiffness_std_n_per_m < 1e-3 * plant.stiffness_n_per_m
+    assert plant.effects == {}
+
+
+def test_a_law_that_the_model_lacks_bends_it_little_and_is_seen() -> None:
+    found = fit_plant(campaign(2, DRAG), 9.81)
+    assert found.gap > 1.5
+    assert found.model.plant.stiffness_n_per_m == pytest.approx(7.1e5, rel=3e-3)
+    assert found.model.plant.damping_n_s_per_m == pytest.approx(520.0, rel=0.02)
+    assert found.model.ratio == pytest.approx(0.8, rel=0.15)
+    assert abs(found.model.ratio - 0.8) < 2.5 * found.model.prior.ratio_std
+
+
+def test_contact_constants_and_mass_need_no_law_of_friction() -> None:
+    for effects in ({}, DRAG):
+        for capture in campaign(3, effects)[4:]:
+            read = slide(capture)
+            stiffness, damping = contact_constants(capture, read)
+            assert stiffness == pytest.approx(7.1e5, rel=0.01)
+            assert damping == pytest.approx(520.0, rel=0.05)
+            assert weigh(capture, read) == pytest.approx(capture.mass_kg, rel=0.03)
+
+
+def test_bad_shots_are_left_out_and_a_campaign_of_them_is_refused() -> None:
+    captures = campaign(4, {})
+    captures[2] = replace(captures[2], position=None)
+    assert 3 not in fit_plant(captures, 9.81).used
+    with pytest.raises(PredictionError, match="no tap of the campaign can be used; shot 3: no position"):
+        fit_plant([captures[2]], 9.81)
+    with pytest.raises(PredictionError, match="there is none"):
+        fit_plant([], 9.81)

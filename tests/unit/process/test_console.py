@@ -1,0 +1,62 @@
+"""`-q` silences what is said beside a result, and never the result."""
+
+import logging
+from pathlib import Path
+
+import pytest
+
+from impactcell.cli import discrepancy as command
+from impactcell.cli.app import app
+from impactcell.journal.store import Journal
+from impactcell.process.console import note
+from tests.snapshots import make_capture, make_snapshot
+
+PKG = logging.getLogger("impactcell")
+
+
+@pytest.fixture(autouse=True)
+def level() -> None:
+    """Start as `main` does."""
+    PKG.setLevel(logging.INFO)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    app(list(arguments), standalone_mode=False)
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("options", "said"), [((), "1 shots in "), (("-v",), "1 shots in "), (("-q",), "")])
+def test_export(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], said: str
+) -> None:
+    with Journal(tmp_path / "j", "press-1") as journal:
+        capture = make_capture(1)
+        journal.append(capture, make_snapshot(capture), b"state")
+    out = run(capsys, "export", str(tmp_path / "j"), "-o", str(tmp_path / "c"), *options)
+    assert out[: len(said)] == said
+    assert bool(out) == bool(said)
+    assert (tmp_path / "c" / "shots.csv").exists()
+
+
+@pytest.mark.parametrize(("options", "said"), [((), "Missing: x\nout/report.html\n"), (("-q",), "")])
+def test_discrepancy(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    options: tuple[str, ...],
+    said: str,
+) -> None:
+    for name, made in (("_read", ("name", None)), ("investigate", None), ("_write", None)):
+        monkeypatch.setattr(command, name, lambda *_, made=made, **__: made)
+    monkeypatch.setattr(command, "sentence", lambda _: "Missing: x")
+    assert run(capsys, "discrepancy", "shots", "-o", "out", *options) == said
+
+
+@pytest.mark.parametrize(("level", "said"), [(logging.INFO, "2 left out\n"), (logging.ERROR, "")])
+def test_a_note_is_no_error(capsys: pytest.CaptureFixture[str], level: int, said: str) -> None:
+    PKG.setLevel(level)
+    note("2 left out")
+    assert capsys.readouterr() == ("", said)
+
+
+def test_a_result_is_written_whatever_the_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, "schema", "-q").startswith("{")

@@ -1,0 +1,159 @@
+"""The YAML reader: scalars as in YAML 1.2, positions, and faults told all at once."""
+
+import contextlib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel, ConfigDict, Field
+
+from impactcell.errors import SettingsError
+from impactcell.settings.yaml_loader import load, read
+
+
+class Part(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    mass_kg: float = Field(gt=0)
+    name: str = "part"
+
+
+class Round(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    kind: Literal["round"]
+    radius_m: float
+
+
+class Square(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    kind: Literal["square"]
+    edge_m: float
+
+
+class Cell(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    part: Part
+    spares: dict[str, Part] = {}
+    shapes: list[Annotated[Round | Square, Field(discriminator="kind")]] = []
+    retries: int | None = None
+
+
+def write(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "cell.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def faults(tmp_path: Path, text: str) -> list[str]:
+    path = write(tmp_path, text)
+    with pytest.raises(SettingsError) as caught:
+        read(path, Cell)
+    return [line.removeprefix(f"{path}:") for line in str(caught.value).splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e-6", 1e-6),
+        ("1.5E3", 1500.0),
+        (".5", 0.5),
+        ("-.inf", float("-inf")),
+        ("010", 10),
+        ("0x1F", 31),
+        ("1_000", "1_000"),
+        ("1:30", "1:30"),
+        ("on", "on"),
+        ("no", "no"),
+        ("true", True),
+        ("~", None),
+        ("", None),
+        ("2026-01-01", "2026-01-01"),
+        ("'5'", "5"),
+    ],
+)
+def test_scalars_are_those_of_the_core_schema(tmp_path: Path, text: str, value: object) -> None:
+    data, _ = load(write(tmp_path, f"key: {text}\n"))
+    assert data == {"key": value}
+
+
+def test_every_fault_is_told_at_once_with_its_place(tmp_path: Path) -> None:
+    text = "part:\n  mas_kg: 3\n  name: [1]\nspares:\n  a: {mass_kg: -1}\nretrys: 2\nretries: x\n"
+    assert faults(tmp_path, text) == [
+        "1:1: 'part.mass_kg' is missing",
+        "2:3: unknown key 'part.mas_kg'; did you mean 'mass_kg'?",
+        "3:9: part.name: should be a valid string",
+        "5:16: spares.a.mass_kg: should be greater than 0, not -1",
+        "6:1: unknown key 'retrys'; did you mean 'retries'?",
+        "7:10: retries: should be a valid integer, unable to parse string as an integer, not 'x'",
+    ]
+
+
+def test_members_of_a_discriminated_union_are_found(tmp_path: Path) -> None:
+    text = "part: {mass_kg: 1}\nshapes:\n  - {kind: round, radius_m: 1, radiusm: 2}\n  - kind: hexagon\n"
+    first, second = faults(tmp_path, text)
+    assert first.startswith("3:32: unknown key")
+    assert "radius_m" in first
+    assert second.startswith("4:5: shapes[1]: ")
+    assert "hexagon" in second
+
+
+def test_an_unknown_key_without_a_near_one_lists_what_is_allowed(tmp_path: Path) -> None:
+    assert faults(tmp_path, "part: {mass_kg: 1, qqq: 1}\n") == [
+        "1:20: unknown key 'part.qqq'; allowed here: mass_kg, name"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "1:1: the file is empty"),
+        ("# only a comment\n", "1:1: the file is empty"),
+        ("a: 1\na: 2\n", "2:1: key 'a' is given twice"),
+        ("a: [1\n", "2:1:"),
+        ("a: 1\n---\nb: 2\n", "2:1:"),
+        ("a: &x [*x]\n", "1:4: this part of the file contains itself"),
+        ("a: !!python/object:os.system {}\n", "1:4:"),
+        ("? [1, 2]\n: 3\n", "1:3: a key must be plain text or a number"),
+        ("a: \x07\n", "1:4: a character YAML does not allow"),
+        ("- 1\n", "1:1: should be a valid dictionary"),
+        ("a: *nobody\n", "1:4:"),
+    ],
+)
+def test_bad_files_are_refused_with_a_place(tmp_path: Path, text: str, message: str) -> None:
+    assert faults(tmp_path, text)[0].startswith(message)
+
+
+def test_a_missing_file_a_directory_and_bytes_are_named(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"nowhere\.yaml: cannot be read: No such file"):
+        load(tmp_path / "nowhere.yaml")
+    with pytest.raises(SettingsError, match="cannot be read: Is a directory"):
+        load(tmp_path)
+    (tmp_path / "b.yaml").write_bytes(b"a: \xff\n")
+    with pytest.raises(SettingsError, match="is not UTF-8 text"):
+        load(tmp_path / "b.yaml")
+
+
+def test_a_file_of_nested_aliases_is_refused(tmp_path: Path) -> None:
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
+    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 9)]
+    with pytest.raises(SettingsError, match="aliases describe more than"):
+        load(write(tmp_path, "\n".join(lines)))
+
+
+def test_merged_keys_keep_the_place_they_come_from(tmp_path: Path) -> None:
+    text = "spares:\n  a: &a {mass_kg: 0}\n  b:\n    <<: *a\n    name: b\npart: {mass_kg: 1}\n"
+    assert faults(tmp_path, text) == [
+        "2:19: spares.a.mass_kg: should be greater than 0, not 0",
+        "2:19: spares.b.mass_kg: should be greater than 0, not 0",
+    ]
+
+
+@given(st.text(max_size=200))
+def test_no_text_gives_anything_but_data_or_a_settings_error(
+    tmp_path_factory: pytest.TempPathFactory, text: str
+) -> None:
+    path = tmp_path_factory.mktemp("any") / "any.yaml"
+    path.write_text(text, encoding="utf-8", errors="replace")
+    with contextlib.suppress(SettingsError):
+        read(path, Cell)

@@ -1,0 +1,75 @@
+"""Declared standard deviations that tell all, part or nothing of the spread; the spread is drawn here."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from impactcell.tracking.wear_batch import declared_std_calibration as beliefs
+from impactcell.tracking.wear_batch import noise_scale as noises
+from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
+from impactcell.tracking.wear_batch.state import Reading, TrackerState, initial_state
+from impactcell.tracking.wear_batch.tracker import track
+
+DECLARED = np.array([0.0018, 0.0023, 0.0056, 0.0061])  # as of a waveform fit at four velocities
+SPREADS = {
+    "all of it": DECLARED,
+    "nothing": np.full(4, 0.0028),
+    "a quarter, beside what all share": np.sqrt(0.002**2 + 0.25 * DECLARED**2),
+}
+CYCLES = 300
+
+
+def followed(spread: np.ndarray, seed: int, knowledge: BatchKnowledge) -> tuple[TrackerState, int]:
+    """State after a stream that neither wears nor changes, and the shifts found in it."""
+    state, draw, shifts = initial_state(), np.random.default_rng(seed), 0
+    for cycle in range(1, CYCLES + 1):
+        value = 0.2 + spread[cycle % 4] * draw.standard_normal()
+        reading = Reading(cycle, value, float(DECLARED[cycle % 4]), cycle * 10**9, "A")
+        tracked = track(TrackerSettings(batch=knowledge), state, reading)
+        state, shifts = tracked.state, shifts + (tracked.shift is not None)
+    return state, shifts
+
+
+@pytest.mark.parametrize("knowledge", BatchKnowledge)
+@pytest.mark.parametrize("spread", SPREADS.values(), ids=SPREADS)
+def test_the_variance_is_that_of_the_estimates_and_no_shift_is_invented(spread, knowledge):
+    ratios, shifts = [], 0
+    for seed in range(8):
+        state, found = followed(spread, seed, knowledge)
+        shifts += found
+        ratios.append([noises.variance(state.noise, std) for std in DECLARED] / spread**2)
+    # of 300 squared differences, whose mean scatters by 10 %, and of exponents a quarter apart
+    assert np.mean(ratios, axis=0) == pytest.approx(1.0, rel=0.25)
+    assert shifts == 0  # 10 (known) and 9 (unknown) of "nothing" where what is declared is believed
+
+
+def test_velocities_that_change_late_change_the_belief_late():
+    """For 600 cycles all declare the same, which says nothing; then it turns out to be no guide."""
+    noise, draw = noises.Noise(), np.random.default_rng(2)
+    for cycle in range(1200):
+        std = float(DECLARED[cycle % 4]) if cycle >= 600 else float(DECLARED[2])
+        noise, _ = noises.take(noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False)
+        if cycle == 599:
+            assert np.exp(noise.belief[:, beliefs.WEIGHT]) == pytest.approx(beliefs.PRIOR)
+    used = [noises.variance(noise, std) for std in DECLARED]
+    assert used == pytest.approx([0.0028**2] * 4, rel=0.3)
+
+
+@given(
+    differences=st.lists(st.floats(0.0, 1e12), max_size=20),
+    ratios=st.lists(st.floats(1e-6, 1e6), min_size=20, max_size=20),
+    std=st.floats(1e-9, 10.0),
+)
+def test_a_belief_stays_one_and_leaves_the_usual_estimate_alone(differences, ratios, std):
+    belief = beliefs.unknown()
+    for place, (squared, ratio) in enumerate(zip(differences, ratios, strict=False)):
+        belief = beliefs.learned(belief, squared, ratio * std, std, std, place + 1.0)
+    assert math.fsum(np.exp(belief[:, beliefs.WEIGHT])) == pytest.approx(1.0)
+    assert np.all(belief[:, beliefs.SCALE] > 0.0)
+    assert beliefs.spread(belief, std, std) == std
+    wide = [beliefs.spread(belief, factor * std, std) for factor in (0.5, 0.9, 1.1, 2.0, 5.0, 10.0)]
+    assert wide == sorted(wide)
+    assert wide[-1] == pytest.approx(2.0 * wide[-2])  # far off: in proportion

@@ -1,0 +1,45 @@
+"""The place of a cycle in time, whatever order cycles come in."""
+
+from dataclasses import replace
+
+from impactcell.tracking.wear_batch.input_validation import Clock, place
+
+LIMIT = 64
+
+
+def come(cycles):
+    """Places of cycles that come in this order, a second apart."""
+    clock, places = Clock(), []
+    for cycle in cycles:
+        clock, where = place(clock, cycle, 10**18 + cycle * 10**9, LIMIT)
+        places.append(where)
+    return clock, places
+
+
+def test_missing_late_and_repeated_cycles():
+    clock, places = come([10, 11, 14, 12, 14, 12, 15])
+    assert [(p.passed, p.lag, p.repeated) for p in places] == [
+        (0, 0, False),
+        (1, 0, False),
+        (3, 0, False),
+        (0, 2, False),
+        (0, 0, True),
+        (0, 0, True),
+        (1, 0, False),
+    ]
+    assert clock.period_s == 1.0
+
+
+def test_numbers_that_restart_go_on_one_cycle_later():
+    clock, places = come([500, 501, 3, 4, 501])
+    assert [(p.index, p.passed) for p in places] == [(500, 0), (501, 1), (502, 1), (503, 1), (1000, 497)]
+    assert places[2].note == "cycle numbers restarted at 3; the clock went back by 498 s"
+    assert clock.number(clock.last) == 501
+
+
+def test_the_last_cycle_that_was_used_is_known_to_have_come_however_many_were_of_no_use_since():
+    clock, _ = come([100])
+    for cycle in range(101, 200):
+        clock = replace(place(clock, cycle, 0, LIMIT)[0], last=100)
+    _, where = place(clock, 100, 10**18 + 10**12, LIMIT)
+    assert where.repeated

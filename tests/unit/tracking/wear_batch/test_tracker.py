@@ -1,0 +1,301 @@
+"""One cycle after another: bad readings, missing and late cycles, announced batches, exact replay."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from impactcell.records import Quality
+from impactcell.serialization import json_text
+from impactcell.tracking import (
+    BatchKnowledge,
+    Reading,
+    TrackerSettings,
+    TrackerState,
+    initial_state,
+    reset_wear,
+    track,
+)
+
+KNOWN = TrackerSettings(wear_limit=0.25)
+UNKNOWN = TrackerSettings(wear_limit=0.25, batch=BatchKnowledge.UNKNOWN)
+STD = 0.002
+SECOND = 1_000_000_000
+
+
+def series(n, seed=0, slope=1e-6, step=0.0, at=0, batch=None):
+    mu = 0.2 + STD * np.random.default_rng(seed).normal(size=n) + slope * np.arange(n)
+    mu[at:] += step * STD
+    return [Reading(i, float(m), STD, (i + 1) * SECOND, batch) for i, m in enumerate(mu)]
+
+
+def run(config, readings, state=None):
+    state, outcomes = state or initial_state(), []
+    for reading in readings:
+        outcomes.append(track(config, state, reading))
+        state = outcomes[-1].state
+    return outcomes
+
+
+def finite(tracked):
+    wear, batch = tracked.wear, tracked.batch
+    figures = (wear.level, wear.level_std, wear.rate_per_cycle, wear.rate_std, batch.offset, batch.offset_std)
+    return all(map(math.isfinite, figures))
+
+
+def the_shift(readings, outcomes):
+    """The cycle of the only shift that was reported, and its evidence."""
+    found = [(r.cycle, o.shift) for r, o in zip(readings, outcomes, strict=True) if o.shift]
+    assert len(found) == 1
+    cycle, evidence = found[0]
+    assert evidence.statistic > evidence.threshold
+    return cycle, evidence
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_a_shift_is_found_with_cycle_size_and_rate(config):
+    readings = series(400, step=3.0, at=250)
+    if config is KNOWN:
+        readings = [replace(r, batch_id="A" if r.cycle < 250 else "B") for r in readings]
+    outcomes = run(config, readings)
+    cycle, evidence = the_shift(readings, outcomes)
+    assert 250 <= cycle <= 258
+    assert evidence.false_alarm_cycles == 100_000.0
+    assert evidence.false_alarm_days == pytest.approx(100_000.0 / 86_400.0, rel=1e-3)
+    last = outcomes[-1]
+    assert abs(last.batch.last_shift_cycle - 250) <= 2
+    assert abs(last.batch.last_shift - 3.0 * STD) < 3.0 * last.batch.last_shift_std
+    assert abs(last.wear.rate_per_cycle - 1e-6) < 3.0 * last.wear.rate_std
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+@pytest.mark.parametrize(
+    ("bad", "why"),
+    [
+        ({"mu_s": math.nan}, "missing"),
+        ({"mu_s": math.inf}, "infinite"),
+        ({"mu_s": -math.inf}, "infinite"),
+        ({"mu_s": -0.1}, "outside"),
+        ({"mu_s": 1e300}, "outside"),
+        ({"mu_s_std": 0.0}, "zero"),
+        ({"mu_s_std": -1.0}, "standard deviation"),
+        ({"mu_s_std": math.inf}, "standard deviation"),
+        ({"cycle": 49}, "came twice"),
+    ],
+)
+def test_a_bad_reading_is_reported_and_the_next_is_used(config, bad, why):
+    readings = series(60, batch="A")
+    before = run(config, readings[:50])[-1]
+    odd = track(config, before.state, replace(readings[50], **bad))
+    assert why in odd.wear.reason
+    assert odd.wear.quality is Quality.UNCERTAIN
+    assert finite(odd)
+    after = track(config, odd.state, readings[51])
+    assert after.used
+    assert after.wear.quality is Quality.GOOD
+    assert finite(after)
+    if not odd.used:
+        assert odd.wear.level == before.wear.level
+
+
+def test_it_says_when_no_change_would_be_reported_yet():
+    outcomes = run(UNKNOWN, series(40, step=8.0, at=5))
+    said = ["still being learned" in o.batch.reason for o in outcomes]
+    assert said[0]
+    assert all(o.batch.quality is Quality.UNCERTAIN for o, s in zip(outcomes, said, strict=True) if s)
+    assert not any(o.shift for o, s in zip(outcomes, said, strict=True) if s)
+    # a change in the very first cycles is found as soon as one may be
+    (found,) = [o.shift for o in outcomes if o.shift]
+    assert found.change_cycle == 5
+    assert not said[-1]
+
+
+def test_nothing_usable_at_all():
+    outcomes = run(UNKNOWN, [Reading(i, math.nan, math.nan) for i in range(5)])
+    assert outcomes[-1].wear.quality is Quality.BAD
+    assert outcomes[-1].batch.quality is Quality.BAD
+    assert "missing" in outcomes[-1].wear.reason
+    assert run(UNKNOWN, series(30), outcomes[-1].state)[-1].used
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_a_thousand_identical_values_are_a_stuck_sensor(config):
+    readings = series(100, batch="A")
+    stuck = [Reading(100 + i, readings[-1].mu_s, STD, 0, "A") for i in range(1000)]
+    outcomes = run(config, [*readings, *stuck])
+    assert not any(o.shift for o in outcomes)
+    assert "same 1001 times" in outcomes[-1].wear.reason
+    assert finite(outcomes[-1])
+    good = track(config, outcomes[-1].state, Reading(1100, 0.2011, STD, 0, "A"))
+    assert good.used
+    assert good.wear.quality is Quality.GOOD
+    fresh = run(config, [Reading(i, 0.2, STD, 0, "A") for i in range(1000)])
+    assert finite(fresh[-1])
+
+
+def test_a_batch_id_that_flips_every_cycle():
+    two = [replace(r, batch_id="AB"[r.cycle % 2]) for r in series(300)]
+    new = [replace(r, batch_id=f"B{r.cycle}") for r in series(300)]
+    for readings in (two, new):
+        outcomes = run(KNOWN, readings)
+        assert finite(outcomes[-1])
+        assert "too often" in outcomes[-1].wear.reason
+        assert not any(o.shift for o in outcomes)
+    settled = run(KNOWN, [Reading(300 + i, 0.2, STD, 0, "Z") for i in range(3)], outcomes[-1].state)
+    assert settled[-1].used
+
+
+def test_the_clock_may_go_back():
+    readings = series(60)
+    readings[40] = replace(readings[40], time_ns=readings[10].time_ns)
+    outcomes = run(UNKNOWN, readings)
+    assert "clock went back by 29 s" in outcomes[40].wear.reason
+    assert outcomes[40].used
+    assert outcomes[-1].state.clock.period_s == pytest.approx(1.0, rel=0.2)
+
+
+def test_cycle_numbers_may_restart():
+    readings = series(300)
+    restarted = [replace(r, cycle=r.cycle - 200) if r.cycle >= 200 else r for r in readings]
+    outcomes = run(UNKNOWN, restarted)
+    assert "restarted at 0" in outcomes[200].wear.reason
+    plain = run(UNKNOWN, readings)
+    assert outcomes[-1].wear.rate_per_cycle == plain[-1].wear.rate_per_cycle
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_missing_cycles_count_as_wear(config):
+    readings = [r for r in series(800, slope=2e-5, batch="A") if r.cycle % 3 == 0]
+    last = run(config, readings)[-1]
+    assert abs(last.wear.rate_per_cycle - 2e-5) < 3.0 * last.wear.rate_std
+    assert abs(last.wear.level - (0.2 + 2e-5 * 798)) < 3.5 * last.wear.level_std
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_late_cycles_hardly_change_the_outcome(config):
+    readings = series(200, batch="A")
+    late = [*readings[:120], *readings[125:140], *readings[120:125], *readings[140:]]
+    ours, plain = run(config, late), run(config, readings)
+    assert "came 19 cycles late" in ours[135].wear.reason
+    assert ours[135].used
+    assert ours[-1].wear.level == pytest.approx(plain[-1].wear.level, abs=0.3 * plain[-1].wear.level_std)
+    assert ours[-1].wear.rate_std == pytest.approx(plain[-1].wear.rate_std, rel=0.05)
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_an_expected_change_is_silent_and_rebaselines(config):
+    readings = series(300, step=5.0, at=150, batch="A")
+    readings = [replace(r, batch_id="B") if r.cycle >= 150 else r for r in readings]
+    readings[150] = replace(readings[150], expected_change=True)
+    outcomes = run(config, readings)
+    assert not any(o.shift for o in outcomes)
+    assert [i for i, o in enumerate(outcomes) if o.expected] == [150]
+    last = outcomes[-1]
+    assert abs(last.batch.offset - 5.0 * STD) < 3.0 * last.batch.offset_std
+    assert last.wear.probability_above_limit < 1e-6
+
+
+def test_ids_may_come_late_and_go_away():
+    readings = series(300)
+    readings = [replace(r, batch_id="A") if 100 <= r.cycle < 200 else r for r in readings]
+    outcomes = run(KNOWN, readings)
+    assert all(o.used and finite(o) for o in outcomes)
+    assert not any(o.shift for o in outcomes)
+
+
+@pytest.mark.parametrize("step", [0.0, 4.0], ids=["no change", "a change"])
+def test_cycles_without_an_id_still_wear(step):
+    readings = series(500, slope=4e-5, step=step, at=330, batch="A")
+    readings = [replace(r, batch_id=None) if 300 <= r.cycle < 380 else r for r in readings]
+    outcomes = run(KNOWN, readings)
+    assert sum(o.shift is not None for o in outcomes) == (step > 0.0)
+    back = outcomes[380].wear
+    total = outcomes[380].batch.offset + back.level
+    assert abs(total - (0.2 + step * STD + 4e-5 * 380)) < 4.0 * back.level_std
+    assert abs(outcomes[-1].wear.rate_per_cycle - 4e-5) < 3.0 * outcomes[-1].wear.rate_std
+
+
+def test_a_known_batch_that_comes_back_is_recognised():
+    readings = [replace(r, batch_id="ABA"[min(r.cycle // 200, 2)]) for r in series(600)]
+    readings = [replace(r, mu_s=r.mu_s + 4.0 * STD) if r.batch_id == "B" else r for r in readings]
+    last = run(KNOWN, readings)[-1]
+    assert (last.batch.batch_id, last.batch.offset, last.batch.offset_std) == ("A", 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["A", "B"], ids=["in the first batch", "in a later one"])
+def test_a_change_within_a_known_batch_is_found_and_is_no_wear(name):
+    readings = [replace(r, batch_id="A" if r.cycle < 200 else name) for r in series(700, slope=2e-6)]
+    readings = [replace(r, mu_s=r.mu_s + 3.0 * STD) if r.cycle >= 450 else r for r in readings]
+    outcomes = run(KNOWN, readings)
+    cycle, _ = the_shift(readings, outcomes)
+    assert 450 <= cycle <= 460
+    last = outcomes[-1]
+    assert abs(last.batch.last_shift_cycle - 450) <= 2
+    assert abs(last.batch.offset - 3.0 * STD) < 3.0 * last.batch.offset_std + 0.5 * STD
+    assert last.batch.batch_id == name
+    # level and rate are those of the first batch, before and after
+    assert abs(last.wear.level - (0.2 + 2e-6 * 699)) < 3.5 * last.wear.level_std
+    assert abs(last.wear.rate_per_cycle - 2e-6) < 3.0 * last.wear.rate_std
+    after = [Reading(700 + i, 0.2 + 2e-6 * (700 + i), STD, 0, "C") for i in range(50)]
+    assert all(finite(o) and o.used for o in run(KNOWN, after[:4], last.state))
+
+
+def test_wear_reset_starts_a_new_reference():
+    last = run(UNKNOWN, series(200, slope=1e-5))[-1]
+    fresh = track(UNKNOWN, reset_wear(last.state), Reading(200, 0.15, STD, 300 * SECOND))
+    assert fresh.wear.level == pytest.approx(0.15)
+    assert fresh.state.noise.factor == last.state.noise.factor or fresh.used
+
+
+@pytest.mark.parametrize("declared", [math.nan, STD, STD / 30.0], ids=["none", "right", "far too small"])
+def test_the_scale_of_the_noise_is_learned(declared):
+    readings = [replace(r, mu_s_std=declared) for r in series(600, seed=3)]
+    outcomes = run(UNKNOWN, readings)
+    assert not any(o.shift for o in outcomes)
+    state = outcomes[-1].state
+    assert state.noise.factor * state.noise.usual_std**2 == pytest.approx(STD**2, rel=0.25)
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_a_restored_state_replays_to_the_same_bits(config):
+    readings = series(700, step=3.0, at=350, batch="A")
+    straight = run(config, readings)
+    state = initial_state()
+    for reading in readings:
+        data = json_text.dumps(state)
+        state = track(config, json_text.loads(TrackerState, data), reading).state
+    assert json_text.dumps(state) == json_text.dumps(straight[-1].state)
+
+
+def test_the_input_state_is_not_written_to():
+    before = run(UNKNOWN, series(120))[-1].state
+    data = json_text.dumps(before)
+    run(UNKNOWN, [Reading(120 + i, 0.25, STD) for i in range(20)], before)
+    assert json_text.dumps(before) == data
+
+
+readings_of_any_kind = st.builds(
+    Reading,
+    cycle=st.integers(0, 60),
+    mu_s=st.one_of(st.floats(), st.floats(0.1, 0.3)),
+    mu_s_std=st.one_of(st.floats(), st.floats(1e-4, 1e-2)),
+    time_ns=st.integers(0, 2**62),
+    batch_id=st.sampled_from([None, "A", "B", ""]),
+    expected_change=st.booleans(),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(readings_of_any_kind, max_size=25), st.sampled_from([KNOWN, UNKNOWN]))
+def test_no_readings_whatever_break_the_state(readings, config):
+    state = initial_state()
+    for reading in readings:
+        tracked = track(config, state, reading)
+        state = tracked.state
+        assert np.isfinite(state.bank[:, 1:]).all()
+        assert tracked.wear.quality is Quality.BAD or finite(tracked)
+        assert tracked.used or tracked.wear.reason
+    assert json_text.dumps(json_text.loads(TrackerState, json_text.dumps(state))) == json_text.dumps(state)
