@@ -1,0 +1,263 @@
+"""What a journal holds, in plain words: to be compared with what the code that wrote it said."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from impactcell.journal.history import Question
+from impactcell.journal.store import Journal
+from impactcell.records import Alarm
+from impactcell.serialization.message_pack import unpack
+from impactcell.service.worker import Durable
+
+
+def stored(journal: Journal) -> Durable:
+    """The state as it is stored."""
+    return unpack(Durable, journal.state() or b"")
+
+
+def described(durable: Durable, journal: Journal) -> dict[str, Any]:
+    """All that an installed cell has learned and been told; floats exactly, as `float.hex`."""
+    assert durable.snapshot is not None
+    assert durable.belief is not None
+    position = journal.position()
+    assert position is not None
+    return {
+        "last durable cycle": {"session": position.session, "cycle": position.cycle},
+        "cycles": journal.count(),
+        "captures": sum(1 for _ in journal.captures()),
+        "cycle": _cycle(durable),
+        "wear and batch": _wear_and_batch(durable),
+        "signature": _signature(durable),
+        "model gap": _model_gap(durable),
+        "alarms": _alarms(durable),
+        "planner": _planner(durable),
+        "last snapshot": _snapshot(durable),
+        "transitions of alarms": [_alarm(alarm) for alarm in journal.alarms(Question()).entries],
+        "audit": [
+            {"time_ns": e.time_ns, "user": e.user, "action": e.action, "with": e.arguments, "came": e.result}
+            for e in journal.audit()
+        ],
+    }
+
+
+def _cycle(durable: Durable) -> dict[str, Any]:
+    state = durable.state
+    person = state.batch.by_person
+    assert person is not None
+    return {
+        "number": state.cycle,
+        "time_ns": state.time_ns,
+        "period_s": state.period_s.hex(),
+        "batch named by the module": state.batch.by_module,
+        "batch named by a person": {
+            "id": person.batch_id,
+            "while the module says": person.module_said,
+            "expected": person.expected,
+        },
+        "announcement seen": state.batch.announcement_seen,
+        "signature grid": {"length_m": state.grid[0].hex(), "points": state.grid[1]},
+    }
+
+
+def _wear_and_batch(durable: Durable) -> dict[str, Any]:
+    state = durable.state.tracker
+    known, shift = state.filter, state.shift
+    assert known is not None
+    assert shift is not None
+    return {
+        "known batches": list(known.batches),
+        "present batch": known.current,
+        "level, rate and offsets": _floats(known.mean),
+        "their covariance": _floats(known.covariance),
+        "run-length hypotheses": {"shape": list(state.bank.shape), "numbers": _floats(state.bank)},
+        "outliers": _floats(state.outliers),
+        "last shift": {
+            "cycle": shift.cycle,
+            "size": shift.size.hex(),
+            "size_std": shift.size_std.hex(),
+            "found at": shift.found_at,
+            "statistic": shift.statistic.hex(),
+            "threshold": shift.threshold.hex(),
+        },
+        "clock": {
+            "base": state.clock.base,
+            "last": state.clock.last,
+            "seen": list(state.clock.seen),
+            "time_ns": state.clock.time_ns,
+            "period_s": state.clock.period_s.hex(),
+        },
+        "noise": {
+            "factor": state.noise.factor.hex(),
+            "weight": state.noise.weight.hex(),
+            "usual_std": state.noise.usual_std.hex(),
+            "last": _floats([state.noise.last_value, state.noise.last_std]),
+            "identical": state.noise.identical,
+            "posterior": _floats(state.noise.belief),
+        },
+        "batch as the PLC names it": [state.batch_id, state.previous_batch],
+        "batches so far": state.batch_count,
+        "batch since": state.batch_start,
+        "shifts reported at": [state.accepted, state.accepted_before],
+        "first cycle": state.first,
+        "process noise": _floats([state.level_variance, state.slope_variance]),
+    }
+
+
+def _signature(durable: Durable) -> dict[str, Any]:
+    state = durable.state.signature
+    reference, variation = state.reference, state.reference.variation
+    return {
+        "batch": state.batch_id,
+        "deviant cycles in a row": state.deviant_run,
+        "cycles of this material": reference.weight.hex(),
+        "mean": _floats(reference.mean),
+        "information": {"matrix": _floats(reference.matrix), "vector": _floats(reference.vector)},
+        "components": {"shape": list(reference.components.shape), "numbers": _floats(reference.components)},
+        "cycles varied": variation.cycles,
+        "scale": _floats(variation.scale),
+        "moments": _floats(variation.moments),
+        "prediction errors": {"sum": reference.spe_sum.hex(), "count": reference.spe_count},
+    }
+
+
+def _model_gap(durable: Durable) -> dict[str, Any]:
+    gap = durable.state.gap
+    return {
+        "count": gap.count,
+        "mean": gap.mean.hex(),
+        "squares": gap.squares.hex(),
+        "excess": gap.excess.hex(),
+        "since": gap.since,
+    }
+
+
+def _alarms(durable: Durable) -> dict[str, Any]:
+    book = durable.state.alarms
+    counters = dict(zip((alarm.name for alarm in book.alarms), book.delays, strict=True))
+    alarms = {
+        alarm.name.value: {
+            **_alarm(alarm),
+            "cycles the rule held, missed, called": [
+                counters[alarm.name].held,
+                counters[alarm.name].missed,
+                counters[alarm.name].called,
+            ],
+        }
+        for alarm in book.alarms
+    }
+    return {"conditions": alarms, "cycles for which a batch change stays announced": book.announced}
+
+
+def _alarm(alarm: Alarm) -> dict[str, Any]:
+    evidence = alarm.evidence
+    return {
+        "condition": alarm.name.value,
+        "enabled": alarm.enabled,
+        "active": alarm.active,
+        "acknowledged": alarm.acknowledged,
+        "confirmed": alarm.confirmed,
+        "shelving": alarm.shelving.value,
+        "shelved until": alarm.shelved_until_ns,
+        "suppressed": alarm.suppressed,
+        "out of service": alarm.out_of_service,
+        "severity": alarm.severity,
+        "message": alarm.message,
+        "cycle": alarm.cycle,
+        "time_ns": alarm.time_ns,
+        "comment": alarm.comment,
+        "user": alarm.user,
+        "evidence": {
+            "statistic": evidence.statistic.hex(),
+            "threshold": evidence.threshold.hex(),
+            "change_cycle": evidence.change_cycle,
+            "size": evidence.size.hex(),
+            "size_std": evidence.size_std.hex(),
+            "false_alarm_cycles": evidence.false_alarm_cycles.hex(),
+            "false_alarm_days": evidence.false_alarm_days.hex(),
+        },
+    }
+
+
+def _planner(durable: Durable) -> dict[str, Any]:
+    belief = durable.belief
+    assert belief is not None
+    return {
+        "weights": _floats(belief.weights),
+        "means": {"shape": list(belief.means.shape), "numbers": _floats(belief.means)},
+        "covariances": {"shape": list(belief.covs.shape), "numbers": _floats(belief.covs)},
+        "scatter's shape and rate": _floats([belief.shape, belief.rate]),
+        "taps": belief.taps,
+        "surprise": belief.surprise.hex(),
+    }
+
+
+def _snapshot(durable: Durable) -> dict[str, Any]:
+    snapshot = durable.snapshot
+    assert snapshot is not None
+    friction, wear, batch = snapshot.friction, snapshot.wear, snapshot.batch
+    task, signature = snapshot.positioning, snapshot.signature
+    return {
+        "cycle": snapshot.cycle,
+        "time_ns": snapshot.time_ns,
+        "velocity and mass": _floats([snapshot.velocity_m_s, snapshot.mass_kg]),
+        "friction": {
+            name: {**_number(value.value, value.std), "quality": value.quality.name, "reason": value.reason}
+            for name, value in (
+                ("mu_s", friction.mu_s),
+                ("mu_k", friction.mu_k),
+                ("by force", friction.by_force),
+                ("by distance", friction.by_distance),
+                ("combined", friction.combined),
+            )
+        },
+        "estimator": friction.estimator.value,
+        "peak force and sliding distance": _floats([friction.peak_force_n, friction.sliding_distance_m]),
+        "wear": {
+            "level": _number(wear.level, wear.level_std),
+            "rate per cycle": _number(wear.rate_per_cycle, wear.rate_std),
+            "limit": wear.limit.hex(),
+            "probability above it": wear.probability_above_limit.hex(),
+            "cycles to it": _floats(
+                [wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high]
+            ),
+            "quality": wear.quality.name,
+            "reason": wear.reason,
+        },
+        "batch": {
+            "id": batch.batch_id,
+            "offset": _number(batch.offset, batch.offset_std),
+            "last shift": _number(batch.last_shift, batch.last_shift_std),
+            "last shift's cycle": batch.last_shift_cycle,
+            "quality": batch.quality.name,
+            "reason": batch.reason,
+        },
+        "signature": {
+            "position_m": _floats(signature.position_m),
+            "friction": _floats(signature.friction),
+            "std": _floats(signature.friction_std),
+            "statistics": _floats([signature.t_squared, signature.spe, signature.deviates_at_m]),
+            "quality": signature.quality.name,
+            "reason": signature.reason,
+        },
+        "positioning": {
+            "target, remaining, velocity, stroke": _floats(
+                [task.target_m, task.remaining_m, task.next_velocity_m_s, task.next_stroke_m]
+            ),
+            "running": task.running,
+            "taps": task.taps,
+            "reason": task.reason,
+        },
+        "alarms": [alarm.name.value for alarm in snapshot.alarms],
+        "model": snapshot.model_name,
+        "gap": {"size": snapshot.gap.hex(), "quality": snapshot.gap_quality.name},
+    }
+
+
+def _number(value: float, std: float) -> dict[str, str]:
+    return {"value": value.hex(), "std": std.hex()}
+
+
+def _floats(values: Iterable[Any]) -> list[str]:
+    return [float(value).hex() for value in np.ravel(values)]  # type: ignore[call-overload]
