@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.data_change_filter import cut, parse_range
 from impactcell.opcua.node_values import with_timestamps

@@ -13,11 +13,11 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
 from asyncua import ua
-from asyncua.crypto import uacrypto
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import padding, rsa
 
 from impactcell.errors import AccessError
+from impactcell.opcua.asyncua_adapter import SIGNATURE_CHECKS, InvalidSignature, x509_from_der
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain
 from impactcell.scada.interface import Actor
@@ -35,10 +35,6 @@ MAX_PASSWORD_BYTES: Final = 1_024
 _OAEP: Final = {
     "http://www.w3.org/2001/04/xmlenc#rsa-oaep": hashes.SHA1,
     "http://opcfoundation.org/UA/security/rsa-oaep-sha2-256": hashes.SHA256,
-}
-_SIGNATURES: Final = {
-    "http://www.w3.org/2001/04/xmldsig-more#rsa-sha256": uacrypto.verify_sha256,
-    "http://opcfoundation.org/UA/security/rsa-pss-sha2-256": uacrypto.verify_pss_sha256,
 }
 
 
@@ -188,15 +184,15 @@ class Logins:
     ) -> Actor:
         try:
             data = first_of_chain(token.CertificateData or b"")
-            certificate = uacrypto.x509_from_der(data)
+            certificate = x509_from_der(data)
         except ValueError:
             raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid) from None
-        check = _SIGNATURES.get(signature.Algorithm or "")
+        check = SIGNATURE_CHECKS.get(signature.Algorithm or "")
         if check is None or not signature.Signature:
             raise FaultError(ua.StatusCodes.BadUserSignatureInvalid)
         try:
             check(certificate, self._trust.own_certificate + nonce, signature.Signature)
-        except (uacrypto.InvalidSignature, ValueError, TypeError, AttributeError):
+        except (InvalidSignature, ValueError, TypeError, AttributeError):
             raise FaultError(ua.StatusCodes.BadUserSignatureInvalid) from None
         self.users()
         user = self._users.by_certificate(fingerprint(data))

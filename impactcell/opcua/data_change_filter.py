@@ -8,8 +8,8 @@ import math
 from typing import Any, Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace, DecodedDataChangeFilter
 from impactcell.opcua.binary_codec import FaultError
 
 _NUMBERS: Final = (
@@ -94,7 +94,7 @@ def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, wanted: 
     if wanted is None or isinstance(wanted, ua.ExtensionObject):
         return ChangeFilter(ua.DataChangeTrigger.StatusValue, 0.0)
     # asyncua exports a subclass of what it decodes, so the exported name would let nothing through.
-    if not isinstance(wanted, ua.uaprotocol_auto.DataChangeFilter):
+    if not isinstance(wanted, DecodedDataChangeFilter):
         raise FaultError(ua.StatusCodes.BadFilterNotAllowed)
     if wanted.DeadbandType == ua.DeadbandType.None_:
         return ChangeFilter(wanted.Trigger, 0.0)

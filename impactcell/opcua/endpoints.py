@@ -4,8 +4,8 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from asyncua import ua
-from asyncua.crypto import security_policies as asyncua_policies
 
+from impactcell.opcua.asyncua_adapter import SECURITY_POLICIES, SecurityPolicyNone
 from impactcell.scada.interface import SecurityPolicy, ServerSettings
 
 PRODUCT_URI: Final = "urn:impactcell"
@@ -13,9 +13,9 @@ PRODUCT_NAME: Final = "impactcell"
 TRANSPORT: Final = "http://opcfoundation.org/UA-Profile/Transport/uatcp-uasc-uabinary"
 
 POLICIES: Final = {
-    SecurityPolicy.BASIC256SHA256: (asyncua_policies.SecurityPolicyBasic256Sha256, 70),
-    SecurityPolicy.AES128_SHA256_RSAOAEP: (asyncua_policies.SecurityPolicyAes128Sha256RsaOaep, 75),
-    SecurityPolicy.AES256_SHA256_RSAPSS: (asyncua_policies.SecurityPolicyAes256Sha256RsaPss, 80),
+    SecurityPolicy.BASIC256SHA256: (SECURITY_POLICIES["Basic256Sha256"], 70),
+    SecurityPolicy.AES128_SHA256_RSAOAEP: (SECURITY_POLICIES["Aes128_Sha256_RsaOaep"], 75),
+    SecurityPolicy.AES256_SHA256_RSAPSS: (SECURITY_POLICIES["Aes256_Sha256_RsaPss"], 80),
 }
 """asyncua's class of each policy, and how much it is preferred."""
 
@@ -61,8 +61,7 @@ class Endpoints:
             for policy in self._settings.policies
         ]
         if self._settings.allow_none:
-            none = asyncua_policies.SecurityPolicyNone
-            found.append(self._endpoint(url, none, 0, ua.MessageSecurityMode.None_))
+            found.append(self._endpoint(url, SecurityPolicyNone, 0, ua.MessageSecurityMode.None_))
         return found
 
     def _endpoint(

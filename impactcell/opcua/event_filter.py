@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.type_instances import supertypes
 

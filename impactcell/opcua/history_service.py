@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.event_filter import Event, EventFilter
 from impactcell.opcua.history_paging import Series, Span, data_value, rest, span

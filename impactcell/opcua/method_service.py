@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.request_dispatch import Context, Service, bounded
 from impactcell.scada.interface import RefusedError, Role

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError, encode
 from impactcell.opcua.data_change_filter import ChangeFilter, change_filter, cut, parse_range
 from impactcell.opcua.event_filter import Event, EventFilter

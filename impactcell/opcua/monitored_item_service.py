@@ -3,8 +3,8 @@
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.monitored_item import DataItem, EventItem
 from impactcell.opcua.node_values import Values

@@ -5,9 +5,8 @@ from datetime import UTC, datetime
 from typing import Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace, AttributeValue
-from asyncua.ua.ua_binary import struct_to_binary
 
+from impactcell.opcua.asyncua_adapter import AddressSpace, AttributeValue, struct_to_binary
 from impactcell.records import Quality
 
 GOOD: Final = ua.StatusCode(ua.StatusCodes.Good)

@@ -10,7 +10,8 @@ from datetime import datetime
 from typing import Final
 
 from asyncua import ua
-from asyncua.ua.uatypes import datetime_to_win_epoch
+
+from impactcell.opcua.asyncua_adapter import datetime_to_win_epoch
 
 _U32: Final = struct.Struct("<I")
 _I32: Final = struct.Struct("<i")

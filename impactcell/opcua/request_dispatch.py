@@ -11,10 +11,10 @@ from typing import Any, Final
 
 from asyncua import ua
 
+from impactcell.opcua.asyncua_adapter import StrictBuffer
 from impactcell.opcua.binary_codec import (
     DecodingError,
     FaultError,
-    StrictBuffer,
     decode,
     decode_type,
     encode,

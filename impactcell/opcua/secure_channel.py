@@ -11,12 +11,18 @@ from collections.abc import Sequence
 from typing import Final
 
 from asyncua import ua
-from asyncua.common.connection import SecureConnection, TransportLimits
-from asyncua.common.utils import Buffer
-from asyncua.crypto.security_policies import SecurityPolicyFactory, SecurityPolicyNone
-from asyncua.crypto.uacrypto import InvalidSignature
 
-from impactcell.opcua.binary_codec import DecodingError, FaultError, StrictBuffer, decode, decode_type, encode
+from impactcell.opcua.asyncua_adapter import (
+    Buffer,
+    InvalidSignature,
+    SecureConnection,
+    SecurityPolicyFactory,
+    SecurityPolicyNone,
+    StrictBuffer,
+    TransportLimits,
+    uatcp_to_binary,
+)
+from impactcell.opcua.binary_codec import DecodingError, FaultError, decode, decode_type, encode
 from impactcell.opcua.trust_list import TrustList, UntrustedError
 
 CHUNK: Final = 65_536
@@ -115,7 +121,7 @@ class Channel:
         answer.SendBufferSize = self._limits.max_send_buffer
         answer.MaxMessageSize = self._limits.max_message_size
         answer.MaxChunkCount = self._limits.max_chunk_count
-        data: bytes = ua.ua_binary.uatcp_to_binary(ua.MessageType.Acknowledge, answer)
+        data: bytes = uatcp_to_binary(ua.MessageType.Acknowledge, answer)
         return data
 
     def receive(self, header: ua.Header, body: bytes) -> ua.Message | None:

@@ -10,13 +10,12 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from asyncua import ua
-from asyncua.crypto.security_policies import SecurityPolicyFactory
 
 from impactcell import __version__
 from impactcell.errors import AccessError
+from impactcell.opcua.asyncua_adapter import SecurityPolicyFactory, bound_null_arrays
 from impactcell.opcua.attribute_service import Attributes
 from impactcell.opcua.authentication import Logins
-from impactcell.opcua.binary_codec import bound_null_arrays
 from impactcell.opcua.endpoints import POLICIES, PRODUCT_NAME, PRODUCT_URI, Endpoints
 from impactcell.opcua.history_paging import PAGE
 from impactcell.opcua.history_processed import AGGREGATES

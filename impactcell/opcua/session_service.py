@@ -9,10 +9,10 @@ import logging
 from typing import Any, Final
 
 from asyncua import ua
-from asyncua.crypto.uacrypto import InvalidSignature
 
+from impactcell.opcua.asyncua_adapter import InvalidSignature, StrictBuffer
 from impactcell.opcua.authentication import Logins
-from impactcell.opcua.binary_codec import FaultError, StrictBuffer
+from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.endpoints import Endpoints
 from impactcell.opcua.request_dispatch import Context, Service
 from impactcell.opcua.sessions import Session, Sessions

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
+from impactcell.opcua.asyncua_adapter import AddressSpace, AttributeValue, NodeData
 from impactcell.opcua.standard_descriptions import DESCRIPTIONS
 
 AGGREGATES = frozenset(

@@ -7,8 +7,8 @@ and fails on an empty path.
 from typing import Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
+from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.request_dispatch import Context, Service, bounded
 from impactcell.opcua.sessions import Continuations

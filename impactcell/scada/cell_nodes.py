@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import fields
 from importlib.resources import as_file, files
-from typing import Any, Final
+from typing import Final
 
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace
 
 from impactcell.errors import SettingsError
+from impactcell.opcua.asyncua_adapter import AddressSpace, StandardServer, address_space, compute_attribute
 from impactcell.opcua.type_instances import (
     HAS_TYPE_DEFINITION,
     instantiate,
@@ -51,7 +51,7 @@ _IDENTIFICATION: Final = {
 }
 
 
-async def load_types(server: Any) -> None:
+async def load_types(server: StandardServer) -> None:
     """Load the shipped NodeSet2 files into an asyncua server and name the namespace of the cells."""
     for name in NODESETS:
         with as_file(files("impactcell.scada") / "model" / f"{name}.NodeSet2.xml") as path:
@@ -72,13 +72,13 @@ class CellSpace:
         The folder that holds all cells.
     """
 
-    def __init__(self, server: Any, uris: list[str], description: CellDescription) -> None:
+    def __init__(self, server: StandardServer, uris: list[str], description: CellDescription) -> None:
         if not description.name or "/" in description.name:
             raise SettingsError(
                 f"cell {description.name!r}: a name is not empty and has no '/', it is part of NodeIds"
             )
         self.description = description
-        self._space = server.iserver.aspace
+        self._space = address_space(server)
         self._cells = uris.index(CELLS_URI)
         self._types = uris.index(TYPES_URI)
         self.node = ua.NodeId(description.name, self._cells)
@@ -116,8 +116,7 @@ class CellSpace:
 
     def compute(self, path: str, value: Callable[[], ua.DataValue]) -> None:
         """Let a variable be computed whenever it is read."""
-        held = self._space[self.path(path)].attributes[ua.AttributeIds.Value]
-        held.value_callback = lambda _node, _attribute: value()
+        compute_attribute(self._space, self.path(path), ua.AttributeIds.Value, value)
 
     def alarm_type(self, alarm: AlarmName) -> ua.NodeId:
         """Event type of a condition."""

@@ -6,9 +6,9 @@ from types import TracebackType
 from typing import Self
 from urllib.parse import urlsplit
 
-from asyncua import Server as AsyncuaServer
 from asyncua import ua
 
+from impactcell.opcua.asyncua_adapter import address_space, new_standard_server
 from impactcell.opcua.event_filter import Event
 from impactcell.opcua.history_service import Histories
 from impactcell.opcua.node_values import Values
@@ -71,12 +71,9 @@ class Server:
         return url._replace(netloc=f"{url.netloc.rpartition(':')[0]}:{port}").geturl()
 
     async def __aenter__(self) -> Self:
-        model = AsyncuaServer()
-        await model.init()
-        model.iserver.method_service.stop()
-        await model.set_application_uri(self._settings.application_uri)
+        model = await new_standard_server(self._settings.application_uri)
         await load_types(model)
-        space = model.iserver.aspace
+        space = address_space(model)
         values = Values(space)
         host = Host(self._settings, space, values)
         for function in aggregate_functions():

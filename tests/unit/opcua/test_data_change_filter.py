@@ -10,7 +10,8 @@ from asyncua.ua import ua_binary
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.opcua.binary_codec import DecodingError, FaultError, StrictBuffer, bound_null_arrays, decode
+from impactcell.opcua.asyncua_adapter import StrictBuffer, bound_null_arrays
+from impactcell.opcua.binary_codec import DecodingError, FaultError, decode
 from impactcell.opcua.data_change_filter import ChangeFilter, cut, parse_range, same
 from impactcell.opcua.event_filter import like
 
