@@ -10,7 +10,7 @@ from pathlib import Path
 from asyncua import Client, ua
 from asyncua.crypto import security_policies
 
-from impactcell.alarms import Event, Occurrence
+from impactcell.alarms import AlarmEvent, EventKind
 from impactcell.alarms.lifecycle import transition
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.records import Alarm, AlarmName, Evidence, Quality, Snapshot
@@ -89,7 +89,7 @@ class LifecycleActions:
     def of(self, cell: str, name: AlarmName) -> Alarm:
         return self.alarms.get((cell, name), Alarm(name))
 
-    def apply(self, cell: str, name: AlarmName, occurrence: Occurrence) -> Alarm:
+    def apply(self, cell: str, name: AlarmName, occurrence: AlarmEvent) -> Alarm:
         done = transition(self.of(cell, name), occurrence)
         if done.refusal is not None:
             raise RefusedError(done.refusal.value)
@@ -112,7 +112,7 @@ class LifecycleActions:
         self,
         cell: str,
         alarm: AlarmName,
-        event: Event,
+        event: EventKind,
         actor: Actor,
         *,
         comment: str = "",
@@ -121,7 +121,7 @@ class LifecycleActions:
         return self.apply(
             cell,
             alarm,
-            Occurrence(
+            AlarmEvent(
                 event, time_ns=time.time_ns(), user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
             ),
         )
@@ -158,15 +158,20 @@ class Site:
         alarm = self.actions.apply(
             cell,
             name,
-            Occurrence(
-                Event.ACTIVATE, self.cycle, time.time_ns(), message=message, severity=700, evidence=evidence
+            AlarmEvent(
+                EventKind.ACTIVATE,
+                self.cycle,
+                time.time_ns(),
+                message=message,
+                severity=700,
+                evidence=evidence,
             ),
         )
         self.server.alarm(cell, alarm)
         return alarm
 
     def clear_alarm(self, name: AlarmName = AlarmName.WEAR_LIMIT, cell: str = CELL) -> Alarm:
-        alarm = self.actions.apply(cell, name, Occurrence(Event.CLEAR, self.cycle, time.time_ns()))
+        alarm = self.actions.apply(cell, name, AlarmEvent(EventKind.CLEAR, self.cycle, time.time_ns()))
         self.server.alarm(cell, alarm)
         return alarm
 

@@ -1,10 +1,25 @@
 """Alarms people trust: rules that raise them, and one life cycle as a transition table."""
 
-from impactcell.alarms.alarm_set import AlarmState, act, after_cycle, at_time, find, initial_state
-from impactcell.alarms.lifecycle import Effect, Event, Occurrence, Refusal, Transition, retained, silent
+from impactcell.alarms.alarm_set import (
+    AlarmSetState,
+    apply_event,
+    apply_rule_result,
+    expire_shelving,
+    initial_state,
+    update,
+)
+from impactcell.alarms.lifecycle import (
+    AlarmEvent,
+    EventKind,
+    Notification,
+    Refusal,
+    Transition,
+    is_retained,
+    is_silenced,
+)
 from impactcell.alarms.rules import (
     AlarmSettings,
-    Finding,
+    RuleResult,
     RuleSettings,
     batch_shift,
     deviant_cycle,
@@ -12,23 +27,23 @@ from impactcell.alarms.rules import (
 )
 
 __all__ = [
+    "AlarmEvent",
+    "AlarmSetState",
     "AlarmSettings",
-    "AlarmState",
-    "Effect",
-    "Event",
-    "Finding",
-    "Occurrence",
+    "EventKind",
+    "Notification",
     "Refusal",
+    "RuleResult",
     "RuleSettings",
     "Transition",
-    "act",
-    "after_cycle",
-    "at_time",
+    "apply_event",
+    "apply_rule_result",
     "batch_shift",
     "deviant_cycle",
-    "find",
+    "expire_shelving",
     "initial_state",
-    "retained",
-    "silent",
+    "is_retained",
+    "is_silenced",
+    "update",
     "wear_limit",
 ]

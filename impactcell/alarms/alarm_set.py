@@ -1,19 +1,26 @@
-"""All alarms of one cell: findings and actions go in, moved alarms come out."""
+"""All alarms of one cell: results of the rules and events go in, transitions come out."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from impactcell.alarms.lifecycle import Event, Occurrence, Transition, expire, transition
-from impactcell.alarms.rules import RESTED, AlarmSettings, Delay, Finding, delayed, occurrence
+from impactcell.alarms.lifecycle import AlarmEvent, EventKind, Transition, expire, transition
+from impactcell.alarms.rules import (
+    ZERO_COUNTS,
+    AlarmSettings,
+    DebounceCounters,
+    RuleResult,
+    alarm_event,
+    debounce,
+)
 from impactcell.records import Alarm, AlarmName, Shelving
 
 T = TypeVar("T")
-_PLACES = {name: place for place, name in enumerate(AlarmName)}
+_INDEX = {name: index for index, name in enumerate(AlarmName)}
 
 
 @dataclass(frozen=True, slots=True)
-class AlarmState:
+class AlarmSetState:
     """Alarms of a cell with their delays, in the order of `AlarmName`.
 
     Attributes
@@ -23,30 +30,30 @@ class AlarmState:
     """
 
     alarms: tuple[Alarm, ...]
-    delays: tuple[Delay, ...]
+    delays: tuple[DebounceCounters, ...]
     announced: int = 0
 
     def alarm(self, name: AlarmName) -> Alarm:
         """One alarm by its name."""
-        return self.alarms[_PLACES[name]]
+        return self.alarms[_INDEX[name]]
 
 
-def initial_state(settings: AlarmSettings) -> AlarmState:
+def initial_state(settings: AlarmSettings) -> AlarmSetState:
     """All conditions normal."""
     rules = [(name, settings.rule(name)) for name in AlarmName]
     alarms = tuple(Alarm(name, enabled=rule.enabled, severity=rule.severity) for name, rule in rules)
-    return AlarmState(alarms, tuple(RESTED for _ in alarms))
+    return AlarmSetState(alarms, tuple(ZERO_COUNTS for _ in alarms))
 
 
-def after_cycle(
+def update(
     settings: AlarmSettings,
-    state: AlarmState,
-    findings: Iterable[Finding],
+    state: AlarmSetState,
+    results: Iterable[RuleResult],
     cycle: int,
     time_ns: int,
     *,
     announced: bool = False,
-) -> tuple[AlarmState, tuple[Transition, ...]]:
+) -> tuple[AlarmSetState, tuple[Transition, ...]]:
     """Move all alarms by what the rules found in one cycle, and by its time.
 
     Parameters
@@ -56,60 +63,64 @@ def after_cycle(
 
     Returns
     -------
-    state : AlarmState
+    state : AlarmSetState
     transitions : tuple of Transition
-        Those that have effects.
+        Those that have notifications.
     """
-    state, moved = at_time(state, cycle, time_ns)
-    left = settings.announced_cycles if announced else max(state.announced - 1, 0)
-    if announced or (state.announced and not left):
-        event = Event.SUPPRESS if announced else Event.UNSUPPRESS
-        state, done = act(state, AlarmName.BATCH_SHIFT, Occurrence(event, cycle, time_ns))
-        moved = (*moved, *([done] if done.effects else []))
-    if left != state.announced:
-        state = replace(state, announced=left)
-    for finding in findings:
-        place = _PLACES[finding.name]
+    state, changes = expire_shelving(state, cycle, time_ns)
+    remaining = settings.announced_cycles if announced else max(state.announced - 1, 0)
+    if announced or (state.announced and not remaining):
+        kind = EventKind.SUPPRESS if announced else EventKind.UNSUPPRESS
+        state, change = apply_event(state, AlarmName.BATCH_SHIFT, AlarmEvent(kind, cycle, time_ns))
+        changes = (*changes, *([change] if change.notifications else []))
+    if remaining != state.announced:
+        state = replace(state, announced=remaining)
+    for result in results:
+        index = _INDEX[result.name]
         # nearly always there is nothing to do
-        if finding.holds or state.alarms[place].active or state.delays[place] is not RESTED:
-            state, done = find(settings, state, finding, cycle, time_ns)
-            moved = (*moved, *([done] if done.effects else []))
-    return state, moved
+        if result.holds or state.alarms[index].active or state.delays[index] is not ZERO_COUNTS:
+            state, change = apply_rule_result(settings, state, result, cycle, time_ns)
+            changes = (*changes, *([change] if change.notifications else []))
+    return state, changes
 
 
-def find(
-    settings: AlarmSettings, state: AlarmState, finding: Finding, cycle: int, time_ns: int
-) -> tuple[AlarmState, Transition]:
-    """Move one alarm by one finding: of a cycle, or of what happens beside the cycles."""
-    place = _PLACES[finding.name]
-    alarm, rule = state.alarms[place], settings.rule(finding.name)
-    delay, event = delayed(rule, alarm, state.delays[place], finding)
-    if delay is not state.delays[place]:
-        state = AlarmState(state.alarms, _with(state.delays, place, delay), state.announced)
-    if event is None:
-        if alarm.active and finding.holds and finding.evidence != alarm.evidence:
-            newer = replace(alarm, message=finding.message or alarm.message, evidence=finding.evidence)
-            state = replace(state, alarms=_with(state.alarms, place, newer))
-        return state, Transition(state.alarms[place])
-    return act(state, finding.name, occurrence(event, finding, rule.severity, cycle, time_ns))
+def apply_rule_result(
+    settings: AlarmSettings, state: AlarmSetState, result: RuleResult, cycle: int, time_ns: int
+) -> tuple[AlarmSetState, Transition]:
+    """Move one alarm by one result: of a cycle, or of what happens beside the cycles."""
+    index = _INDEX[result.name]
+    alarm, rule = state.alarms[index], settings.rule(result.name)
+    delay, kind = debounce(rule, alarm, state.delays[index], result)
+    if delay is not state.delays[index]:
+        state = AlarmSetState(state.alarms, _with(state.delays, index, delay), state.announced)
+    if kind is None:
+        if alarm.active and result.holds and result.evidence != alarm.evidence:
+            renewed = replace(alarm, message=result.message or alarm.message, evidence=result.evidence)
+            state = replace(state, alarms=_with(state.alarms, index, renewed))
+        return state, Transition(state.alarms[index])
+    return apply_event(state, result.name, alarm_event(kind, result, rule.severity, cycle, time_ns))
 
 
-def act(state: AlarmState, name: AlarmName, happened: Occurrence) -> tuple[AlarmState, Transition]:
+def apply_event(state: AlarmSetState, name: AlarmName, event: AlarmEvent) -> tuple[AlarmSetState, Transition]:
     """Move one alarm by an event: a person's action, or the outside's suppression."""
-    place = _PLACES[name]
-    done = transition(state.alarms[place], happened)
-    if happened.event in (Event.ENABLE, Event.DISABLE) and done.refusal is None:
-        state = replace(state, delays=_with(state.delays, place, RESTED))
-    return replace(state, alarms=_with(state.alarms, place, done.alarm)), done
+    index = _INDEX[name]
+    change = transition(state.alarms[index], event)
+    if event.kind in (EventKind.ENABLE, EventKind.DISABLE) and change.refusal is None:
+        state = replace(state, delays=_with(state.delays, index, ZERO_COUNTS))
+    return replace(state, alarms=_with(state.alarms, index, change.alarm)), change
 
 
-def at_time(state: AlarmState, cycle: int, time_ns: int) -> tuple[AlarmState, tuple[Transition, ...]]:
+def expire_shelving(
+    state: AlarmSetState, cycle: int, time_ns: int
+) -> tuple[AlarmSetState, tuple[Transition, ...]]:
     """End every shelving whose time is over."""
     if all(alarm.shelving is Shelving.UNSHELVED for alarm in state.alarms):
         return state, ()
-    done = [expire(alarm, cycle, time_ns) for alarm in state.alarms]
-    return replace(state, alarms=tuple(t.alarm for t in done)), tuple(t for t in done if t.effects)
+    changes = [expire(alarm, cycle, time_ns) for alarm in state.alarms]
+    return replace(state, alarms=tuple(t.alarm for t in changes)), tuple(
+        t for t in changes if t.notifications
+    )
 
 
-def _with(items: tuple[T, ...], place: int, item: T) -> tuple[T, ...]:
-    return (*items[:place], item, *items[place + 1 :])
+def _with(items: tuple[T, ...], index: int, item: T) -> tuple[T, ...]:
+    return (*items[:index], item, *items[index + 1 :])

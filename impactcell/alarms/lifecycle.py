@@ -19,7 +19,7 @@ from types import MappingProxyType
 from impactcell.records import Alarm, Evidence, Shelving
 
 
-class Event(enum.Enum):
+class EventKind(enum.Enum):
     """What can happen to an alarm: by the process, by a person, by time."""
 
     ACTIVATE = "activate"
@@ -65,16 +65,16 @@ class Refusal(enum.Enum):
     INVALID_STATE = "BadInvalidState"
 
 
-class Effect(enum.Enum):
+class Notification(enum.Enum):
     """What the outside has to do after a transition."""
 
-    NOTIFY = "send an event: something of the alarm changed"
-    ANNOUNCE = "call for attention: newly active or active again, and not kept silent"
+    EVENT = "send an event: something of the alarm changed"
+    ANNUNCIATE = "call for attention: newly active or active again, and not kept silent"
 
 
-A, E, R = Annunciation, Event, Refusal
+A, E, R = Annunciation, EventKind, Refusal
 
-ANNUNCIATION: Mapping[tuple[Annunciation, Event], Annunciation | Refusal] = MappingProxyType(
+ANNUNCIATION: Mapping[tuple[Annunciation, EventKind], Annunciation | Refusal] = MappingProxyType(
     {
         (A.NORMAL, E.ACTIVATE): A.UNACKNOWLEDGED,
         (A.NORMAL, E.CLEAR): A.NORMAL,
@@ -110,7 +110,7 @@ ANNUNCIATION: Mapping[tuple[Annunciation, Event], Annunciation | Refusal] = Mapp
 )
 
 S = Shelving
-SHELVING: Mapping[tuple[Shelving, Event], Shelving | Refusal] = MappingProxyType(
+SHELVING: Mapping[tuple[Shelving, EventKind], Shelving | Refusal] = MappingProxyType(
     {
         (S.UNSHELVED, E.SHELVE_TIMED): S.TIMED,
         (S.UNSHELVED, E.SHELVE_ONE_SHOT): S.ONE_SHOT,
@@ -131,7 +131,7 @@ SHELVING: Mapping[tuple[Shelving, Event], Shelving | Refusal] = MappingProxyType
     }
 )
 
-SWITCHES: Mapping[tuple[str, bool, Event], bool | Refusal] = MappingProxyType(
+SWITCHES: Mapping[tuple[str, bool, EventKind], bool | Refusal] = MappingProxyType(
     {
         ("enabled", False, E.ENABLE): True,
         ("enabled", True, E.ENABLE): R.ALREADY_ENABLED,
@@ -149,7 +149,7 @@ SWITCHES: Mapping[tuple[str, bool, Event], bool | Refusal] = MappingProxyType(
 )
 
 # A disabled condition is not processed: people and rules are refused or ignored, time and switches go on.
-DISABLED: Mapping[Event, Refusal | None] = MappingProxyType(
+DISABLED: Mapping[EventKind, Refusal | None] = MappingProxyType(
     {
         E.ACTIVATE: None,
         E.CLEAR: None,
@@ -164,12 +164,12 @@ DISABLED: Mapping[Event, Refusal | None] = MappingProxyType(
 )
 
 ACTIONS_OF_PEOPLE = frozenset(
-    set(Event) - {E.ACTIVATE, E.CLEAR, E.REALARM, E.SHELVE_EXPIRED, E.SUPPRESS, E.UNSUPPRESS}
+    set(EventKind) - {E.ACTIVATE, E.CLEAR, E.REALARM, E.SHELVE_EXPIRED, E.SUPPRESS, E.UNSUPPRESS}
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Occurrence:
+class AlarmEvent:
     """An event with what comes with it.
 
     Attributes
@@ -182,7 +182,7 @@ class Occurrence:
         How long to shelve; for one-shot shelving the longest time, 0 for no end.
     """
 
-    event: Event
+    kind: EventKind
     cycle: int = 0
     time_ns: int = 0
     user: str = ""
@@ -198,17 +198,17 @@ class Transition:
     """An alarm after an event, what is to be done, and why nothing happened if it was refused."""
 
     alarm: Alarm
-    effects: tuple[Effect, ...] = ()
+    notifications: tuple[Notification, ...] = ()
     refusal: Refusal | None = None
 
 
-def silent(alarm: Alarm) -> bool:
+def is_silenced(alarm: Alarm) -> bool:
     """Whether the alarm is kept from people: disabled, shelved, suppressed or out of service."""
     shelved = alarm.shelving is not Shelving.UNSHELVED
     return not alarm.enabled or shelved or alarm.suppressed or alarm.out_of_service
 
 
-def retained(alarm: Alarm) -> bool:
+def is_retained(alarm: Alarm) -> bool:
     """Whether a client that refreshes must be shown the alarm (Retain of ConditionType)."""
     return alarm.enabled and (alarm.active or not alarm.acknowledged or not alarm.confirmed)
 
@@ -218,67 +218,70 @@ def annunciation(alarm: Alarm) -> Annunciation:
     return Annunciation((alarm.active, alarm.acknowledged, alarm.confirmed))
 
 
-def transition(alarm: Alarm, occurrence: Occurrence) -> Transition:
+def transition(alarm: Alarm, event: AlarmEvent) -> Transition:
     """Apply one event after the tables above; a refused one leaves the alarm as it was."""
-    event = occurrence.event
-    if not alarm.enabled and event in DISABLED:
-        return Transition(alarm, refusal=DISABLED[event])
-    if event is Event.SHELVE_TIMED and occurrence.shelve_ns <= 0:
+    if not alarm.enabled and event.kind in DISABLED:
+        return Transition(alarm, refusal=DISABLED[event.kind])
+    if event.kind is EventKind.SHELVE_TIMED and event.shelve_ns <= 0:
         return Transition(alarm, refusal=Refusal.SHELVING_TIME)
-    moved = _move(alarm, event)
+    moved = _apply_tables(alarm, event.kind)
     if isinstance(moved, Refusal):
         return Transition(alarm, refusal=moved)
-    if event in (Event.SHELVE_TIMED, Event.SHELVE_ONE_SHOT):
-        until = occurrence.time_ns + occurrence.shelve_ns if occurrence.shelve_ns > 0 else 0
+    if event.kind in (EventKind.SHELVE_TIMED, EventKind.SHELVE_ONE_SHOT):
+        until = event.time_ns + event.shelve_ns if event.shelve_ns > 0 else 0
         moved = replace(moved, shelved_until_ns=until)
     elif moved.shelving is Shelving.UNSHELVED:
         moved = replace(moved, shelved_until_ns=0)
-    again = event is Event.COMMENT or (event is Event.REALARM and alarm.active)
-    if moved == alarm and not again:
+    repeated = event.kind is EventKind.COMMENT or (event.kind is EventKind.REALARM and alarm.active)
+    if moved == alarm and not repeated:
         return Transition(alarm)
-    moved = _described(moved, occurrence)
-    called = moved.active and not moved.acknowledged and event in (Event.ACTIVATE, Event.REALARM)
-    effects = (Effect.NOTIFY, Effect.ANNOUNCE) if called and not silent(moved) else (Effect.NOTIFY,)
-    return Transition(moved, effects)
+    moved = _described(moved, event)
+    calls = moved.active and not moved.acknowledged and event.kind in (EventKind.ACTIVATE, EventKind.REALARM)
+    notifications = (
+        (Notification.EVENT, Notification.ANNUNCIATE)
+        if calls and not is_silenced(moved)
+        else (Notification.EVENT,)
+    )
+    return Transition(moved, notifications)
 
 
 def expire(alarm: Alarm, cycle: int, time_ns: int) -> Transition:
     """End a shelving whose time is over at `time_ns`."""
     if alarm.shelving is Shelving.UNSHELVED or not 0 < alarm.shelved_until_ns <= time_ns:
         return Transition(alarm)
-    return transition(alarm, Occurrence(Event.SHELVE_EXPIRED, cycle, time_ns))
+    return transition(alarm, AlarmEvent(EventKind.SHELVE_EXPIRED, cycle, time_ns))
 
 
-def _move(alarm: Alarm, event: Event) -> Alarm | Refusal:
+def _apply_tables(alarm: Alarm, kind: EventKind) -> Alarm | Refusal:
     moved = alarm
     for name in ("enabled", "suppressed", "out_of_service"):
-        target = SWITCHES.get((name, getattr(alarm, name), event))
+        target = SWITCHES.get((name, getattr(alarm, name), kind))
         if isinstance(target, Refusal):
             return target
         if target is not None:
             moved = replace(moved, **{name: target})  # type: ignore[arg-type]
-    state = ANNUNCIATION.get((annunciation(alarm), event))
+    state = ANNUNCIATION.get((annunciation(alarm), kind))
     if isinstance(state, Refusal):
         return state
-    if event is Event.DISABLE:
+    if kind is EventKind.DISABLE:
         state = Annunciation.NORMAL
     if state is not None:
         active, acknowledged, confirmed = state.value
         moved = replace(moved, active=active, acknowledged=acknowledged, confirmed=confirmed)
-    shelving = SHELVING.get((alarm.shelving, event))
+    shelving = SHELVING.get((alarm.shelving, kind))
     if isinstance(shelving, Refusal):
         return shelving
     return moved if shelving is None else replace(moved, shelving=shelving)
 
 
-def _described(alarm: Alarm, occurrence: Occurrence) -> Alarm:
+def _described(alarm: Alarm, event: AlarmEvent) -> Alarm:
     return replace(
         alarm,
-        cycle=occurrence.cycle,
-        time_ns=occurrence.time_ns,
-        message=alarm.message if occurrence.message is None else occurrence.message,
-        severity=alarm.severity if occurrence.severity is None else occurrence.severity,
-        evidence=alarm.evidence if occurrence.evidence is None else occurrence.evidence,
-        comment=occurrence.comment or alarm.comment,
-        user=occurrence.user or alarm.user,
+        cycle=event.cycle,
+        time_ns=event.time_ns,
+        message=alarm.message if event.message is None else event.message,
+        severity=alarm.severity if event.severity is None else event.severity,
+        evidence=alarm.evidence if event.evidence is None else event.evidence,
+        comment=event.comment or alarm.comment,
+        user=event.user or alarm.user,
     )

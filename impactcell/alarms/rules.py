@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from impactcell.alarms.lifecycle import Event, Occurrence
+from impactcell.alarms.lifecycle import AlarmEvent, EventKind
 from impactcell.records import Alarm, AlarmName, Evidence, Quality, WearState
 
 
@@ -35,7 +35,7 @@ class RuleSettings:
 DEFAULT_RULES: Mapping[AlarmName, RuleSettings] = MappingProxyType(
     {
         AlarmName.WEAR_LIMIT: RuleSettings(severity=700, on_delay=5, off_delay=20),
-        # a shift is one cycle's finding: the alarm stands for a while and then clears by itself
+        # a shift is one cycle's result: the alarm stands for a while and then clears by itself
         AlarmName.BATCH_SHIFT: RuleSettings(severity=500, off_delay=50),
         AlarmName.DEVIANT_CYCLE: RuleSettings(severity=400, off_delay=1),
         AlarmName.MODULE_CONNECTION: RuleSettings(severity=800),
@@ -70,21 +70,21 @@ class AlarmSettings:
         return self.rules.get(name, DEFAULT_RULES[name])
 
 
-NOTHING = Evidence()
+NO_EVIDENCE = Evidence()
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class RuleResult:
     """What a rule says of one condition now; `holds` None where it cannot tell, and all stays as it is."""
 
     name: AlarmName
     holds: bool | None
     message: str = ""
-    evidence: Evidence = NOTHING
+    evidence: Evidence = NO_EVIDENCE
 
 
 @dataclass(frozen=True, slots=True)
-class Delay:
+class DebounceCounters:
     """Cycles that are counted for one condition.
 
     Attributes
@@ -100,70 +100,72 @@ class Delay:
     called: int = 0
 
 
-RESTED = Delay()
+ZERO_COUNTS = DebounceCounters()
 
 
-def wear_limit(settings: AlarmSettings, wear: WearState, cycle: int, *, active: bool) -> Finding:
+def wear_limit(settings: AlarmSettings, wear: WearState, cycle: int, *, active: bool) -> RuleResult:
     """Wear on the probability that the level is above the limit, with hysteresis in probability."""
     probability = wear.probability_above_limit
     threshold = settings.wear_off if active else settings.wear_on
     if wear.quality is Quality.BAD or probability != probability:
-        return Finding(AlarmName.WEAR_LIMIT, None)
+        return RuleResult(AlarmName.WEAR_LIMIT, None)
     if probability <= threshold:
-        return Finding(AlarmName.WEAR_LIMIT, holds=False)
+        return RuleResult(AlarmName.WEAR_LIMIT, holds=False)
     above = wear.level - wear.limit
     since = cycle - round(above / wear.rate_per_cycle) if wear.rate_per_cycle > 0.0 < above else cycle
     evidence = Evidence(probability, settings.wear_on, max(since, 0), above, wear.level_std)
     message = (
         f"mu_s {wear.level:.4f} ± {wear.level_std:.4f}, limit {wear.limit:.4f}, P(above) {probability:.3f}"
     )
-    return Finding(AlarmName.WEAR_LIMIT, holds=True, message=message, evidence=evidence)
+    return RuleResult(AlarmName.WEAR_LIMIT, holds=True, message=message, evidence=evidence)
 
 
-def batch_shift(shift: Evidence | None) -> Finding:
+def batch_shift(shift: Evidence | None) -> RuleResult:
     """Find a batch shift in what the tracker says."""
     if shift is None:
-        return Finding(AlarmName.BATCH_SHIFT, holds=False)
+        return RuleResult(AlarmName.BATCH_SHIFT, holds=False)
     message = f"mu_s shifted by {shift.size:+.4f} ± {shift.size_std:.4f} from cycle {shift.change_cycle}"
-    return Finding(AlarmName.BATCH_SHIFT, holds=True, message=message, evidence=shift)
+    return RuleResult(AlarmName.BATCH_SHIFT, holds=True, message=message, evidence=shift)
 
 
-def deviant_cycle(deviation: Evidence | None, at_m: float, *, judged: bool) -> Finding:
+def deviant_cycle(deviation: Evidence | None, at_m: float, *, judged: bool) -> RuleResult:
     """Find a deviant cycle in what the signature says; `judged` False while its reference is learned."""
     if not judged:
-        return Finding(AlarmName.DEVIANT_CYCLE, None)
+        return RuleResult(AlarmName.DEVIANT_CYCLE, None)
     if deviation is None:
-        return Finding(AlarmName.DEVIANT_CYCLE, holds=False)
+        return RuleResult(AlarmName.DEVIANT_CYCLE, holds=False)
     message = f"friction {deviation.size:+.4f} ± {deviation.size_std:.4f} off at {at_m * 1e3:.2f} mm"
     if not math.isfinite(deviation.size_std + at_m):
         message = "the stroke as a whole is unlike the others; no single place stands out"
-    return Finding(AlarmName.DEVIANT_CYCLE, holds=True, message=message, evidence=deviation)
+    return RuleResult(AlarmName.DEVIANT_CYCLE, holds=True, message=message, evidence=deviation)
 
 
-def delayed(rule: RuleSettings, alarm: Alarm, delay: Delay, finding: Finding) -> tuple[Delay, Event | None]:
-    """Count cycles and say which event, if any, the finding gives to its alarm."""
-    if finding.holds is None:
+def debounce(
+    rule: RuleSettings, alarm: Alarm, delay: DebounceCounters, result: RuleResult
+) -> tuple[DebounceCounters, EventKind | None]:
+    """Count cycles and say which event, if any, the result gives to its alarm."""
+    if result.holds is None:
         return delay, None
     if not alarm.enabled:
-        return RESTED, None
+        return ZERO_COUNTS, None
     if not alarm.active:
-        if not finding.holds:
-            return RESTED, None
+        if not result.holds:
+            return ZERO_COUNTS, None
         if delay.held < rule.on_delay:
-            return Delay(delay.held + 1), None
-        return RESTED, Event.ACTIVATE
-    missed, called = 0 if finding.holds else delay.missed + 1, delay.called + 1
+            return DebounceCounters(delay.held + 1), None
+        return ZERO_COUNTS, EventKind.ACTIVATE
+    missed, called = 0 if result.holds else delay.missed + 1, delay.called + 1
     if missed > rule.off_delay:
-        return RESTED, Event.CLEAR
+        return ZERO_COUNTS, EventKind.CLEAR
     if rule.realarm and called >= rule.realarm:
-        return Delay(0, missed), Event.REALARM
-    return Delay(0, missed, called), None
+        return DebounceCounters(0, missed), EventKind.REALARM
+    return DebounceCounters(0, missed, called), None
 
 
-def occurrence(event: Event, finding: Finding, severity: int, cycle: int, time_ns: int) -> Occurrence:
-    """Make the event that carries a finding's message and evidence, where it has any."""
-    if not finding.holds:
-        return Occurrence(event, cycle, time_ns)
-    return Occurrence(
-        event, cycle, time_ns, message=finding.message, severity=severity, evidence=finding.evidence
+def alarm_event(kind: EventKind, result: RuleResult, severity: int, cycle: int, time_ns: int) -> AlarmEvent:
+    """Make the event that carries a result's message and evidence, where it has any."""
+    if not result.holds:
+        return AlarmEvent(kind, cycle, time_ns)
+    return AlarmEvent(
+        kind, cycle, time_ns, message=result.message, severity=severity, evidence=result.evidence
     )

@@ -5,9 +5,9 @@
     capture ── estimate ── track ── signature ── gap ── alarms ──► snapshot
                              ▲ state                        state ▼
 
-`step` takes a cycle; `find` takes what happens beside the cycles (link, journal); `act` takes what people
-do to a condition; `start_batch` and `reset_wear` what they do to the tracker. Each gives a new `CellState`,
-which `impactcell.serialization.message_pack` writes and reads back bit for bit.
+`step` takes a cycle; `apply_rule_result` what happens beside the cycles (link, journal); `apply_event` what
+people do to a condition; `start_batch` and `reset_wear_level` what they do to the tracker. Each gives a new
+`CellState`, which `impactcell.serialization.message_pack` writes and reads back bit for bit.
 """
 
 import math
@@ -16,16 +16,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from impactcell import alarms
-from impactcell.alarms import AlarmSettings, AlarmState, Finding, Occurrence, Transition
+from impactcell.alarms import AlarmEvent, AlarmSetState, AlarmSettings, RuleResult, Transition
 from impactcell.cell.preprocessing import (
-    Announcement,
-    BatchSaid,
-    Known,
-    NamedBatch,
-    completed,
-    doubted,
-    mean_period_s,
-    named_batch,
+    BatchAnnouncement,
+    BatchNaming,
+    CaptureDefaults,
+    OperatorBatch,
+    assign_batch,
+    degrade_quality,
+    fill_defaults,
+    update_period,
 )
 from impactcell.physics import Plant, Strike, free_motion
 from impactcell.prediction import Model, estimate
@@ -40,10 +40,11 @@ from impactcell.records import (
     Samples,
     Snapshot,
 )
-from impactcell.tracking import Reading, Tracked, TrackerSettings, TrackerState, reset_wear, track
+from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker as signature
 from impactcell.tracking.signature.tracker import SignatureSettings, SignatureState, SignatureTracked
+from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings, TrackerState, TrackingResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ class CellDesign:
     tracker: TrackerSettings
     signature: SignatureSettings
     alarms: AlarmSettings
-    known: Known = field(default_factory=Known)
+    known: CaptureDefaults = field(default_factory=CaptureDefaults)
     false_alarm_cycles: float = 100_000.0
 
 
@@ -74,16 +75,16 @@ class CellState:
     tracker: TrackerState
     signature: SignatureState
     gap: gap_cusum.GapState
-    alarms: AlarmState
+    alarms: AlarmSetState
     cycle: int = 0
     time_ns: int = 0
     period_s: float = 0.0
-    batch: BatchSaid = field(default_factory=BatchSaid)
+    batch: BatchNaming = field(default_factory=BatchNaming)
     grid: tuple[float, int] = (0.0, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stepped:
+class StepResult:
     """Outcome of one cycle.
 
     Attributes
@@ -111,7 +112,7 @@ def initial_state(design: CellDesign) -> CellState:
     )
 
 
-def adapted(design: CellDesign, state: CellState) -> CellState:
+def migrate_state(design: CellDesign, state: CellState) -> CellState:
     """Make a state fit the design: a signature on another grid is learned anew, all else stays."""
     if state.grid == _grid(design):
         return state
@@ -127,24 +128,26 @@ def step(
     state: CellState,
     capture: Capture,
     positioning: PositioningState,
-    announcement: Announcement | None = None,
+    announcement: BatchAnnouncement | None = None,
     faults: tuple[str, ...] = (),
-) -> Stepped:
+) -> StepResult:
     """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
-    capture = completed(design.known, capture)
-    named = named_batch(state.batch, capture, announcement)
-    friction = doubted(estimate(capture, design.model), faults)
-    period_s = mean_period_s(state.period_s, (state.cycle, state.time_ns), capture)
-    tracked = track(
+    capture = fill_defaults(design.known, capture)
+    named = assign_batch(state.batch, capture, announcement)
+    friction = degrade_quality(estimate(capture, design.model), faults)
+    period_s = update_period(state.period_s, (state.cycle, state.time_ns), capture)
+    tracked = wear_batch.update(
         design.tracker,
         state.tracker,
-        Reading.of(capture.cycle, capture.time_ns, friction, named.batch_id, expected=named.expected),
+        FrictionObservation.of(
+            capture.cycle, capture.time_ns, friction, named.batch_id, expected=named.expected
+        ),
     )
     signed = _sign(design, state, capture, tracked, period_s)
-    gapped = gap_cusum.follow(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
-    findings = _findings(design, state, capture, tracked, signed, gapped, period_s)
-    alarm_state, moved = alarms.after_cycle(
-        design.alarms, state.alarms, findings, capture.cycle, capture.time_ns, announced=tracked.expected
+    gapped = gap_cusum.update(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
+    results = _findings(design, state, capture, tracked, signed, gapped, period_s)
+    alarm_state, moved = alarms.update(
+        design.alarms, state.alarms, results, capture.cycle, capture.time_ns, announced=tracked.expected
     )
     after = replace(
         state,
@@ -172,42 +175,42 @@ def step(
         gap=friction.gap,
         gap_quality=_gap_quality(friction, gapped),
     )
-    return Stepped(after, snapshot, tuple(t.alarm for t in moved), _notes(friction, tracked))
+    return StepResult(after, snapshot, tuple(t.alarm for t in moved), _notes(friction, tracked))
 
 
-def find(
-    design: CellDesign, state: CellState, finding: Finding, time_ns: int
+def apply_rule_result(
+    design: CellDesign, state: CellState, result: RuleResult, time_ns: int
 ) -> tuple[CellState, tuple[Alarm, ...]]:
     """Take what a rule beside the cycles says, as of the link or the journal; the alarms that moved."""
-    found, done = alarms.find(design.alarms, state.alarms, finding, state.cycle, time_ns)
-    return replace(state, alarms=found), (done.alarm,) if done.effects else ()
+    found, done = alarms.apply_rule_result(design.alarms, state.alarms, result, state.cycle, time_ns)
+    return replace(state, alarms=found), (done.alarm,) if done.notifications else ()
 
 
-def pass_time(state: CellState, time_ns: int) -> tuple[CellState, tuple[Alarm, ...]]:
+def expire_shelving(state: CellState, time_ns: int) -> tuple[CellState, tuple[Alarm, ...]]:
     """End every shelving whose time is over, also while no cycles come."""
-    passed, moved = alarms.at_time(state.alarms, state.cycle, time_ns)
+    passed, moved = alarms.expire_shelving(state.alarms, state.cycle, time_ns)
     return replace(state, alarms=passed), tuple(transition.alarm for transition in moved)
 
 
-def act(state: CellState, name: AlarmName, occurrence: Occurrence) -> tuple[CellState, Transition]:
+def apply_event(state: CellState, name: AlarmName, event: AlarmEvent) -> tuple[CellState, Transition]:
     """Apply a person's action on a condition; a refused one leaves the state as it was."""
-    acted, done = alarms.act(state.alarms, name, replace(occurrence, cycle=state.cycle))
+    acted, done = alarms.apply_event(state.alarms, name, replace(event, cycle=state.cycle))
     return replace(state, alarms=acted), done
 
 
 def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState:
     """Name the batch from the next cycle on; an expected change raises no alarm and re-baselines."""
-    named = NamedBatch(batch_id, state.batch.by_module, expected)
+    named = OperatorBatch(batch_id, state.batch.by_module, expected)
     return replace(state, batch=replace(state.batch, by_person=named))
 
 
-def renew_surface(state: CellState) -> CellState:
+def reset_wear_level(state: CellState) -> CellState:
     """Learn the wear level anew from the next cycle on, after worn parts were replaced."""
-    return replace(state, tracker=reset_wear(state.tracker))
+    return replace(state, tracker=wear_batch.reset_wear_level(state.tracker))
 
 
 def _sign(
-    design: CellDesign, state: CellState, capture: Capture, tracked: Tracked, period_s: float
+    design: CellDesign, state: CellState, capture: Capture, tracked: TrackingResult, period_s: float
 ) -> SignatureTracked:
     """Friction along the stroke, with what the model knows to depend on the speed taken out."""
     plant = design.model.plant
@@ -243,17 +246,17 @@ def _findings(
     design: CellDesign,
     state: CellState,
     capture: Capture,
-    tracked: Tracked,
+    tracked: TrackingResult,
     signed: SignatureTracked,
-    gapped: gap_cusum.GapTracked,
+    gapped: gap_cusum.GapResult,
     period_s: float,
-) -> list[Finding]:
+) -> list[RuleResult]:
     wear_active = state.alarms.alarm(AlarmName.WEAR_LIMIT).active
     found = [
         alarms.wear_limit(design.alarms, tracked.wear, capture.cycle, active=wear_active),
         alarms.batch_shift(tracked.shift),
         alarms.deviant_cycle(signed.deviation, signed.signature.deviates_at_m, judged=signed.judged),
-        Finding(AlarmName.MODEL_GAP, gapped.exceeds, _gap_message(gapped), gapped.evidence),
+        RuleResult(AlarmName.MODEL_GAP, gapped.exceeds, _gap_message(gapped), gapped.evidence),
     ]
     return [replace(one, evidence=_rated(design, one.evidence, period_s)) for one in found]
 
@@ -268,17 +271,17 @@ def _rated(design: CellDesign, evidence: Evidence, period_s: float) -> Evidence:
     )
 
 
-def _gap_message(gapped: gap_cusum.GapTracked) -> str:
+def _gap_message(gapped: gap_cusum.GapResult) -> str:
     evidence = gapped.evidence
     return f"residual {evidence.size:+.2f} above its usual level since cycle {evidence.change_cycle}"
 
 
-def _gap_quality(friction: FrictionEstimate, gapped: gap_cusum.GapTracked) -> Quality:
+def _gap_quality(friction: FrictionEstimate, gapped: gap_cusum.GapResult) -> Quality:
     if math.isnan(friction.gap):
         return Quality.BAD
     return Quality.UNCERTAIN if gapped.exceeds is None else Quality.GOOD
 
 
-def _notes(friction: FrictionEstimate, tracked: Tracked) -> tuple[str, ...]:
+def _notes(friction: FrictionEstimate, tracked: TrackingResult) -> tuple[str, ...]:
     reason = friction.mu_s.reason if friction.mu_s.quality is not Quality.GOOD else ""
     return tuple(dict.fromkeys(note for note in (reason, *tracked.notes) if note))

@@ -10,7 +10,7 @@ PERIOD_GAIN = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class CaptureDefaults:
     """What is known of a cell where its module says nothing.
 
     Attributes
@@ -28,7 +28,7 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
-class NamedBatch:
+class OperatorBatch:
     """A batch named by a person: holds until the module names another than it did then."""
 
     batch_id: str
@@ -37,7 +37,7 @@ class NamedBatch:
 
 
 @dataclass(frozen=True, slots=True)
-class Announcement:
+class BatchAnnouncement:
     """A batch change that the PLC announces through the module; `sequence` 0 before the first."""
 
     sequence: int = 0
@@ -45,24 +45,24 @@ class Announcement:
 
 
 @dataclass(frozen=True, slots=True)
-class BatchSaid:
+class BatchNaming:
     """What has been said of the batch so far: by a person, by the module, by announcements of the PLC."""
 
-    by_person: NamedBatch | None = None
+    by_person: OperatorBatch | None = None
     by_module: str | None = None
     announcement_seen: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class CycleBatch:
     """The batch of a cycle, whether its change was expected, and what has been said after it."""
 
-    said: BatchSaid
+    said: BatchNaming
     batch_id: str | None
     expected: bool
 
 
-def completed(known: Known, capture: Capture) -> Capture:
+def fill_defaults(known: CaptureDefaults, capture: Capture) -> Capture:
     """Fill in what the module does not report: mass, stroke and the noise of its sensors."""
     mass_kg, stroke_m = capture.mass_kg, capture.stroke_m
     if math.isnan(mass_kg) and known.mass_kg is not None:
@@ -78,7 +78,7 @@ def completed(known: Known, capture: Capture) -> Capture:
     )
 
 
-def doubted(friction: FrictionEstimate, faults: tuple[str, ...]) -> FrictionEstimate:
+def degrade_quality(friction: FrictionEstimate, faults: tuple[str, ...]) -> FrictionEstimate:
     """Make an estimate from a capture with faults uncertain at best, and say why."""
     if not faults or friction.mu_s.quality is not Quality.GOOD:
         return friction
@@ -94,7 +94,7 @@ def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
     )
 
 
-def named_batch(said: BatchSaid, capture: Capture, announcement: Announcement | None) -> Named:
+def assign_batch(said: BatchNaming, capture: Capture, announcement: BatchAnnouncement | None) -> CycleBatch:
     """Decide which batch a cycle belongs to, and whether its change was expected.
 
     The batch is what the module wrote down with the cycle itself. Of announcements only the newest can be
@@ -114,10 +114,10 @@ def named_batch(said: BatchSaid, capture: Capture, announcement: Announcement | 
             expected, seen = True, announcement.sequence
         elif changed and 0 < seen < announcement.sequence - 1:
             expected, seen = True, seen + 1
-    return Named(BatchSaid(by_person, capture.batch_id, seen), batch_id, expected)
+    return CycleBatch(BatchNaming(by_person, capture.batch_id, seen), batch_id, expected)
 
 
-def mean_period_s(before_s: float, since: tuple[int, int], capture: Capture) -> float:
+def update_period(before_s: float, since: tuple[int, int], capture: Capture) -> float:
     """Follow the mean time between cycles, 0 before it is known; pauses of a shift change count little.
 
     `since` is number and time (ns) of the cycle before.

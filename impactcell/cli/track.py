@@ -8,11 +8,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from impactcell import alarms
-from impactcell.alarms import AlarmSettings, Effect
+from impactcell.alarms import AlarmSettings, Notification
 from impactcell.errors import SeriesError
 from impactcell.records import AlarmName, Evidence
-from impactcell.tracking import BatchKnowledge, Reading, Tracked, TrackerSettings, initial_state
-from impactcell.tracking import track as track_cycle
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import (
+    BatchKnowledge,
+    FrictionObservation,
+    TrackerSettings,
+    TrackingResult,
+    initial_state,
+)
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
 FEWEST = 2
@@ -31,7 +37,7 @@ class Raised:
 class Replayed:
     """A series after its last cycle."""
 
-    last: Tracked
+    last: TrackingResult
     raised: tuple[Raised, ...]
     used: int
     notes: tuple[tuple[int, str], ...]
@@ -75,7 +81,7 @@ def track(
     sys.stdout.write(text + "\n")
 
 
-def replay(settings: TrackerSettings, readings: list[Reading]) -> Replayed:
+def replay(settings: TrackerSettings, readings: list[FrictionObservation]) -> Replayed:
     """Track a series and its alarms; a shift is reported as the cycles after it came to see it."""
     rules = AlarmSettings()
     state, book = initial_state(), alarms.initial_state(rules)
@@ -83,7 +89,7 @@ def replay(settings: TrackerSettings, readings: list[Reading]) -> Replayed:
     notes: list[tuple[int, str]] = []
     used, open_shift, tracked = 0, -1, None
     for reading in readings:
-        tracked = track_cycle(settings, state, reading)
+        tracked = wear_batch.update(settings, state, reading)
         state = tracked.state
         used += tracked.used
         notes.extend((reading.cycle, note) for note in tracked.notes)
@@ -92,13 +98,13 @@ def replay(settings: TrackerSettings, readings: list[Reading]) -> Replayed:
             alarms.wear_limit(rules, tracked.wear, reading.cycle, active=active),
             alarms.batch_shift(tracked.shift),
         ]
-        book, moved = alarms.after_cycle(
+        book, moved = alarms.update(
             rules, book, findings, reading.cycle, reading.time_ns, announced=tracked.expected
         )
         raised.extend(
             Raised(t.alarm.name, reading.cycle, t.alarm.evidence)
             for t in moved
-            if Effect.ANNOUNCE in t.effects and t.alarm.name is not AlarmName.BATCH_SHIFT
+            if Notification.ANNUNCIATE in t.notifications and t.alarm.name is not AlarmName.BATCH_SHIFT
         )
         if tracked.shift is not None:
             # a second shift while the first still stands is news too
@@ -111,7 +117,7 @@ def replay(settings: TrackerSettings, readings: list[Reading]) -> Replayed:
     return Replayed(tracked, tuple(raised), used, tuple(notes))
 
 
-def read_series(path: Path) -> tuple[list[Reading], bool]:
+def read_series(path: Path) -> tuple[list[FrictionObservation], bool]:
     """Read a series; also tell whether it has a column `batch`.
 
     Raises
@@ -150,7 +156,7 @@ def read_series(path: Path) -> tuple[list[Reading], bool]:
     return readings, "batch" in header
 
 
-def _reading(path: Path, line: int, cells: dict[str, str]) -> Reading:
+def _reading(path: Path, line: int, cells: dict[str, str]) -> FrictionObservation:
     try:
         number = float(cells["cycle"])
         cycle = int(number)
@@ -159,7 +165,7 @@ def _reading(path: Path, line: int, cells: dict[str, str]) -> Reading:
     if cycle != number or cycle < 0:
         raise SeriesError(f"{path}:{line}: cycle `{cells['cycle']}` is not a whole number from 0 on")
     mu_s, std = (_number(path, line, name, cells.get(name, "")) for name in ("mu_s", "mu_s_std"))
-    return Reading(cycle, mu_s, std, batch_id=cells.get("batch") or None)
+    return FrictionObservation(cycle, mu_s, std, batch_id=cells.get("batch") or None)
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
@@ -174,7 +180,7 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
         ) from None
 
 
-def _refined(raised: Raised, tracked: Tracked) -> Raised:
+def _refined(raised: Raised, tracked: TrackingResult) -> Raised:
     """Let what is now believed of the shift replace what was believed when it was found."""
     batch, evidence = tracked.batch, raised.evidence
     if not math.isfinite(batch.last_shift):

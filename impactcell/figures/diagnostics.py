@@ -11,8 +11,15 @@ import numpy as np
 
 from impactcell.figures.friction import COLOURS, GREY, STYLE
 from impactcell.records import Capture, Channel, Samples
-from impactcell.tracking import BatchKnowledge, Reading, Tracked, TrackerSettings, initial_state, track
+from impactcell.tracking import wear_batch
 from impactcell.tracking.signature import tracker
+from impactcell.tracking.wear_batch import (
+    BatchKnowledge,
+    FrictionObservation,
+    TrackerSettings,
+    TrackingResult,
+    initial_state,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -156,11 +163,15 @@ def _legends(panels: "Sequence[Axes]") -> None:
         axes.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 
 
-def _tracked(mu_s: Samples, batches: list[str] | list[None], knowledge: BatchKnowledge) -> list[Tracked]:
+def _tracked(
+    mu_s: Samples, batches: list[str] | list[None], knowledge: BatchKnowledge
+) -> list[TrackingResult]:
     settings = TrackerSettings(wear_limit=LIMIT, batch=knowledge)
     state, outcomes = initial_state(), []
     for cycle, (value, batch) in enumerate(zip(mu_s, batches, strict=True)):
-        outcomes.append(track(settings, state, Reading(cycle, float(value), STD, batch_id=batch)))
+        outcomes.append(
+            wear_batch.update(settings, state, FrictionObservation(cycle, float(value), STD, batch_id=batch))
+        )
         state = outcomes[-1].state
     return outcomes
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from asyncua import ua
 
-from impactcell.alarms import retained
+from impactcell.alarms import is_retained
 from impactcell.opcua.event_filter import Event, Path
 from impactcell.opcua.node_values import GOOD, Values, moment
 from impactcell.records import Alarm, AlarmName, Shelving
@@ -131,7 +131,7 @@ class Condition:
 
     def present(self) -> Event | None:
         """Make the event of the present state for a refresh; None where it is not to be shown."""
-        return self.event(self.alarm) if retained(self.alarm) else None
+        return self.event(self.alarm) if is_retained(self.alarm) else None
 
     def _show(self, alarm: Alarm) -> None:
         time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
@@ -156,7 +156,7 @@ class Condition:
                 "Severity": (alarm.severity, ua.VariantType.UInt16),
                 "ConditionName": (alarm.name.value, ua.VariantType.String),
                 "BranchId": (ua.NodeId(), ua.VariantType.NodeId),
-                "Retain": (retained(alarm), ua.VariantType.Boolean),
+                "Retain": (is_retained(alarm), ua.VariantType.Boolean),
                 "ClientUserId": (alarm.user, ua.VariantType.String),
                 "Comment": (ua.LocalizedText(alarm.comment), _LT),
                 "Quality": (GOOD, ua.VariantType.StatusCode),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from impactcell.alarms import Event
+from impactcell.alarms import EventKind
 from impactcell.records import Alarm, AlarmName, Quality
 
 
@@ -168,13 +168,13 @@ class Actions(Protocol):
         self,
         cell: str,
         alarm: AlarmName,
-        event: Event,
+        event: EventKind,
         actor: Actor,
         *,
         comment: str = "",
         shelve_s: float = 0.0,
     ) -> Alarm:
-        """Apply a person's action through `impactcell.alarms.act`; the new state of the condition.
+        """Apply a person's action through `impactcell.alarms.apply_event`; the new state of the condition.
 
         The action is one of acknowledge, confirm, comment, enable, disable and the three of shelving. A
         `Transition` that carries a refusal is raised as `RefusedError(refusal.value)`.

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from asyncua import ua
 
-from impactcell.alarms import Event
+from impactcell.alarms import EventKind
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.method_service import Argument, ArgumentError, Calls, Method
 from impactcell.opcua.request_dispatch import Context
@@ -30,27 +30,27 @@ _SHELVING_TIME: Final = Argument("ShelvingTime", ua.VariantType.Double)
 
 _ids = ua.ObjectIds
 # Action: name of the method, its NodeIds on the types, its arguments.
-_CONDITION_METHODS: Final[Mapping[Event, tuple[str, tuple[int, ...], tuple[Argument, ...]]]] = {
-    Event.ENABLE: ("Enable", (_ids.ConditionType_Enable,), ()),
-    Event.DISABLE: ("Disable", (_ids.ConditionType_Disable,), ()),
-    Event.COMMENT: ("AddComment", (_ids.ConditionType_AddComment,), (_EVENT_ID, _COMMENT)),
-    Event.ACKNOWLEDGE: (
+_CONDITION_METHODS: Final[Mapping[EventKind, tuple[str, tuple[int, ...], tuple[Argument, ...]]]] = {
+    EventKind.ENABLE: ("Enable", (_ids.ConditionType_Enable,), ()),
+    EventKind.DISABLE: ("Disable", (_ids.ConditionType_Disable,), ()),
+    EventKind.COMMENT: ("AddComment", (_ids.ConditionType_AddComment,), (_EVENT_ID, _COMMENT)),
+    EventKind.ACKNOWLEDGE: (
         "Acknowledge",
         (_ids.AcknowledgeableConditionType_Acknowledge,),
         (_EVENT_ID, _COMMENT),
     ),
-    Event.CONFIRM: ("Confirm", (_ids.AcknowledgeableConditionType_Confirm,), (_EVENT_ID, _COMMENT)),
-    Event.SHELVE_TIMED: (
+    EventKind.CONFIRM: ("Confirm", (_ids.AcknowledgeableConditionType_Confirm,), (_EVENT_ID, _COMMENT)),
+    EventKind.SHELVE_TIMED: (
         "ShelvingState/TimedShelve",
         (_ids.ShelvedStateMachineType_TimedShelve, _ids.AlarmConditionType_ShelvingState_TimedShelve),
         (_SHELVING_TIME,),
     ),
-    Event.SHELVE_ONE_SHOT: (
+    EventKind.SHELVE_ONE_SHOT: (
         "ShelvingState/OneShotShelve",
         (_ids.ShelvedStateMachineType_OneShotShelve, _ids.AlarmConditionType_ShelvingState_OneShotShelve),
         (),
     ),
-    Event.UNSHELVE: (
+    EventKind.UNSHELVE: (
         "ShelvingState/Unshelve",
         (_ids.ShelvedStateMachineType_Unshelve, _ids.AlarmConditionType_ShelvingState_Unshelve),
         (),
@@ -140,24 +140,24 @@ def bind_condition(
 
 
 def _action(
-    condition: Condition, event: Event, actions: Actions, tell: Tell
+    condition: Condition, event: EventKind, actions: Actions, tell: Tell
 ) -> Callable[[Context, Sequence[Any]], Awaitable[None]]:
     async def act(context: Context, given: Sequence[Any]) -> None:
         comment, shelve_s = "", 0.0
-        if event in (Event.ACKNOWLEDGE, Event.CONFIRM, Event.COMMENT):
+        if event in (EventKind.ACKNOWLEDGE, EventKind.CONFIRM, EventKind.COMMENT):
             if condition.alarm.enabled and not condition.knows(given[0]):
                 raise FaultError(ua.StatusCodes.BadEventIdUnknown)
             comment = _text(given[1], 1)
-        elif event is Event.SHELVE_TIMED:
+        elif event is EventKind.SHELVE_TIMED:
             shelve_s = given[0] / 1e3
             if not 0.0 < shelve_s <= MAX_SHELVE_S:
                 raise FaultError(ua.StatusCodes.BadShelvingTimeOutOfRange)
-        elif event is Event.SHELVE_ONE_SHOT:
+        elif event is EventKind.SHELVE_ONE_SHOT:
             shelve_s = MAX_SHELVE_S
         what = f"{condition.cell}: {condition.name.value}: {event.value}"
         if comment:
             what += f" ({comment!r})"
-        if event is Event.SHELVE_TIMED:
+        if event is EventKind.SHELVE_TIMED:
             what += f" ({shelve_s:g} s)"
         work = actions.act_on_condition(
             condition.cell, condition.name, event, context.actor, comment=comment, shelve_s=shelve_s

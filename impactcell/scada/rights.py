@@ -4,7 +4,7 @@ import enum
 from collections.abc import Mapping
 from typing import Final
 
-from impactcell.alarms import Event
+from impactcell.alarms import EventKind
 from impactcell.scada.interface import Role
 
 
@@ -58,15 +58,15 @@ MATRIX: Final[Mapping[tuple[Area, Right], Role | None]] = {
 }
 """Lowest role that has a right; None where nobody has it."""
 
-CONDITION_AREAS: Final[Mapping[Event, Area]] = {
-    Event.ACKNOWLEDGE: Area.ACKNOWLEDGE,
-    Event.CONFIRM: Area.CONFIRM,
-    Event.COMMENT: Area.COMMENT,
-    Event.SHELVE_TIMED: Area.SHELVE,
-    Event.SHELVE_ONE_SHOT: Area.SHELVE,
-    Event.UNSHELVE: Area.SHELVE,
-    Event.ENABLE: Area.ENABLE,
-    Event.DISABLE: Area.ENABLE,
+CONDITION_AREAS: Final[Mapping[EventKind, Area]] = {
+    EventKind.ACKNOWLEDGE: Area.ACKNOWLEDGE,
+    EventKind.CONFIRM: Area.CONFIRM,
+    EventKind.COMMENT: Area.COMMENT,
+    EventKind.SHELVE_TIMED: Area.SHELVE,
+    EventKind.SHELVE_ONE_SHOT: Area.SHELVE,
+    EventKind.UNSHELVE: Area.SHELVE,
+    EventKind.ENABLE: Area.ENABLE,
+    EventKind.DISABLE: Area.ENABLE,
 }
 
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from impactcell.alarms import Finding
-from impactcell.cell.preprocessing import Announcement
+from impactcell.alarms import RuleResult
+from impactcell.cell.preprocessing import BatchAnnouncement
 from impactcell.errors import ImpactCellError, JournalError, PositioningError
 from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
 from impactcell.journal.retention import Retention
@@ -215,13 +215,13 @@ class RunningCell:
                 self.server.publish(self.cell.name, snapshot)
             fault = task.fault
             reason, evidence = fault or ("", Evidence())
-            await self._find(Finding(AlarmName.POSITIONING_FAULT, fault is not None, reason, evidence))
+            await self._find(RuleResult(AlarmName.POSITIONING_FAULT, fault is not None, reason, evidence))
 
-    def _announcement(self) -> Announcement | None:
+    def _announcement(self) -> BatchAnnouncement | None:
         report = self._module.report
         if report is None or report.batch is None or not report.batch.sequence:
             return None
-        return Announcement(report.batch.sequence, report.batch.from_cycle)
+        return BatchAnnouncement(report.batch.sequence, report.batch.from_cycle)
 
     def _link_changed(self, status: ModuleStatus) -> None:
         self._link_news.put_nowait(status)
@@ -233,7 +233,7 @@ class RunningCell:
                 if not status.connected:
                     self.server.mark_bad(self.cell.name, time.time_ns())
                 self._show_module(self.server)
-            await self._find(Finding(AlarmName.MODULE_CONNECTION, not status.connected, status.reason))
+            await self._find(RuleResult(AlarmName.MODULE_CONNECTION, not status.connected, status.reason))
 
     async def _look_at_journal(self) -> None:
         fault = self.worker.journal_fault
@@ -241,9 +241,9 @@ class RunningCell:
         if bool(fault) != active:
             if fault:
                 self.log.error("%s", fault)
-            await self._find(Finding(AlarmName.JOURNAL_FAULT, bool(fault), fault, Evidence()))
+            await self._find(RuleResult(AlarmName.JOURNAL_FAULT, bool(fault), fault, Evidence()))
 
-    async def _find(self, finding: Finding) -> None:
+    async def _find(self, finding: RuleResult) -> None:
         self._show_alarms(await self.worker.find(finding, time.time_ns()))
 
     async def _tick(self) -> None:

@@ -6,15 +6,15 @@ from impactcell import __version__
 from impactcell.alarms import AlarmSettings, RuleSettings
 from impactcell.alarms.rules import DEFAULT_RULES
 from impactcell.cell import CellDesign
-from impactcell.cell.preprocessing import Known
+from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink, TlsFiles
 from impactcell.journal.retention import Retention
 from impactcell.records import AlarmName
 from impactcell.scada import CellDescription, Limits, Machine, Ranges, ServerSettings
 from impactcell.settings import Cell
 from impactcell.settings.sections import Journal
-from impactcell.tracking import BatchKnowledge, TrackerSettings
 from impactcell.tracking.signature.tracker import SignatureSettings
+from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 
 MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
 
@@ -40,7 +40,7 @@ def cell_design(cell: Cell) -> CellDesign:
             false_alarm_cycles=settings.alarms.false_alarm_cycles,
         ),
         alarms=alarm_settings(cell),
-        known=Known(
+        known=CaptureDefaults(
             mass_kg=settings.part.mass_kg,
             stroke_m=None if stroke_mm is None else stroke_mm * MM,
             force_noise_std_n=settings.sensors.force_noise_std_n,

@@ -5,7 +5,7 @@ import time
 from collections.abc import Mapping
 
 from impactcell import cell as core
-from impactcell.alarms import Event, Occurrence
+from impactcell.alarms import AlarmEvent, EventKind
 from impactcell.errors import PositioningError
 from impactcell.journal.store import AuditEntry
 from impactcell.records import Alarm, AlarmName
@@ -33,7 +33,9 @@ class CellActions:
 
     async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
         """Learn the wear level anew after worn parts were replaced."""
-        await self._cell(cell).worker.change(core.renew_surface, _audit(actor, "ResetWear", Comment=comment))
+        await self._cell(cell).worker.change(
+            core.reset_wear_level, _audit(actor, "ResetWear", Comment=comment)
+        )
 
     async def set_target(self, cell: str, target_m: float, actor: Actor) -> None:
         """Start a positioning task."""
@@ -53,7 +55,7 @@ class CellActions:
         self,
         cell: str,
         alarm: AlarmName,
-        event: Event,
+        event: EventKind,
         actor: Actor,
         *,
         comment: str = "",
@@ -61,10 +63,10 @@ class CellActions:
     ) -> Alarm:
         """Apply an action through the life cycle in `impactcell.alarms`; the new state of the condition."""
         audit = _audit(actor, event.value, Condition=alarm.value, Comment=comment, Seconds=shelve_s)
-        occurrence = Occurrence(
+        alarm_event = AlarmEvent(
             event, time_ns=audit.time_ns, user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
         )
-        done = await self._cell(cell).worker.act(alarm, occurrence, audit)
+        done = await self._cell(cell).worker.act(alarm, alarm_event, audit)
         if done.refusal is not None:
             raise RefusedError(done.refusal.value, f"{cell}: {alarm.value}: {done.refusal.value}")
         return done.alarm

@@ -10,7 +10,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 
 from impactcell import cell as core
-from impactcell.alarms import Finding
+from impactcell.alarms import RuleResult
 from impactcell.errors import JournalError
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
@@ -212,8 +212,8 @@ def _tell_fault(cell: Cell, server: Server, reason: str) -> None:
     """Log why a cell does not run, and raise its alarm; once it runs, it shows its own."""
     log.error("cell=%s waits until its journal can be opened: %s", cell.name, reason)
     design = cell_design(cell)
-    fault = Finding(AlarmName.JOURNAL_FAULT, holds=True, message=reason)
-    for alarm in core.find(design, core.initial_state(design), fault, time.time_ns())[1]:
+    fault = RuleResult(AlarmName.JOURNAL_FAULT, holds=True, message=reason)
+    for alarm in core.apply_rule_result(design, core.initial_state(design), fault, time.time_ns())[1]:
         server.alarm(cell.name, alarm)
 
 

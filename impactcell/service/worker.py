@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from impactcell import cell as core
-from impactcell.alarms import Finding, Occurrence, Transition
-from impactcell.cell import CellDesign, CellState, Stepped
-from impactcell.cell.preprocessing import Announcement
+from impactcell.alarms import AlarmEvent, RuleResult, Transition
+from impactcell.cell import CellDesign, CellState, StepResult
+from impactcell.cell.preprocessing import BatchAnnouncement
 from impactcell.fieldbus.capture_ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
@@ -42,10 +42,10 @@ class Durable:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Processed:
+class CycleResult:
     """Outcome of one cycle, and the last cycle that is safely stored (None: none yet)."""
 
-    stepped: Stepped
+    stepped: StepResult
     durable: Mark | None
 
 
@@ -124,16 +124,16 @@ class Worker:
         self,
         capture: Capture,
         positioning: PositioningState,
-        announcement: Announcement | None,
+        announcement: BatchAnnouncement | None,
         faults: tuple[str, ...] = (),
-    ) -> Processed:
+    ) -> CycleResult:
         """Take one cycle through the pipeline and store it."""
         processed = await self.run(lambda: self._process(capture, positioning, announcement, faults))
         if self._keeper.untidy:
             self._thread.submit(self._tidy, capture.time_ns)  # what is shown need not wait for it
         return processed
 
-    async def find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
+    async def find(self, finding: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
         """Take what a rule beside the cycles says; the alarms that moved."""
         return await self.run(lambda: self._find(finding, time_ns))
 
@@ -143,9 +143,9 @@ class Worker:
             return ()
         return await self.run(lambda: self._pass_time(time_ns))
 
-    async def act(self, name: AlarmName, occurrence: Occurrence, audit: AuditEntry) -> Transition:
+    async def act(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
         """Apply a person's action on a condition, and write down who did it."""
-        return await self.run(lambda: self._act(name, occurrence, audit))
+        return await self.run(lambda: self._act(name, event, audit))
 
     async def change(self, change: Callable[[CellState], CellState], audit: AuditEntry) -> None:
         """Change the state by a person's command, and write down who did it."""
@@ -165,7 +165,7 @@ class Worker:
 
         def swap() -> None:
             self._design = design
-            self._state = core.adapted(design, self._state)
+            self._state = core.migrate_state(design, self._state)
             self._keep_model()
 
         await self.run(swap)
@@ -197,7 +197,7 @@ class Worker:
             return Durable(core.initial_state(self._design))
         try:
             stored = unpack(Durable, blob)
-            return replace(stored, state=core.adapted(self._design, stored.state))
+            return replace(stored, state=core.migrate_state(self._design, stored.state))
         except ValueError as error:
             self.log.warning(
                 "the journal's state is of another version (%s); tracking begins anew, cycles go on", error
@@ -208,18 +208,18 @@ class Worker:
         self,
         capture: Capture,
         positioning: PositioningState,
-        announcement: Announcement | None,
+        announcement: BatchAnnouncement | None,
         faults: tuple[str, ...],
-    ) -> Processed:
+    ) -> CycleResult:
         with _computing:
             stepped = self._stepped(capture, positioning, announcement, faults)
         self.last = Mark(capture.session, capture.cycle)
         self._state, self._snapshot = stepped.state, stepped.snapshot
         if self._keeper.journal is None:
-            return Processed(stepped, self.last)
+            return CycleResult(stepped, self.last)
         blob = self._blob()
         self._keeper.cycle(lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed))
-        return Processed(stepped, self.durable)
+        return CycleResult(stepped, self.durable)
 
     def _tidy(self, time_ns: int) -> None:
         try:
@@ -231,9 +231,9 @@ class Worker:
         self,
         capture: Capture,
         positioning: PositioningState,
-        announcement: Announcement | None,
+        announcement: BatchAnnouncement | None,
         faults: tuple[str, ...],
-    ) -> Stepped:
+    ) -> StepResult:
         try:
             return core.step(self._design, self._state, capture, positioning, announcement, faults)
         except Exception as error:
@@ -247,22 +247,22 @@ class Worker:
     def _blob(self) -> bytes:
         return pack(Durable(self._state, self._snapshot, self.belief))
 
-    def _find(self, finding: Finding, time_ns: int) -> tuple[Alarm, ...]:
-        self._state, moved = core.find(self._design, self._state, finding, time_ns)
+    def _find(self, finding: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
+        self._state, moved = core.apply_rule_result(self._design, self._state, finding, time_ns)
         if moved:
             self._record(moved, None)
         return moved
 
     def _pass_time(self, time_ns: int) -> tuple[Alarm, ...]:
-        self._state, moved = core.pass_time(self._state, time_ns)
+        self._state, moved = core.expire_shelving(self._state, time_ns)
         if moved:
             self._record(moved, None)
         return moved
 
-    def _act(self, name: AlarmName, occurrence: Occurrence, audit: AuditEntry) -> Transition:
-        self._state, done = core.act(self._state, name, occurrence)
+    def _act(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
+        self._state, done = core.apply_event(self._state, name, event)
         result = "Good" if done.refusal is None else done.refusal.value
-        self._record((done.alarm,) if done.effects else (), _with_result(audit, result))
+        self._record((done.alarm,) if done.notifications else (), _with_result(audit, result))
         return done
 
     def _change(self, change: Callable[[CellState], CellState], audit: AuditEntry) -> None:

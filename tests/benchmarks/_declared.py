@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, initial_state, track
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
 from tests.benchmarks.table import Table
 
 DECLARED = np.array([0.0018, 0.0023, 0.0056, 0.0061])  # as of a waveform fit at four velocities, in turn
@@ -25,8 +26,8 @@ def shifts(values: np.ndarray, declared: np.ndarray, knowledge: BatchKnowledge) 
     """Cycles at which a shift is reported."""
     state, found = initial_state(), []
     for cycle, value in enumerate(values):
-        reading = Reading(cycle + 1, value, declared[cycle % 4], (cycle + 1) * 10**9, "A")
-        tracked = track(TrackerSettings(batch=knowledge), state, reading)
+        reading = FrictionObservation(cycle + 1, value, declared[cycle % 4], (cycle + 1) * 10**9, "A")
+        tracked = wear_batch.update(TrackerSettings(batch=knowledge), state, reading)
         state = tracked.state
         if tracked.shift is not None:
             found.append(cycle)

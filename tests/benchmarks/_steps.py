@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from impactcell.tracking import TrackerSettings
-from impactcell.tracking.wear_batch import run_length_bank
+from impactcell.tracking.wear_batch import TrackerSettings, run_length_bank
 from tests.benchmarks import _charts, _streams
 from tests.benchmarks.table import Table
 
@@ -39,7 +38,7 @@ def _follow(
     for k in range(len(z)):
         t = first + k
         reading[0], reading[4] = z[k], t
-        count, _, statistic = run_length_bank.run_cycle(table, count, design, reading, outliers, accepted)
+        count, _, statistic = run_length_bank.update(table, count, design, reading, outliers, accepted)
         if statistic > limit:
             accepted = t
             found[n] = t
@@ -74,7 +73,7 @@ class Run:
         settings = TrackerSettings()
         prior = settings.outlier_probability
         table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-        first = run_length_bank.seed(value, 1.0, settings.slope_std, 0, prior)
+        first = run_length_bank.initial_bank(value, 1.0, settings.slope_std, 0, prior)
         table[: len(first)] = first
         made = run_length_bank.design(
             settings.hazard, settings.step_std**2, 0.0, 0.0, prior, settings.slope_std**2

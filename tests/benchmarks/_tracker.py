@@ -12,20 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from impactcell import tracking
-from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, initial_state, track
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
 from tests.benchmarks import _charts, _inside, _steps, _streams
 from tests.benchmarks.table import Table
 
 UNIT, MEAN = 0.002, 0.2  # of a series in mu_s
 KNOWN_SEEDS = _streams.REPORTED + 20_000
 START_SEEDS = _streams.REPORTED + 30_000
-SOURCES = (
-    *("bank", "batch", "commissioning", "declared", "honesty", "hypotheses", "noise", "screening"),
-    *("settings", "tracker", "wear"),
-)
-DIRECTORY = Path(tracking.__file__).parent
-CODE = hashlib.sha256(b"".join((DIRECTORY / f"{name}.py").read_bytes() for name in SOURCES)).hexdigest()[:12]
+SOURCES = sorted(Path(wear_batch.__file__).parent.glob("*.py"))
+CODE = hashlib.sha256(b"".join(source.read_bytes() for source in SOURCES)).hexdigest()[:12]
 
 
 def known_table(*, quick: bool) -> Table:
@@ -112,10 +108,10 @@ def starts_table(*, quick: bool) -> Table:
                 state = initial_state()
                 for k, value in enumerate(z.tolist()):
                     said = "A" if knowledge is BatchKnowledge.KNOWN else None
-                    done = track(
+                    done = wear_batch.update(
                         TrackerSettings(batch=knowledge),
                         state,
-                        Reading(k, MEAN + UNIT * value, UNIT, batch_id=said),
+                        FrictionObservation(k, MEAN + UNIT * value, UNIT, batch_id=said),
                     )
                     state = done.state
                     if done.shift is not None:
@@ -149,7 +145,9 @@ def _run(seed: int, knowledge: BatchKnowledge, sizes: tuple[float, ...] = ()) ->
     settings, state, batch = TrackerSettings(batch=knowledge), initial_state(), truth.batch.tolist()
     shifts = []
     for i, z in enumerate(truth.values.tolist()):
-        done = track(settings, state, Reading(i, MEAN + UNIT * z, UNIT, batch_id=f"B{batch[i]}"))
+        done = wear_batch.update(
+            settings, state, FrictionObservation(i, MEAN + UNIT * z, UNIT, batch_id=f"B{batch[i]}")
+        )
         state = done.state
         if done.shift is not None:
             shifts.append((i, done.shift.change_cycle))

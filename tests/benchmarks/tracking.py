@@ -10,9 +10,10 @@ import numpy as np
 from impactcell import alarms
 from impactcell.alarms import AlarmSettings
 from impactcell.records import AlarmName
-from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, initial_state, track
+from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker
+from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
 from tests.benchmarks import _declared, _inside, _signatures, _sizes, _slides, _steps, _tracker
 from tests.benchmarks.table import Table
 
@@ -57,21 +58,21 @@ def cost_table(*, quick: bool) -> Table:
         signed, gaps = tracker.initial_state(shape), gap_cusum.GapState()
         took: dict[str, list[float]] = {"tracker": [], "signature": [], "gap and alarms": []}
         for i in range(n):
-            reading = Reading(i, 0.2 + 0.002 * rng.normal(), 0.002, (i + 1) * 10**9, "A")
+            reading = FrictionObservation(i, 0.2 + 0.002 * rng.normal(), 0.002, (i + 1) * 10**9, "A")
             t0 = time.thread_time()
-            tracked = track(config, state, reading)
+            tracked = wear_batch.update(config, state, reading)
             t1 = time.thread_time()
             seen = tracker.update(shape, signed, captures[i % 20])
             t2 = time.thread_time()
-            followed = gap_cusum.follow(gaps, 1.0 + 0.02 * rng.normal(), i, 1e5, 1.0)
+            followed = gap_cusum.update(gaps, 1.0 + 0.02 * rng.normal(), i, 1e5, 1.0)
             active = book.alarm(AlarmName.WEAR_LIMIT).active
             findings = [
                 alarms.wear_limit(rules, tracked.wear, i, active=active),
                 alarms.batch_shift(tracked.shift),
                 alarms.deviant_cycle(seen.deviation, seen.signature.deviates_at_m, judged=seen.judged),
-                alarms.Finding(AlarmName.MODEL_GAP, followed.exceeds, "", followed.evidence),
+                alarms.RuleResult(AlarmName.MODEL_GAP, followed.exceeds, "", followed.evidence),
             ]
-            book, _ = alarms.after_cycle(rules, book, findings, i, reading.time_ns)
+            book, _ = alarms.update(rules, book, findings, i, reading.time_ns)
             t3 = time.thread_time()
             state, signed, gaps = tracked.state, seen.state, followed.state
             for name, spent in zip(took, (t1 - t0, t2 - t1, t3 - t2), strict=True):

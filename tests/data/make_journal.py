@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from impactcell.alarms import Event
+from impactcell.alarms import EventKind
 from impactcell.journal.store import Journal
 from impactcell.records import AlarmName
 from impactcell.scada import Actor, Role
@@ -84,16 +84,20 @@ async def _wearing(watched: Watched) -> None:
     """Let the cell wear; people see its alarms, and each is left in another state."""
     act = CellActions(watched.service.running).act_on_condition
     await watched.alarm(CELL, AlarmName.DEVIANT_CYCLE, active=True)
-    await act(CELL, AlarmName.DEVIANT_CYCLE, Event.ACKNOWLEDGE, OPERATOR, comment="a chip on the table")
-    await act(CELL, AlarmName.DEVIANT_CYCLE, Event.SHELVE_TIMED, OPERATOR, shelve_s=YEARS_S)
+    await act(CELL, AlarmName.DEVIANT_CYCLE, EventKind.ACKNOWLEDGE, OPERATOR, comment="a chip on the table")
+    await act(CELL, AlarmName.DEVIANT_CYCLE, EventKind.SHELVE_TIMED, OPERATOR, shelve_s=YEARS_S)
     await watched.alarm(CELL, AlarmName.BATCH_SHIFT, active=True)
-    await act(CELL, AlarmName.BATCH_SHIFT, Event.ACKNOWLEDGE, OPERATOR)
-    await act(CELL, AlarmName.BATCH_SHIFT, Event.CONFIRM, OPERATOR)
+    await act(CELL, AlarmName.BATCH_SHIFT, EventKind.ACKNOWLEDGE, OPERATOR)
+    await act(CELL, AlarmName.BATCH_SHIFT, EventKind.CONFIRM, OPERATOR)
     await act(
-        CELL, AlarmName.BATCH_SHIFT, Event.COMMENT, ENGINEER, comment="supplier changed the coating, µ lower"
+        CELL,
+        AlarmName.BATCH_SHIFT,
+        EventKind.COMMENT,
+        ENGINEER,
+        comment="supplier changed the coating, µ lower",
     )
-    await act(CELL, AlarmName.MODEL_GAP, Event.DISABLE, ENGINEER)
-    await act(CELL, AlarmName.JOURNAL_FAULT, Event.SHELVE_ONE_SHOT, OPERATOR)
+    await act(CELL, AlarmName.MODEL_GAP, EventKind.DISABLE, ENGINEER)
+    await act(CELL, AlarmName.JOURNAL_FAULT, EventKind.SHELVE_ONE_SHOT, OPERATOR)
     await watched.alarm(CELL, AlarmName.WEAR_LIMIT, active=True)
     await watched.until(CELL, CYCLES - 2)
 

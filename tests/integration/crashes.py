@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from impactcell import cell as core
-from impactcell.cell.preprocessing import BatchSaid
+from impactcell.cell.preprocessing import BatchNaming
 from impactcell.journal.store import Journal
 from impactcell.records import PositioningState
 from impactcell.serialization import json_text
@@ -93,4 +93,4 @@ def judged(cell_file: Path, journal_file: Path, told: list[str]) -> Outcome:
 
 
 def _without_alarms(state: core.CellState) -> bytes:
-    return json_text.dumps(replace(state, alarms=None, batch=BatchSaid()))  # type: ignore[arg-type]
+    return json_text.dumps(replace(state, alarms=None, batch=BatchNaming()))  # type: ignore[arg-type]

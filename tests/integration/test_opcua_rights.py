@@ -140,11 +140,11 @@ async def confirm(hand: Hand) -> int:
 
 
 async def _acknowledged(hand: Hand) -> None:
-    from impactcell.alarms import Event, Occurrence
+    from impactcell.alarms import AlarmEvent, EventKind
 
     _fresh(hand)
     alarm = hand.here.actions.apply(
-        CELL, AlarmName.WEAR_LIMIT, Occurrence(Event.ACKNOWLEDGE, time_ns=START_NS)
+        CELL, AlarmName.WEAR_LIMIT, AlarmEvent(EventKind.ACKNOWLEDGE, time_ns=START_NS)
     )
     hand.here.server.alarm(CELL, alarm)
 

@@ -16,7 +16,7 @@ import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 
-from impactcell.alarms import Event, Occurrence
+from impactcell.alarms import AlarmEvent, EventKind
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.trust_list import fingerprint
 from impactcell.records import Alarm, AlarmName
@@ -128,12 +128,12 @@ class Commands:
         actions = self.here.actions
         actions.alarms.clear()
         told = [
-            actions.apply(CELL, name, Occurrence(event, number, START_NS + number * 10**9, message="past"))
+            actions.apply(CELL, name, AlarmEvent(event, number, START_NS + number * 10**9, message="past"))
             for number, (name, event) in enumerate(
                 [
-                    (AlarmName.WEAR_LIMIT, Event.ACTIVATE),
-                    (AlarmName.WEAR_LIMIT, Event.CLEAR),
-                    (AlarmName.BATCH_SHIFT, Event.ACTIVATE),
+                    (AlarmName.WEAR_LIMIT, EventKind.ACTIVATE),
+                    (AlarmName.WEAR_LIMIT, EventKind.CLEAR),
+                    (AlarmName.BATCH_SHIFT, EventKind.ACTIVATE),
                 ]
             )
         ]

@@ -31,7 +31,7 @@ class GapState:
 
 
 @dataclass(frozen=True, slots=True)
-class GapTracked:
+class GapResult:
     """Outcome of one capture; `exceeds` None while the usual residual is being learned."""
 
     state: GapState
@@ -40,11 +40,11 @@ class GapTracked:
     reason: str = ""
 
 
-def follow(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, period_s: float) -> GapTracked:
+def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, period_s: float) -> GapResult:
     """Take one capture's normalised residual (1 = noise floor) into the state."""
     limit = threshold(false_alarm_cycles)
     if not (math.isfinite(gap) and gap > 0.0):
-        return GapTracked(state, None, Evidence(), "the capture has no normalised residual")
+        return GapResult(state, None, Evidence(), "the capture has no normalised residual")
     value = math.log(gap)
     score = 0.0
     if state.count >= 2 and state.squares > 0.0:
@@ -65,7 +65,7 @@ def follow(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         squares += step * (value - mean)
     fresh = GapState(count, mean, squares, excess, since)
     if count < FIRST:
-        return GapTracked(fresh, None, Evidence(), "the usual residual is being learned")
+        return GapResult(fresh, None, Evidence(), "the usual residual is being learned")
     usual = math.exp(mean)
     evidence = Evidence(
         excess,
@@ -76,7 +76,7 @@ def follow(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         false_alarm_cycles,
         false_alarm_cycles * period_s / 86_400.0,
     )
-    return GapTracked(fresh, excess > limit, evidence)
+    return GapResult(fresh, excess > limit, evidence)
 
 
 @functools.cache

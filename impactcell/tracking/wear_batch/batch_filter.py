@@ -8,10 +8,10 @@ import numpy as np
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import run_length_bank as banks
 from impactcell.tracking.wear_batch import wear_filter
-from impactcell.tracking.wear_batch.input_validation import Place
-from impactcell.tracking.wear_batch.noise_scale import Noise, moved
+from impactcell.tracking.wear_batch.input_validation import CycleTiming
+from impactcell.tracking.wear_batch.noise_scale import NoiseScale, scale_change
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
-from impactcell.tracking.wear_batch.state import Reading, Shift, TrackerState
+from impactcell.tracking.wear_batch.state import ChangePoint, FrictionObservation, TrackerState
 
 FEWEST_DIFFERENCES = 18.0  # the scale of the noise must rest on so many before a shift is believed
 LEARNING_DIFFERENCES = 100.0  # before so many,
@@ -19,12 +19,12 @@ BOTH = 2.0  # ways to a false alarm where batches are known: within one, and bet
 SETTLED = 1.15  # it must not have moved by such a factor since the first cycles were gone over with it
 
 
-def take(
+def update_bank(
     settings: TrackerSettings,
     state: TrackerState,
-    reading: Reading,
+    reading: FrictionObservation,
     variance: float,
-    where: Place,
+    where: CycleTiming,
     announced: float,
 ) -> tuple[Samples, tuple[float, float], float]:
     """Take a reading into the bank.
@@ -53,22 +53,22 @@ def take(
     )
     values = np.array([reading.mu_s, variance, where.passed, where.lag, where.index, announced])
     outliers = np.array(state.outliers)
-    count, _, statistic = banks.run_cycle(
+    count, _, statistic = banks.update(
         table, len(state.bank), design, values, outliers, float(state.accepted)
     )
     return table[:count].copy(), (float(outliers[0]), float(outliers[1])), statistic
 
 
-def find_shift(
+def detect_change(
     settings: TrackerSettings,
     state: TrackerState,
-    reading: Reading,
-    noise: Noise,
+    reading: FrictionObservation,
+    noise: NoiseScale,
     bank: Samples,
     statistic: float,
-    where: Place,
+    where: CycleTiming,
     announced: float,
-) -> tuple[TrackerState, Shift | None]:
+) -> tuple[TrackerState, ChangePoint | None]:
     """Report the shift that a reading, in `bank` by now, makes certain enough."""
     if announced > 0.0:
         # an announced change is no finding, and what came before it has been settled by it
@@ -77,14 +77,16 @@ def find_shift(
     known = settings.batch is BatchKnowledge.KNOWN and reading.batch_id is not None
     ways = BOTH if known else 1.0
     threshold = banks.threshold(ways * settings.false_alarm_cycles)
-    if announced < 0.0 or where.lag > 0 or statistic <= threshold or not _settled(state, noise):
+    if announced < 0.0 or where.lag > 0 or statistic <= threshold or not _scale_is_known(state, noise):
         return state, None
-    cycle, size, std = banks.last_shift(bank, state.accepted, where.index)
-    shift = Shift(cycle, size, std, where.index, statistic, threshold)
+    cycle, size, std = banks.locate_change_point(bank, state.accepted, where.index)
+    shift = ChangePoint(cycle, size, std, where.index, statistic, threshold)
     return replace(state, accepted_before=state.accepted, accepted=where.index, shift=shift), shift
 
 
-def innovation(state: TrackerState, reading: Reading, variance: float, where: Place) -> float:
+def innovation(
+    state: TrackerState, reading: FrictionObservation, variance: float, where: CycleTiming
+) -> float:
     """Give the reading minus what the bank predicts before it is taken in, in standard deviations."""
     mean, spread = banks.moments(state.bank)
     ahead = where.passed - where.lag
@@ -93,14 +95,14 @@ def innovation(state: TrackerState, reading: Reading, variance: float, where: Pl
     return float((reading.mu_s - predicted) / math.sqrt(width))
 
 
-def compare_batch(
+def compare_with_previous_batch(
     settings: TrackerSettings,
     state: TrackerState,
     current: wear_filter.WearFilter,
-    noise: Noise,
+    noise: NoiseScale,
     variance: float,
     index: int,
-) -> tuple[TrackerState, Shift | None]:
+) -> tuple[TrackerState, ChangePoint | None]:
     """Test whether the PLC's present batch differs from the one before.
 
     The log Bayes factor of a shift against none, by the density ratio of Savage and Dickey; under no
@@ -115,26 +117,26 @@ def compare_batch(
     statistic = 0.5 * (size / std) ** 2 + math.log(std / prior)
     length = max(1.0, (state.batch_start - state.first) / max(state.batch_count - 1, 1))
     threshold = math.log(max(BOTH * settings.false_alarm_cycles / length, 20.0))
-    shift = Shift(state.batch_start, size, std, index, statistic, threshold)
+    shift = ChangePoint(state.batch_start, size, std, index, statistic, threshold)
     if state.tested:
         reported = state.shift is not None and state.shift.cycle == state.batch_start
         return (replace(state, shift=shift) if reported else state), None
-    if statistic <= threshold or not _settled(state, noise):
+    if statistic <= threshold or not _scale_is_known(state, noise):
         return state, None
     return replace(state, shift=shift, tested=True), shift
 
 
-def not_yet(state: TrackerState) -> str:
+def reason_not_ready(state: TrackerState) -> str:
     """Say why no change of batch would be reported yet; empty where one would be."""
-    if _settled(state, state.noise):
+    if _scale_is_known(state, state.noise):
         return ""
     return "no change of batch is reported yet: the scale of the noise is still being learned"
 
 
-def _settled(state: TrackerState, noise: Noise) -> bool:
+def _scale_is_known(state: TrackerState, noise: NoiseScale) -> bool:
     """Whether the scale of the noise is known well enough to tell a shift from noise."""
     if noise.weight < FEWEST_DIFFERENCES:
         return False
     if state.history is None or noise.weight >= LEARNING_DIFFERENCES:
         return True
-    return moved(noise, state.replayed, np.array([noise.last_std]))[0] < SETTLED
+    return scale_change(noise, state.replayed, np.array([noise.last_std]))[0] < SETTLED

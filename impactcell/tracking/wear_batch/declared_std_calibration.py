@@ -26,13 +26,13 @@ SMALLEST_SCALE = 1e-6
 WEIGHT, SCALE = 0, 1
 
 
-def unknown() -> Samples:
+def prior_posterior() -> Samples:
     """Belief before any difference, a row an exponent: log probability, factor of the variance."""
     return np.column_stack([np.log(PRIOR), np.ones(len(PRIOR))])
 
 
 @compiled
-def counted(squared: float, factor: float) -> float:
+def outlier_weight(squared: float, factor: float) -> float:
     """How much of a squared difference counts for the variance: by the odds of an outlier in it."""
     odds = CONTAMINATED / (1.0 - CONTAMINATED) / math.sqrt(WIDE)
     odds *= math.exp(min(0.5 * squared / factor * (1.0 - 1.0 / WIDE), 700.0))
@@ -41,7 +41,7 @@ def counted(squared: float, factor: float) -> float:
 
 
 @compiled
-def spread(belief: Samples, std: float, usual: float) -> float:
+def calibrated_std(belief: Samples, std: float, usual: float) -> float:
     """Give the standard deviation to go with a declared one; with the usual one, the usual one itself."""
     if std == usual or not usual > 0.0:
         return std
@@ -55,7 +55,7 @@ def spread(belief: Samples, std: float, usual: float) -> float:
 
 
 @compiled
-def learned(belief: Samples, squared: float, std: float, last: float, usual: float, weight: float) -> Samples:
+def update(belief: Samples, squared: float, std: float, last: float, usual: float, weight: float) -> Samples:
     """Belief after one more difference.
 
     Parameters
@@ -75,7 +75,7 @@ def learned(belief: Samples, squared: float, std: float, last: float, usual: flo
         odd = math.log(CONTAMINATED / math.sqrt(WIDE)) - 0.5 * own / (scale * WIDE)
         density = max(good, odd) + math.log1p(math.exp(-abs(good - odd))) - 0.5 * math.log(scale * variance)
         found[i, WEIGHT] += OVERLAP * density
-        found[i, SCALE] = max(scale + (own * counted(own, scale) - scale) / weight, SMALLEST_SCALE)
+        found[i, SCALE] = max(scale + (own * outlier_weight(own, scale) - scale) / weight, SMALLEST_SCALE)
         top = max(top, found[i, WEIGHT])
     total = 0.0
     for i in range(len(found)):

@@ -8,7 +8,7 @@ SMALLEST_STD = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Clock:
+class CycleClock:
     """Which cycles have been seen.
 
     Attributes
@@ -37,7 +37,7 @@ class Clock:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class CycleTiming:
     """Where a cycle belongs: `passed` cycles after the newest one, or `lag` cycles before it."""
 
     index: int
@@ -47,30 +47,34 @@ class Place:
     note: str = ""
 
 
-def place(clock: Clock, cycle: int, time_ns: int, reorder_limit: int) -> tuple[Clock, Place]:
+def update_clock(
+    clock: CycleClock, cycle: int, time_ns: int, reorder_limit: int
+) -> tuple[CycleClock, CycleTiming]:
     """Find the place of a cycle and move the clock there."""
     index = cycle + clock.base
     if not clock.seen:
-        return Clock(clock.base, index, (index,), time_ns), Place(index, 0, 0, repeated=False)
+        return CycleClock(clock.base, index, (index,), time_ns), CycleTiming(index, 0, 0, repeated=False)
     if index == clock.last or index in clock.seen:
         note = f"cycle {cycle} came twice, the second is ignored"
-        return clock, Place(index, 0, 0, repeated=True, note=note)
+        return clock, CycleTiming(index, 0, 0, repeated=True, note=note)
     seen, lag = (*clock.seen[-reorder_limit:], index), clock.last - index
     if 0 < lag <= reorder_limit:
-        clock = Clock(clock.base, clock.last, seen, clock.time_ns, clock.period_s)
-        return clock, Place(index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late")
+        clock = CycleClock(clock.base, clock.last, seen, clock.time_ns, clock.period_s)
+        return clock, CycleTiming(index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late")
     restarted = lag > 0
     base = clock.last + 1 - cycle if restarted else clock.base
     index = cycle + base
     passed = index - clock.last
-    time_ns, period_s, note = _timed(clock, time_ns, passed)
+    time_ns, period_s, note = _update_period(clock, time_ns, passed)
     if restarted:
         seen = (*seen[:-1], index)
         note = "; ".join(filter(None, (f"cycle numbers restarted at {cycle}", note)))
-    return Clock(base, index, seen, time_ns, period_s), Place(index, passed, 0, repeated=False, note=note)
+    return CycleClock(base, index, seen, time_ns, period_s), CycleTiming(
+        index, passed, 0, repeated=False, note=note
+    )
 
 
-def fault(value: float, std: float) -> tuple[str, bool]:
+def validate_estimate(value: float, std: float) -> tuple[str, bool]:
     """Say what is wrong with an estimate, and whether its value must not be used."""
     if not math.isfinite(value):
         return f"mu_s is {'missing' if math.isnan(value) else 'infinite'}, the cycle is not used", True
@@ -83,12 +87,12 @@ def fault(value: float, std: float) -> tuple[str, bool]:
     return "", False
 
 
-def usable_std(std: float) -> float:
+def valid_std(std: float) -> float:
     """Return the standard deviation where it can be one, else nan."""
     return std if SMALLEST_STD <= std <= LARGEST_FRICTION else math.nan
 
 
-def _timed(clock: Clock, time_ns: int, passed: int) -> tuple[int, float, str]:
+def _update_period(clock: CycleClock, time_ns: int, passed: int) -> tuple[int, float, str]:
     """Time and period after `passed` cycles; a clock that goes back is reported and otherwise ignored."""
     if time_ns == 0 or clock.time_ns == 0:
         return time_ns or clock.time_ns, clock.period_s, ""

@@ -15,7 +15,7 @@ from impactcell.records import Samples
 from impactcell.tracking.wear_batch import noise_scale as noises
 from impactcell.tracking.wear_batch import run_length_bank as banks
 from impactcell.tracking.wear_batch import wear_filter
-from impactcell.tracking.wear_batch.noise_scale import Noise
+from impactcell.tracking.wear_batch.noise_scale import NoiseScale
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 
 SCHEDULE = (50, 100, 200)  # cycles after which there is a first look, before the end of commissioning
@@ -38,7 +38,7 @@ INDEX, VALUE, STD, ANNOUNCED, BATCH = range(5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class History:
+class CommissioningRecord:
     """The first cycles, as they were taken in.
 
     Attributes
@@ -54,7 +54,7 @@ class History:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Replayed:
+class ReplayResult:
     """The bank after the history, outliers among how many readings, and the history's log likelihood."""
 
     bank: Samples
@@ -62,9 +62,9 @@ class Replayed:
     likelihood: float
 
 
-def remember(
-    history: History, index: int, value: float, std: float, announced: float, batch: str | None
-) -> History:
+def append_cycle(
+    history: CommissioningRecord, index: int, value: float, std: float, announced: float, batch: str | None
+) -> CommissioningRecord:
     """Add one cycle."""
     batches = history.batches
     if batch is not None and batch not in batches:
@@ -74,9 +74,13 @@ def remember(
     return replace(history, rows=rows, batches=batches)
 
 
-def replay(
-    settings: TrackerSettings, history: History, noise: Noise, level_walk: float, slope_walk: float
-) -> Replayed:
+def replay_bank(
+    settings: TrackerSettings,
+    history: CommissioningRecord,
+    noise: NoiseScale,
+    level_walk: float,
+    slope_walk: float,
+) -> ReplayResult:
     """Run the bank over the history.
 
     Parameters
@@ -95,7 +99,7 @@ def replay(
     readings[:, 5] = rows[:, ANNOUNCED]
     table = np.zeros((banks.ROWS, banks.WIDTH))
     slope_std = settings.slope_std * float(np.sqrt(variance[0]))
-    first = banks.seed(
+    first = banks.initial_bank(
         rows[0, VALUE], variance[0], slope_std, int(rows[0, INDEX]), settings.outlier_probability
     )
     table[: len(first)] = first
@@ -108,17 +112,19 @@ def replay(
         slope_std**2,
     )
     outliers = np.zeros(2)
-    count, likelihood = banks.run_series(table, len(first), design, readings, outliers, rows[0, INDEX])
-    return Replayed(table[:count].copy(), (float(outliers[0]), float(outliers[1])), likelihood)
+    count, likelihood = banks.update_series(table, len(first), design, readings, outliers, rows[0, INDEX])
+    return ReplayResult(table[:count].copy(), (float(outliers[0]), float(outliers[1])), likelihood)
 
 
-def most_likely(settings: TrackerSettings, history: History, noise: Noise) -> tuple[float, float]:
+def identify_random_walks(
+    settings: TrackerSettings, history: CommissioningRecord, noise: NoiseScale
+) -> tuple[float, float]:
     """Find the random walks of level and slope, in standard deviations of one estimate a cycle."""
     start = (settings.level_noise, settings.slope_noise)
 
     @cache
     def likelihood(level: float, slope: float) -> float:
-        return replay(settings, history, noise, level, slope).likelihood
+        return replay_bank(settings, history, noise, level, slope).likelihood
 
     none = likelihood(*start)
     level, best = start[0], none
@@ -135,20 +141,24 @@ def most_likely(settings: TrackerSettings, history: History, noise: Noise) -> tu
 
 
 def replay_filter(
-    settings: TrackerSettings, history: History, noise: Noise, level_walk: float, slope_walk: float
+    settings: TrackerSettings,
+    history: CommissioningRecord,
+    noise: NoiseScale,
+    level_walk: float,
+    slope_walk: float,
 ) -> wear_filter.WearFilter:
     """Run the filter of known batches over the history."""
     rows = history.rows[history.rows[:, BATCH] >= 0.0]
     variance = noises.variances(noise, rows[:, STD])
     unit = float(np.median(variance))
     names = [history.batches[int(place)] for place in rows[:, BATCH]]
-    state = wear_filter.start(
+    state = wear_filter.initial_state(
         rows[0, VALUE], variance[0], settings.slope_std * math.sqrt(variance[0]), names[0]
     )
     for before, row, own, name in zip(rows[:-1], rows[1:], variance[1:], names[1:], strict=True):
         passed = int(row[INDEX] - before[INDEX])
-        state = wear_filter.pass_cycles(state, passed, level_walk**2 * unit, slope_walk**2 * unit)
+        state = wear_filter.predict(state, passed, level_walk**2 * unit, slope_walk**2 * unit)
         if name != state.current:
-            state = wear_filter.change_batch(state, name, settings.step_std**2 * own)
-        state, _ = wear_filter.measure(state, row[VALUE], own, settings.outlier_threshold)
+            state = wear_filter.switch_batch(state, name, settings.step_std**2 * own)
+        state, _ = wear_filter.update(state, row[VALUE], own, settings.outlier_threshold)
     return state

@@ -32,7 +32,7 @@ SMALLEST_FACTOR = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Noise:
+class NoiseScale:
     """Factor of the noise and what it was learned from.
 
     Attributes
@@ -63,15 +63,15 @@ class Noise:
     last_std: float = math.nan
     identical: int = 0
     guessed: bool = False
-    belief: Samples = field(default_factory=beliefs.unknown)
+    belief: Samples = field(default_factory=beliefs.prior_posterior)
 
 
-def in_a_row(noise: Noise, value: float) -> int:
+def identical_run(noise: NoiseScale, value: float) -> int:
     """Count how many values in a row have been the same, with this one."""
     return noise.identical + 1 if value == noise.last_value else 1
 
 
-def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[Noise, float]:
+def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> tuple[NoiseScale, float]:
     """Take in an estimate, and its difference from the one before into the factor unless it comes late.
 
     Returns
@@ -88,73 +88,73 @@ def take(noise: Noise, value: float, declared: float, *, late: bool) -> tuple[No
     else:
         std = usual = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
         weight, guessed = 0.0, True
-    identical = in_a_row(noise, value)
+    identical = identical_run(noise, value)
     fresh = replace(noise, weight=weight, usual_std=usual, guessed=guessed, identical=identical)
     if late:
         return fresh, std
     fresh = replace(fresh, last_value=value, last_std=std)
-    return (fresh if math.isnan(noise.last_value) else _compared(fresh, noise)), std
+    return (fresh if math.isnan(noise.last_value) else _update_factor(fresh, noise)), std
 
 
-def _compared(noise: Noise, before: Noise) -> Noise:
+def _update_factor(noise: NoiseScale, before: NoiseScale) -> NoiseScale:
     """Learn from the difference of the last estimate from the one before."""
     square, weight = (noise.last_value - before.last_value) ** 2, min(noise.weight + 1.0, MEMORY)
     stds, usual = (noise.last_std, before.last_std), noise.usual_std
-    squared = square / sum(beliefs.spread(noise.belief, std, usual) ** 2 for std in stds)
+    squared = square / sum(beliefs.calibrated_std(noise.belief, std, usual) ** 2 for std in stds)
     if noise.guessed and weight <= UNSCALED:
         # nothing to judge outliers by yet: the plain mean
         factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
         return replace(noise, factor=factor, rough=factor, weight=weight)
     clipped = min(squared, CLIP**2 * noise.rough) / CONSISTENCY
     rough = max(noise.rough + (clipped - noise.rough) / weight, SMALLEST_FACTOR)
-    own = squared * beliefs.counted(squared, noise.factor)
+    own = squared * beliefs.outlier_weight(squared, noise.factor)
     factor = max(noise.factor + (own - noise.factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
     usual_square = square / (2.0 * noise.factor * usual**2)
-    belief = beliefs.learned(noise.belief, usual_square, *stds, usual, weight)
+    belief = beliefs.update(noise.belief, usual_square, *stds, usual, weight)
     return replace(noise, factor=factor, rough=rough, weight=weight, belief=belief)
 
 
-def variance(noise: Noise, std: float) -> float:
+def variance(noise: NoiseScale, std: float) -> float:
     """Variance of an estimate that declares `std`; wider while a guessed scale rests on few differences."""
     doubt = 1.0 + 4.0 / max(noise.weight, 1.0) if noise.guessed else 1.0
-    return float(noise.factor * doubt * beliefs.spread(noise.belief, std, noise.usual_std) ** 2)
+    return float(noise.factor * doubt * beliefs.calibrated_std(noise.belief, std, noise.usual_std) ** 2)
 
 
-def variances(noise: Noise, stds: Samples) -> Samples:
+def variances(noise: NoiseScale, stds: Samples) -> Samples:
     """Variances of the estimates of a history, whose noise is now known."""
-    return noise.factor * _unscaled(noise, stds)
+    return noise.factor * _calibrated_variances(noise, stds)
 
 
-def moved(noise: Noise, since: Noise, stds: Samples) -> tuple[float, float]:
+def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[float, float]:
     """Factors, at least one, by which variances of these estimates have moved together, and apart (rms)."""
     ratios = np.log(variances(noise, stds) / variances(since, stds))
     return math.exp(abs(np.mean(ratios))), math.exp(np.std(ratios))
 
 
-def _unscaled(noise: Noise, stds: Samples) -> Samples:
+def _calibrated_variances(noise: NoiseScale, stds: Samples) -> Samples:
     """Variances before the factor."""
-    return np.array([beliefs.spread(noise.belief, std, noise.usual_std) for std in stds]) ** 2
+    return np.array([beliefs.calibrated_std(noise.belief, std, noise.usual_std) for std in stds]) ** 2
 
 
-def settle(noise: Noise, values: Samples, stds: Samples) -> Noise:
+def refit(noise: NoiseScale, values: Samples, stds: Samples) -> NoiseScale:
     """Fit the factor to all of the first values at once, for following it up from a wrong one takes long."""
-    unscaled = _unscaled(noise, stds)
+    unscaled = _calibrated_variances(noise, stds)
     squared = np.diff(values) ** 2 / (unscaled[1:] + unscaled[:-1])
     # by the median, which outliers hardly move: that of a squared standard normal is 0.4549
     start = max(float(np.median(squared)) / 0.4549, SMALLEST_FACTOR)
-    factor = _fit(squared, start, 0.0 if noise.guessed else DECLARED_WEIGHT)
+    factor = _maximum_likelihood_factor(squared, start, 0.0 if noise.guessed else DECLARED_WEIGHT)
     if not 1.0 / CONTRADICTED < factor < CONTRADICTED:
         # what was declared is plainly wrong, and is no longer to weigh against the data
-        factor = _fit(squared, start, 0.0)
+        factor = _maximum_likelihood_factor(squared, start, 0.0)
     return replace(noise, factor=factor, rough=factor)
 
 
 @compiled
-def _fit(squared: Samples, factor: float, before: float) -> float:
+def _maximum_likelihood_factor(squared: Samples, factor: float, before: float) -> float:
     """Fit the factor to squared differences by EM, with `before` differences at a factor of one."""
     for _ in range(30):
         total = 0.0
         for one in squared:
-            total += one * beliefs.counted(one, factor)
+            total += one * beliefs.outlier_weight(one, factor)
         factor = max((before + total) / (before + len(squared)), SMALLEST_FACTOR)
     return factor

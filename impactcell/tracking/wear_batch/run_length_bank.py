@@ -38,7 +38,7 @@ def outlier_probability(prior: float, seen: float, cycles: float) -> float:
 
 
 @compiled
-def run_cycle(
+def update(
     bank: Samples, count: int, design: Samples, reading: Samples, outliers: Samples, accepted: float
 ) -> tuple[int, float, float]:
     """Take one reading into the first `count` rows of `bank`, in place.
@@ -80,22 +80,22 @@ def run_cycle(
     count = run_length_update.prune(bank, count, CAPACITY, RECENT, cycle + lag, accepted)
     # only changes within the window count: over very long spans some tiny change is all but certain
     since = max(accepted, cycle + lag - WINDOW)
-    return count, density, run_length_update.odds(bank, count, since, hazard, slope)
+    return count, density, run_length_update.shiryaev_roberts(bank, count, since, hazard, slope)
 
 
 @compiled
-def run_series(
+def update_series(
     bank: Samples, count: int, design: Samples, readings: Samples, outliers: Samples, accepted: float
 ) -> tuple[int, float]:
-    """Take readings, shape (n, 6), one after another, after that of `seed`; sum log densities."""
+    """Take readings, shape (n, 6), one after another, after that of `initial_bank`; sum log densities."""
     total = 0.0
     for reading in readings[1:]:
-        count, density, _ = run_cycle(bank, count, design, reading, outliers, accepted)
+        count, density, _ = update(bank, count, design, reading, outliers, accepted)
         total += density
     return count, total
 
 
-def seed(value: float, variance: float, slope_std: float, cycle: int, outliers: float) -> Samples:
+def initial_bank(value: float, variance: float, slope_std: float, cycle: int, outliers: float) -> Samples:
     """Make the bank of a first measurement: two rows, in case it is an outlier.
 
     Returns
@@ -127,7 +127,7 @@ def design(
     outliers: float,
     slope_prior: float,
 ) -> Samples:
-    """Make the `design` of `run_cycle`."""
+    """Make the `design` of `update`."""
     return np.array([hazard, step_variance, level_variance, slope_variance, outliers, slope_prior])
 
 
@@ -141,7 +141,7 @@ def threshold(false_alarm_cycles: float) -> float:
     return math.log(false_alarm_cycles) - CALIBRATION
 
 
-def last_shift(bank: Samples, after: float, until: float) -> tuple[int, float, float]:
+def locate_change_point(bank: Samples, after: float, until: float) -> tuple[int, float, float]:
     """Most probable first cycle of the change in (after, until], its size and standard deviation."""
     rows = bank[(bank[:, CHANGE] > after) & (bank[:, CHANGE] <= until)]
     if len(rows) == 0:

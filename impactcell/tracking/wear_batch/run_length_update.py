@@ -44,7 +44,7 @@ def predict(bank: Samples, count: int, cycles: float, level_variance: float, slo
 
 
 @compiled
-def log_sum(bank: Samples, first: int, last: int) -> float:
+def log_sum_exp(bank: Samples, first: int, last: int) -> float:
     """Logarithm of the weight of rows first..last-1 together."""
     top = -np.inf
     for i in range(first, last):
@@ -60,7 +60,7 @@ def log_sum(bank: Samples, first: int, last: int) -> float:
 @compiled
 def merge(bank: Samples, first: int, last: int, into: Samples) -> None:
     """Write the moment-matched mixture of rows first..last-1 to `into`; weights add."""
-    total = log_sum(bank, first, last)
+    total = log_sum_exp(bank, first, last)
     mean, covariance = np.zeros(4), np.zeros((4, 4))
     heaviest = first
     for i in range(first, last):
@@ -141,7 +141,7 @@ def update(
     odd_share : float
         Probability, now, that it is an outlier.
     """
-    before = log_sum(bank, 0, count)
+    before = log_sum_exp(bank, 0, count)
     g, good_share = np.empty(4), np.empty(count)
     for i in range(count):
         row = bank[i]
@@ -165,7 +165,7 @@ def update(
             row[2 + a] += share * g[a] / spread * innovation
             for b in range(4):
                 row[6 + 4 * a + b] -= shrink * g[a] * g[b]
-    total, odd_share = log_sum(bank, 0, count), 0.0
+    total, odd_share = log_sum_exp(bank, 0, count), 0.0
     for i in range(count):
         bank[i, 0] -= total
         odd_share += math.exp(bank[i, 0]) * (1.0 - good_share[i])
@@ -227,7 +227,7 @@ def slope_evidence(mean: float, variance: float, prior: float) -> float:
 
 
 @compiled
-def odds(bank: Samples, count: int, since: float, hazard: float, slope_prior: float) -> float:
+def shiryaev_roberts(bank: Samples, count: int, since: float, hazard: float, slope_prior: float) -> float:
     """Shiryaev-Roberts log statistic: changed after `since` against not, the prior odds taken out."""
     split = 0
     while split < count and bank[split, 1] <= since:
@@ -237,4 +237,4 @@ def odds(bank: Samples, count: int, since: float, hazard: float, slope_prior: fl
     weighed = np.empty((count, 1))
     for i in range(count):
         weighed[i, 0] = bank[i, 0] + slope_evidence(bank[i, 3], bank[i, 11], slope_prior)
-    return log_sum(weighed, split, count) - log_sum(weighed, 0, split) - math.log(hazard)
+    return log_sum_exp(weighed, split, count) - log_sum_exp(weighed, 0, split) - math.log(hazard)

@@ -6,16 +6,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from impactcell.records import BatchState, Evidence, FrictionEstimate, Samples, WearState
-from impactcell.tracking.wear_batch.input_validation import Clock
-from impactcell.tracking.wear_batch.noise_identification import History
-from impactcell.tracking.wear_batch.noise_scale import Noise
-from impactcell.tracking.wear_batch.process_noise_adaptation import Monitor
+from impactcell.tracking.wear_batch.input_validation import CycleClock
+from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
+from impactcell.tracking.wear_batch.noise_scale import NoiseScale
+from impactcell.tracking.wear_batch.process_noise_adaptation import InnovationCorrelation
 from impactcell.tracking.wear_batch.run_length_bank import WIDTH
 from impactcell.tracking.wear_batch.wear_filter import WearFilter
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class FrictionObservation:
     """What one cycle brings: mu_s, its standard deviation (nan where there is none), what the PLC says."""
 
     cycle: int
@@ -34,13 +34,13 @@ class Reading:
         batch_id: str | None,
         *,
         expected: bool = False,
-    ) -> "Reading":
+    ) -> "FrictionObservation":
         """Take the published mu_s of an estimate."""
         return cls(cycle, estimate.mu_s.value, estimate.mu_s.std, time_ns, batch_id, expected)
 
 
 @dataclass(frozen=True, slots=True)
-class Shift:
+class ChangePoint:
     """The last batch shift: index of its first cycle, size in mu_s, and how it was found."""
 
     cycle: int
@@ -75,8 +75,8 @@ class TrackerState:
         As it was when the first cycles were last gone over with it.
     """
 
-    clock: Clock = field(default_factory=Clock)
-    noise: Noise = field(default_factory=Noise)
+    clock: CycleClock = field(default_factory=CycleClock)
+    noise: NoiseScale = field(default_factory=NoiseScale)
     filter: WearFilter | None = None
     bank: Samples = field(default_factory=lambda: np.zeros((0, WIDTH)))
     outliers: tuple[float, float] = (0.0, 0.0)
@@ -87,17 +87,17 @@ class TrackerState:
     batch_start: int = 0
     batch_count: int = 0
     tested: bool = True
-    shift: Shift | None = None
+    shift: ChangePoint | None = None
     first: int = 0
-    replayed: Noise = field(default_factory=Noise)
-    history: History | None = None
-    monitor: Monitor = field(default_factory=Monitor)
+    replayed: NoiseScale = field(default_factory=NoiseScale)
+    history: CommissioningRecord | None = None
+    monitor: InnovationCorrelation = field(default_factory=InnovationCorrelation)
     level_variance: float = 0.0
     slope_variance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracked:
+class TrackingResult:
     """Outcome of one cycle.
 
     Attributes
@@ -129,7 +129,7 @@ def initial_state() -> TrackerState:
     return TrackerState()
 
 
-def reset_wear(state: TrackerState) -> TrackerState:
+def reset_wear_level(state: TrackerState) -> TrackerState:
     """State after the surface was renewed: the next cycle is a new reference; the noise stays learned."""
     return TrackerState(
         clock=state.clock,

@@ -8,42 +8,49 @@ from impactcell.tracking.wear_batch import batch_filter as batches
 from impactcell.tracking.wear_batch import run_length_bank as banks
 from impactcell.tracking.wear_batch import wear_filter, wear_report
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
-from impactcell.tracking.wear_batch.state import Reading, Shift, Tracked, TrackerState
+from impactcell.tracking.wear_batch.state import (
+    ChangePoint,
+    FrictionObservation,
+    TrackerState,
+    TrackingResult,
+)
 
 
-def nothing_yet(
-    settings: TrackerSettings, state: TrackerState, reading: Reading, notes: list[str]
-) -> Tracked:
+def empty_result(
+    settings: TrackerSettings, state: TrackerState, reading: FrictionObservation, notes: list[str]
+) -> TrackingResult:
     """Outcome of a cycle before the first usable one."""
     nan, reason = math.nan, "; ".join(notes)
     none = WearState(nan, nan, nan, nan, settings.wear_limit, nan, nan, nan, nan, Quality.BAD, reason)
     batch = BatchState(reading.batch_id or "", nan, nan, nan, nan, 0, Quality.BAD, reason)
-    return Tracked(state, none, batch, None, expected=False, innovation=nan, used=False, notes=tuple(notes))
+    return TrackingResult(
+        state, none, batch, None, expected=False, innovation=nan, used=False, notes=tuple(notes)
+    )
 
 
-def outcome(
+def tracking_result(
     settings: TrackerSettings,
     state: TrackerState,
-    reading: Reading,
+    reading: FrictionObservation,
     notes: list[str],
     *,
     used: bool,
-    shift: Shift | None = None,
+    shift: ChangePoint | None = None,
     innovation: float = math.nan,
     expected: bool = False,
-) -> Tracked:
+) -> TrackingResult:
     """Outcome of a cycle: by the filter where the batch is known, else by the bank."""
     reason = "; ".join(notes)
     quality = Quality.GOOD if used and not notes else Quality.UNCERTAIN
     if state.filter is not None and settings.batch is BatchKnowledge.KNOWN and reading.batch_id is not None:
-        level, slope, covariance, offset, offset_std = _of_filter(state.filter)
+        level, slope, covariance, offset, offset_std = _filter_moments(state.filter)
     else:
-        level, slope, covariance, offset, offset_std = _of_bank(state)
-    state = _refined(state)
+        level, slope, covariance, offset, offset_std = _bank_moments(state)
+    state = _refine_change_point(state)
     walks = (state.level_variance, state.slope_variance)
     published = wear_report.wear_state(level, slope, covariance, walks, settings.wear_limit, quality, reason)
     last = state.shift
-    learning = batches.not_yet(state)
+    learning = batches.reason_not_ready(state)
     batch = BatchState(
         reading.batch_id or state.batch_id or "",
         offset,
@@ -55,10 +62,10 @@ def outcome(
         "; ".join([*notes, *([learning] if learning else [])]),
     )
     evidence = None if shift is None else _evidence(settings, state, shift)
-    return Tracked(state, published, batch, evidence, expected, innovation, used, tuple(notes))
+    return TrackingResult(state, published, batch, evidence, expected, innovation, used, tuple(notes))
 
 
-def _of_filter(
+def _filter_moments(
     known: wear_filter.WearFilter,
 ) -> tuple[float, float, tuple[float, float, float], float, float]:
     spread = known.covariance
@@ -67,7 +74,7 @@ def _of_filter(
     return float(known.mean[0]), float(known.mean[1]), covariance, offset, offset_std
 
 
-def _of_bank(state: TrackerState) -> tuple[float, float, tuple[float, float, float], float, float]:
+def _bank_moments(state: TrackerState) -> tuple[float, float, tuple[float, float, float], float, float]:
     """Level is total minus offset: friction as if the first batch were still there."""
     mean, full = banks.moments(state.bank)
     covariance = (
@@ -79,15 +86,15 @@ def _of_bank(state: TrackerState) -> tuple[float, float, tuple[float, float, flo
     return float(mean[0] - mean[2]), float(mean[1]), covariance, float(mean[2]), offset_std
 
 
-def _refined(state: TrackerState) -> TrackerState:
+def _refine_change_point(state: TrackerState) -> TrackerState:
     """Let the cycles since say more of the bank's last shift: when it was and how large."""
     if state.shift is None or state.shift.found_at != state.accepted:
         return state
-    cycle, size, std = banks.last_shift(state.bank, state.accepted_before, state.accepted)
+    cycle, size, std = banks.locate_change_point(state.bank, state.accepted_before, state.accepted)
     return replace(state, shift=replace(state.shift, cycle=cycle, size=size, size_std=std))
 
 
-def _evidence(settings: TrackerSettings, state: TrackerState, shift: Shift) -> Evidence:
+def _evidence(settings: TrackerSettings, state: TrackerState, shift: ChangePoint) -> Evidence:
     return Evidence(
         shift.statistic,
         shift.threshold,

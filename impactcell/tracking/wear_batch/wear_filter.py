@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import predict, update
+from filterpy import kalman
 
 from impactcell.records import Samples
 
@@ -52,17 +52,17 @@ class Innovation:
     std: float
 
 
-def start(value: float, variance: float, slope_std: float, batch: str) -> WearFilter:
+def initial_state(value: float, variance: float, slope_std: float, batch: str) -> WearFilter:
     """Begin with one measurement; its batch is the reference."""
     return WearFilter((batch,), batch, np.array([value, 0.0]), np.diag([variance, slope_std**2]))
 
 
-def resume(mean: Samples, covariance: Samples, batch: str) -> WearFilter:
+def from_bank(mean: Samples, covariance: Samples, batch: str) -> WearFilter:
     """Go on from the bank's state [total, slope, offset, shift]; the present batch becomes the reference."""
     return WearFilter((batch,), batch, mean[:2].copy(), covariance[:2, :2].copy())
 
 
-def change_within(state: WearFilter, mean: Samples, covariance: Samples) -> WearFilter:
+def restart_after_change(state: WearFilter, mean: Samples, covariance: Samples) -> WearFilter:
     """Go on from the bank's state after the present batch changed without a new name.
 
     What the filter took in since the change is wrong, and the bank has it right: level = total - offset,
@@ -74,7 +74,7 @@ def change_within(state: WearFilter, mean: Samples, covariance: Samples) -> Wear
     return WearFilter(batches, state.current, taken @ mean, taken @ covariance @ taken.T)
 
 
-def pass_cycles(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:
+def predict(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:
     """Predict over `cycles` cycles; the variances are those of the random walks, a cycle."""
     n = len(state.mean)
     transition = np.eye(n)
@@ -83,11 +83,11 @@ def pass_cycles(state: WearFilter, cycles: int, level_variance: float, slope_var
     noise[0, 0] = level_variance * cycles + slope_variance * cycles**3 / 3.0
     noise[0, 1] = noise[1, 0] = slope_variance * cycles**2 / 2.0
     noise[1, 1] = slope_variance * cycles
-    mean, covariance = predict(state.mean, state.covariance, F=transition, Q=noise)
+    mean, covariance = kalman.predict(state.mean, state.covariance, F=transition, Q=noise)
     return WearFilter(state.batches, state.current, mean, covariance)
 
 
-def change_batch(state: WearFilter, batch: str, step_variance: float) -> WearFilter:
+def switch_batch(state: WearFilter, batch: str, step_variance: float) -> WearFilter:
     """Go on with another batch: one seen before, or a new one with an offset unknown to `step_variance`."""
     batches, mean, covariance = state.batches, state.mean, state.covariance
     if batch in batches[1:]:
@@ -103,7 +103,7 @@ def change_batch(state: WearFilter, batch: str, step_variance: float) -> WearFil
         if len(batches) > KEPT_BATCHES:
             kept = [i for i in range(len(mean)) if i != 2]
             batches, mean, covariance = (batches[0], *batches[2:]), mean[kept], covariance[np.ix_(kept, kept)]
-        n, before = len(mean), _place(batches, state.current)
+        n, before = len(mean), _offset_index(batches, state.current)
         # a new offset is the present one and a step
         batches, mean = (*batches, batch), np.append(mean, mean[before] if before else 0.0)
         grown = np.zeros((n + 1, n + 1))
@@ -116,13 +116,13 @@ def change_batch(state: WearFilter, batch: str, step_variance: float) -> WearFil
     return WearFilter(batches, batch, mean, covariance)
 
 
-def measure(
+def update(
     state: WearFilter, value: float, variance: float, threshold: float, lag: int = 0, batch: str | None = None
 ) -> tuple[WearFilter, Innovation]:
     """Update with one measurement, `lag` cycles late, of `batch` (the present one if None)."""
     design = np.zeros((1, len(state.mean)))
     design[0, :2] = 1.0, -lag
-    if place := _place(state.batches, state.current if batch is None else batch):
+    if place := _offset_index(state.batches, state.current if batch is None else batch):
         design[0, place] = 1.0
     row = design[0]
     own = float(row @ state.covariance @ row)
@@ -133,7 +133,9 @@ def measure(
         ratio *= max(1.0, 0.5 * ratio)
         # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
         variance = (own + variance) * ratio - own
-    mean, covariance = update(state.mean, state.covariance, np.array([value]), np.array([[variance]]), design)
+    mean, covariance = kalman.update(
+        state.mean, state.covariance, np.array([value]), np.array([[variance]]), design
+    )
     symmetric = (covariance + covariance.T) / 2.0
     return WearFilter(state.batches, state.current, mean, symmetric), Innovation(innovation, std)
 
@@ -146,7 +148,7 @@ def offset(state: WearFilter, batch: str) -> tuple[float, float]:
 def contrast(state: WearFilter, batch: str, other: str | None) -> tuple[float, float]:
     """Offset of `batch` minus that of `other`, and its standard deviation."""
     size = variance = 0.0
-    a, b = _place(state.batches, batch), _place(state.batches, other)
+    a, b = _offset_index(state.batches, batch), _offset_index(state.batches, other)
     if a:
         size, variance = float(state.mean[a]), float(state.covariance[a, a])
     if b:
@@ -156,6 +158,6 @@ def contrast(state: WearFilter, batch: str, other: str | None) -> tuple[float, f
     return size, math.sqrt(max(variance, 0.0))
 
 
-def _place(batches: tuple[str | None, ...], batch: str | None) -> int:
+def _offset_index(batches: tuple[str | None, ...], batch: str | None) -> int:
     """Place of a batch's offset in the state; 0 for the reference batch, which has none."""
     return 0 if batch == batches[0] else 1 + batches.index(batch)

@@ -38,14 +38,14 @@ def wear_state(
     else:
         above = float(ndtr((level - limit) / std)) if std > 0.0 else float(level > limit)
         spreads = (level_var, cross, slope_var, *noise)
-        expected, low, high = _reached(level - limit, slope, spreads)
+        expected, low, high = _cycles_to_limit(level - limit, slope, spreads)
     return WearState(
         level, std, slope, math.sqrt(slope_var), limit, above, expected, low, high, quality, reason
     )
 
 
 @compiled
-def _above(
+def _level_above_limit(
     above: float, slope: float, spreads: tuple[float, float, float, float, float], z: float, cycles: float
 ) -> float:
     """Return level minus limit after so many cycles, plus z standard deviations of it."""
@@ -56,30 +56,32 @@ def _above(
 
 
 @compiled
-def _reached(
+def _cycles_to_limit(
     above: float, slope: float, spreads: tuple[float, float, float, float, float]
 ) -> tuple[float, float, float]:
     """Cycles until the limit is reached, and both ends of their interval."""
     return (
-        _first(above, slope, spreads, 0.0),
-        _first(above, slope, spreads, SPREAD),
-        _first(above, slope, spreads, -SPREAD),
+        _first_crossing(above, slope, spreads, 0.0),
+        _first_crossing(above, slope, spreads, SPREAD),
+        _first_crossing(above, slope, spreads, -SPREAD),
     )
 
 
 @compiled
-def _first(above: float, slope: float, spreads: tuple[float, float, float, float, float], z: float) -> float:
-    """First number of cycles at which `_above` is positive, by bisection; inf if beyond `FARTHEST`."""
-    if _above(above, slope, spreads, z, 0.0) >= 0.0:
+def _first_crossing(
+    above: float, slope: float, spreads: tuple[float, float, float, float, float], z: float
+) -> float:
+    """First cycle at which `_level_above_limit` is positive, by bisection; inf if beyond `FARTHEST`."""
+    if _level_above_limit(above, slope, spreads, z, 0.0) >= 0.0:
         return 0.0
     near, far = 0.0, 1.0
-    while _above(above, slope, spreads, z, far) < 0.0:
+    while _level_above_limit(above, slope, spreads, z, far) < 0.0:
         near, far = far, far * 2.0
         if far > FARTHEST:
             return np.inf
     while far - near > 1e-10 * far:
         middle = 0.5 * (near + far)
-        if _above(above, slope, spreads, z, middle) < 0.0:
+        if _level_above_limit(above, slope, spreads, z, middle) < 0.0:
             near = middle
         else:
             far = middle

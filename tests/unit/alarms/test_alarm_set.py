@@ -3,7 +3,7 @@
 import math
 
 from impactcell import alarms
-from impactcell.alarms import AlarmSettings, Event, Finding, Occurrence, RuleSettings
+from impactcell.alarms import AlarmEvent, AlarmSettings, EventKind, RuleResult, RuleSettings
 from impactcell.records import AlarmName, Evidence, Quality, Shelving, WearState
 from impactcell.serialization import json_text
 
@@ -20,8 +20,8 @@ def run(settings, state, name, holds, start=0):
     """Feed one finding a cycle; give back the events as (cycle, active, announced)."""
     events = []
     for i, held in enumerate(holds, start=start):
-        state, moved = alarms.after_cycle(settings, state, [Finding(name, held)], i, i * SECOND)
-        events.extend((i, t.alarm.active, alarms.Effect.ANNOUNCE in t.effects) for t in moved)
+        state, moved = alarms.update(settings, state, [RuleResult(name, held)], i, i * SECOND)
+        events.extend((i, t.alarm.active, alarms.Notification.ANNUNCIATE in t.notifications) for t in moved)
     return state, events
 
 
@@ -31,7 +31,7 @@ def test_wear_has_hysteresis_in_probability():
     active = []
     for i, p in enumerate([0.5, 0.89, 0.91, 0.6, 0.51, 0.49, 0.89, 0.95]):
         found = alarms.wear_limit(settings, wear(p), i, active=state.alarm(WEAR).active)
-        state, _ = alarms.after_cycle(settings, state, [found], i, 0)
+        state, _ = alarms.update(settings, state, [found], i, 0)
         active.append(state.alarm(WEAR).active)
     assert active == [False, False, True, True, True, False, False, True]
 
@@ -68,7 +68,7 @@ def test_realarm_after_so_many_cycles():
     state = alarms.initial_state(settings)
     state, events = run(settings, state, WEAR, [True] * 8)
     assert events == [(0, True, True), (3, True, True), (6, True, True)]
-    state, _ = alarms.act(state, WEAR, Occurrence(Event.ACKNOWLEDGE))
+    state, _ = alarms.apply_event(state, WEAR, AlarmEvent(EventKind.ACKNOWLEDGE))
     assert state.alarm(WEAR).acknowledged
     state, _ = run(settings, state, WEAR, [True] * 3, start=8)
     assert not state.alarm(WEAR).acknowledged
@@ -78,10 +78,10 @@ def test_a_call_again_while_the_rule_rests_keeps_what_was_said():
     settings = AlarmSettings(rules={BATCH: RuleSettings(off_delay=9, realarm=2)})
     state = alarms.initial_state(settings)
     evidence = Evidence(12.0, 11.0, 4, 0.01, 0.002)
-    state, _ = alarms.after_cycle(settings, state, [alarms.batch_shift(evidence)], 5, 0)
+    state, _ = alarms.update(settings, state, [alarms.batch_shift(evidence)], 5, 0)
     said, called = state.alarm(BATCH).message, []
     for i in range(6, 10):
-        state, moved = alarms.after_cycle(settings, state, [alarms.batch_shift(None)], i, 0)
+        state, moved = alarms.update(settings, state, [alarms.batch_shift(None)], i, 0)
         called.extend(i for _ in moved)
     assert called == [7, 9]
     assert (state.alarm(BATCH).message, state.alarm(BATCH).evidence) == (said, evidence)
@@ -91,12 +91,12 @@ def test_a_shift_stands_for_a_while_and_clears_by_itself():
     settings = AlarmSettings(rules={BATCH: RuleSettings(off_delay=3)})
     state = alarms.initial_state(settings)
     evidence = Evidence(12.0, 11.0, 4, 0.01, 0.002)
-    state, moved = alarms.after_cycle(settings, state, [alarms.batch_shift(evidence)], 5, 0)
+    state, moved = alarms.update(settings, state, [alarms.batch_shift(evidence)], 5, 0)
     assert moved[0].alarm.evidence == evidence
     assert "+0.0100 ± 0.0020 from cycle 4" in moved[0].alarm.message
     cleared = []
     for i in range(6, 12):
-        state, moved = alarms.after_cycle(settings, state, [alarms.batch_shift(None)], i, 0)
+        state, moved = alarms.update(settings, state, [alarms.batch_shift(None)], i, 0)
         cleared.extend(i for t in moved if not t.alarm.active)
     assert cleared == [9]
     assert not state.alarm(BATCH).acknowledged
@@ -105,27 +105,27 @@ def test_a_shift_stands_for_a_while_and_clears_by_itself():
 def test_an_announced_batch_keeps_the_batch_alarm_silent():
     settings = AlarmSettings(announced_cycles=3)
     state = alarms.initial_state(settings)
-    state, moved = alarms.after_cycle(settings, state, [], 1, 0, announced=True)
+    state, moved = alarms.update(settings, state, [], 1, 0, announced=True)
     assert state.alarm(BATCH).suppressed
     assert len(moved) == 1
-    state, moved = alarms.after_cycle(settings, state, [alarms.batch_shift(Evidence())], 2, 0)
+    state, moved = alarms.update(settings, state, [alarms.batch_shift(Evidence())], 2, 0)
     assert state.alarm(BATCH).active
-    assert all(alarms.Effect.ANNOUNCE not in t.effects for t in moved)
+    assert all(alarms.Notification.ANNUNCIATE not in t.notifications for t in moved)
     for i in (3, 4):
-        state, _ = alarms.after_cycle(settings, state, [alarms.batch_shift(None)], i, 0)
+        state, _ = alarms.update(settings, state, [alarms.batch_shift(None)], i, 0)
     assert not state.alarm(BATCH).suppressed
 
 
 def test_shelving_ends_with_time_as_the_cycles_bring_it():
     settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state = alarms.initial_state(settings)
-    shelve = Occurrence(Event.SHELVE_TIMED, 0, 0, user="ann", shelve_ns=5 * SECOND)
-    state, done = alarms.act(state, WEAR, shelve)
+    shelve = AlarmEvent(EventKind.SHELVE_TIMED, 0, 0, user="ann", shelve_ns=5 * SECOND)
+    state, done = alarms.apply_event(state, WEAR, shelve)
     assert done.refusal is None
     state, events = run(settings, state, WEAR, [False, True, True, True, True, True])
     assert events == [(1, True, False), (5, True, False)]
     assert state.alarm(WEAR).shelving is Shelving.UNSHELVED
-    again, moved = alarms.at_time(state, 6, 99 * SECOND)
+    again, moved = alarms.expire_shelving(state, 6, 99 * SECOND)
     assert again == state
     assert moved == ()
 
@@ -133,11 +133,13 @@ def test_shelving_ends_with_time_as_the_cycles_bring_it():
 def test_a_condition_beside_the_cycles():
     settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state = alarms.initial_state(settings)
-    lost = Finding(AlarmName.MODULE_CONNECTION, holds=True, message="connection refused")
-    state, done = alarms.find(settings, state, lost, 0, 5)
+    lost = RuleResult(AlarmName.MODULE_CONNECTION, holds=True, message="connection refused")
+    state, done = alarms.apply_rule_result(settings, state, lost, 0, 5)
     assert done.alarm.active
     assert done.alarm.message == "connection refused"
-    state, done = alarms.find(settings, state, Finding(AlarmName.MODULE_CONNECTION, holds=False), 0, 6)
+    state, done = alarms.apply_rule_result(
+        settings, state, RuleResult(AlarmName.MODULE_CONNECTION, holds=False), 0, 6
+    )
     assert not done.alarm.active
     assert not done.alarm.acknowledged
 
@@ -146,10 +148,10 @@ def test_a_disabled_condition_is_not_evaluated_and_comes_back():
     settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state = alarms.initial_state(settings)
     state, _ = run(settings, state, WEAR, [True])
-    state, _ = alarms.act(state, WEAR, Occurrence(Event.DISABLE))
+    state, _ = alarms.apply_event(state, WEAR, AlarmEvent(EventKind.DISABLE))
     state, events = run(settings, state, WEAR, [True, True])
     assert events == []
-    state, _ = alarms.act(state, WEAR, Occurrence(Event.ENABLE))
+    state, _ = alarms.apply_event(state, WEAR, AlarmEvent(EventKind.ENABLE))
     _, events = run(settings, state, WEAR, [True])
     assert events == [(0, True, True)]
 
@@ -157,6 +159,6 @@ def test_a_disabled_condition_is_not_evaluated_and_comes_back():
 def test_the_state_is_restored_bit_for_bit():
     settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state, _ = run(settings, alarms.initial_state(settings), WEAR, [True, True, False])
-    state, _ = alarms.act(state, WEAR, Occurrence(Event.SHELVE_ONE_SHOT, comment="ä"))
+    state, _ = alarms.apply_event(state, WEAR, AlarmEvent(EventKind.SHELVE_ONE_SHOT, comment="ä"))
     data = json_text.dumps(state)
-    assert json_text.dumps(json_text.loads(alarms.AlarmState, data)) == data
+    assert json_text.dumps(json_text.loads(alarms.AlarmSetState, data)) == data

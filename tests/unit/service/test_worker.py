@@ -214,7 +214,7 @@ async def test_no_more_cells_compute_at_a_time_than_there_are_cores(
     at_work, most = 0, 0
     met = threading.Barrier(3)
 
-    def counted(*arguments: object) -> core.Stepped:
+    def counted(*arguments: object) -> core.StepResult:
         nonlocal at_work, most
         with lock:
             at_work += 1

@@ -302,7 +302,7 @@ def test_a_model_gap_is_found_at_the_designed_rate():
     rng = np.random.default_rng(0)
     state, alarms = gap_cusum.GapState(), 0
     for cycle in range(20_000):
-        done = gap_cusum.follow(state, float(np.exp(0.05 * rng.normal())), cycle, 1000.0, 1.0)
+        done = gap_cusum.update(state, float(np.exp(0.05 * rng.normal())), cycle, 1000.0, 1.0)
         state = done.state
         if done.exceeds:
             alarms += 1
@@ -310,20 +310,20 @@ def test_a_model_gap_is_found_at_the_designed_rate():
     assert 8 <= alarms <= 34
     found = []
     for cycle in range(100):
-        done = gap_cusum.follow(state, float(1.2 * np.exp(0.05 * rng.normal())), 20_000 + cycle, 1e5, 1.0)
+        done = gap_cusum.update(state, float(1.2 * np.exp(0.05 * rng.normal())), 20_000 + cycle, 1e5, 1.0)
         state = done.state
         found.append(done.exceeds)
     assert found.index(True) < 12
     assert done.evidence.size == pytest.approx(0.2, abs=0.15)
-    back = [gap_cusum.follow(state, 1.0, 30_000, 1e5, 1.0)]
+    back = [gap_cusum.update(state, 1.0, 30_000, 1e5, 1.0)]
     while back[-1].exceeds:
-        back.append(gap_cusum.follow(back[-1].state, 1.0, 30_000 + len(back), 1e5, 1.0))
+        back.append(gap_cusum.update(back[-1].state, 1.0, 30_000 + len(back), 1e5, 1.0))
     assert len(back) < 20
 
 
 def test_a_gap_that_is_no_number_is_left_out():
     for bad in (math.nan, math.inf, -1.0, 0.0):
-        done = gap_cusum.follow(gap_cusum.GapState(), bad, 1, 1e5, 1.0)
+        done = gap_cusum.update(gap_cusum.GapState(), bad, 1, 1e5, 1.0)
         assert done.exceeds is None
         assert done.reason
         assert done.state == gap_cusum.GapState()

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from impactcell.tracking.wear_batch import declared_std_calibration as beliefs
 from impactcell.tracking.wear_batch import noise_scale as noises
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
-from impactcell.tracking.wear_batch.state import Reading, TrackerState, initial_state
-from impactcell.tracking.wear_batch.tracker import track
+from impactcell.tracking.wear_batch.state import FrictionObservation, TrackerState, initial_state
+from impactcell.tracking.wear_batch.tracker import update
 
 DECLARED = np.array([0.0018, 0.0023, 0.0056, 0.0061])  # as of a waveform fit at four velocities
 SPREADS = {
@@ -27,8 +27,8 @@ def followed(spread: np.ndarray, seed: int, knowledge: BatchKnowledge) -> tuple[
     state, draw, shifts = initial_state(), np.random.default_rng(seed), 0
     for cycle in range(1, CYCLES + 1):
         value = 0.2 + spread[cycle % 4] * draw.standard_normal()
-        reading = Reading(cycle, value, float(DECLARED[cycle % 4]), cycle * 10**9, "A")
-        tracked = track(TrackerSettings(batch=knowledge), state, reading)
+        reading = FrictionObservation(cycle, value, float(DECLARED[cycle % 4]), cycle * 10**9, "A")
+        tracked = update(TrackerSettings(batch=knowledge), state, reading)
         state, shifts = tracked.state, shifts + (tracked.shift is not None)
     return state, shifts
 
@@ -48,10 +48,10 @@ def test_the_variance_is_that_of_the_estimates_and_no_shift_is_invented(spread, 
 
 def test_velocities_that_change_late_change_the_belief_late():
     """For 600 cycles all declare the same, which says nothing; then it turns out to be no guide."""
-    noise, draw = noises.Noise(), np.random.default_rng(2)
+    noise, draw = noises.NoiseScale(), np.random.default_rng(2)
     for cycle in range(1200):
         std = float(DECLARED[cycle % 4]) if cycle >= 600 else float(DECLARED[2])
-        noise, _ = noises.take(noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False)
+        noise, _ = noises.update(noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False)
         if cycle == 599:
             assert np.exp(noise.belief[:, beliefs.WEIGHT]) == pytest.approx(beliefs.PRIOR)
     used = [noises.variance(noise, std) for std in DECLARED]
@@ -64,12 +64,12 @@ def test_velocities_that_change_late_change_the_belief_late():
     std=st.floats(1e-9, 10.0),
 )
 def test_a_belief_stays_one_and_leaves_the_usual_estimate_alone(differences, ratios, std):
-    belief = beliefs.unknown()
+    belief = beliefs.prior_posterior()
     for place, (squared, ratio) in enumerate(zip(differences, ratios, strict=False)):
-        belief = beliefs.learned(belief, squared, ratio * std, std, std, place + 1.0)
+        belief = beliefs.update(belief, squared, ratio * std, std, std, place + 1.0)
     assert math.fsum(np.exp(belief[:, beliefs.WEIGHT])) == pytest.approx(1.0)
     assert np.all(belief[:, beliefs.SCALE] > 0.0)
-    assert beliefs.spread(belief, std, std) == std
-    wide = [beliefs.spread(belief, factor * std, std) for factor in (0.5, 0.9, 1.1, 2.0, 5.0, 10.0)]
+    assert beliefs.calibrated_std(belief, std, std) == std
+    wide = [beliefs.calibrated_std(belief, factor * std, std) for factor in (0.5, 0.9, 1.1, 2.0, 5.0, 10.0)]
     assert wide == sorted(wide)
     assert wide[-1] == pytest.approx(2.0 * wide[-2])  # far off: in proportion

@@ -2,16 +2,16 @@
 
 from dataclasses import replace
 
-from impactcell.tracking.wear_batch.input_validation import Clock, place
+from impactcell.tracking.wear_batch.input_validation import CycleClock, update_clock
 
 LIMIT = 64
 
 
 def come(cycles):
     """Places of cycles that come in this order, a second apart."""
-    clock, places = Clock(), []
+    clock, places = CycleClock(), []
     for cycle in cycles:
-        clock, where = place(clock, cycle, 10**18 + cycle * 10**9, LIMIT)
+        clock, where = update_clock(clock, cycle, 10**18 + cycle * 10**9, LIMIT)
         places.append(where)
     return clock, places
 
@@ -40,6 +40,6 @@ def test_numbers_that_restart_go_on_one_cycle_later():
 def test_the_last_cycle_that_was_used_is_known_to_have_come_however_many_were_of_no_use_since():
     clock, _ = come([100])
     for cycle in range(101, 200):
-        clock = replace(place(clock, cycle, 0, LIMIT)[0], last=100)
-    _, where = place(clock, 100, 10**18 + 10**12, LIMIT)
+        clock = replace(update_clock(clock, cycle, 0, LIMIT)[0], last=100)
+    _, where = update_clock(clock, 100, 10**18 + 10**12, LIMIT)
     assert where.repeated

@@ -8,22 +8,27 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from scipy.stats import multivariate_normal
 
-from impactcell.tracking import BatchKnowledge, Reading, TrackerSettings, initial_state, track
-from impactcell.tracking.wear_batch import run_length_bank, run_length_update
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import (
+    BatchKnowledge,
+    FrictionObservation,
+    TrackerSettings,
+    initial_state,
+    run_length_bank,
+    run_length_update,
+)
 
 
 def run(values, design, announced=None, variance=1.0, slope_std=0.1, accepted=0.0):
     table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-    first = run_length_bank.seed(values[0], variance, slope_std, 0, design[4])
+    first = run_length_bank.initial_bank(values[0], variance, slope_std, 0, design[4])
     table[: len(first)] = first
     count, densities, statistics = len(first), [], []
     outliers = np.zeros(2)
     for t, value in enumerate(values[1:], start=1):
         told = 0.0 if announced is None else announced[t]
         reading = np.array([value, variance, 1.0, 0.0, t, told])
-        count, density, statistic = run_length_bank.run_cycle(
-            table, count, design, reading, outliers, accepted
-        )
+        count, density, statistic = run_length_bank.update(table, count, design, reading, outliers, accepted)
         densities.append(density)
         statistics.append(statistic)
     return table[:count], np.array(densities), np.array(statistics)
@@ -102,7 +107,7 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
     variance, level_q, slope_q = 4e-6, 1e-9, 1e-13
     design = run_length_bank.design(1e-3, 1e-4, level_q, slope_q, 0.0, 1e-8)
     table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-    table[0] = run_length_bank.seed(values[0], variance, 1e-4, 0, 0.01)[0]
+    table[0] = run_length_bank.initial_bank(values[0], variance, 1e-4, 0, 0.01)[0]
     table[0, run_length_bank.WEIGHT] = 0.0
     oracle = KalmanFilter(2, 1)
     oracle.x = np.array([[values[0]], [0.0]])
@@ -113,7 +118,7 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
     oracle.R *= variance
     for t, value in enumerate(values[1:], start=1):
         reading = np.array([value, variance, 1.0, 0.0, t, -1.0])
-        count, density, _ = run_length_bank.run_cycle(table, 1, design, reading, np.zeros(2), 0.0)
+        count, density, _ = run_length_bank.update(table, 1, design, reading, np.zeros(2), 0.0)
         oracle.predict()
         oracle.update(value)
         assert count == 1
@@ -130,12 +135,12 @@ def test_a_late_reading_gives_the_same_state_as_in_time():
 
     def take(order):
         table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-        table[0] = run_length_bank.seed(values[0], 1.0, 0.1, 0, 0.01)[0]
+        table[0] = run_length_bank.initial_bank(values[0], 1.0, 0.1, 0, 0.01)[0]
         count, newest, outliers = 1, 0, np.zeros(2)
         for t in order:
             passed, lag = max(t - newest, 0), max(newest - t, 0)
             reading = np.array([values[t], 1.0, passed, lag, t, -1.0])
-            count, _, _ = run_length_bank.run_cycle(table, count, design, reading, outliers, 0.0)
+            count, _, _ = run_length_bank.update(table, count, design, reading, outliers, 0.0)
             newest = max(newest, t)
         return run_length_bank.moments(table[:count])
 
@@ -152,7 +157,7 @@ def test_an_announced_change_leaves_one_history_and_knows_its_size():
     told = np.where(np.arange(400) == 200, 1.0, -1.0)
     table, _, _ = run(values, run_length_bank.design(1e-3, 16.0, 0.0, 0.0, 0.003, 0.01), announced=told)
     assert {int(row[run_length_bank.CHANGE]) for row in table} == {200}
-    cycle, size, std = run_length_bank.last_shift(table, 199, 200)
+    cycle, size, std = run_length_bank.locate_change_point(table, 199, 200)
     assert cycle == 200
     # two lines of 200 points with a common slope, known level and slope to within their data
     assert std == pytest.approx(0.2, rel=0.1)
@@ -184,12 +189,12 @@ def test_how_many_outliers_there_are_is_learned(share):
     values[odd] += 10.0 * rng.normal(size=int(odd.sum()))
     prior = 0.005
     table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-    first = run_length_bank.seed(values[0], 1.0, 0.1, 0, prior)
+    first = run_length_bank.initial_bank(values[0], 1.0, 0.1, 0, prior)
     table[: len(first)] = first
     count, outliers, made = len(first), np.zeros(2), run_length_bank.design(3e-3, 16.0, 0.0, 0.0, prior, 0.01)
     for t, value in enumerate(values[1:], start=1):
         reading = np.array([value, 1.0, 1.0, 0.0, t, 0.0])
-        count, _, _ = run_length_bank.run_cycle(table, count, made, reading, outliers, 0.0)
+        count, _, _ = run_length_bank.update(table, count, made, reading, outliers, 0.0)
     learned = run_length_bank.outlier_probability(prior, *outliers)
     # a quarter of the outliers are too small to be told from good values
     assert 0.6 * share <= learned <= 1.2 * share + 0.2 * prior
@@ -204,7 +209,7 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
     config, std = TrackerSettings(batch=BatchKnowledge.UNKNOWN), 0.002
     state, ours = initial_state(), []
     for i, value in enumerate(z.tolist()):
-        done = track(config, state, Reading(i, 0.2 + std * value, std))
+        done = wear_batch.update(config, state, FrictionObservation(i, 0.2 + std * value, std))
         state = done.state
         if done.shift is not None:
             ours.append((i, done.shift.change_cycle, done.shift.size / std))
@@ -213,15 +218,15 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
         config.hazard, config.step_std**2, 0.0, 0.0, config.outlier_probability, config.slope_std**2
     )
     table, outliers = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH)), np.zeros(2)
-    first = run_length_bank.seed(z[0], 1.0, config.slope_std, 0, config.outlier_probability)
+    first = run_length_bank.initial_bank(z[0], 1.0, config.slope_std, 0, config.outlier_probability)
     table[: len(first)] = first
     count, accepted, its = len(first), 0.0, []
     for t in range(1, len(z)):
         reading = np.array([z[t], 1.0, 1.0, 0.0, t, 0.0])
-        count, _, statistic = run_length_bank.run_cycle(table, count, made, reading, outliers, accepted)
+        count, _, statistic = run_length_bank.update(table, count, made, reading, outliers, accepted)
         if statistic > run_length_bank.threshold(config.false_alarm_cycles):
             before, accepted = accepted, float(t)
-            change, size, _ = run_length_bank.last_shift(table[:count], before, accepted)
+            change, size, _ = run_length_bank.locate_change_point(table[:count], before, accepted)
             its.append((t, change, size))
     assert len(its) == 2
     assert len(ours) == len(its)

@@ -10,14 +10,13 @@ from hypothesis import strategies as st
 
 from impactcell.records import Quality
 from impactcell.serialization import json_text
-from impactcell.tracking import (
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import (
     BatchKnowledge,
-    Reading,
+    FrictionObservation,
     TrackerSettings,
     TrackerState,
     initial_state,
-    reset_wear,
-    track,
 )
 
 KNOWN = TrackerSettings(wear_limit=0.25)
@@ -29,13 +28,13 @@ SECOND = 1_000_000_000
 def series(n, seed=0, slope=1e-6, step=0.0, at=0, batch=None):
     mu = 0.2 + STD * np.random.default_rng(seed).normal(size=n) + slope * np.arange(n)
     mu[at:] += step * STD
-    return [Reading(i, float(m), STD, (i + 1) * SECOND, batch) for i, m in enumerate(mu)]
+    return [FrictionObservation(i, float(m), STD, (i + 1) * SECOND, batch) for i, m in enumerate(mu)]
 
 
 def run(config, readings, state=None):
     state, outcomes = state or initial_state(), []
     for reading in readings:
-        outcomes.append(track(config, state, reading))
+        outcomes.append(wear_batch.update(config, state, reading))
         state = outcomes[-1].state
     return outcomes
 
@@ -89,11 +88,11 @@ def test_a_shift_is_found_with_cycle_size_and_rate(config):
 def test_a_bad_reading_is_reported_and_the_next_is_used(config, bad, why):
     readings = series(60, batch="A")
     before = run(config, readings[:50])[-1]
-    odd = track(config, before.state, replace(readings[50], **bad))
+    odd = wear_batch.update(config, before.state, replace(readings[50], **bad))
     assert why in odd.wear.reason
     assert odd.wear.quality is Quality.UNCERTAIN
     assert finite(odd)
-    after = track(config, odd.state, readings[51])
+    after = wear_batch.update(config, odd.state, readings[51])
     assert after.used
     assert after.wear.quality is Quality.GOOD
     assert finite(after)
@@ -114,7 +113,7 @@ def test_it_says_when_no_change_would_be_reported_yet():
 
 
 def test_nothing_usable_at_all():
-    outcomes = run(UNKNOWN, [Reading(i, math.nan, math.nan) for i in range(5)])
+    outcomes = run(UNKNOWN, [FrictionObservation(i, math.nan, math.nan) for i in range(5)])
     assert outcomes[-1].wear.quality is Quality.BAD
     assert outcomes[-1].batch.quality is Quality.BAD
     assert "missing" in outcomes[-1].wear.reason
@@ -124,15 +123,15 @@ def test_nothing_usable_at_all():
 @pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
 def test_a_thousand_identical_values_are_a_stuck_sensor(config):
     readings = series(100, batch="A")
-    stuck = [Reading(100 + i, readings[-1].mu_s, STD, 0, "A") for i in range(1000)]
+    stuck = [FrictionObservation(100 + i, readings[-1].mu_s, STD, 0, "A") for i in range(1000)]
     outcomes = run(config, [*readings, *stuck])
     assert not any(o.shift for o in outcomes)
     assert "same 1001 times" in outcomes[-1].wear.reason
     assert finite(outcomes[-1])
-    good = track(config, outcomes[-1].state, Reading(1100, 0.2011, STD, 0, "A"))
+    good = wear_batch.update(config, outcomes[-1].state, FrictionObservation(1100, 0.2011, STD, 0, "A"))
     assert good.used
     assert good.wear.quality is Quality.GOOD
-    fresh = run(config, [Reading(i, 0.2, STD, 0, "A") for i in range(1000)])
+    fresh = run(config, [FrictionObservation(i, 0.2, STD, 0, "A") for i in range(1000)])
     assert finite(fresh[-1])
 
 
@@ -144,7 +143,9 @@ def test_a_batch_id_that_flips_every_cycle():
         assert finite(outcomes[-1])
         assert "too often" in outcomes[-1].wear.reason
         assert not any(o.shift for o in outcomes)
-    settled = run(KNOWN, [Reading(300 + i, 0.2, STD, 0, "Z") for i in range(3)], outcomes[-1].state)
+    settled = run(
+        KNOWN, [FrictionObservation(300 + i, 0.2, STD, 0, "Z") for i in range(3)], outcomes[-1].state
+    )
     assert settled[-1].used
 
 
@@ -239,13 +240,15 @@ def test_a_change_within_a_known_batch_is_found_and_is_no_wear(name):
     # level and rate are those of the first batch, before and after
     assert abs(last.wear.level - (0.2 + 2e-6 * 699)) < 3.5 * last.wear.level_std
     assert abs(last.wear.rate_per_cycle - 2e-6) < 3.0 * last.wear.rate_std
-    after = [Reading(700 + i, 0.2 + 2e-6 * (700 + i), STD, 0, "C") for i in range(50)]
+    after = [FrictionObservation(700 + i, 0.2 + 2e-6 * (700 + i), STD, 0, "C") for i in range(50)]
     assert all(finite(o) and o.used for o in run(KNOWN, after[:4], last.state))
 
 
 def test_wear_reset_starts_a_new_reference():
     last = run(UNKNOWN, series(200, slope=1e-5))[-1]
-    fresh = track(UNKNOWN, reset_wear(last.state), Reading(200, 0.15, STD, 300 * SECOND))
+    fresh = wear_batch.update(
+        UNKNOWN, wear_batch.reset_wear_level(last.state), FrictionObservation(200, 0.15, STD, 300 * SECOND)
+    )
     assert fresh.wear.level == pytest.approx(0.15)
     assert fresh.state.noise.factor == last.state.noise.factor or fresh.used
 
@@ -266,19 +269,19 @@ def test_a_restored_state_replays_to_the_same_bits(config):
     state = initial_state()
     for reading in readings:
         data = json_text.dumps(state)
-        state = track(config, json_text.loads(TrackerState, data), reading).state
+        state = wear_batch.update(config, json_text.loads(TrackerState, data), reading).state
     assert json_text.dumps(state) == json_text.dumps(straight[-1].state)
 
 
 def test_the_input_state_is_not_written_to():
     before = run(UNKNOWN, series(120))[-1].state
     data = json_text.dumps(before)
-    run(UNKNOWN, [Reading(120 + i, 0.25, STD) for i in range(20)], before)
+    run(UNKNOWN, [FrictionObservation(120 + i, 0.25, STD) for i in range(20)], before)
     assert json_text.dumps(before) == data
 
 
 readings_of_any_kind = st.builds(
-    Reading,
+    FrictionObservation,
     cycle=st.integers(0, 60),
     mu_s=st.one_of(st.floats(), st.floats(0.1, 0.3)),
     mu_s_std=st.one_of(st.floats(), st.floats(1e-4, 1e-2)),
@@ -293,7 +296,7 @@ readings_of_any_kind = st.builds(
 def test_no_readings_whatever_break_the_state(readings, config):
     state = initial_state()
     for reading in readings:
-        tracked = track(config, state, reading)
+        tracked = wear_batch.update(config, state, reading)
         state = tracked.state
         assert np.isfinite(state.bank[:, 1:]).all()
         assert tracked.wear.quality is Quality.BAD or finite(tracked)

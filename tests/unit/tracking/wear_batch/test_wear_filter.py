@@ -11,12 +11,12 @@ from impactcell.tracking.wear_batch import wear_filter, wear_report
 
 
 def run(values, batches, variance=1.0, slope_std=1.0, step_variance=1e6):
-    state = wear_filter.start(values[0], variance, slope_std, batches[0])
+    state = wear_filter.initial_state(values[0], variance, slope_std, batches[0])
     for value, batch in zip(values[1:], batches[1:], strict=True):
-        state = wear_filter.pass_cycles(state, 1, 0.0, 0.0)
+        state = wear_filter.predict(state, 1, 0.0, 0.0)
         if batch != state.current:
-            state = wear_filter.change_batch(state, batch, step_variance)
-        state, _ = wear_filter.measure(state, value, variance, math.inf)
+            state = wear_filter.switch_batch(state, batch, step_variance)
+        state, _ = wear_filter.update(state, value, variance, math.inf)
     return state
 
 
@@ -53,12 +53,12 @@ def test_equals_least_squares_with_batches_that_come_back():
 def test_an_outlier_is_clipped():
     state = run(np.zeros(50), ["A"] * 50, slope_std=0.01)
     std = math.sqrt(1.0 + state.covariance[0, 0])
-    edge, _ = wear_filter.measure(state, 2.5 * std, 1.0, 2.5)
-    odd, error = wear_filter.measure(state, 4.5 * std, 1.0, 2.5)
+    edge, _ = wear_filter.update(state, 2.5 * std, 1.0, 2.5)
+    odd, error = wear_filter.update(state, 4.5 * std, 1.0, 2.5)
     assert odd.mean == pytest.approx(edge.mean, rel=1e-9)
     assert odd.covariance[0, 0] > edge.covariance[0, 0]
     assert error.value == pytest.approx(4.5 * std, abs=1e-6)
-    far, _ = wear_filter.measure(state, 100.0, 1.0, 2.5)
+    far, _ = wear_filter.update(state, 100.0, 1.0, 2.5)
     assert abs(far.mean[0]) < 0.2 * abs(edge.mean[0])
 
 
@@ -76,12 +76,12 @@ def test_a_late_measurement_at_its_own_place():
     in_time = run(values, ["A"] * 30)
     late = run(np.delete(values, 20), ["A"] * 29)
     # the same cycles, the twenty-first taken in at the end
-    state = wear_filter.start(values[0], 1.0, 1.0, "A")
+    state = wear_filter.initial_state(values[0], 1.0, 1.0, "A")
     for t in range(1, 30):
-        state = wear_filter.pass_cycles(state, 1, 0.0, 0.0)
+        state = wear_filter.predict(state, 1, 0.0, 0.0)
         if t != 20:
-            state, _ = wear_filter.measure(state, values[t], 1.0, math.inf)
-    state, _ = wear_filter.measure(state, values[20], 1.0, math.inf, lag=9)
+            state, _ = wear_filter.update(state, values[t], 1.0, math.inf)
+    state, _ = wear_filter.update(state, values[20], 1.0, math.inf, lag=9)
     assert state.mean == pytest.approx(in_time.mean, abs=1e-9)
     assert state.covariance == pytest.approx(in_time.covariance, abs=1e-9)
     assert late.mean[0] != pytest.approx(in_time.mean[0], abs=1e-6)
