@@ -43,7 +43,7 @@ from impactcell.records import (
 from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker as signature
-from impactcell.tracking.signature.tracker import SignatureSettings, SignatureState, SignatureTracked
+from impactcell.tracking.signature.tracker import SignatureResult, SignatureSettings, SignatureState
 from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings, TrackerState, TrackingResult
 
 
@@ -211,7 +211,7 @@ def reset_wear_level(state: CellState) -> CellState:
 
 def _sign(
     design: CellDesign, state: CellState, capture: Capture, tracked: TrackingResult, period_s: float
-) -> SignatureTracked:
+) -> SignatureResult:
     """Friction along the stroke, with what the model knows to depend on the speed taken out."""
     plant = design.model.plant
     viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
@@ -247,7 +247,7 @@ def _findings(
     state: CellState,
     capture: Capture,
     tracked: TrackingResult,
-    signed: SignatureTracked,
+    signed: SignatureResult,
     gapped: gap_cusum.GapResult,
     period_s: float,
 ) -> list[RuleResult]:

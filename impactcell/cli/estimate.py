@@ -17,8 +17,8 @@ from impactcell.physics import Strike
 from impactcell.prediction import Model, calibrate
 from impactcell.prediction import estimate as estimate_tap
 from impactcell.prediction.free_slide import free_slide_friction
-from impactcell.prediction.joint_plant_fit import fit_plant, weigh
-from impactcell.prediction.slide_features import slide
+from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
+from impactcell.prediction.slide_features import extract_slide
 from impactcell.process.console import note, tell
 from impactcell.process.progress import progress
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
@@ -86,7 +86,7 @@ def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
     for shot in shots:
         if math.isnan(shot.mass_kg):
             try:
-                found.append(replace(shot, mass_kg=weigh(shot, slide(shot))))
+                found.append(replace(shot, mass_kg=estimate_mass(shot, extract_slide(shot))))
                 continue
             except (PredictionError, PhysicsError) as fault:
                 note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {fault}")

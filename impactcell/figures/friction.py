@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from impactcell.physics import EventKind, Plant, Strike, strike
-from impactcell.prediction import Model, Prior, calibrate, estimate, printed
-from impactcell.prediction.equations import Mix, force_weight
+from impactcell.prediction import Model, Prior, calibrate, estimate, printed_predictor
+from impactcell.prediction.equations import MassInterpolation, force_weight
 from impactcell.records import Capture, Channel, Samples
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def force_and_distance(figure: "Figure") -> None:
     left, right = figure.subplots(1, 2)
     velocities = np.linspace(2000, 6000, 17)
     curve = np.linspace(2000, 6000, 200)
-    paper = Mix(MASS_KG, ((1.0, printed()),), inside=True)
+    paper = MassInterpolation(MASS_KG, ((1.0, printed_predictor()),), inside=True)
     for mu, colour in zip(FRICTIONS, COLOURS, strict=True):
         motions = [strike(plant(mu), tap(float(v))) for v in velocities]
         left.plot(velocities, [one.peak_force_n for one in motions], "o", color=colour, markersize=3.2)
@@ -161,7 +161,7 @@ def errors(figure: "Figure") -> None:
     left.set_ylim(0, 4.4)
     left.set_ylabel(r"mean error of $\mu_s$ / %")
     left.legend(loc="lower left")
-    mixed = Mix(MASS_KG, ((1.0, printed()),), inside=True)
+    mixed = MassInterpolation(MASS_KG, ((1.0, printed_predictor()),), inside=True)
     frictions = np.linspace(0.15, 0.25, 101)
     weights = np.array([force_weight(mixed, mu, 0.075) for mu in frictions])  # the same at every velocity
     right.plot(frictions, weights, color=COLOURS[0], label="peak force")

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.numerics.jit import Reals, compiled
+from impactcell.numerics.jit import FloatArray, compiled
 
 Shifts = NDArray[np.uint8]
 Words = NDArray[np.uint32]
@@ -23,7 +23,7 @@ LONGEST = 31
 
 
 @compiled
-def packed(values: Reals, resolution: float) -> tuple[bool, Shifts, Words]:
+def packed(values: FloatArray, resolution: float) -> tuple[bool, Shifts, Words]:
     """Write the codes of `values` in few bits.
 
     Returns
@@ -75,7 +75,7 @@ def packed(values: Reals, resolution: float) -> tuple[bool, Shifts, Words]:
 
 
 @compiled
-def unpacked(shifts: Shifts, words: Words, count: int, resolution: float) -> Reals:
+def unpacked(shifts: Shifts, words: Words, count: int, resolution: float) -> FloatArray:
     """Give the values back; nan for those that the words do not hold."""
     values = np.full(count, np.nan)
     code, bits, filled, size = 0, 0, 0, 0
@@ -98,7 +98,7 @@ def unpacked(shifts: Shifts, words: Words, count: int, resolution: float) -> Rea
 
 
 @compiled
-def is_uniform(time_s: Reals, rate_hz: float) -> bool:
+def is_uniform(time_s: FloatArray, rate_hz: float) -> bool:
     """Whether times are those of `records.uniform_times` at this rate, bit for bit."""
     start_s = time_s[0]
     for i in range(len(time_s)):  # noqa: SIM110  # compiled

@@ -16,28 +16,28 @@ from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-Reals = NDArray[np.float64]
-Wholes = NDArray[np.int64]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 pointer_to: Any = types.CPointer
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class Numbers(Protocol):
+class FloatPointer(Protocol):
     """Bare pointer to floating-point numbers; an array will do where nothing is compiled."""
 
     def __getitem__(self, index: int, /) -> float: ...
     def __setitem__(self, index: int, value: float, /) -> None: ...
 
 
-class Integers(Protocol):
+class IntPointer(Protocol):
     """Bare pointer to whole numbers."""
 
     def __getitem__(self, index: int, /) -> int: ...
     def __setitem__(self, index: int, value: int, /) -> None: ...
 
 
-Law = Callable[[float, float, float, float, Numbers], float]
+Law = Callable[[float, float, float, float, FloatPointer], float]
 """A law of the plant: four numbers and the parameters of its effect in, one number out."""
 
 _POINTERS: dict[Law, Any] = {}
@@ -135,7 +135,7 @@ def _pointer(_context, array):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def _offset(_context, data, count):  # type: ignore[no-untyped-def]
+def _advance(_context, data, count):  # type: ignore[no-untyped-def]
     signature = data(data, types.int64)
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -144,18 +144,18 @@ def _offset(_context, data, count):  # type: ignore[no-untyped-def]
     return signature, generate
 
 
-invoke = cast("Callable[[int, float, float, float, float, Numbers, int], float]", _invoke)
+invoke = cast("Callable[[int, float, float, float, float, FloatPointer, int], float]", _invoke)
 """Call the law at an address with four numbers and the parameters from `row[offset]` on."""
 
-numbers = cast("Callable[[Reals], Numbers]", _pointer)
+float_pointer = cast("Callable[[FloatArray], FloatPointer]", _pointer)
 """Bare pointer to a contiguous array's data, for compiled code only.
 
 Indexed like the array, but without bounds, shape or reference count, whose upkeep would cost more than the
 arithmetic in functions as small as those of a plant. Whoever makes one keeps the array alive.
 """
 
-integers = cast("Callable[[Wholes], Integers]", _pointer)
+int_pointer = cast("Callable[[IntArray], IntPointer]", _pointer)
 """The same for whole numbers."""
 
-offset = cast("Callable[[Numbers, int], Numbers]", _offset)
+advance = cast("Callable[[FloatPointer, int], FloatPointer]", _advance)
 """Pointer `count` elements further on."""

@@ -14,11 +14,11 @@ from impactcell.records import Samples
 
 GROWTH = 1.3
 """Factor by which windows grow."""
-MOST_WINDOWS = 64
+MAX_WINDOWS = 64
 
 
 @compiled
-def survey(times: Samples, values: Samples) -> tuple[int, bool, float, float, int]:
+def channel_statistics(times: Samples, values: Samples) -> tuple[int, bool, float, float, int]:
     """Look through a channel once.
 
     Returns
@@ -114,7 +114,7 @@ def middle_second_difference(values: Samples) -> float:
 
 
 @compiled
-def polynomial(
+def fit_polynomial(
     times: Samples, values: Samples, origin_s: float, scale_s: float, degree: int
 ) -> tuple[Samples, Samples, float]:
     """Fit a polynomial of at most third degree in u = (t - origin) / scale.
@@ -124,7 +124,7 @@ def polynomial(
     coefficients : ndarray, shape (degree + 1,)
         Lowest power first; nan where the samples do not determine them.
     factor : ndarray, shape (degree + 1, degree + 1)
-        Cholesky's factor L of the normal equations, for `spread`.
+        Cholesky's factor L of the normal equations, for `value_std`.
     squares : float
         Sum of squares of the residuals.
     """
@@ -170,7 +170,7 @@ def polynomial(
 
 
 @compiled
-def spread(factor: Samples, u: float) -> float:
+def value_std(factor: Samples, u: float) -> float:
     """Give the standard deviation of the polynomial's value at `u`, in those of one sample."""
     size = len(factor)
     column = np.empty(size)
@@ -195,7 +195,7 @@ def value_at(coefficients: Samples, u: float) -> float:
 
 
 @compiled
-def _top(cubic: Samples, low: float, high: float) -> float:
+def _argmax(cubic: Samples, low: float, high: float) -> float:
     """Where a cubic is largest between two ends."""
     best = low if value_at(cubic, low) > value_at(cubic, high) else high
     # The zero of the derivative c1 + 2 c2 u + 3 c3 u² at which the second derivative is negative.
@@ -236,7 +236,7 @@ def widest_cubic(
     found, value, std = False, np.nan, np.nan
     highest, lowest = np.inf, -np.inf
     half, centre = narrowest_s, at_s
-    for _ in range(MOST_WINDOWS):
+    for _ in range(MAX_WINDOWS):
         if half > widest_s and found:
             break
         first = np.searchsorted(times, centre - left * half - 0.01 * step_s)
@@ -246,15 +246,15 @@ def widest_cubic(
             if half > 4.0 * widest_s:
                 break
             continue
-        cubic, factor, squares = polynomial(times[first:last], values[first:last], centre, half, 3)
+        cubic, factor, squares = fit_polynomial(times[first:last], values[first:last], centre, half, 3)
         freedom = last - first - 4
         if not squares / sigma**2 <= freedom + 3.0 * math.sqrt(2.0 * freedom):
             break
-        u = _top(cubic, (times[first] - centre) / half, (times[last - 1] - centre) / half)
+        u = _argmax(cubic, (times[first] - centre) / half, (times[last - 1] - centre) / half)
         top = value_at(cubic, u)
         if top > highest or top < lowest:
             break
-        found, value, std = True, top, sigma * spread(factor, u)
+        found, value, std = True, top, sigma * value_std(factor, u)
         highest, lowest = min(highest, top + 2.0 * std), max(lowest, top - 2.0 * std)
         if left == 1.0 and right == 1.0:
             centre = min(max(centre + half * u, at_s - half), at_s + half)

@@ -11,7 +11,7 @@ ROUNDING = 1e-14  # of a diagonal element: what is left of it below this is roun
 
 
 @compiled
-def factor(matrix: Samples) -> Samples:
+def cholesky(matrix: Samples) -> Samples:
     """Lower Cholesky factor of a positive semidefinite matrix.
 
     A pivot of which only rounding is left is infinite: its unknown is solved as zero.
@@ -31,7 +31,7 @@ def factor(matrix: Samples) -> Samples:
 
 
 @compiled
-def part(matrix: Samples, top: int, bottom: int, left: int, right: int) -> Samples:
+def block(matrix: Samples, top: int, bottom: int, left: int, right: int) -> Samples:
     """Copy of the rows `top` .. `bottom` - 1 in the columns `left` .. `right` - 1."""
     found = np.empty((bottom - top, right - left))
     for i in range(bottom - top):
@@ -41,7 +41,7 @@ def part(matrix: Samples, top: int, bottom: int, left: int, right: int) -> Sampl
 
 
 @compiled
-def product(A: Samples, B: Samples) -> Samples:
+def transposed_product(A: Samples, B: Samples) -> Samples:
     """Give A' B, shapes (k, n) and (k, m)."""
     found = np.zeros((A.shape[1], B.shape[1]))
     for k in range(len(A)):
@@ -52,7 +52,7 @@ def product(A: Samples, B: Samples) -> Samples:
 
 
 @compiled
-def triangle(matrix: Samples) -> Samples:
+def pack_triangle(matrix: Samples) -> Samples:
     """Lower triangle of a symmetric matrix, by rows: what is kept of one between cycles."""
     kept, p = np.empty(len(matrix) * (len(matrix) + 1) // 2), 0
     for i in range(len(matrix)):
@@ -63,7 +63,7 @@ def triangle(matrix: Samples) -> Samples:
 
 
 @compiled
-def square(kept: Samples) -> Samples:
+def unpack_triangle(kept: Samples) -> Samples:
     """Symmetric matrix of a lower triangle."""
     n, p = int(math.sqrt(2.0 * len(kept))), 0
     matrix = np.empty((n, n))
@@ -75,7 +75,7 @@ def square(kept: Samples) -> Samples:
 
 
 @compiled
-def forward(lower: Samples, right: Samples) -> Samples:
+def solve_lower(lower: Samples, right: Samples) -> Samples:
     """Solve L X = R, shapes (n, n) and (n, k)."""
     n, width = right.shape
     found = right.copy()
@@ -90,7 +90,7 @@ def forward(lower: Samples, right: Samples) -> Samples:
 
 
 @compiled
-def backward(lower: Samples, right: Samples) -> Samples:
+def solve_upper(lower: Samples, right: Samples) -> Samples:
     """Solve L' X = R, shapes (n, n) and (n, k)."""
     n, width = right.shape
     found = right.copy()
@@ -105,21 +105,21 @@ def backward(lower: Samples, right: Samples) -> Samples:
 
 
 @compiled
-def solved(matrix: Samples, right: Samples) -> Samples:
+def solve(matrix: Samples, right: Samples) -> Samples:
     """Solve M x = r for a symmetric positive definite matrix, shapes (n, n) and (n,)."""
-    lower = factor(matrix)
-    return backward(lower, forward(lower, right.reshape((len(right), 1)))).reshape(len(right))
+    lower = cholesky(matrix)
+    return solve_upper(lower, solve_lower(lower, right.reshape((len(right), 1)))).reshape(len(right))
 
 
 @compiled
 def inverse(matrix: Samples) -> Samples:
     """Inverse of a symmetric positive definite matrix."""
-    lower = factor(matrix)
-    return backward(lower, forward(lower, np.eye(len(matrix))))
+    lower = cholesky(matrix)
+    return solve_upper(lower, solve_lower(lower, np.eye(len(matrix))))
 
 
 @compiled
-def marginal(
+def marginalise(
     matrix: Samples, vector: Samples, inner: Samples, cross: Samples, along: Samples
 ) -> tuple[Samples, Samples]:
     """Information on some unknowns with others, of which `inner`, `cross` and `along` tell, integrated out.
@@ -142,7 +142,7 @@ def marginal(
         for i in range(n):
             right[c, i] = cross[c, i]
         right[c, n] = along[c]
-    half = forward(factor(inner), right)
+    half = solve_lower(cholesky(inner), right)
     left, rest = matrix.copy(), vector.copy()
     for c in range(k):
         for i in range(n):
@@ -154,16 +154,16 @@ def marginal(
 
 
 @compiled
-def varied(components: Samples, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
+def with_random_effects(components: Samples, matrix: Samples, vector: Samples) -> tuple[Samples, Samples]:
     """Information (G^-1 + C C')^-1 and its vector: what is left of G when the unknowns vary by C.
 
     Shapes (n, k), (n, n) and (n,).
     """
     k = components.shape[1]
-    cross, inner, along = product(components, matrix), np.eye(k), np.zeros(k)
+    cross, inner, along = transposed_product(components, matrix), np.eye(k), np.zeros(k)
     for c in range(k):
         for i in range(len(vector)):
             along[c] += components[i, c] * vector[i]
             for d in range(k):
                 inner[c, d] += cross[c, i] * components[i, d]
-    return marginal(matrix, vector, inner, cross, along)
+    return marginalise(matrix, vector, inner, cross, along)

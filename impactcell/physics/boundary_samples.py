@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from impactcell.numerics.jit import Integers, Numbers, compiled
+from impactcell.numerics.jit import FloatPointer, IntPointer, compiled
 from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import actuator_speed, body_force, contact_force, derivative, reading
 
@@ -14,13 +14,13 @@ ELASTIC_PERIODS = 3.0
 @compiled
 def before_contact(
     begin_s: float,
-    row: Numbers,
-    program: Integers,
-    z: Numbers,
-    memo: Numbers,
-    cursor: Integers,
-    times: Numbers,
-    out: Numbers,
+    row: FloatPointer,
+    program: IntPointer,
+    z: FloatPointer,
+    memo: FloatPointer,
+    cursor: IntPointer,
+    times: FloatPointer,
+    out: FloatPointer,
 ) -> None:
     """Fill the samples before the first phase: everything as it begins, no force on the sensor."""
     for channel in range(at.CHANNELS):
@@ -39,7 +39,7 @@ def before_contact(
 
 
 @compiled
-def last_sample(memo: Numbers, cursor: Integers, times: Numbers) -> float:
+def last_sample(memo: FloatPointer, cursor: IntPointer, times: FloatPointer) -> float:
     """Time up to which the motion has to be known for all samples [s]."""
     last = -np.inf
     for channel in range(at.CHANNELS):
@@ -50,7 +50,7 @@ def last_sample(memo: Numbers, cursor: Integers, times: Numbers) -> float:
 
 
 @compiled
-def all_taken(cursor: Integers) -> bool:
+def all_taken(cursor: IntPointer) -> bool:
     """Whether every sample asked for has been filled."""
     for channel in range(at.CHANNELS):  # noqa: SIM110  # compiled
         if cursor[channel] < cursor[at.CHANNELS + channel]:
@@ -59,7 +59,9 @@ def all_taken(cursor: Integers) -> bool:
 
 
 @compiled
-def resting_force(t: float, z: Numbers, mode: Integers, row: Numbers, program: Integers) -> float:
+def resting_force(
+    t: float, z: FloatPointer, mode: IntPointer, row: FloatPointer, program: IntPointer
+) -> float:
     """Contact force in the present state [N]."""
     return contact_force(z, actuator_speed(t, z, mode, row, program), mode, row, program)
 
@@ -67,14 +69,14 @@ def resting_force(t: float, z: Numbers, mode: Integers, row: Numbers, program: I
 @compiled
 def after_end(
     t: float,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    cursor: Integers,
-    times: Numbers,
-    out: Numbers,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    cursor: IntPointer,
+    times: FloatPointer,
+    out: FloatPointer,
 ) -> None:
     """Fill the samples after the last phase: everything stays as it is, a lagging sensor settles."""
     force = resting_force(t, z, mode, row, program)
@@ -96,14 +98,14 @@ def after_end(
 @compiled
 def rests(
     t: float,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    cursor: Integers,
-    figures: Numbers,
-    K: Numbers,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    cursor: IntPointer,
+    figures: FloatPointer,
+    K: FloatPointer,
 ) -> bool:
     """Whether a part that nothing drives any more has come to rest and all is known of it.
 
@@ -129,7 +131,7 @@ def rests(
 
 @compiled
 def elastic_rest(
-    t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers
+    t: float, z: FloatPointer, mode: IntPointer, memo: FloatPointer, row: FloatPointer, program: IntPointer
 ) -> float:
     """Position at which elastic stick holds whatever still pulls at the part: where its ringing would end."""
     z[at.SPEED_OF_PART] = 0.0
@@ -148,7 +150,13 @@ def elastic_rest(
 
 @compiled
 def finish(
-    t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers, figures: Numbers
+    t: float,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    figures: FloatPointer,
 ) -> None:
     """Turn what was noted on the way into the figures of the tap."""
     rest = z[at.U]

@@ -6,7 +6,7 @@ for on the interpolant and then located with full steps, so that it is as exact 
 
 import numpy as np
 
-from impactcell.numerics.jit import Integers, Numbers, compiled, invoke
+from impactcell.numerics.jit import FloatPointer, IntPointer, compiled, invoke
 from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import (
     actuator_speed,
@@ -23,7 +23,7 @@ CHECKS = 5
 
 
 @compiled
-def applies(event: int, mode: Integers, memo: Numbers, program: Integers) -> bool:
+def applies(event: int, mode: IntPointer, memo: FloatPointer, program: IntPointer) -> bool:
     """Whether the present phase can end in this kind of event."""
     zone = mode[at.ZONE]
     slip = mode[at.SLIP]
@@ -46,11 +46,11 @@ def applies(event: int, mode: Integers, memo: Numbers, program: Integers) -> boo
 def margin(
     event: int,
     t: float,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
 ) -> float:
     """Distance from the end of the phase by this kind of event, positive before it."""
     if event == at.STOP:
@@ -77,7 +77,7 @@ def margin(
 
 
 @compiled
-def state_at(theta: float, n: int, dense: Numbers, z: Numbers) -> None:
+def state_at(theta: float, n: int, dense: FloatPointer, z: FloatPointer) -> None:
     """Write the state at the fraction `theta` of the step into z."""
     for i in range(n):
         z[i] = evaluate(theta, dense, i)
@@ -90,12 +90,12 @@ def crossing(
     high: float,
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
 ) -> float:
     """Fraction of the step, in (low, high], at which the margin of `event` crosses zero.
 
@@ -143,13 +143,13 @@ def crossing(
 def first_event(
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    found: Numbers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    found: FloatPointer,
 ) -> bool:
     """Find the first event within the step; `found` gets its kind and its fraction of the step."""
     high = 1.0
@@ -189,7 +189,7 @@ def first_event(
 
 @compiled
 def hold_or_slip(
-    t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers
+    t: float, z: FloatPointer, mode: IntPointer, memo: FloatPointer, row: FloatPointer, program: IntPointer
 ) -> bool:
     """Let a part at rest slip if what pulls at it exceeds what stick can hold; True if it does."""
     speed = actuator_speed(t, z, mode, row, program)
@@ -202,7 +202,7 @@ def hold_or_slip(
 
 
 @compiled
-def next_kink(t: float, row: Numbers, program: Integers) -> float:
+def next_kink(t: float, row: FloatPointer, program: IntPointer) -> float:
     """Next time after t at which a law of the actuator's run-up changes its formula [s]."""
     kink = np.inf
     for i in range(program[at.UNTIL], program[at.UNTIL + 1], 2):

@@ -5,12 +5,14 @@ of the state, so that a step that runs past an event is still a step of a smooth
 bare pointers (`impactcell.numerics.jit.pointer`) laid out as in `impactcell.physics.memory_layout`.
 """
 
-from impactcell.numerics.jit import Integers, Numbers, compiled, invoke
+from impactcell.numerics.jit import FloatPointer, IntPointer, compiled, invoke
 from impactcell.physics import memory_layout as at
 
 
 @compiled
-def actuator_speed(t: float, z: Numbers, mode: Integers, row: Numbers, program: Integers) -> float:
+def actuator_speed(
+    t: float, z: FloatPointer, mode: IntPointer, row: FloatPointer, program: IntPointer
+) -> float:
     """Y' = v times the laws of its run-up, less the speed the laws of its load take away [m/s]."""
     if mode[at.RUNNING] == 0:
         return 0.0
@@ -23,7 +25,9 @@ def actuator_speed(t: float, z: Numbers, mode: Integers, row: Numbers, program: 
 
 
 @compiled
-def compression(z: Numbers, speed: float, mode: Integers, row: Numbers, program: Integers) -> float:
+def compression(
+    z: FloatPointer, speed: float, mode: IntPointer, row: FloatPointer, program: IntPointer
+) -> float:
     """Contact force while touching, before it is clipped at zero [N]."""
     d = z[at.TRAVEL] - z[at.U]
     rate = speed - z[at.SPEED_OF_PART]
@@ -36,7 +40,9 @@ def compression(z: Numbers, speed: float, mode: Integers, row: Numbers, program:
 
 
 @compiled
-def contact_force(z: Numbers, speed: float, mode: Integers, row: Numbers, program: Integers) -> float:
+def contact_force(
+    z: FloatPointer, speed: float, mode: IntPointer, row: FloatPointer, program: IntPointer
+) -> float:
     """Force of the actuator on the part, positive in compression, negative in adhesion [N]."""
     if mode[at.ZONE] == at.TOUCHING:
         return 0.0 if mode[at.CLIPPED] == 1 else compression(z, speed, mode, row, program)
@@ -48,7 +54,9 @@ def contact_force(z: Numbers, speed: float, mode: Integers, row: Numbers, progra
 
 
 @compiled
-def body_force(t: float, z: Numbers, memo: Numbers, row: Numbers, program: Integers) -> float:
+def body_force(
+    t: float, z: FloatPointer, memo: FloatPointer, row: FloatPointer, program: IntPointer
+) -> float:
     """Sum up the forces on the part other than contact and Coulomb friction, along the tap [N]."""
     direction = row[at.DIRECTION]
     force = memo[at.DRIVE] + memo[at.DRIVE_SLOPE] * (t - memo[at.DRIVE_TIME])
@@ -61,7 +69,7 @@ def body_force(t: float, z: Numbers, memo: Numbers, row: Numbers, program: Integ
 
 
 @compiled
-def friction_scale(u: float, row: Numbers, program: Integers) -> float:
+def friction_scale(u: float, row: FloatPointer, program: IntPointer) -> float:
     """Product of the laws by which friction varies along the table [1]."""
     scale = 1.0
     x = row[at.START] + row[at.DIRECTION] * u
@@ -71,7 +79,7 @@ def friction_scale(u: float, row: Numbers, program: Integers) -> float:
 
 
 @compiled
-def kinetic_friction(u: float, speed: float, row: Numbers, program: Integers) -> float:
+def kinetic_friction(u: float, speed: float, row: FloatPointer, program: IntPointer) -> float:
     """Magnitude of Coulomb friction in slip at `speed` >= 0 [N]."""
     mu = row[at.MU_K]
     for i in range(program[at.KINETIC], program[at.KINETIC + 1], 2):
@@ -80,7 +88,7 @@ def kinetic_friction(u: float, speed: float, row: Numbers, program: Integers) ->
 
 
 @compiled
-def breakaway_force(u: float, row: Numbers, program: Integers) -> float:
+def breakaway_force(u: float, row: FloatPointer, program: IntPointer) -> float:
     """Force that stick can hold [N].
 
     mu_s m g; where the friction of slow slip is larger than that, the part only moves once it is exceeded.
@@ -92,12 +100,12 @@ def breakaway_force(u: float, row: Numbers, program: Integers) -> float:
 @compiled
 def derivative(
     t: float,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    out: Numbers,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    out: FloatPointer,
     begin: int,
 ) -> None:
     """Equations of motion (1)-(3) of the present phase, into `out` from index `begin` on."""
@@ -127,7 +135,7 @@ def derivative(
 
 
 @compiled
-def reading(force: float, row: Numbers, program: Integers) -> float:
+def reading(force: float, row: FloatPointer, program: IntPointer) -> float:
     """Apply the sensor's laws to a contact force that has been through its lag [N]."""
     for i in range(program[at.READING], program[at.READING + 1], 2):
         force = invoke(program[i], force, 0.0, 0.0, 0.0, row, program[i + 1])

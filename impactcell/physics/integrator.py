@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from impactcell.numerics.jit import Integers, Numbers, compiled, integers, numbers, offset
+from impactcell.numerics.jit import FloatPointer, IntPointer, advance, compiled, float_pointer, int_pointer
 from impactcell.physics import memory_layout as at
 from impactcell.physics.boundary_samples import after_end, before_contact, finish, last_sample, rests
 from impactcell.physics.events import first_event, margin, next_kink, state_at
@@ -34,15 +34,15 @@ def locate(
     t: float,
     h: float,
     fraction: float,
-    z: Numbers,
-    new: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    K: Numbers,
-    dense: Numbers,
-    scratch: Numbers,
+    z: FloatPointer,
+    new: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    K: FloatPointer,
+    dense: FloatPointer,
+    scratch: FloatPointer,
 ) -> float:
     """Length of the step that ends exactly at the event; K, `new` and `dense` become that step's.
 
@@ -70,30 +70,30 @@ def locate(
 
 @compiled
 def follow(
-    row: Numbers,
-    program: Integers,
-    drive: Numbers,
+    row: FloatPointer,
+    program: IntPointer,
+    drive: FloatPointer,
     drives: int,
     horizon: float,
     goal: int,
-    cursor: Integers,
-    times: Numbers,
-    out: Numbers,
-    event_kinds: Integers,
-    event_times: Numbers,
-    figures: Numbers,
-    work: Numbers,
-    mode: Integers,
+    cursor: IntPointer,
+    times: FloatPointer,
+    out: FloatPointer,
+    event_kinds: IntPointer,
+    event_times: FloatPointer,
+    figures: FloatPointer,
+    work: FloatPointer,
+    mode: IntPointer,
 ) -> None:
     """Integrate one tap; all arrays are bare pointers, `integrate_all` says what they hold."""
     n = at.EXTRA + (program[at.LOSS + 1] - program[at.LOSS]) // 2
-    z, new, scratch = offset(work, 0), offset(work, at.WIDTH), offset(work, 2 * at.WIDTH)
-    K = offset(work, 3 * at.WIDTH)
-    dense = offset(work, (3 + EXTENDED) * at.WIDTH)
-    memo = offset(work, (11 + EXTENDED) * at.WIDTH)
-    powers = offset(work, (11 + EXTENDED) * at.WIDTH + at.MEMOS)
-    moments = offset(work, (11 + EXTENDED) * at.WIDTH + at.MEMOS + POWERS)
-    found = offset(work, (11 + EXTENDED) * at.WIDTH + at.MEMOS + 2 * POWERS)
+    z, new, scratch = advance(work, 0), advance(work, at.WIDTH), advance(work, 2 * at.WIDTH)
+    K = advance(work, 3 * at.WIDTH)
+    dense = advance(work, (3 + EXTENDED) * at.WIDTH)
+    memo = advance(work, (11 + EXTENDED) * at.WIDTH)
+    powers = advance(work, (11 + EXTENDED) * at.WIDTH + at.MEMOS)
+    moments = advance(work, (11 + EXTENDED) * at.WIDTH + at.MEMOS + POWERS)
+    found = advance(work, (11 + EXTENDED) * at.WIDTH + at.MEMOS + 2 * POWERS)
     for i in range(WORK):
         work[i] = 0.0
     clear(n, mode, figures)
@@ -237,20 +237,20 @@ def integrate_all(
     mode = np.empty(at.MODES, np.int64)
     for i in range(rows.shape[0]):
         follow(
-            numbers(rows[i]),
-            integers(program),
-            numbers(drives[drive_ends[i] :]),
+            float_pointer(rows[i]),
+            int_pointer(program),
+            float_pointer(drives[drive_ends[i] :]),
             (drive_ends[i + 1] - drive_ends[i]) // 2,
             horizon,
             goal,
-            integers(cursors[i]),
-            numbers(times),
-            numbers(out),
-            integers(event_kinds),
-            numbers(event_times),
-            numbers(figures[i]),
-            numbers(work),
-            integers(mode),
+            int_pointer(cursors[i]),
+            float_pointer(times),
+            float_pointer(out),
+            int_pointer(event_kinds),
+            float_pointer(event_times),
+            float_pointer(figures[i]),
+            float_pointer(work),
+            int_pointer(mode),
         )
     # A last use keeps the workspace alive while bare pointers into it are in use.
     mode[0] = work.shape[0]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from impactcell.numerics.jit import Integers, Numbers, compiled, invoke
+from impactcell.numerics.jit import FloatPointer, IntPointer, compiled, invoke
 from impactcell.physics import memory_layout as at
 from impactcell.physics.events import hold_or_slip, next_kink
 from impactcell.physics.forces import actuator_speed, body_force, contact_force, reading
@@ -14,7 +14,7 @@ RIGID_N_PER_M = 1e12
 
 
 @compiled
-def first_law(kind: int, missing: float, row: Numbers, program: Integers) -> float:
+def first_law(kind: int, missing: float, row: FloatPointer, program: IntPointer) -> float:
     """Value of the only law of a kind that is a plain number, `missing` where there is none."""
     if program[kind + 1] == program[kind]:
         return missing
@@ -23,7 +23,7 @@ def first_law(kind: int, missing: float, row: Numbers, program: Integers) -> flo
 
 
 @compiled
-def clear(states: int, mode: Integers, figures: Numbers) -> None:
+def clear(states: int, mode: IntPointer, figures: FloatPointer) -> None:
     """Forget the tap before."""
     for i in range(at.MODES):
         mode[i] = 0
@@ -36,7 +36,7 @@ def clear(states: int, mode: Integers, figures: Numbers) -> None:
 
 
 @compiled
-def prepare(t: float, memo: Numbers, row: Numbers, program: Integers) -> None:
+def prepare(t: float, memo: FloatPointer, row: FloatPointer, program: IntPointer) -> None:
     """Read the laws that are plain numbers, once for the whole tap."""
     stick = first_law(at.STICK, np.inf, row, program)
     memo[at.STICK_STIFFNESS] = stick if stick < RIGID_N_PER_M else 0.0
@@ -49,7 +49,9 @@ def prepare(t: float, memo: Numbers, row: Numbers, program: Integers) -> None:
 
 
 @compiled
-def begin(t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, program: Integers) -> None:
+def begin(
+    t: float, z: FloatPointer, mode: IntPointer, memo: FloatPointer, row: FloatPointer, program: IntPointer
+) -> None:
     """Set up the first phase: first contact at t = 0, or a part that already slides."""
     if math.isnan(row[at.INITIAL_SPEED]):
         mode[at.ZONE] = at.TOUCHING
@@ -68,7 +70,7 @@ def begin(t: float, z: Numbers, mode: Integers, memo: Numbers, row: Numbers, pro
 
 
 @compiled
-def unread(shown: float, row: Numbers, program: Integers) -> float:
+def unread(shown: float, row: FloatPointer, program: IntPointer) -> float:
     """Find the force at which the sensor shows `shown` [N]; where it is saturated, `shown` itself."""
     force = shown
     for _ in range(20):
@@ -83,7 +85,13 @@ def unread(shown: float, row: Numbers, program: Integers) -> float:
 
 @compiled
 def enter_interval(
-    i: int, drive: Numbers, drives: int, mode: Integers, memo: Numbers, row: Numbers, program: Integers
+    i: int,
+    drive: FloatPointer,
+    drives: int,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
 ) -> None:
     """Take up the driving force between its measured samples i and i + 1.
 
@@ -100,7 +108,13 @@ def enter_interval(
 
 @compiled
 def enter_first_interval(
-    t: float, drive: Numbers, drives: int, mode: Integers, memo: Numbers, row: Numbers, program: Integers
+    t: float,
+    drive: FloatPointer,
+    drives: int,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
 ) -> None:
     """Take up the driving force where it acts at time t, its delay undone."""
     first = 0
@@ -110,7 +124,9 @@ def enter_first_interval(
 
 
 @compiled
-def note(kind: int, t: float, figures: Numbers, cursor: Integers, kinds: Integers, times: Numbers) -> None:
+def note(
+    kind: int, t: float, figures: FloatPointer, cursor: IntPointer, kinds: IntPointer, times: FloatPointer
+) -> None:
     """Record an event."""
     i = int(figures[at.EVENT_COUNT])
     if i < cursor[at.ROOM]:
@@ -120,7 +136,9 @@ def note(kind: int, t: float, figures: Numbers, cursor: Integers, kinds: Integer
 
 
 @compiled
-def note_breakaway(t: float, figures: Numbers, cursor: Integers, kinds: Integers, times: Numbers) -> None:
+def note_breakaway(
+    t: float, figures: FloatPointer, cursor: IntPointer, kinds: IntPointer, times: FloatPointer
+) -> None:
     """Record that the part moves; its first time is kept among the figures."""
     if math.isnan(figures[at.BREAKAWAY_TIME]):
         figures[at.BREAKAWAY_TIME] = t
@@ -128,7 +146,7 @@ def note_breakaway(t: float, figures: Numbers, cursor: Integers, kinds: Integers
 
 
 @compiled
-def touch(t: float, z: Numbers, mode: Integers, row: Numbers, program: Integers) -> None:
+def touch(t: float, z: FloatPointer, mode: IntPointer, row: FloatPointer, program: IntPointer) -> None:
     """Decide anew whether the contact is being compressed, after a jump of either speed."""
     if mode[at.ZONE] == at.TOUCHING:
         mode[at.DAMPER] = 1 if actuator_speed(t, z, mode, row, program) > z[at.SPEED_OF_PART] else 0
@@ -138,15 +156,15 @@ def touch(t: float, z: Numbers, mode: Integers, row: Numbers, program: Integers)
 def pass_event(
     event: int,
     t: float,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    figures: Numbers,
-    cursor: Integers,
-    kinds: Integers,
-    times: Numbers,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    figures: FloatPointer,
+    cursor: IntPointer,
+    kinds: IntPointer,
+    times: FloatPointer,
 ) -> None:
     """Change from the phase that ends in `event` to the next one."""
     if event == at.STOP:

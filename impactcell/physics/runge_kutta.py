@@ -10,7 +10,7 @@ import math
 import numpy as np
 from scipy.integrate import DOP853
 
-from impactcell.numerics.jit import Integers, Numbers, compiled
+from impactcell.numerics.jit import FloatPointer, IntPointer, compiled
 from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import derivative
 
@@ -37,13 +37,13 @@ def stages(
     last: int,
     t: float,
     h: float,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    K: Numbers,
-    scratch: Numbers,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    K: FloatPointer,
+    scratch: FloatPointer,
 ) -> None:
     """Evaluate stages `first` to `last` - 1 of the step h from (t, z) into the rows of K."""
     n = mode[at.STATES]
@@ -57,7 +57,7 @@ def stages(
 
 
 @compiled
-def error(n: int, h: float, z: Numbers, new: Numbers, K: Numbers) -> float:
+def error(n: int, h: float, z: FloatPointer, new: FloatPointer, K: FloatPointer) -> float:
     """Estimated error of the step in units of the tolerance (Hairer's combination of orders 5 and 3)."""
     fifth = 0.0
     third = 0.0
@@ -76,7 +76,9 @@ def error(n: int, h: float, z: Numbers, new: Numbers, K: Numbers) -> float:
 
 
 @compiled
-def interpolant(n: int, h: float, z: Numbers, new: Numbers, K: Numbers, dense: Numbers) -> None:
+def interpolant(
+    n: int, h: float, z: FloatPointer, new: FloatPointer, K: FloatPointer, dense: FloatPointer
+) -> None:
     """Coefficients of the interpolant over the step, shape (8, WIDTH), from all 16 stages."""
     for i in range(n):
         delta = new[i] - z[i]
@@ -92,7 +94,7 @@ def interpolant(n: int, h: float, z: Numbers, new: Numbers, K: Numbers, dense: N
 
 
 @compiled
-def evaluate(theta: float, dense: Numbers, i: int) -> float:
+def evaluate(theta: float, dense: FloatPointer, i: int) -> float:
     """Component i of the state at the fraction `theta` of the step."""
     rest = 1.0 - theta
     value = dense[7 * at.WIDTH + i] * theta

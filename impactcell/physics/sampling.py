@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from impactcell.numerics.jit import Integers, Numbers, compiled
+from impactcell.numerics.jit import FloatPointer, IntPointer, compiled
 from impactcell.physics import memory_layout as at
 from impactcell.physics.events import state_at
 from impactcell.physics.forces import actuator_speed, contact_force, reading
@@ -21,11 +21,11 @@ def force_at(
     theta: float,
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    row: Numbers,
-    program: Integers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    row: FloatPointer,
+    program: IntPointer,
 ) -> float:
     """Contact force at the fraction `theta` of the step [N]; `z` is scratch."""
     if mode[at.ZONE] < at.NEAR:
@@ -35,7 +35,7 @@ def force_at(
 
 
 @compiled
-def exponential_moments(theta: float, ratio: float, out: Numbers) -> None:
+def exponential_moments(theta: float, ratio: float, out: FloatPointer) -> None:
     """Response of a first-order lag, at rest before, to the powers of time since the step's start.
 
     out[j] = integral from 0 to theta of s^j exp(-(theta - s)/ratio)/ratio ds, by the recursion
@@ -66,7 +66,7 @@ def exponential_moments(theta: float, ratio: float, out: Numbers) -> None:
 
 
 @compiled
-def lagged(theta: float, before: float, ratio: float, powers: Numbers, moments: Numbers) -> float:
+def lagged(theta: float, before: float, ratio: float, powers: FloatPointer, moments: FloatPointer) -> float:
     """Lagged force at the fraction `theta` of a step over which the force is the polynomial `powers`."""
     exponential_moments(theta, ratio, moments)
     value = before * math.exp(-theta / ratio)
@@ -79,12 +79,12 @@ def lagged(theta: float, before: float, ratio: float, powers: Numbers, moments: 
 def force_polynomial(
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    row: Numbers,
-    program: Integers,
-    powers: Numbers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    powers: FloatPointer,
 ) -> None:
     """Monomial coefficients of the contact force over the step, in the fraction of the step."""
     n = POWERS
@@ -103,15 +103,15 @@ def sensed(
     theta: float,
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
     before: float,
-    powers: Numbers,
-    moments: Numbers,
+    powers: FloatPointer,
+    moments: FloatPointer,
 ) -> float:
     """Contact force after the sensor's lag, before its other laws [N]."""
     if memo[at.LAG_S] > 0.0:
@@ -123,16 +123,16 @@ def sensed(
 def find_peak(
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
     before: float,
-    powers: Numbers,
-    moments: Numbers,
-    figures: Numbers,
+    powers: FloatPointer,
+    moments: FloatPointer,
+    figures: FloatPointer,
 ) -> None:
     """Raise the peak force to the largest within this step."""
     if mode[at.ZONE] == at.ABSENT or (mode[at.ZONE] != at.TOUCHING and memo[at.LAG_S] == 0.0):
@@ -181,18 +181,18 @@ def find_peak(
 def take_samples(
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
     before: float,
-    powers: Numbers,
-    moments: Numbers,
-    cursor: Integers,
-    times: Numbers,
-    out: Numbers,
+    powers: FloatPointer,
+    moments: FloatPointer,
+    cursor: IntPointer,
+    times: FloatPointer,
+    out: FloatPointer,
 ) -> None:
     """Fill every channel's samples that fall into [t, t + h)."""
     end = t + h
@@ -226,18 +226,18 @@ def take_samples(
 def record(
     t: float,
     h: float,
-    dense: Numbers,
-    z: Numbers,
-    mode: Integers,
-    memo: Numbers,
-    row: Numbers,
-    program: Integers,
-    powers: Numbers,
-    moments: Numbers,
-    cursor: Integers,
-    times: Numbers,
-    out: Numbers,
-    figures: Numbers,
+    dense: FloatPointer,
+    z: FloatPointer,
+    mode: IntPointer,
+    memo: FloatPointer,
+    row: FloatPointer,
+    program: IntPointer,
+    powers: FloatPointer,
+    moments: FloatPointer,
+    cursor: IntPointer,
+    times: FloatPointer,
+    out: FloatPointer,
+    figures: FloatPointer,
 ) -> None:
     """Take the peak force and the samples of an accepted step, and carry the sensor's lag over it."""
     before = memo[at.LAGGED_FORCE]

@@ -9,7 +9,7 @@ from impactcell.prediction.model import (
     Predictor,
     Prior,
     Sensitivity,
-    printed,
+    printed_predictor,
 )
 
 __all__ = [
@@ -21,5 +21,5 @@ __all__ = [
     "Sensitivity",
     "calibrate",
     "estimate",
-    "printed",
+    "printed_predictor",
 ]

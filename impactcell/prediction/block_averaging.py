@@ -22,7 +22,7 @@ FINE_POSITION_BLOCK_S = 5e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scatter:
+class WithinBlockSums:
     """How the samples of each block lie about its means.
 
     Attributes
@@ -42,12 +42,12 @@ class Scatter:
     noise_std: float
 
 
-NONE = np.empty(0)
-NO_SCATTER = Scatter(NONE, NONE, NONE, NONE, 1.0)
+EMPTY = np.empty(0)
+NO_SUMS = WithinBlockSums(EMPTY, EMPTY, EMPTY, EMPTY, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Blocks:
+class BlockMeans:
     """Means of consecutive samples of one channel.
 
     Attributes
@@ -61,20 +61,20 @@ class Blocks:
     time_s: Samples
     values: Samples
     std: Samples
-    scatter: Scatter = NO_SCATTER
+    scatter: WithinBlockSums = NO_SUMS
 
 
-NOTHING = Blocks(NONE, NONE, NONE)
+NO_BLOCKS = BlockMeans(EMPTY, EMPTY, EMPTY)
 
 
-def blocks(
+def average_blocks(
     channel: Channel,
     coarse_s: float,
     fine_s: float,
     fine: Sequence[tuple[float, float]],
     edges: Sequence[float] = (),
     until_s: float = np.inf,
-) -> Blocks:
+) -> BlockMeans:
     """Average a channel over blocks.
 
     Parameters
@@ -92,7 +92,7 @@ def blocks(
     times = channel.time_s
     count = len(times) if until_s >= times[-1] else int(np.searchsorted(times, until_s, "right"))
     if count == 0:
-        return NOTHING
+        return NO_BLOCKS
     times, values = times[:count], channel.values[:count]
     begin, end = float(times[0]), float(times[-1])
     rulers = [_ruler(min(0.0, begin), end + coarse_s, coarse_s)]
@@ -102,8 +102,10 @@ def blocks(
             rulers.append(_ruler(low, high + fine_s, fine_s))
     rulers += [(edge, 0.0, 1.0) for edge in edges]
     sigma = noise_std(channel)
-    table = _gathered(times, values, np.array(rulers), sigma)
-    return Blocks(table[1], table[2], table[6], Scatter(table[0], table[3], table[4], table[5], sigma))
+    table = _average(times, values, np.array(rulers), sigma)
+    return BlockMeans(
+        table[1], table[2], table[6], WithinBlockSums(table[0], table[3], table[4], table[5], sigma)
+    )
 
 
 def _ruler(start: float, stop: float, step: float) -> tuple[float, float, float]:
@@ -112,7 +114,7 @@ def _ruler(start: float, stop: float, step: float) -> tuple[float, float, float]
 
 
 @compiled
-def _gathered(times: Samples, values: Samples, rulers: Samples, sigma: float) -> Samples:
+def _average(times: Samples, values: Samples, rulers: Samples, sigma: float) -> Samples:
     """Count, means, sums about the means and standard deviation of each block with samples, shape (7, n).
 
     A block begins with the first sample and at each mark of the `rulers`, shape (m, 3).

@@ -14,20 +14,20 @@ from scipy.optimize import least_squares
 
 from impactcell.errors import PhysicsError, PredictionError
 from impactcell.physics import EventKind, Plant, Strike, strike
-from impactcell.prediction.equations import Mix
+from impactcell.prediction.equations import MassInterpolation
 from impactcell.prediction.model import (
     REFERENCE_VELOCITY,
     DistanceForm,
     ForceForm,
     Predictor,
     Sensitivity,
-    printed,
+    printed_predictor,
 )
 from impactcell.records import Samples
 
 REGIME_GRID = 41
-NARROWEST = 4
-PERTURBED = 0.01
+MIN_VELOCITIES = 4
+RELATIVE_STEP = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,17 +82,17 @@ def _regime(plant: Plant, tap: Strike) -> Regime:
     return Regime.HALTED if tap.stroke_m / tap.velocity_m_s < separations[0] else Regime.CLEAN
 
 
-def spans(found: Sequence[Regime], velocities: Samples) -> list[tuple[float, float]]:
+def velocity_spans(found: Sequence[Regime], velocities: Samples) -> list[tuple[float, float]]:
     """Velocities between which one describable regime holds; neighbours meet where it changes."""
     kept: list[tuple[float, float]] = []
     for caught, run in groupby(range(len(found)), key=lambda index: found[index] is Regime.CAUGHT):
         indices = list(run)
-        if caught or len(indices) < NARROWEST:
+        if caught or len(indices) < MIN_VELOCITIES:
             continue
         clean = [index for index in indices if found[index] is Regime.CLEAN]
         halted = [index for index in indices if found[index] is Regime.HALTED]
         low, high = float(velocities[indices[0]]), float(velocities[indices[-1]])
-        if min(len(clean), len(halted)) < NARROWEST:
+        if min(len(clean), len(halted)) < MIN_VELOCITIES:
             kept.append((low, high))
         else:
             meet = 0.5 * float(velocities[clean[-1]] + velocities[halted[0]])
@@ -112,7 +112,9 @@ def sweep(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) ->
     table = np.array(
         [
             [
-                figures(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity))
+                peak_and_distance(
+                    replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity)
+                )
                 for mu in frictions.tolist()
             ]
             for velocity in velocities.tolist()
@@ -121,7 +123,7 @@ def sweep(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) ->
     return Sweep(velocities, frictions, table[:, :, 0], table[:, :, 1])
 
 
-def figures(plant: Plant, tap: Strike) -> tuple[float, float]:
+def peak_and_distance(plant: Plant, tap: Strike) -> tuple[float, float]:
     """Peak force, N, and sliding distance, m, of one tap."""
     motion = strike(plant, tap)
     return motion.peak_force_n, motion.sliding_distance_m
@@ -139,19 +141,19 @@ def fit_force(swept: Sweep) -> ForceForm:
 def fit_distance(swept: Sweep) -> DistanceForm:
     """Equation (5) by least squares in mu_s, starting from the printed coefficients."""
     u = (swept.velocity_m_s / REFERENCE_VELOCITY)[:, None]
-    mu, slid = swept.mu_s[None, :], swept.sliding_distance_m
-    slope = np.abs(np.gradient(slid, swept.mu_s, axis=1, edge_order=2))
+    mu, slide = swept.mu_s[None, :], swept.sliding_distance_m
+    slope = np.abs(np.gradient(slide, swept.mu_s, axis=1, edge_order=2))
 
     def form(p: Samples) -> Samples:
         shape: Samples = np.exp(p[1]) * u ** p[2] * (p[0] - mu) ** 2 + np.exp(p[3]) * u ** p[4]
         return shape
 
     def miss(p: Samples) -> Samples:
-        error: Samples = ((form(p) - slid) / slope).ravel()
+        error: Samples = ((form(p) - slide) / slope).ravel()
         return error
 
-    start = printed().distance
-    scale = float(np.median(slid / form(_packed(start))))
+    start = printed_predictor().distance
+    scale = float(np.median(slide / form(_packed(start))))
     first = _packed(replace(start, square_m=start.square_m * scale, offset_m=start.offset_m * scale))
     fit = least_squares(miss, first, method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=20_000)
     limit, square, square_power, offset, offset_power = fit.x.tolist()
@@ -159,7 +161,7 @@ def fit_distance(swept: Sweep) -> DistanceForm:
     return DistanceForm(limit, math.exp(square), square_power, math.exp(offset), offset_power, rms)
 
 
-def predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Predictor:
+def fit_predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Predictor:
     """Fit both equations for one mass in one regime; find how they depend on what is taken as known."""
     swept = sweep(plant, tap, velocities, frictions)
     fitted = Predictor(
@@ -170,14 +172,14 @@ def predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples
         distance=fit_distance(swept),
     )
     changed = {
-        "stiffness": replace(plant, stiffness_n_per_m=plant.stiffness_n_per_m * (1.0 + PERTURBED)),
-        "damping": replace(plant, damping_n_s_per_m=plant.damping_n_s_per_m * (1.0 + PERTURBED)),
-        "ratio": replace(plant, mu_k=plant.mu_k * (1.0 + PERTURBED)),
+        "stiffness": replace(plant, stiffness_n_per_m=plant.stiffness_n_per_m * (1.0 + RELATIVE_STEP)),
+        "damping": replace(plant, damping_n_s_per_m=plant.damping_n_s_per_m * (1.0 + RELATIVE_STEP)),
+        "ratio": replace(plant, mu_k=plant.mu_k * (1.0 + RELATIVE_STEP)),
     }
-    force, slid = {}, {}
+    force, slide = {}, {}
     for name, other in changed.items():
-        force[name], slid[name] = _sensitivities(fitted, plant, other, tap)
-    return replace(fitted, force_sensitivity=Sensitivity(**force), distance_sensitivity=Sensitivity(**slid))
+        force[name], slide[name] = _sensitivities(fitted, plant, other, tap)
+    return replace(fitted, force_sensitivity=Sensitivity(**force), distance_sensitivity=Sensitivity(**slide))
 
 
 def calibrate(
@@ -216,9 +218,9 @@ def calibrate(
         if progress is not None:
             progress(done, len(masses_kg))
         mine = replace(tap, mass_kg=float(mass))
-        for low, high in spans(regimes(plant, mine, grid, frictions), grid):
+        for low, high in velocity_spans(regimes(plant, mine, grid, frictions), grid):
             inside = np.linspace(low, high, len(velocities_m_s))
-            found.append(predictor(plant, mine, inside, frictions))
+            found.append(fit_predictor(plant, mine, inside, frictions))
     if progress is not None:
         progress(len(masses_kg), len(masses_kg))
     if not found:
@@ -233,20 +235,20 @@ def calibrate(
 def _sensitivities(fitted: Predictor, plant: Plant, other: Plant, tap: Strike) -> tuple[float, float]:
     """Mean relative change of both predicted mu_s per relative change of one property of the plant."""
     ratio = other.mu_k / other.mu_s
-    mixed = Mix(tap.mass_kg, ((1.0, fitted),), inside=True)
-    force, slid = [], []
+    mixed = MassInterpolation(tap.mass_kg, ((1.0, fitted),), inside=True)
+    force, slide = [], []
     for velocity in np.linspace(*fitted.velocity_range_m_s, 3).tolist():
         mu = plant.mu_s
         try:
-            peak, length = figures(
+            peak, length = peak_and_distance(
                 replace(other, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity)
             )
-            peak_0, length_0 = figures(plant, replace(tap, velocity_m_s=velocity))
+            peak_0, length_0 = peak_and_distance(plant, replace(tap, velocity_m_s=velocity))
         except PhysicsError:
             continue
-        force.append((peak - peak_0) / fitted.force.friction_n / mu / PERTURBED)
-        slid.append((length - length_0) / mixed.slope_of_distance(mu, velocity) / mu / PERTURBED)
-    return float(np.mean(force or [0.0])), float(np.mean(slid or [0.0]))
+        force.append((peak - peak_0) / fitted.force.friction_n / mu / RELATIVE_STEP)
+        slide.append((length - length_0) / mixed.slope_of_distance(mu, velocity) / mu / RELATIVE_STEP)
+    return float(np.mean(force or [0.0])), float(np.mean(slide or [0.0]))
 
 
 def _packed(form: DistanceForm) -> Samples:

@@ -12,15 +12,15 @@ from itertools import pairwise
 from scipy.optimize import brentq
 
 from impactcell.errors import NegativeRootError, PredictionError
-from impactcell.prediction.feature_extraction import Reading
+from impactcell.prediction.feature_extraction import MeasuredFeature
 from impactcell.prediction.model import REFERENCE_VELOCITY, DistanceForm, Model, Predictor, Sensitivity
 from impactcell.records import Capture, Coefficient, Quality
 
-LOWEST_MU = 1e-3
+MIN_MU_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Mix:
+class MassInterpolation:
     """The predictors of one mass: those of the masses on either side of it, and their shares."""
 
     mass_kg: float
@@ -54,7 +54,7 @@ class Mix:
         """Equation (5) forward, m."""
         return math.exp(
             sum(
-                share * math.log(max(distance(predictor.distance, mu_s, velocity_m_s), 1e-12))
+                share * math.log(max(sliding_distance(predictor.distance, mu_s, velocity_m_s), 1e-12))
                 for share, predictor in self.parts
             )
         )
@@ -68,7 +68,7 @@ class Mix:
         ) / (2.0 * step)
 
 
-def distance(form: DistanceForm, mu_s: float, velocity_m_s: float) -> float:
+def sliding_distance(form: DistanceForm, mu_s: float, velocity_m_s: float) -> float:
     """Equation (5) forward for one mass, m."""
     u = velocity_m_s / REFERENCE_VELOCITY
     square: float = form.square_m * u**form.square_power * (form.limit - mu_s) ** 2
@@ -76,7 +76,7 @@ def distance(form: DistanceForm, mu_s: float, velocity_m_s: float) -> float:
     return square + offset
 
 
-def mix(model: Model, mass_kg: float, velocity_m_s: float) -> Mix:
+def interpolate_mass(model: Model, mass_kg: float, velocity_m_s: float) -> MassInterpolation:
     """Choose the predictors for a mass and velocity.
 
     Raises
@@ -93,7 +93,7 @@ def mix(model: Model, mass_kg: float, velocity_m_s: float) -> Mix:
     masses = sorted({one.mass_kg for one in model.predictors})
     close = min(masses, key=lambda mass: abs(mass - mass_kg))
     if abs(close / mass_kg - 1.0) < 1e-3:
-        return Mix(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=True)
+        return MassInterpolation(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=True)
     for low, high in pairwise(masses):
         if low < mass_kg < high:
             share = math.log(mass_kg / low) / math.log(high / low)
@@ -101,8 +101,8 @@ def mix(model: Model, mass_kg: float, velocity_m_s: float) -> Mix:
                 (1.0 - share, _for_velocity(model, low, velocity_m_s)),
                 (share, _for_velocity(model, high, velocity_m_s)),
             )
-            return Mix(mass_kg, parts, inside=True)
-    return Mix(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=False)
+            return MassInterpolation(mass_kg, parts, inside=True)
+    return MassInterpolation(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=False)
 
 
 def _for_velocity(model: Model, mass_kg: float, velocity_m_s: float) -> Predictor:
@@ -115,7 +115,9 @@ def _for_velocity(model: Model, mass_kg: float, velocity_m_s: float) -> Predicto
     return min((one for one in model.predictors if one.mass_kg == mass_kg), key=away)
 
 
-def by_force(model: Model, mixed: Mix, velocity_m_s: float, peak: Reading) -> Coefficient:
+def by_force(
+    model: Model, mixed: MassInterpolation, velocity_m_s: float, peak: MeasuredFeature
+) -> Coefficient:
     """Equation (4): mu_s = (F_p - velocity_n_s_per_m v) / friction_n.
 
     Raises
@@ -129,12 +131,14 @@ def by_force(model: Model, mixed: Mix, velocity_m_s: float, peak: Reading) -> Co
         raise PredictionError(
             f"peak force {peak.value:.4g} N is below that of a part without friction; check mass and velocity"
         )
-    known = _known_to(model, _sensitivity(mixed, lambda one: one.force_sensitivity))
+    known = _relative_calibration_std(model, _sensitivity(mixed, lambda one: one.force_sensitivity))
     std = math.hypot(peak.std / slope, mixed.mean(lambda one: one.force.rms), value * known)
-    return _in_range(model, mixed, velocity_m_s, value, std)
+    return _graded(model, mixed, velocity_m_s, value, std)
 
 
-def by_distance(model: Model, mixed: Mix, velocity_m_s: float, slid: Reading) -> Coefficient:
+def by_distance(
+    model: Model, mixed: MassInterpolation, velocity_m_s: float, slide: MeasuredFeature
+) -> Coefficient:
     """Equation (5): mu_s = limit - sqrt((d - offset_m u^offset_power) / (square_m u^square_power)).
 
     Raises
@@ -146,45 +150,45 @@ def by_distance(model: Model, mixed: Mix, velocity_m_s: float, slid: Reading) ->
     """
     limit = min(predictor.distance.limit for _, predictor in mixed.parts)
     shortest = mixed.sliding_distance(limit, velocity_m_s)
-    if slid.value < shortest:
+    if slide.value < shortest:
         raise NegativeRootError(
-            f"sliding distance {1e6 * slid.value:.4g} µm is below {1e6 * shortest:.4g} µm, the shortest for "
+            f"sliding distance {1e6 * slide.value:.4g} µm is below {1e6 * shortest:.4g} µm, the shortest for "
             f"which equation (5) has a root at {velocity_m_s:.4g} m/s; check mass, stroke and velocity"
         )
-    if slid.value > mixed.sliding_distance(LOWEST_MU, velocity_m_s):
+    if slide.value > mixed.sliding_distance(MIN_MU_S, velocity_m_s):
         raise PredictionError(
-            f"sliding distance {1e6 * slid.value:.4g} µm is that of a part without friction; "
+            f"sliding distance {1e6 * slide.value:.4g} µm is that of a part without friction; "
             "check mass and velocity"
         )
     if len(mixed.parts) == 1:
-        value = mixed.parts[0][1].distance.root(slid.value, velocity_m_s)
+        value = mixed.parts[0][1].distance.root(slide.value, velocity_m_s)
     else:
         value = float(
             brentq(
-                lambda mu_s: mixed.sliding_distance(mu_s, velocity_m_s) - slid.value,
-                LOWEST_MU, limit, xtol=1e-15,
+                lambda mu_s: mixed.sliding_distance(mu_s, velocity_m_s) - slide.value,
+                MIN_MU_S, limit, xtol=1e-15,
             )
         )  # fmt: skip
     slope = abs(mixed.slope_of_distance(value, velocity_m_s))
-    known = _known_to(model, _sensitivity(mixed, lambda one: one.distance_sensitivity))
+    known = _relative_calibration_std(model, _sensitivity(mixed, lambda one: one.distance_sensitivity))
     rms = mixed.mean(lambda one: one.distance.rms)
-    std = math.hypot(slid.std / max(slope, 1e-12), rms, value * known)
-    return _in_range(model, mixed, velocity_m_s, value, std)
+    std = math.hypot(slide.std / max(slope, 1e-12), rms, value * known)
+    return _graded(model, mixed, velocity_m_s, value, std)
 
 
 def combined(
     model: Model,
-    mixed: Mix,
+    mixed: MassInterpolation,
     velocity_m_s: float,
-    force: tuple[Coefficient, Reading],
-    slid: tuple[Coefficient, Reading],
+    force: tuple[Coefficient, MeasuredFeature],
+    slide: tuple[Coefficient, MeasuredFeature],
 ) -> Coefficient:
     """Equation (6): mu_s = mu_force w_F + mu_dist w_d, weighted by the gradients of both figures.
 
     w_F = dF/dmu / (dF/dmu + dd/dmu ΔF/Δd) and w_d = 1 - w_F, with ΔF and Δd the spans of peak force and
     sliding distance over the calibrated range of mu_s at this velocity.
     """
-    (mu_force, peak), (mu_dist, distance_read) = force, slid
+    (mu_force, peak), (mu_dist, distance_read) = force, slide
     weight = force_weight(mixed, 0.5 * (mu_force.value + mu_dist.value), velocity_m_s)
     value = weight * mu_force.value + (1.0 - weight) * mu_dist.value
     one = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
@@ -201,12 +205,12 @@ def combined(
         weight * mixed.mean(lambda one: one.force.rms),
         rest * distance_read.std / max(slope, 1e-12),
         rest * mixed.mean(lambda one: one.distance.rms),
-        value * _known_to(model, both),
+        value * _relative_calibration_std(model, both),
     )
-    return _in_range(model, mixed, velocity_m_s, value, std)
+    return _graded(model, mixed, velocity_m_s, value, std)
 
 
-def force_weight(mixed: Mix, mu_s: float, velocity_m_s: float) -> float:
+def force_weight(mixed: MassInterpolation, mu_s: float, velocity_m_s: float) -> float:
     """w_F of equation (6)."""
     low = max(predictor.mu_s_range[0] for _, predictor in mixed.parts)
     high = min(predictor.mu_s_range[1] for _, predictor in mixed.parts)
@@ -218,7 +222,9 @@ def force_weight(mixed: Mix, mu_s: float, velocity_m_s: float) -> float:
     return slope_f / (slope_f + slope_d * span_f / max(abs(span_d), 1e-12))
 
 
-def out_of_range(model: Model, mixed: Mix, velocity_m_s: float, mu_s: float, stroke_m: float) -> str:
+def out_of_range(
+    model: Model, mixed: MassInterpolation, velocity_m_s: float, mu_s: float, stroke_m: float
+) -> str:
     """Say in which ways a tap lies outside the calibration; empty where it does not.
 
     `mu_s` is not judged where it is nan.
@@ -268,12 +274,14 @@ def beyond_calibration(model: Model, capture: Capture, mu_s: float) -> str:
     return "; ".join(reasons)
 
 
-def _in_range(model: Model, mixed: Mix, velocity_m_s: float, value: float, std: float) -> Coefficient:
+def _graded(
+    model: Model, mixed: MassInterpolation, velocity_m_s: float, value: float, std: float
+) -> Coefficient:
     reason = out_of_range(model, mixed, velocity_m_s, value, model.stroke_m)
     return Coefficient(value, std, Quality.UNCERTAIN if reason else Quality.GOOD, reason)
 
 
-def _known_to(model: Model, sensitivity: Sensitivity) -> float:
+def _relative_calibration_std(model: Model, sensitivity: Sensitivity) -> float:
     """Relative error of mu_s that comes from what the calibration took as known."""
     plant, prior = model.plant, model.prior
     return math.hypot(
@@ -283,7 +291,7 @@ def _known_to(model: Model, sensitivity: Sensitivity) -> float:
     )
 
 
-def _sensitivity(mixed: Mix, of: Callable[[Predictor], Sensitivity]) -> Sensitivity:
+def _sensitivity(mixed: MassInterpolation, of: Callable[[Predictor], Sensitivity]) -> Sensitivity:
     return Sensitivity(
         mixed.mean(lambda one: of(one).stiffness),
         mixed.mean(lambda one: of(one).damping),

@@ -15,26 +15,26 @@ from impactcell.errors import (
     NoSeparationError,
 )
 from impactcell.numerics.local_polynomial import (
+    channel_statistics,
+    fit_polynomial,
     median,
     middle_second_difference,
-    polynomial,
     running_mean,
-    spread,
-    survey,
+    value_std,
     widest_cubic,
 )
 from impactcell.records import Capture, Channel, Samples
 
 CONTACT_SMOOTHING_S = 2e-4
 """Short against a contact of some 17 ms, long against a sample at 1 MHz."""
-WIDEST_WINDOW_S = 4e-3
-BIASED = 1.5
-CLIPPED_RUN = 5
+MAX_WINDOW_S = 4e-3
+BIAS_FACTOR = 1.5
+MIN_CLIPPED_RUN = 5
 """Equal largest samples in a row that noise does not produce."""
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class MeasuredFeature:
     """A figure read off a capture, with one standard deviation."""
 
     value: float
@@ -42,7 +42,7 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sensed(Channel):
+class CheckedChannel(Channel):
     """A channel that has been checked, and what all readings of it need, found once.
 
     Attributes
@@ -62,16 +62,16 @@ class Sensed(Channel):
     smooth: Samples | None = None
 
 
-def sensed(channel: Channel | None, name: str, *, smoothed: bool = False) -> Channel | None:
+def check_if_usable(channel: Channel | None, name: str, *, smoothed: bool = False) -> Channel | None:
     """Check a channel once for all readings; one that nothing can be read from stays as it is."""
     try:
-        given = checked(channel, name)
+        given = check_channel(channel, name)
     except CaptureError:
         return channel
     return replace(given, smooth=_smooth(given)) if smoothed else given
 
 
-def checked(channel: Channel | None, name: str) -> Sensed:
+def check_channel(channel: Channel | None, name: str) -> CheckedChannel:
     """Refuse a channel nothing can be read from.
 
     Raises
@@ -79,7 +79,7 @@ def checked(channel: Channel | None, name: str) -> Sensed:
     CaptureError
         It is missing, empty, not finite, not ordered in time or constant.
     """
-    if isinstance(channel, Sensed):
+    if isinstance(channel, CheckedChannel):
         return channel
     if channel is None:
         raise CaptureError(f"no {name} was recorded")
@@ -89,7 +89,7 @@ def checked(channel: Channel | None, name: str) -> Sensed:
         raise CaptureError(
             f"the {name} record has {len(channel.values)} samples at {len(channel.time_s)} times"
         )
-    bad, ascending, lowest, highest, plateau = survey(channel.time_s, channel.values)
+    bad, ascending, lowest, highest, plateau = channel_statistics(channel.time_s, channel.values)
     if bad:
         raise CaptureError(f"{bad} of {len(channel.values)} {name} samples are not numbers")
     if len(channel.values) < 8:
@@ -98,13 +98,13 @@ def checked(channel: Channel | None, name: str) -> Sensed:
         raise CaptureError(f"the times of the {name} record do not increase")
     if highest == lowest:
         raise CaptureError(f"the {name} is constant at {channel.values[0]:.6g}")
-    return Sensed(
+    return CheckedChannel(
         channel.time_s, channel.values, channel.noise_std, channel.full_scale, channel.resolution,
         noise_std(channel), highest, plateau,
     )  # fmt: skip
 
 
-def displacement(capture: Capture) -> Sensed:
+def displacement(capture: Capture) -> CheckedChannel:
     """Position of a capture counted from where the part lay, positive along +1.
 
     Recorders differ in where they count from: that place, or the table's zero. The first samples, taken
@@ -113,9 +113,9 @@ def displacement(capture: Capture) -> Sensed:
     Raises
     ------
     CaptureError
-        As `checked`.
+        As `check_channel`.
     """
-    position = checked(capture.position, "position")
+    position = check_channel(capture.position, "position")
     first = sorted(position.values[:5].tolist())[2]
     if abs(first - capture.start_m) < abs(first):
         values = position.values - capture.start_m
@@ -128,7 +128,7 @@ def noise_std(channel: Channel) -> float:
 
     Where the sensor's noise is not known it is taken from second differences, by their median.
     """
-    if isinstance(channel, Sensed):
+    if isinstance(channel, CheckedChannel):
         return channel.sigma
     raster = (channel.resolution or 0.0) / math.sqrt(12.0)
     if channel.noise_std is not None:
@@ -137,7 +137,7 @@ def noise_std(channel: Channel) -> float:
     return max(white, raster, 1e-9 * float(np.abs(channel.values).max()))
 
 
-def peak_force(channel: Channel) -> Reading:
+def peak_force(channel: Channel) -> MeasuredFeature:
     """Largest contact force of a capture, N, from a cubic fitted around it.
 
     Raises
@@ -147,7 +147,7 @@ def peak_force(channel: Channel) -> Reading:
     ClippedForceError
         The force is saturated.
     """
-    force = checked(channel, "force")
+    force = check_channel(channel, "force")
     refuse_clipped(force)
     sigma = noise_std(force)
     times, values = force.time_s, force.values
@@ -155,25 +155,25 @@ def peak_force(channel: Channel) -> Reading:
     top = int(smooth.argmax())
     if smooth[top] < 8.0 * sigma:
         raise CaptureError(f"no contact: the force stays below {smooth[top]:.3g} N, noise is {sigma:.3g} N")
-    found = _widest_fit(times, values, sigma, times[top], 1.0, 1.0)
+    found = _fit_maximum(times, values, sigma, times[top], 1.0, 1.0)
     if found is None:  # a jump beside the peak, as when the actuator halts within the contact
-        sided = [_widest_fit(times, values, sigma, times[top], *s) for s in ((1.0, 0.0), (0.0, 1.0))]
+        sided = [_fit_maximum(times, values, sigma, times[top], *s) for s in ((1.0, 0.0), (0.0, 1.0))]
         found = max((one for one in sided if one is not None), key=lambda one: one.value, default=None)
-    return found or Reading(float(smooth[top]), sigma)
+    return found or MeasuredFeature(float(smooth[top]), sigma)
 
 
-def refuse_clipped(force: Sensed) -> None:
+def refuse_clipped(force: CheckedChannel) -> None:
     """Raise `ClippedForceError` where the force stands at its full scale or on a plateau of equal samples."""
     if force.full_scale is not None and force.highest >= force.full_scale[1]:
         count = int((force.values >= force.full_scale[1]).sum())
         raise ClippedForceError(f"{count} force samples are at full scale, {force.full_scale[1]:.6g} N")
-    if force.plateau >= CLIPPED_RUN and (force.resolution or 0.0) < 2.0 * (force.noise_std or 0.0):
+    if force.plateau >= MIN_CLIPPED_RUN and (force.resolution or 0.0) < 2.0 * (force.noise_std or 0.0):
         raise ClippedForceError(
             f"{force.plateau} force samples in a row stand at {force.highest:.6g} N: clipped"
         )
 
 
-def loss_of_contact(force: Channel) -> Reading:
+def loss_of_contact(force: Channel) -> MeasuredFeature:
     """Time at which contact was last lost, s, from the falling flank of the force extrapolated to zero.
 
     Raises
@@ -202,17 +202,19 @@ def loss_of_contact(force: Channel) -> Reading:
         freedom = len(falling) - 3
         if freedom < 3:
             break
-        parabola, factor, squares = polynomial(times[first : last + 1][pressed], falling, end_s, window, 2)
+        parabola, factor, squares = fit_polynomial(
+            times[first : last + 1][pressed], falling, end_s, window, 2
+        )
         real = [root for root in _real_roots(*parabola.tolist()) if -0.5 < root < 1.0]
         if real and squares / sigma**2 < freedom + 4.0 * math.sqrt(2.0 * freedom):
             root = min(real, key=abs)
             slope = abs(float(parabola[1] + 2.0 * parabola[2] * root))
-            error = sigma * spread(factor, root)
-            return Reading(end_s + window * root, window * min(error / max(slope, 1e-300), 1.0))
+            error = sigma * value_std(factor, root)
+            return MeasuredFeature(end_s + window * root, window * min(error / max(slope, 1e-300), 1.0))
         window /= 1.6
     near = times[max(0, last - 50) : last + 2]
     step = median(near[1:] - near[:-1])
-    return Reading(float(times[last] + 0.5 * step * width), step * width)
+    return MeasuredFeature(float(times[last] + 0.5 * step * width), step * width)
 
 
 def _smoothing_width(channel: Channel) -> int:
@@ -221,7 +223,7 @@ def _smoothing_width(channel: Channel) -> int:
 
 
 def _smooth(channel: Channel) -> Samples:
-    if isinstance(channel, Sensed) and channel.smooth is not None:
+    if isinstance(channel, CheckedChannel) and channel.smooth is not None:
         return channel.smooth
     width = _smoothing_width(channel)
     if width == 1:
@@ -240,13 +242,11 @@ def _real_roots(c0: float, c1: float, c2: float) -> tuple[float, ...]:
     return (larger / c2, c0 / larger) if larger else (0.0,)
 
 
-def _widest_fit(
+def _fit_maximum(
     times: Samples, values: Samples, sigma: float, at_s: float, left: float, right: float
-) -> Reading | None:
-    """Maximum of a cubic about `at_s`; what bias stays is of the size of the noise: hence `BIASED`."""
+) -> MeasuredFeature | None:
+    """Maximum of a cubic about `at_s`; what bias stays is of the size of the noise: hence `BIAS_FACTOR`."""
     step = median(times[1:100] - times[: min(len(times), 100) - 1])
     narrowest_s = max(2.5e-4, 4.0 * step)
-    found, value, std = widest_cubic(
-        times, values, sigma, at_s, left, right, narrowest_s, WIDEST_WINDOW_S, step
-    )
-    return Reading(value, BIASED * std) if found else None
+    found, value, std = widest_cubic(times, values, sigma, at_s, left, right, narrowest_s, MAX_WINDOW_S, step)
+    return MeasuredFeature(value, BIAS_FACTOR * std) if found else None

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from impactcell.errors import CaptureError
-from impactcell.prediction.feature_extraction import checked, noise_std
+from impactcell.prediction.feature_extraction import check_channel, noise_std
 from impactcell.records import Capture, Coefficient, Quality, Samples
 
 
@@ -18,9 +18,9 @@ def free_slide_friction(capture: Capture, gravity_m_s2: float) -> Coefficient:
     Raises
     ------
     CaptureError
-        The position cannot be used, or nothing slid.
+        The position cannot be used, or nothing slide.
     """
-    position = checked(capture.position, "position")
+    position = check_channel(capture.position, "position")
     times = position.time_s - position.time_s[0]
     sign = math.copysign(1.0, position.values[-1] - position.values[0])
     moved = sign * (position.values - position.values[0])

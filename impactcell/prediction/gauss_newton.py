@@ -7,32 +7,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impactcell.errors import PhysicsError
-from impactcell.numerics.jit import Wholes, compiled
-from impactcell.prediction.linearised_model import JUST_STICKING, PARAMETERS, RATIO, Linear, Response
-from impactcell.prediction.posterior import Side
+from impactcell.numerics.jit import IntArray, compiled
+from impactcell.prediction.linearised_model import (
+    JUST_STICKING,
+    PARAMETERS,
+    RATIO,
+    Linearisation,
+    LinearisedModel,
+)
+from impactcell.prediction.posterior import TruncatedGaussian
 from impactcell.records import Samples
 
 Indices = NDArray[np.intp]
 
-MOST_STEPS = 25
-SETTLED = 0.02
+MAX_ITERATIONS = 25
+STEP_TOLERANCE = 0.02
 """Length of a step, in posterior standard deviations, below which the fit is at its minimum. This and
-`NO_GAIN` are for residuals of the size of the noise; where they are larger, so are these."""
-LONGEST_IN_STD = 4.0
+`COST_TOLERANCE` are for residuals of the size of the noise; where they are larger, so are these."""
+MAX_STEP_STD = 4.0
 """Longest step, in standard deviations of the prior: farther away the linear model says nothing."""
-NO_GAIN = 0.005
+COST_TOLERANCE = 0.005
 """Change of half a sum of squares that means nothing: a kink that passes a sample makes Gauss-Newton go to
 and fro by less."""
 
 
-TO_AND_FRO = 0.1
+REFUSED_COST_TOLERANCE = 0.1
 """The same of a step that was refused: where the smaller ones after it mean nothing either, a kink passes
 samples, and the minimum lies within less than half a standard deviation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Belief:
-    """Prior in theta: mean, and one over its standard deviation; 0 where nothing is known.
+class GaussianPrior:
+    """Prior in theta: mean, and one over its standard deviation; 0 where nothing is prior.
 
     Attributes
     ----------
@@ -62,15 +68,15 @@ class Minimum:
     linear : Linear
     cost : float
         Half the sum of squares, data and prior.
-    settled : bool
+    converged : bool
         False where the steps came to an end before the minimum did.
     """
 
     theta: Samples
     side: int
-    linear: Linear
+    linear: Linearisation
     cost: float
-    settled: bool = True
+    converged: bool = True
 
     @property
     def residual(self) -> Samples:
@@ -82,7 +88,7 @@ class Minimum:
         """Sum of squares of the data's residuals."""
         return self.linear.chi2
 
-    def as_side(self, known: Belief, misfit: float = 1.0) -> Side:
+    def truncated(self, prior: GaussianPrior, misfit: float = 1.0) -> TruncatedGaussian:
         """Give the quadratic about the minimum, the data's weight divided by `misfit` squared.
 
         Raises
@@ -90,23 +96,23 @@ class Minimum:
         LinAlgError
             The data and the prior do not determine it.
         """
-        away = self.theta - known.mean
-        step, covariance, length, log_determinant = _solved(
-            self.linear.normal, self.linear.slope, known.weight, away, known.free, misfit, 0.0
+        away = self.theta - prior.mean
+        step, covariance, length, log_determinant = _solve_step(
+            self.linear.normal, self.linear.slope, prior.weight, away, prior.free, misfit, 0.0
         )
         if not math.isfinite(log_determinant):
             raise np.linalg.LinAlgError("the curvature is not positive")
-        cost = 0.5 * (self.chi2 / misfit**2 - length) + known.cost(self.theta)
-        return Side(self.theta + step, covariance, cost, -log_determinant, self.side)
+        cost = 0.5 * (self.chi2 / misfit**2 - length) + prior.cost(self.theta)
+        return TruncatedGaussian(self.theta + step, covariance, cost, -log_determinant, self.side)
 
 
 @compiled
-def _solved(
+def _solve_step(
     normal: Samples,
     slope: Samples,
     weight: Samples,
     away: Samples,
-    free: Wholes,
+    free: IntArray,
     misfit: float,
     damping: float,
 ) -> tuple[Samples, Samples, float, float]:
@@ -162,32 +168,36 @@ def _solved(
     return step, inverse, length, log_determinant
 
 
-def descend(response: Response, known: Belief, start: Samples, side: int) -> Minimum:
+def fit(model: LinearisedModel, prior: GaussianPrior, start: Samples, side: int) -> Minimum:
     """Find the minimum of data and prior, with the model of one side continued across the kink.
 
     Below the kink (`side` -1) the model is that of immediate breakaway. Above it (`side` +1) the residuals
     are continued linearly along mu_k/mu_s from the kink.
     """
-    longest = np.minimum(0.5, LONGEST_IN_STD / np.maximum(known.weight, 1e-12))
-    best = _at(response, known, start, side)
+    longest = np.minimum(0.5, MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
+    best = _linearise(model, prior, start, side)
     damping, refused = 0.0, math.inf
-    for _ in range(MOST_STEPS):
-        found, away = best.linear, best.theta - known.mean
-        step, _, length, _ = _solved(found.normal, found.slope, known.weight, away, known.free, 1.0, damping)
+    for _ in range(MAX_ITERATIONS):
+        found, away = best.linear, best.theta - prior.mean
+        step, _, length, _ = _solve_step(
+            found.normal, found.slope, prior.weight, away, prior.free, 1.0, damping
+        )
         if not math.isfinite(length):
             break
-        noise = max(2.0 * best.cost / response.size, 1.0)
-        if length < SETTLED**2 * noise and damping <= 1e-3:
+        noise = max(2.0 * best.cost / model.size, 1.0)
+        if length < STEP_TOLERANCE**2 * noise and damping <= 1e-3:
             return best
         moved = best.theta + np.minimum(np.maximum(step, -longest), longest)
         try:
-            tried = _at(response, known, moved, side)
+            tried = _linearise(model, prior, moved, side)
         except PhysicsError:
             tried = replace(best, cost=math.inf)
-        if tried.cost <= best.cost + NO_GAIN * noise:
+        if tried.cost <= best.cost + COST_TOLERANCE * noise:
             gain = best.cost - tried.cost
-            settled = abs(gain) < NO_GAIN * noise and (damping <= 1e-2 or refused < TO_AND_FRO * noise)
-            refused = math.inf if gain > TO_AND_FRO * noise else refused
+            settled = abs(gain) < COST_TOLERANCE * noise and (
+                damping <= 1e-2 or refused < REFUSED_COST_TOLERANCE * noise
+            )
+            refused = math.inf if gain > REFUSED_COST_TOLERANCE * noise else refused
             best = tried
             if settled:
                 return best
@@ -197,14 +207,14 @@ def descend(response: Response, known: Belief, start: Samples, side: int) -> Min
             damping = max(10.0 * damping, 1e-2)
             if damping > 1e8:
                 break
-    return replace(best, settled=False)
+    return replace(best, converged=False)
 
 
-def _at(response: Response, known: Belief, theta: Samples, side: int) -> Minimum:
+def _linearise(model: LinearisedModel, prior: GaussianPrior, theta: Samples, side: int) -> Minimum:
     """Give the linear model at `theta`, that above the kink continued linearly below it."""
     at, beyond = theta, 0.0
-    if side > 0 and (below := response.kink(theta) - JUST_STICKING) < 0.0:
+    if side > 0 and (below := model.kink_coordinate(theta) - JUST_STICKING) < 0.0:
         at, beyond = theta.copy(), -below
         at[RATIO] += below
-    found = response.linear(at, side, beyond)
-    return Minimum(theta, side, found, 0.5 * found.chi2 + known.cost(theta))
+    found = model.linearise(at, side, beyond)
+    return Minimum(theta, side, found, 0.5 * found.chi2 + prior.cost(theta))

@@ -12,35 +12,41 @@ import numpy as np
 
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
 from impactcell.physics import Plant
-from impactcell.prediction.feature_extraction import checked, displacement, peak_force
+from impactcell.prediction.feature_extraction import check_channel, displacement, peak_force
 from impactcell.prediction.linearised_model import (
     DAMPING,
     MU_K,
     RATIO,
     STIFFNESS,
-    Linear,
-    Response,
-    parameters,
-    respond,
+    Linearisation,
+    LinearisedModel,
+    linearised_model,
+    parameters_of,
 )
 from impactcell.prediction.model import Model, Prior
-from impactcell.prediction.phase_reweighting import DOUBTED, LATER, Indices, doubt, phases
-from impactcell.prediction.slide_features import Slide, slide
+from impactcell.prediction.phase_reweighting import (
+    LATE_FACTORS,
+    MISFIT_THRESHOLD,
+    Indices,
+    interval_of_blocks,
+    std_factors,
+)
+from impactcell.prediction.slide_features import SlideFeatures, extract_slide
 from impactcell.prediction.waveform import fit
 from impactcell.records import Capture, Samples
 
 SHARED = slice(RATIO, DAMPING + 1)
-USUAL_RATIO = 0.76
-WEAKLY = np.array([0.3, 1.0, 1.0])
+INITIAL_RATIO = 0.76
+WEAK_STD = np.array([0.3, 1.0, 1.0])
 """Standard deviations of ln(mu_k/mu_s, k, b) about the start: they only hold what no tap shows."""
-BY_CONTACT = np.array([0.3, 3e-4, 2e-3])
+CONTACT_STD = np.array([0.3, 3e-4, 2e-3])
 """The same where k and b of the contact alone are believed more than the model of the whole tap."""
-MOST_STEPS = 40
-SETTLED = 0.02
-NO_GAIN = 0.05
+MAX_ITERATIONS = 40
+STEP_TOLERANCE = 0.02
+COST_TOLERANCE = 0.05
 """Change of half a sum of squares over all taps that means nothing."""
-LEAST_RATIO_STD = 1e-3
-ROUNDS = 4
+MIN_RATIO_STD = 1e-3
+REWEIGHTING_ROUNDS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,55 +79,55 @@ def fit_plant(captures: Sequence[Capture], gravity_m_s2: float, name: str = "fit
     taps, faults = [], []
     for capture in captures:
         try:
-            taps.append((capture, slide(capture), peak_force(checked(capture.force, "force"))))
+            taps.append((capture, extract_slide(capture), peak_force(check_channel(capture.force, "force"))))
         except (PredictionError, PhysicsError) as fault:
             faults.append(f"shot {capture.cycle}: {fault}")
     if not taps:
         raise PredictionError(
             f"no tap of the campaign can be used; {faults[0] if faults else 'there is none'}"
         )
-    contacts = np.array([contact_constants(capture, slid) for capture, slid, _ in taps])
+    contacts = np.array([contact_constants(capture, slide) for capture, slide, _ in taps])
     stiffness, damping = np.median(contacts, axis=0).tolist()
-    frictions = [max(slid.deceleration.value / gravity_m_s2, 1e-3) for _, slid, _ in taps]
+    frictions = [max(slide.deceleration.value / gravity_m_s2, 1e-3) for _, slide, _ in taps]
     mean = float(np.mean(frictions))
-    start = Plant(stiffness, max(damping, 1.0), mean / USUAL_RATIO, mean, gravity_m_s2)
+    start = Plant(stiffness, max(damping, 1.0), mean / INITIAL_RATIO, mean, gravity_m_s2)
     responses, thetas, parts = [], [], []
-    for (capture, slid, _), mu_k in zip(taps, frictions, strict=True):
-        plant = replace(start, mu_k=mu_k, mu_s=mu_k / USUAL_RATIO)
+    for (capture, slide, _), mu_k in zip(taps, frictions, strict=True):
+        plant = replace(start, mu_k=mu_k, mu_s=mu_k / INITIAL_RATIO)
         try:
-            responses.append(respond(capture, plant, slid.separation_s))
-            thetas.append(parameters(plant))
-            parts.append(phases(responses[-1], slid.separation_s, slid.stop_s))
+            responses.append(linearised_model(capture, plant, slide.separation_s))
+            thetas.append(parameters_of(plant))
+            parts.append(interval_of_blocks(responses[-1], slide.separation_s, slide.stop_s))
         except PhysicsError as fault:
             faults.append(f"shot {capture.cycle}: {fault}")
     if not responses:
         raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
-    found, covariance, chi2 = _joint(responses, np.array(thetas), thetas[0][SHARED], WEAKLY)
+    found, covariance, chi2 = _fit_shared(responses, np.array(thetas), thetas[0][SHARED], WEAK_STD)
     count = sum(response.size for response in responses)
     misfit = math.sqrt(chi2 / max(count - len(found) - 3, 1))
-    if misfit > DOUBTED:
+    if misfit > MISFIT_THRESHOLD:
         anchored = found.copy()
         anchored[:, STIFFNESS], anchored[:, DAMPING] = math.log(stiffness), math.log(max(damping, 1.0))
-        found, covariance = _doubting(responses, anchored, parts)
+        found, covariance = _fit_reweighted(responses, anchored, parts)
     mu_k = float(np.exp(found[:, MU_K]).mean())
     ratio, stiffness, damping = np.exp(found[0, SHARED]).tolist()
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
     plant = Plant(stiffness, damping, mu_k / ratio, mu_k, gravity_m_s2)
-    prior = Prior(stds[1] * stiffness, stds[2] * damping, max(stds[0] * ratio, LEAST_RATIO_STD))
+    prior = Prior(stds[1] * stiffness, stds[2] * damping, max(stds[0] * ratio, MIN_RATIO_STD))
     model = Model(name, plant, prior)
     scatter = ratio_scatter([capture for capture, _, _ in taps], model)
     model = replace(model, prior=replace(prior, ratio_std=math.hypot(prior.ratio_std, scatter)))
     return PlantFit(model, tuple(capture.cycle for capture, _, _ in taps), misfit)
 
 
-def contact_constants(capture: Capture, slid: Slide) -> tuple[float, float]:
+def contact_constants(capture: Capture, slide: SlideFeatures) -> tuple[float, float]:
     """K and b by regressing the force of the first contact on indentation and its rate.
 
     The rate comes from a spline-free derivative of the position: a polynomial over the contact, which is
     smooth enough for a start.
     """
-    force, position = checked(capture.force, "force"), displacement(capture)
-    end = min(slid.separation_s, capture.stroke_m / capture.velocity_m_s)
+    force, position = check_channel(capture.force, "force"), displacement(capture)
+    end = min(slide.separation_s, capture.stroke_m / capture.velocity_m_s)
     inside = (position.time_s > 0.0) & (position.time_s < end)
     if inside.sum() < 12:
         raise PredictionError(f"shot {capture.cycle}: too few position samples within the contact")
@@ -137,14 +143,14 @@ def contact_constants(capture: Capture, slid: Slide) -> tuple[float, float]:
     return float(stiffness), float(damping)
 
 
-def weigh(capture: Capture, slid: Slide) -> float:
+def estimate_mass(capture: Capture, slide: SlideFeatures) -> float:
     """Mass of the part, kg, from its momentum: the force's impulse is m (x'(t_2) - x'(t_1) + a (t_2 - t_1)).
 
     Between the middle of the contact, when the part slips, and its loss; a is the deceleration of the slide.
     """
-    force, position = checked(capture.force, "force"), displacement(capture)
-    end, start = slid.separation_s, 0.4 * slid.separation_s
-    inside = (position.time_s > 0.5 * start) & (position.time_s < end + 0.25 * (slid.stop_s - end))
+    force, position = check_channel(capture.force, "force"), displacement(capture)
+    end, start = slide.separation_s, 0.4 * slide.separation_s
+    inside = (position.time_s > 0.5 * start) & (position.time_s < end + 0.25 * (slide.stop_s - end))
     moved = capture.direction * position.values[inside]
     path = np.polynomial.Chebyshev.fit(
         position.time_s[inside], moved, min(12, max(4, int(inside.sum()) // 6))
@@ -152,7 +158,7 @@ def weigh(capture: Capture, slid: Slide) -> float:
     speed = path.deriv()
     at = np.linspace(start, end, 2001)
     impulse = float(np.trapezoid(np.interp(at, force.time_s, force.values), at))
-    return impulse / float(speed(end) - speed(start) + slid.deceleration.value * (end - start))
+    return impulse / float(speed(end) - speed(start) + slide.deceleration.value * (end - start))
 
 
 def ratio_scatter(captures: Sequence[Capture], model: Model) -> float:
@@ -176,14 +182,14 @@ def ratio_scatter(captures: Sequence[Capture], model: Model) -> float:
     return math.sqrt(max(excess / float(weights.sum() - (weights**2).sum() / weights.sum()), 0.0))
 
 
-def _joint(
-    responses: Sequence[Response], thetas: Samples, anchor: Samples, spread: Samples
+def _fit_shared(
+    responses: Sequence[LinearisedModel], thetas: Samples, anchor: Samples, spread: Samples
 ) -> tuple[Samples, Samples, float]:
     """Minimise over the shared parameters, held to `anchor` within `spread`, and every tap's mu_k."""
     prior = np.diag(1.0 / spread**2)
-    linear, cost = _all_linear(responses, thetas)
+    linear, cost = _linearise_all(responses, thetas)
     damping = 0.0
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_ITERATIONS):
         curvature, gradient = prior.copy(), prior @ (thetas[0, SHARED] - anchor)
         own = []
         for one in linear:
@@ -192,7 +198,7 @@ def _joint(
             gradient += one.slope[SHARED] - cross * (g / h)
             own.append((h, cross, g))
         step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
-        if float(step @ curvature @ step) < SETTLED**2:
+        if float(step @ curvature @ step) < STEP_TOLERANCE**2:
             return thetas, np.asarray(np.linalg.inv(curvature)), 2.0 * cost
         step = np.clip(step, -0.3, 0.3)
         while True:
@@ -200,23 +206,23 @@ def _joint(
             moved[:, SHARED] += step
             moved[:, MU_K] -= np.array([(g + cross @ step) / h for h, cross, g in own])
             try:
-                new_linear, new_cost = _all_linear(responses, moved)
+                new_linear, new_cost = _linearise_all(responses, moved)
             except PhysicsError:
                 new_cost = math.inf
-            if new_cost <= cost + NO_GAIN:
+            if new_cost <= cost + COST_TOLERANCE:
                 break
             step = 0.3 * step
             if float(np.abs(step).max()) < 1e-9:
                 raise NotConvergedError("the plant could not be fitted to the campaign")
-        settled = abs(new_cost - cost) < NO_GAIN
+        settled = abs(new_cost - cost) < COST_TOLERANCE
         thetas, linear, cost = moved, new_linear, new_cost
         if settled:
             return thetas, np.asarray(np.linalg.inv(curvature)), 2.0 * cost
     raise NotConvergedError("the plant could not be fitted to the campaign")
 
 
-def _doubting(
-    responses: Sequence[Response], thetas: Samples, parts: Sequence[Indices]
+def _fit_reweighted(
+    responses: Sequence[LinearisedModel], thetas: Samples, parts: Sequence[Indices]
 ) -> tuple[Samples, Samples]:
     """Fit again, with each phase of the tap believed as far as the model describes it there.
 
@@ -225,16 +231,18 @@ def _doubting(
     """
     covariance = np.zeros((3, 3))
     anchor = thetas[0, SHARED].copy()
-    for _ in range(ROUNDS):
-        linear, _ = _all_linear(responses, thetas)
+    for _ in range(REWEIGHTING_ROUNDS):
+        linear, _ = _linearise_all(responses, thetas)
         doubted = [
-            response.doubted(doubt(one.residual, phase) * LATER[phase])
+            response.reweighted(std_factors(one.residual, phase) * LATE_FACTORS[phase])
             for response, one, phase in zip(responses, linear, parts, strict=True)
         ]
-        thetas, covariance, _ = _joint(doubted, thetas, anchor, BY_CONTACT)
+        thetas, covariance, _ = _fit_shared(doubted, thetas, anchor, CONTACT_STD)
     return thetas, covariance
 
 
-def _all_linear(responses: Sequence[Response], thetas: Samples) -> tuple[list[Linear], float]:
-    linear = [response.linear(theta) for response, theta in zip(responses, thetas, strict=True)]
+def _linearise_all(
+    responses: Sequence[LinearisedModel], thetas: Samples
+) -> tuple[list[Linearisation], float]:
+    linear = [response.linearise(theta) for response, theta in zip(responses, thetas, strict=True)]
     return linear, 0.5 * sum(one.chi2 for one in linear)

@@ -16,10 +16,10 @@ from impactcell.prediction.block_averaging import (
     FINE_FORCE_BLOCK_S,
     FINE_POSITION_BLOCK_S,
     FORCE_BLOCK_S,
-    NOTHING,
+    NO_BLOCKS,
     POSITION_BLOCK_S,
-    Blocks,
-    blocks,
+    BlockMeans,
+    average_blocks,
 )
 from impactcell.prediction.feature_extraction import displacement
 from impactcell.records import Capture, Samples
@@ -28,15 +28,15 @@ MU_K, RATIO, STIFFNESS, DAMPING = range(4)
 PARAMETERS = 4
 JUST_STICKING = 1e-7
 """z above which the model is that of a part that sticks first."""
-AWAY = np.array([1.0, -1.0, 1.0, -1.0])
+STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
-STEP = 1e-5
-STEPS_OUT = AWAY * STEP
+RELATIVE_STEP = 1e-5
+STEPS_OUT = STEP_SENSES * RELATIVE_STEP
 STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT)])
 KINK_SPAN_S = 1.5e-4
 
 
-def commanded(capture: Capture) -> Strike:
+def tap_input(capture: Capture) -> Strike:
     """Turn a capture's command into a tap for the model; without a stroke the actuator halts by itself."""
     return Strike(
         velocity_m_s=capture.velocity_m_s,
@@ -57,7 +57,7 @@ def with_parameters(plant: Plant, theta: Samples) -> Plant:
     )
 
 
-def parameters(plant: Plant) -> Samples:
+def parameters_of(plant: Plant) -> Samples:
     """Nominal parameters of a plant, shape (4,)."""
     return np.log(
         [plant.mu_k, plant.mu_k / plant.mu_s, plant.stiffness_n_per_m, max(plant.damping_n_s_per_m, 1e-6)]
@@ -65,7 +65,7 @@ def parameters(plant: Plant) -> Samples:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Linear:
+class Linearisation:
     """Normalised residuals, data minus model, and what their derivative by theta makes of them.
 
     Attributes
@@ -85,7 +85,7 @@ class Linear:
     chi2: float
 
 
-class Response:
+class LinearisedModel:
     """A capture in blocks, and the model that should reproduce them.
 
     Parameters
@@ -96,7 +96,7 @@ class Response:
     force, position : Blocks
     """
 
-    def __init__(self, plant: Plant, tap: Strike, force: Blocks, position: Blocks) -> None:
+    def __init__(self, plant: Plant, tap: Strike, force: BlockMeans, position: BlockMeans) -> None:
         self.tap = tap
         self.force_time_s, self.position_time_s = force.time_s, position.time_s
         self.size = len(force.values) + len(position.values)
@@ -114,7 +114,7 @@ class Response:
         self._scatters = force.scatter, position.scatter
         self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
 
-    def doubted(self, factor: Samples) -> "Response":
+    def reweighted(self, factor: Samples) -> "LinearisedModel":
         """Give the same response with the standard deviation of each residual multiplied, shape (n,)."""
         other = copy(self)
         other._weights = self._weights / factor  # noqa: SLF001  # its own copy
@@ -134,7 +134,7 @@ class Response:
             (self.position_time_s, self._scatters[1], slice(split, None)),
         ):
             if len(times) > 2:
-                squares, used = _squares(
+                squares, used = _sample_squares(
                     times, model[part], residual[part], self._weights[part], scatter.count, scatter.times,
                     scatter.values, scatter.both, scatter.noise_std,
                 )  # fmt: skip
@@ -142,12 +142,12 @@ class Response:
                 count += used
         return math.sqrt(total / count)
 
-    def kink(self, theta: Samples) -> float:
+    def kink_coordinate(self, theta: Samples) -> float:
         """Give z = ln(mu_s m g / (b v)), positive where the part sticks first."""
         ahead = float(theta[MU_K] - theta[RATIO] - theta[DAMPING])
         return ahead + math.log(self._weight_n / self.tap.velocity_m_s)
 
-    def linear(self, theta: Samples, side: int = 0, beyond: float = 0.0) -> Linear:
+    def linearise(self, theta: Samples, side: int = 0, beyond: float = 0.0) -> Linearisation:
         """Residuals and their normal equations at `theta`.
 
         The derivative is that of a step which leads away from the kink into the side that sticks.
@@ -173,13 +173,13 @@ class Response:
         table = self._table.copy()
         table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
         traces = self._ensemble.traces(table)
-        found = _compared(traces.force_n, traces.position_m, self._values, self._weights, STEPS_OUT, beyond)
+        found = _linearise(traces.force_n, traces.position_m, self._values, self._weights, STEPS_OUT, beyond)
         if not math.isfinite(found[3]):
             raise PhysicsError("the motion is not finite with these parameters")
-        return Linear(*found)
+        return Linearisation(*found)
 
 
-def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
+def linearised_model(capture: Capture, plant: Plant, separation_s: float) -> LinearisedModel:
     """Average a capture over blocks, fine where `plant` has its events and contact was lost.
 
     Parameters
@@ -191,7 +191,7 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
     separation_s : float
         Last loss of contact as read off the force; nan where it was not.
     """
-    tap = commanded(capture)
+    tap = tap_input(capture)
     motion = strike(plant, tap)
     kinks = [event.time_s for event in motion.events]
     if math.isfinite(separation_s):
@@ -199,21 +199,21 @@ def respond(capture: Capture, plant: Plant, separation_s: float) -> Response:
     spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
     halt = tap.stroke_m / tap.velocity_m_s
     edges = [halt] if math.isfinite(halt) else []
-    force = NOTHING
+    force = NO_BLOCKS
     if capture.force is not None:
-        force = blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
+        force = average_blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
         jumps = [event.time_s for event in motion.events if event.kind is EventKind.CONTACT]
         if jumps:
-            force = replace(force, std=force.std * _straddling(force.time_s, jumps))
-    position = blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
-    return Response(plant, tap, force, position)
+            force = replace(force, std=force.std * _std_factors_at_jumps(force.time_s, jumps))
+    position = average_blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
+    return LinearisedModel(plant, tap, force, position)
 
 
 @compiled
-def _compared(
+def _linearise(
     force: Samples, position: Samples, values: Samples, weights: Samples, steps: Samples, beyond: float
 ) -> tuple[Samples, Samples, Samples, float]:
-    """Fields of `Linear` from blocks of the model at theta and, one after the other, beside it.
+    """Fields of `Linearisation` from blocks of the model at theta and, one after the other, beside it.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def _compared(
 
 
 @compiled
-def _squares(
+def _sample_squares(
     times: Samples,
     model: Samples,
     residual: Samples,
@@ -280,7 +280,7 @@ def _squares(
     return total, used
 
 
-def _straddling(times: Samples, jumps: list[float]) -> Samples:
+def _std_factors_at_jumps(times: Samples, jumps: list[float]) -> Samples:
     """Factor that takes blocks about a jump out of the fit: their means depend on where in them it lies."""
     factor = np.ones_like(times)
     for jump in jumps:

@@ -139,7 +139,7 @@ class Model:
         return self.plant.mu_k / self.plant.mu_s
 
 
-def printed(force_rms: float = 0.0, distance_rms: float = 0.0) -> Predictor:
+def printed_predictor(force_rms: float = 0.0, distance_rms: float = 0.0) -> Predictor:
     """Equations (4) and (5) as printed in the paper: 18.9 kg of steel on carbide.
 
     Units are not printed; they come out as v in mm/min, F_p in N and d in µm. The range is that over

@@ -8,34 +8,36 @@ not as many good ones, and what is fitted comes from the phases that the model d
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.prediction.linearised_model import Response
+from impactcell.prediction.linearised_model import LinearisedModel
 from impactcell.records import Samples
 
 Indices = NDArray[np.intp]
 
-DOUBTED = 1.15
+MISFIT_THRESHOLD = 1.15
 """Misfit of blocks from which on the model is not believed in every phase alike."""
-FORCE_PHASES, CONTACT_PHASES, SLIDE_PHASES = 16, 8, 8
-LATER = np.full(FORCE_PHASES + CONTACT_PHASES + SLIDE_PHASES, 30.0)
-LATER[: FORCE_PHASES // 4] = LATER[FORCE_PHASES : FORCE_PHASES + CONTACT_PHASES // 4] = 1.0
+FORCE_INTERVALS, CONTACT_INTERVALS, SLIDE_INTERVALS = 16, 8, 8
+LATE_FACTORS = np.full(FORCE_INTERVALS + CONTACT_INTERVALS + SLIDE_INTERVALS, 30.0)
+LATE_FACTORS[: FORCE_INTERVALS // 4] = LATE_FACTORS[
+    FORCE_INTERVALS : FORCE_INTERVALS + CONTACT_INTERVALS // 4
+] = 1.0
 """Factor of the standard deviations of each phase once the model is doubted: mu_s is then left to the first
 quarter of the contact, where all is slow and laws that depend on speed say little."""
 
 
-def phases(response: Response, separation_s: float, stop_s: float) -> Indices:
+def interval_of_blocks(response: LinearisedModel, separation_s: float, stop_s: float) -> Indices:
     """Give each block the number of its phase: of contact for force, of contact and slide for position."""
 
     def along(times: Samples, start: float, end: float, parts: int) -> Indices:
         return np.clip(((times - start) / (end - start) * parts).astype(np.intp), 0, parts - 1)
 
     force, position = response.force_time_s, response.position_time_s
-    first = along(force, 0.0, separation_s, FORCE_PHASES)
-    contact = FORCE_PHASES + along(position, 0.0, separation_s, CONTACT_PHASES)
-    sliding = FORCE_PHASES + CONTACT_PHASES + along(position, separation_s, stop_s, SLIDE_PHASES)
+    first = along(force, 0.0, separation_s, FORCE_INTERVALS)
+    contact = FORCE_INTERVALS + along(position, 0.0, separation_s, CONTACT_INTERVALS)
+    sliding = FORCE_INTERVALS + CONTACT_INTERVALS + along(position, separation_s, stop_s, SLIDE_INTERVALS)
     return np.concatenate([first, np.where(position < separation_s, contact, sliding)])
 
 
-def doubt(residual: Samples, phase: Indices) -> Samples:
+def std_factors(residual: Samples, phase: Indices) -> Samples:
     """Factor of each residual's standard deviation, shape (n,), 1 where a phase shows no more than noise.
 
     With r² the mean square of a phase of n blocks beyond what noise makes it, the phase's mean has the

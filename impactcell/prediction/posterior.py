@@ -14,11 +14,11 @@ from scipy.special import log_ndtr, ndtr
 
 from impactcell.records import Samples
 
-NODES = 300
+QUADRATURE_NODES = 300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Side:
+class TruncatedGaussian:
     """A Gaussian cut off at z = 0.
 
     Attributes
@@ -55,7 +55,7 @@ class Posterior:
         z = form @ theta + offset.
     """
 
-    sides: tuple[Side, ...]
+    sides: tuple[TruncatedGaussian, ...]
     weights: Samples
     form: Samples
     offset: float
@@ -67,7 +67,7 @@ class Posterior:
             mean, variance = float(of @ side.mean), float(of @ side.covariance @ of)
             if side.sign:
                 centre, spread, slope = self._along(side, of)
-                shift, shrink = _cut(side.sign * centre / spread)
+                shift, shrink = _truncated_moments(side.sign * centre / spread)
                 mean += slope * side.sign * spread * shift
                 variance -= slope**2 * spread**2 * (1.0 - shrink)
             means.append(mean)
@@ -88,9 +88,9 @@ class Posterior:
                 continue
             centre, spread, slope = self._along(side, of)
             # z at equal steps of its own cut-off distribution: every node has the same weight
-            share = (np.arange(NODES) + 0.5) / NODES
+            share = (np.arange(QUADRATURE_NODES) + 0.5) / QUADRATURE_NODES
             bound = -side.sign * centre / spread
-            normal = _upper_quantile(bound, share)
+            normal = _truncated_quantile(bound, share)
             z = side.sign * spread * normal
             rest = math.sqrt(max(variance - slope**2 * spread**2, 1e-30))
             total += weight * ndtr((at[:, None] - mean - slope * z[None, :]) / rest).mean(axis=1)
@@ -110,14 +110,14 @@ class Posterior:
             ends.append(0.5 * (a + b))
         return ends[0], ends[1]
 
-    def _along(self, side: Side, of: Samples) -> tuple[float, float, float]:
+    def _along(self, side: TruncatedGaussian, of: Samples) -> tuple[float, float, float]:
         """Mean and spread of z on one side, and how the linear form follows z."""
         centre = float(self.form @ side.mean) + self.offset
         variance = float(self.form @ side.covariance @ self.form)
         return centre, math.sqrt(variance), float(of @ side.covariance @ self.form) / variance
 
 
-def mixture(sides: tuple[Side, ...], form: Samples, offset: float) -> Posterior:
+def mixture(sides: tuple[TruncatedGaussian, ...], form: Samples, offset: float) -> Posterior:
     """Weigh the sides by the mass of each cut-off Gaussian."""
     logs = []
     for side in sides:
@@ -130,13 +130,13 @@ def mixture(sides: tuple[Side, ...], form: Samples, offset: float) -> Posterior:
     return Posterior(sides, weights / weights.sum(), form, offset)
 
 
-def _cut(beta: float) -> tuple[float, float]:
+def _truncated_moments(beta: float) -> tuple[float, float]:
     """Shift of the mean and factor of the variance of a standard normal cut off below -beta."""
     hazard = math.exp(-0.5 * beta * beta - 0.5 * math.log(2.0 * math.pi) - float(log_ndtr(beta)))
     return hazard, max(1.0 - hazard * (hazard + beta), 0.0)
 
 
-def _upper_quantile(bound: float, share: Samples) -> Samples:
+def _truncated_quantile(bound: float, share: Samples) -> Samples:
     """Quantiles of a standard normal cut off below `bound`."""
     from scipy.special import ndtri_exp
 

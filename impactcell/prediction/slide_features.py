@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
-from impactcell.numerics.local_polynomial import mean, median, polynomial, spread, value_at
+from impactcell.numerics.local_polynomial import fit_polynomial, mean, median, value_at, value_std
 from impactcell.prediction.feature_extraction import (
-    Reading,
-    checked,
+    MeasuredFeature,
+    check_channel,
     displacement,
     loss_of_contact,
     noise_std,
@@ -19,7 +19,7 @@ from impactcell.records import Capture, Samples
 
 
 @dataclass(frozen=True, slots=True)
-class Slide:
+class SlideFeatures:
     """The free slide as read off a capture.
 
     Attributes
@@ -31,13 +31,13 @@ class Slide:
         Mean deceleration of the slide, m/s².
     """
 
-    distance: Reading
+    distance: MeasuredFeature
     separation_s: float
     stop_s: float
-    deceleration: Reading
+    deceleration: MeasuredFeature
 
 
-def slide(capture: Capture) -> Slide:
+def extract_slide(capture: Capture) -> SlideFeatures:
     """Read the free slide: where contact was last lost, where the part came to rest, and how it braked.
 
     Raises
@@ -54,20 +54,20 @@ def slide(capture: Capture) -> Slide:
     tail = max(5, len(moved) // 50)
     if abs(mean(moved[-tail:]) - mean(moved[:tail])) < 6.0 * sigma:
         raise NoBreakawayError(f"the part moved less than {6.0 * sigma:.3g} m")
-    separation = loss_of_contact(checked(capture.force, "force"))
+    separation = loss_of_contact(check_channel(capture.force, "force"))
     separation_s = separation.value
     if separation_s >= times[-tail]:
         raise NoSeparationError("contact was lost only when the position record ended")
-    start = _level(times, moved, separation_s, sigma)
-    rest, stop_s, deceleration = _rest(times, moved, separation_s, sigma)
+    start = _value_at_separation(times, moved, separation_s, sigma)
+    rest, stop_s, deceleration = _rest_and_deceleration(times, moved, separation_s, sigma)
     speed = max(deceleration.value, 0.0) * (stop_s - separation_s)
     error = math.hypot(rest.std, start.std, speed * separation.std)
-    return Slide(Reading(rest.value - start.value, error), separation_s, stop_s, deceleration)
+    return SlideFeatures(MeasuredFeature(rest.value - start.value, error), separation_s, stop_s, deceleration)
 
 
-def _rest(
+def _rest_and_deceleration(
     times: Samples, moved: Samples, separation_s: float, sigma: float
-) -> tuple[Reading, float, Reading]:
+) -> tuple[MeasuredFeature, float, MeasuredFeature]:
     """Level at rest, time of rest, mean deceleration; a parabola through the slide tells when it stopped."""
     tail = max(5, len(moved) // 50)
     final = median(moved[-tail:])
@@ -78,11 +78,11 @@ def _rest(
     last = len(times) - 1 - int(sliding[::-1].argmax())
     inside = slice(first, last + 1)
     origin, span = separation_s, float(times[last] - separation_s)
-    cubic, factor, _ = polynomial(times[inside], moved[inside], origin, span, 3)
+    cubic, factor, _ = fit_polynomial(times[inside], moved[inside], origin, span, 3)
     _, c1, c2, c3 = cubic.tolist()
     last_speed, braking = c1 + 2.0 * c2 + 3.0 * c3, -(2.0 * c2 + 6.0 * c3)
     # The zero of the speed next after the last sample that still moved is the stop.
-    near = [root.real for root in _zeros(c1, 2.0 * c2, 3.0 * c3) if abs(root.imag) < 0.2]
+    near = [root.real for root in _complex_roots(c1, 2.0 * c2, 3.0 * c3) if abs(root.imag) < 0.2]
     near = [root for root in near if 0.7 < root < 1.6]
     if near:
         stop = min(near, key=lambda root: abs(root - 1.0))
@@ -90,22 +90,24 @@ def _rest(
         stop = 1.0 + (last_speed / braking if braking > 0.0 else math.inf if last_speed > 0.0 else 0.0)
     stop_s = origin + span * max(stop, 1.0)
     quiet = (last + len(times)) // 2  # what lies after it is at rest, if anything is
-    if stop_s > times[-1] and not _still(times[quiet:], moved[quiet:], sigma):
+    if stop_s > times[-1] and not _is_at_rest(times[quiet:], moved[quiet:], sigma):
         left = 1e3 * last_speed / span
         raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
     stop_s = min(stop_s, float(times[-1]))
     after = moved[times.searchsorted(stop_s, "right") if stop_s < times[-1] else quiet :]
     if len(after) >= 3:
-        rest = Reading(mean(after), sigma / math.sqrt(len(after)))
+        rest = MeasuredFeature(mean(after), sigma / math.sqrt(len(after)))
     else:
-        rest = Reading(value_at(cubic, stop), sigma * spread(factor, 1.0))
-    parabola, factor, _ = polynomial(times[inside], moved[inside], origin, span, 2)
+        rest = MeasuredFeature(value_at(cubic, stop), sigma * value_std(factor, 1.0))
+    parabola, factor, _ = fit_polynomial(times[inside], moved[inside], origin, span, 2)
     # The inverse of the normal equations has 1 / L² in its last place: the variance of the highest power.
-    deceleration = Reading(-2.0 * float(parabola[2]) / span**2, 2.0 * sigma / float(factor[2, 2]) / span**2)
+    deceleration = MeasuredFeature(
+        -2.0 * float(parabola[2]) / span**2, 2.0 * sigma / float(factor[2, 2]) / span**2
+    )
     return rest, float(stop_s), deceleration
 
 
-def _zeros(c0: float, c1: float, c2: float) -> tuple[complex, ...]:
+def _complex_roots(c0: float, c1: float, c2: float) -> tuple[complex, ...]:
     """Zeros of c0 + c1 u + c2 u², complex ones too."""
     if c2 == 0.0:
         return (-c0 / c1,) if c1 else ()
@@ -113,7 +115,7 @@ def _zeros(c0: float, c1: float, c2: float) -> tuple[complex, ...]:
     return (-c1 + root) / (2.0 * c2), (-c1 - root) / (2.0 * c2)
 
 
-def _still(times: Samples, moved: Samples, sigma: float) -> bool:
+def _is_at_rest(times: Samples, moved: Samples, sigma: float) -> bool:
     """Whether a stretch of positions shows no motion, long enough to tell."""
     if len(times) < 30:
         return False
@@ -121,13 +123,13 @@ def _still(times: Samples, moved: Samples, sigma: float) -> bool:
     return abs(slope) < 5.0 * sigma / math.sqrt(float(np.square(times - times.mean()).sum()))
 
 
-def _level(times: Samples, values: Samples, at_s: float, sigma: float) -> Reading:
+def _value_at_separation(times: Samples, values: Samples, at_s: float, sigma: float) -> MeasuredFeature:
     """Value of a smooth channel at a time, from a cubic through its neighbourhood."""
     for half in (2e-3, 4e-3, 8e-3):
         first = int(times.searchsorted(at_s - half, "left"))
         last = int(times.searchsorted(at_s + half, "right"))
         if last - first >= 8:
             scale = max(at_s - float(times[first]), float(times[last - 1]) - at_s)
-            cubic, factor, _ = polynomial(times[first:last], values[first:last], at_s, scale, 3)
-            return Reading(float(cubic[0]), sigma * spread(factor, 0.0))
-    return Reading(float(np.interp(at_s, times, values)), sigma)
+            cubic, factor, _ = fit_polynomial(times[first:last], values[first:last], at_s, scale, 3)
+            return MeasuredFeature(float(cubic[0]), sigma * value_std(factor, 0.0))
+    return MeasuredFeature(float(np.interp(at_s, times, values)), sigma)

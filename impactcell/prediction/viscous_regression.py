@@ -16,9 +16,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from impactcell.errors import CaptureError, PhysicsError, PredictionError
-from impactcell.prediction.block_averaging import Blocks, blocks
+from impactcell.prediction.block_averaging import BlockMeans, average_blocks
 from impactcell.prediction.feature_extraction import displacement
-from impactcell.prediction.slide_features import slide
+from impactcell.prediction.slide_features import extract_slide
 from impactcell.records import Capture, Samples
 
 BLOCK_S = 5e-4
@@ -29,7 +29,7 @@ MOST_RATE_PER_S = 100.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Viscous:
+class ViscousFit:
     """k_v of a set of taps and the mu_k of each.
 
     Attributes
@@ -49,7 +49,7 @@ class Viscous:
     used: tuple[int, ...]
 
 
-def by_least_squares(captures: Sequence[Capture], gravity_m_s2: float = 9.81) -> Viscous:
+def by_least_squares(captures: Sequence[Capture], gravity_m_s2: float = 9.81) -> ViscousFit:
     """k_v by least squares on the positions of all slides, x_0, x'_0 and mu_k of each tap free.
 
     Raises
@@ -72,7 +72,7 @@ def by_least_squares(captures: Sequence[Capture], gravity_m_s2: float = 9.81) ->
     for _, mass, path in slides:
         (_, speed, bend), _ = _fit_slide(path, viscous / mass)
         mu_k.append((-bend - viscous / mass * speed) / gravity_m_s2)
-    return Viscous(
+    return ViscousFit(
         viscous,
         math.sqrt(2.0 / curvature) if curvature > 0.0 else math.inf,
         np.array(mu_k),
@@ -80,7 +80,7 @@ def by_least_squares(captures: Sequence[Capture], gravity_m_s2: float = 9.81) ->
     )
 
 
-def by_decrement(captures: Sequence[Capture], gravity_m_s2: float = 9.81) -> Viscous:
+def by_decrement(captures: Sequence[Capture], gravity_m_s2: float = 9.81) -> ViscousFit:
     """k_v from how the displacement over equal intervals T shrinks, after the decrement method.
 
     D_i = x(t_i + T) - x(t_i) obeys D_{i+1} = q D_i - p with q = exp(-k_v T / m) and p = mu_k g T (1 - q) / r,
@@ -112,15 +112,15 @@ def by_decrement(captures: Sequence[Capture], gravity_m_s2: float = 9.81) -> Vis
     mean = float(np.average(rates, weights=weights))
     scatter = float(np.average((np.array(rates) - mean) ** 2, weights=weights))
     std = math.sqrt(max(scatter / max(len(rates) - 1, 1), 1.0 / float(np.sum(weights))))
-    return Viscous(mean, std, np.array(mu_k), tuple(cycle for cycle, _, _ in slides))
+    return ViscousFit(mean, std, np.array(mu_k), tuple(cycle for cycle, _, _ in slides))
 
 
-def _slides(captures: Sequence[Capture]) -> list[tuple[int, float, Blocks]]:
+def _slides(captures: Sequence[Capture]) -> list[tuple[int, float, BlockMeans]]:
     """Cycle, mass and blocks of position of each free slide, time counted from its beginning."""
     found, fault = [], "there is none"
     for capture in captures:
         try:
-            read = slide(capture)
+            read = extract_slide(capture)
             path = displacement(capture)
         except (PredictionError, PhysicsError) as error:
             fault = f"cycle {capture.cycle}: {error}"
@@ -129,20 +129,22 @@ def _slides(captures: Sequence[Capture]) -> list[tuple[int, float, Blocks]]:
             fault = f"cycle {capture.cycle}: the part's mass is not known"
             continue
         margin = MARGIN * (read.stop_s - read.separation_s)
-        inside = blocks(path, BLOCK_S, BLOCK_S, [], [read.separation_s + margin, read.stop_s - margin])
+        inside = average_blocks(
+            path, BLOCK_S, BLOCK_S, [], [read.separation_s + margin, read.stop_s - margin]
+        )
         kept = (inside.time_s > read.separation_s + margin) & (inside.time_s < read.stop_s - margin)
         if kept.sum() < 2 * INTERVALS:
             fault = f"cycle {capture.cycle}: the slide is too short for its position samples"
             continue
         moved = capture.direction * inside.values[kept]
         times = inside.time_s[kept] - (read.separation_s + margin)
-        found.append((capture.cycle, capture.mass_kg, Blocks(times, moved, inside.std[kept])))
+        found.append((capture.cycle, capture.mass_kg, BlockMeans(times, moved, inside.std[kept])))
     if not found:
         raise CaptureError(f"no slide can be used; {fault}")
     return found
 
 
-def _fit_slide(path: Blocks, rate: float) -> tuple[tuple[float, float, float], float]:
+def _fit_slide(path: BlockMeans, rate: float) -> tuple[tuple[float, float, float], float]:
     """x_0, x'_0 and the coefficient of phi, and the sum of squares, for k_v / m = `rate`."""
     t, weight = path.time_s, 1.0 / path.std
     x = rate * t
@@ -157,7 +159,7 @@ def _fit_slide(path: Blocks, rate: float) -> tuple[tuple[float, float, float], f
     return (start, speed, bend), float(residual @ residual)
 
 
-def _at(path: Blocks, time_s: float, half_s: float) -> float:
+def _at(path: BlockMeans, time_s: float, half_s: float) -> float:
     """Position at a time, from a parabola through its neighbourhood."""
     near = np.flatnonzero(np.abs(path.time_s - time_s) <= half_s)
     if len(near) < 4:

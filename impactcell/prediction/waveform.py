@@ -14,38 +14,44 @@ import numpy as np
 
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.physics import Plant
-from impactcell.prediction.feature_extraction import checked, refuse_clipped
-from impactcell.prediction.gauss_newton import Belief, Minimum, descend
+from impactcell.prediction import gauss_newton
+from impactcell.prediction.feature_extraction import check_channel, refuse_clipped
+from impactcell.prediction.gauss_newton import GaussianPrior, Minimum
 from impactcell.prediction.linearised_model import (
     DAMPING,
     MU_K,
     RATIO,
     STIFFNESS,
-    Response,
-    parameters,
-    respond,
+    LinearisedModel,
+    linearised_model,
+    parameters_of,
     with_parameters,
 )
 from impactcell.prediction.model import Model
-from impactcell.prediction.phase_reweighting import DOUBTED, LATER, doubt, phases
+from impactcell.prediction.phase_reweighting import (
+    LATE_FACTORS,
+    MISFIT_THRESHOLD,
+    interval_of_blocks,
+    std_factors,
+)
 from impactcell.prediction.posterior import Posterior, mixture
-from impactcell.prediction.slide_features import Slide, slide
+from impactcell.prediction.slide_features import SlideFeatures, extract_slide
 from impactcell.records import Capture, Samples
 
-FAR_FROM_KINK = 6.0
+KINK_DISTANCE_STD = 6.0
 """Standard deviations of z beyond which the other side of the kink has no weight."""
-OF_MU_K = np.array([1.0, 0.0, 0.0, 0.0])
-OF_MU_S = np.array([1.0, -1.0, 0.0, 0.0])
-Z = np.array([1.0, -1.0, 0.0, -1.0])
+MU_K_FORM = np.array([1.0, 0.0, 0.0, 0.0])
+MU_S_FORM = np.array([1.0, -1.0, 0.0, 0.0])
+KINK_FORM = np.array([1.0, -1.0, 0.0, -1.0])
 """How z, which tells the side of the kink, follows theta."""
-MISSED = 4.0
+MAX_MISFIT = 4.0
 """Misfit of blocks from which on the waveform is not believed at all."""
-ROUNDS = 3
+REWEIGHTING_ROUNDS = 3
 """Rounds of doubting the phases that the model misses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Waveform:
+class WaveformFit:
     """Outcome of a waveform fit.
 
     Attributes
@@ -77,11 +83,11 @@ class Waveform:
 
     def interval(self, level: float = 0.95) -> tuple[tuple[float, float], tuple[float, float]]:
         """Equal-tailed credible intervals of mu_s and of mu_k."""
-        mu_s, mu_k = (self.posterior.interval(of, level) for of in (OF_MU_S, OF_MU_K))
+        mu_s, mu_k = (self.posterior.interval(of, level) for of in (MU_S_FORM, MU_K_FORM))
         return (math.exp(mu_s[0]), math.exp(mu_s[1])), (math.exp(mu_k[0]), math.exp(mu_k[1]))
 
 
-def belief(model: Model, *, fixed_ratio: bool = False) -> Belief:
+def prior_of(model: Model, *, fixed_ratio: bool = False) -> GaussianPrior:
     """Prior of a tap's parameters; with `fixed_ratio` mu_k/mu_s is the plant's exactly, as in the paper."""
     plant, prior = model.plant, model.prior
     weight = np.array(
@@ -93,10 +99,12 @@ def belief(model: Model, *, fixed_ratio: bool = False) -> Belief:
         ]
     )
     free = np.array([MU_K, STIFFNESS, DAMPING] if fixed_ratio else [MU_K, RATIO, STIFFNESS, DAMPING])
-    return Belief(parameters(plant), weight, free)
+    return GaussianPrior(parameters_of(plant), weight, free)
 
 
-def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_ratio: bool = False) -> Waveform:
+def fit(
+    capture: Capture, model: Model, slide: SlideFeatures | None = None, *, fixed_ratio: bool = False
+) -> WaveformFit:
     """Fit the whole waveform of one tap.
 
     Parameters
@@ -104,7 +112,7 @@ def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_rati
     capture : Capture
         With force and position.
     model : Model
-    slid : Slide, optional
+    slide : SlideFeatures, optional
         The slide as read off this capture, where that has been done already.
     fixed_ratio : bool
         Take mu_k/mu_s as exactly the plant's, as the paper does.
@@ -116,51 +124,55 @@ def fit(capture: Capture, model: Model, slid: Slide | None = None, *, fixed_rati
     NotConvergedError
         The fit did not reach a minimum, or the model is not that of this tap.
     """
-    force = checked(capture.force, "force")
+    force = check_channel(capture.force, "force")
     refuse_clipped(force)
-    slid = slid or slide(capture)
-    known = belief(model, fixed_ratio=fixed_ratio)
-    theta = known.mean.copy()
-    theta[MU_K] = math.log(max(braking_friction(model, capture.mass_kg, slid), 1e-3))
+    slide = slide or extract_slide(capture)
+    prior = prior_of(model, fixed_ratio=fixed_ratio)
+    theta = prior.mean.copy()
+    theta[MU_K] = math.log(max(deceleration_friction(model, capture.mass_kg, slide), 1e-3))
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
         raise CaptureError("the part's mass or the actuator's velocity is not known")
     try:
-        return _fit(capture, model.plant, known, theta, slid)
+        return _fit(capture, model.plant, prior, theta, slide)
     except PhysicsError as fault:
         raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
     except np.linalg.LinAlgError as fault:
         raise NotConvergedError(f"the fit is singular: {fault}") from fault
 
 
-def _fit(capture: Capture, plant: Plant, known: Belief, start: Samples, slid: Slide) -> Waveform:
-    response = respond(capture, with_parameters(plant, start), slid.separation_s)
-    offset = response.kink(start) - float(Z @ start)
-    fits = _both_sides(response, known, start)
-    plain, misfit = _likelier(fits, known, offset)
-    if misfit > DOUBTED:  # perhaps only because the start had its kinks elsewhere
-        response = respond(capture, with_parameters(plant, plain.theta), slid.separation_s)
-        fits = _both_sides(response, known, plain.theta)
-        plain, misfit = _likelier(fits, known, offset)
+def _fit(
+    capture: Capture, plant: Plant, prior: GaussianPrior, start: Samples, slide: SlideFeatures
+) -> WaveformFit:
+    response = linearised_model(capture, with_parameters(plant, start), slide.separation_s)
+    offset = response.kink_coordinate(start) - float(KINK_FORM @ start)
+    fits = _fit_both_sides(response, prior, start)
+    plain, misfit = _likelier_side(fits, prior, offset)
+    if misfit > MISFIT_THRESHOLD:  # perhaps only because the start had its kinks elsewhere
+        response = linearised_model(capture, with_parameters(plant, plain.theta), slide.separation_s)
+        fits = _fit_both_sides(response, prior, plain.theta)
+        plain, misfit = _likelier_side(fits, prior, offset)
     widening, best = max(misfit, 1.0), plain
-    if misfit > DOUBTED:
+    if misfit > MISFIT_THRESHOLD:
         widening = 1.0
-        phase = phases(response, slid.separation_s, slid.stop_s)
-        for _ in range(ROUNDS):
-            residual = response.linear(best.theta, best.side).residual
-            fits = _both_sides(response.doubted(doubt(residual, phase) * LATER[phase]), known, best.theta)
-            best, _ = _likelier(fits, known, offset)
+        phase = interval_of_blocks(response, slide.separation_s, slide.stop_s)
+        for _ in range(REWEIGHTING_ROUNDS):
+            residual = response.linearise(best.theta, best.side).residual
+            fits = _fit_both_sides(
+                response.reweighted(std_factors(residual, phase) * LATE_FACTORS[phase]), prior, best.theta
+            )
+            best, _ = _likelier_side(fits, prior, offset)
     gap = response.gap(plain.residual)
-    if misfit > MISSED:
+    if misfit > MAX_MISFIT:
         raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
-    if not best.settled:
+    if not best.converged:
         raise NotConvergedError("the waveform fit did not settle", gap)
-    sides = tuple(one.as_side(known, widening) for one in fits)
+    sides = tuple(one.truncated(prior, widening) for one in fits)
     if len(sides) == 1:
         sides = (replace(sides[0], sign=0),)
-    posterior = mixture(sides, Z, offset)
+    posterior = mixture(sides, KINK_FORM, offset)
     slips_at_once = [one.side < 0 for one in fits]
-    (mu_s, mu_s_std), (mu_k, mu_k_std) = (_moments(posterior, of) for of in (OF_MU_S, OF_MU_K))
-    return Waveform(
+    (mu_s, mu_s_std), (mu_k, mu_k_std) = (_log_normal_moments(posterior, of) for of in (MU_S_FORM, MU_K_FORM))
+    return WaveformFit(
         mu_s=mu_s,
         mu_s_std=mu_s_std,
         mu_k=mu_k,
@@ -173,37 +185,39 @@ def _fit(capture: Capture, plant: Plant, known: Belief, start: Samples, slid: Sl
     )
 
 
-def _both_sides(response: Response, known: Belief, start: Samples) -> list[Minimum]:
+def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samples) -> list[Minimum]:
     """Descend on the side of the start, and on the other where the kink is near."""
-    first = 1 if response.kink(start) >= 0.0 else -1
-    found = descend(response, known, start, first)
-    spread = math.sqrt(float(Z @ found.as_side(known).covariance @ Z))
-    if first * response.kink(found.theta) >= FAR_FROM_KINK * spread:
+    first = 1 if response.kink_coordinate(start) >= 0.0 else -1
+    found = gauss_newton.fit(response, prior, start, first)
+    spread = math.sqrt(float(KINK_FORM @ found.truncated(prior).covariance @ KINK_FORM))
+    if first * response.kink_coordinate(found.theta) >= KINK_DISTANCE_STD * spread:
         return [found]
-    return [found, descend(response, known, found.theta, -first)]
+    return [found, gauss_newton.fit(response, prior, found.theta, -first)]
 
 
-def _likelier(fits: list[Minimum], known: Belief, offset: float) -> tuple[Minimum, float]:
+def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> tuple[Minimum, float]:
     """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
-    freedom = max(len(fits[0].residual) - len(known.free), 1)
+    freedom = max(len(fits[0].residual) - len(prior.free), 1)
     misfit = math.sqrt(min(one.chi2 for one in fits) / freedom)
     if len(fits) == 1:
         return fits[0], misfit
-    weights = mixture(tuple(one.as_side(known, max(misfit, 1.0)) for one in fits), Z, offset).weights
+    weights = mixture(
+        tuple(one.truncated(prior, max(misfit, 1.0)) for one in fits), KINK_FORM, offset
+    ).weights
     best = fits[int(np.argmax(weights))]
     return best, math.sqrt(best.chi2 / freedom)
 
 
-def _moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
+def _log_normal_moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
     """Mean and standard deviation of exp(`of` @ theta)."""
     mean, std = posterior.moments(of)
     value = math.exp(mean + 0.5 * std * std)
     return value, value * math.sqrt(math.expm1(std * std))
 
 
-def braking_friction(model: Model, mass_kg: float, slid: Slide) -> float:
+def deceleration_friction(model: Model, mass_kg: float, slide: SlideFeatures) -> float:
     """mu_k from the mean deceleration of a slide, less what viscous friction took of it."""
     effect = model.plant.effects.get("viscous_friction", {})
     viscous = float(np.mean(effect.get("viscous_coefficient_n_s_per_m", 0.0)))
-    mean_speed = slid.distance.value / max(slid.stop_s - slid.separation_s, 1e-9)
-    return (slid.deceleration.value - viscous * mean_speed / mass_kg) / model.plant.gravity_m_s2
+    mean_speed = slide.distance.value / max(slide.stop_s - slide.separation_s, 1e-9)
+    return (slide.deceleration.value - viscous * mean_speed / mass_kg) / model.plant.gravity_m_s2

@@ -9,7 +9,7 @@ from scipy.stats import f as f_distribution
 
 from impactcell.tracking.signature import deviation_shapes, deviation_test, friction_profile, tracker
 from impactcell.tracking.signature import reference as references
-from impactcell.tracking.signature.slide_segment import find_slide
+from impactcell.tracking.signature.slide_segment import extract_segment
 from tests.benchmarks._slides import FRICTION, GRAVITY, slide
 from tests.benchmarks.table import Table
 
@@ -64,7 +64,7 @@ class Normality:
         self.grid = settings.grid_m
         self.to_coefficients = np.linalg.pinv(friction_profile.on_grid(settings.points))
         capture, _ = slide(_normal(np.random.default_rng([8, 0])), SPEED, RATE, NOISE, 0)
-        self.seen = friction_profile.information(find_slide(capture), self.grid, GRAVITY)
+        self.seen = friction_profile.information(extract_segment(capture), self.grid, GRAVITY)
         G = self.G = self.seen.matrix
         self.C = self.to_coefficients @ (FRICTION * np.array([m(self.grid) for m in MODES]).T)
         texture = FRICTION * (1.0 + 0.03 * np.sin(2.0 * np.pi * self.grid / 1.3e-3))
@@ -118,11 +118,11 @@ def false_alarm_table(*, quick: bool) -> Table:
             seen = replace(truth.seen, vector=vector)
             verdict = None
             if known.variation.cycles >= settings.learned_cycles:
-                verdict = deviation_test.judge(known, seen, truth.grid)
+                verdict = deviation_test.test_deviation(known, seen, truth.grid)
                 ordinary += verdict.p_value < 100.0 * alpha
                 judged += 1
             # never given up: what is falsely thought deviant is learned all the same
-            state = tracker.learned(state, seen, settings, verdict and replace(verdict, p_value=1.0))
+            state = tracker.update_reference(state, seen, settings, verdict and replace(verdict, p_value=1.0))
     rows = []
     for n, rates in found.items():
         error = 1.96 * np.std(rates) / math.sqrt(len(rates))
@@ -150,12 +150,12 @@ def mixed_table(*, quick: bool) -> Table:
         for cycle in range(MIXED):
             speed = SPEEDS[cycle % len(SPEEDS)]
             capture, _ = slide(_normal(rng), speed, RATE, NOISE, run * MIXED + cycle)
-            seen = friction_profile.information(find_slide(capture), settings.grid_m, GRAVITY)
+            seen = friction_profile.information(extract_segment(capture), settings.grid_m, GRAVITY)
             known, verdict = state.reference, None
             if known.variation.cycles >= settings.learned_cycles:
-                verdict = deviation_test.judge(known, seen, settings.grid_m)
+                verdict = deviation_test.test_deviation(known, seen, settings.grid_m)
                 found[speed].append(verdict.p_value)
-            state = tracker.learned(state, seen, settings, verdict and replace(verdict, p_value=1.0))
+            state = tracker.update_reference(state, seen, settings, verdict and replace(verdict, p_value=1.0))
     rows = []
     for name, p in [(f"{speed:g} m/s", np.array(found[speed])) for speed in SPEEDS] + [
         ("all", np.concatenate(list(found.values())))
@@ -180,7 +180,7 @@ def _tail(
     push: float,
 ) -> float:
     j = len(truth.G)
-    looked = deviation_shapes.shapes(settings.length_m, settings.points)
+    looked = deviation_shapes.deviation_shapes(settings.length_m, settings.points)
     rows, _, waves = looked.within(truth.seen.reached_m, j)
     first = len(rows) - 2 - 2 * waves
     cosines, sines = (rows[first + k : len(rows) - 2 : 2] for k in (0, 1))
@@ -201,7 +201,7 @@ def _tail(
     y += (push * sign)[:, np.newaxis] * (filters[picked] @ truth.covariance)
     ratio = 0.1 + 0.9 * (np.cosh(push * (y @ filters.T)) * math.exp(-(push**2) / 2.0)).mean(axis=1)
     alarms = [
-        deviation_test.judge(known, replace(truth.seen, vector=v), truth.grid).p_value < alpha
+        deviation_test.test_deviation(known, replace(truth.seen, vector=v), truth.grid).p_value < alpha
         for v in y + truth.G @ truth.mean
     ]
     return float(np.mean(np.array(alarms) / ratio))
@@ -266,12 +266,12 @@ def power_table(*, quick: bool) -> Table:
                 size = aim / truth.score(shape, _deviant(truth, base, size * sign, shape, 5000 + k).matrix)
                 seen = _deviant(truth, base, size * sign, shape, 5000 + k)
                 power[oracle].append(norm.sf(norm.isf(alpha) - size * truth.score(shape, seen.matrix)))
-                verdict = deviation_test.judge(state.reference, seen, truth.grid)
+                verdict = deviation_test.test_deviation(state.reference, seen, truth.grid)
                 ours[oracle].append(verdict.p_value < alpha)
                 if verdict.p_value < alpha:
                     off[oracle].append(abs(verdict.at_m - place))
                 plain[oracle].append(_plain(verdict, state.reference.variation.cycles) < alpha)
-                verdict = deviation_test.judge(young.reference, seen, truth.grid)
+                verdict = deviation_test.test_deviation(young.reference, seen, truth.grid)
                 early[oracle].append(verdict.p_value < alpha)
             amplitudes.append(100.0 * size)
         for kind, hits, bar in (
@@ -317,17 +317,17 @@ def power_table(*, quick: bool) -> Table:
     return Table("Deviant cycle at 1e-5 false alarms", columns, rows, note)
 
 
-def _deviant(truth: Normality, base, size: float, shape, seed: int) -> friction_profile.Information:
+def _deviant(truth: Normality, base, size: float, shape, seed: int) -> friction_profile.SplineInformation:
     """What one slide says over friction that deviates by a shape, in shares of the friction."""
 
     def friction(x):
         return base(x) + size * FRICTION * shape(np.asarray(x))
 
     capture, _ = slide(friction, SPEED, RATE, NOISE, seed)
-    return friction_profile.information(find_slide(capture), truth.grid, GRAVITY)
+    return friction_profile.information(extract_segment(capture), truth.grid, GRAVITY)
 
 
-def _plain(verdict: deviation_test.Verdict, cycles: int) -> float:
+def _plain(verdict: deviation_test.DeviationTest, cycles: int) -> float:
     """p-value of Hotelling's T^2 and SPE alone, half of the false alarms each."""
     k = deviation_test.COMPONENTS
     hotelling = f_distribution.sf(verdict.t_squared * (cycles - k) / (k * (cycles - 1.0)), k, cycles - k)

@@ -75,13 +75,13 @@ def speed_table(*, quick: bool) -> Table:
     n, rate = 400_000 if quick else 1_000_000, 1e6
     T = 1.0 / rate
     z = 0.1 * np.arange(n) * T + NOISE * np.random.default_rng(1).normal(size=n)
-    start = in_cycle_filter.start(T, NOISE, 1e5)
-    in_cycle_filter.filter_block(start, z[:10])
+    start = in_cycle_filter.initial_state(T, NOISE, 1e5)
+    in_cycle_filter.update(start, z[:10])
     best = math.inf
     for _ in range(7):
         state, before = start, time.perf_counter()
         for block in np.split(z, n // 10_000):
-            state, ours = in_cycle_filter.filter_block(state, block)
+            state, ours = in_cycle_filter.update(state, block)
         best = min(best, time.perf_counter() - before)
     few = 5_000
     oracle = KalmanFilter(3, 1)
@@ -99,7 +99,7 @@ def speed_table(*, quick: bool) -> Table:
             oracle.update(z[k])
             theirs[k] = oracle.x[:, 0]
         slowest = min(slowest, time.perf_counter() - before)
-    _, ours = in_cycle_filter.filter_block(start, z[:few])
+    _, ours = in_cycle_filter.update(start, z[:few])
     apart = float((np.abs(ours - theirs).max(axis=0) / np.abs(theirs).max(axis=0)).max())
     ratio = (n / best) / (few / slowest)
     rows = [

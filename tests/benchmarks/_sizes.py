@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from impactcell.tracking.signature import deviation_test, friction_profile, matched_filter_scan, tracker
-from impactcell.tracking.signature.slide_segment import find_slide
+from impactcell.tracking.signature.slide_segment import extract_segment
 from tests.benchmarks._deviant import NOISE, RATE, SPEED, Normality, _normal
 from tests.benchmarks._slides import FRICTION, GRAVITY, slide
 from tests.benchmarks.table import Table
@@ -54,8 +54,8 @@ def table(*, quick: bool) -> Table:
     truth, alpha = Normality(settings), 1.0 / settings.false_alarm_cycles
     state = tracker.initial_state(settings)
     for vector in truth.vectors(np.random.default_rng(13), LEARNED) + truth.G @ truth.mean:
-        seen = friction_profile.Information(truth.G, vector, truth.seen.reached_m, truth.seen.seen)
-        state = tracker.learned(state, seen, settings, None)
+        seen = friction_profile.SplineInformation(truth.G, vector, truth.seen.reached_m, truth.seen.seen)
+        state = tracker.update_reference(state, seen, settings, None)
     rows = []
     for number, (name, (family, make)) in enumerate(SHAPES.items()):
         found, deviant = [], 0
@@ -69,9 +69,9 @@ def table(*, quick: bool) -> Table:
                 return base(x) + size * shape(np.asarray(x))
 
             capture, _ = slide(friction, SPEED, RATE, NOISE, 20_000 + k)
-            verdict = deviation_test.judge(
+            verdict = deviation_test.test_deviation(
                 state.reference,
-                friction_profile.information(find_slide(capture), truth.grid, GRAVITY),
+                friction_profile.information(extract_segment(capture), truth.grid, GRAVITY),
                 truth.grid,
             )
             deviant += verdict.p_value < alpha

@@ -10,9 +10,9 @@ import time
 import numpy as np
 
 from impactcell.physics import Strike
-from impactcell.prediction import Model, calibrate, estimate, printed
-from impactcell.prediction.calibration import predictor
-from impactcell.prediction.equations import distance
+from impactcell.prediction import Model, calibrate, estimate, printed_predictor
+from impactcell.prediction.calibration import fit_predictor
+from impactcell.prediction.equations import sliding_distance
 from impactcell.prediction.viscous_regression import by_decrement, by_least_squares
 from impactcell.prediction.waveform import fit
 from tests.benchmarks._prediction_shots import (
@@ -38,14 +38,14 @@ from tests.benchmarks.table import Table
 def table_of_coefficients() -> Table:
     velocities = np.linspace(0.05, 0.1, 17)
     tap = Strike(0.1, MASS_KG, halts_at_separation=True)
-    fitted, given = predictor(PLANT, tap, velocities, FRICTIONS), printed()
+    fitted, given = fit_predictor(PLANT, tap, velocities, FRICTIONS), printed_predictor()
     mu, v = np.meshgrid(FRICTIONS, velocities)
 
     def force(one):  # type: ignore[no-untyped-def]
         return one.force.friction_n * mu + one.force.velocity_n_s_per_m * v
 
     error_f = np.abs(force(fitted) / force(given) - 1.0)
-    error_d = np.abs(distance(fitted.distance, mu, v) / distance(given.distance, mu, v) - 1.0)
+    error_d = np.abs(sliding_distance(fitted.distance, mu, v) / sliding_distance(given.distance, mu, v) - 1.0)
     return Table(
         "Equations (4) and (5) refitted to the reference plant, against the printed coefficients",
         ("curve", "bar", "largest difference", "mean"),

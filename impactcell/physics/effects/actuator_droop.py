@@ -2,11 +2,11 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def loss(w: float, force: float, _c: float, _d: float, p: Numbers) -> float:
+def loss(w: float, force: float, _c: float, _d: float, p: FloatPointer) -> float:
     """W' = (c F - w) / tau."""
     return (p[0] * force - w) / p[1]
 

@@ -1,15 +1,15 @@
 """Actuator ramp: the actuator needs time to reach its speed."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def run_up(t: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def run_up(t: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """min(t / t_r, 1)."""
     return t / p[0] if t < p[0] else 1.0
 
 
-def end(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def end(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """t_r."""
     return p[0]
 

@@ -2,16 +2,16 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def pull(gap: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def pull(gap: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """Return A (1 - gap/l)."""
     return p[0] * (1.0 - gap / p[1])
 
 
-def reach(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """L, and none without a force."""
     return p[1] if p[0] != 0.0 else 0.0
 

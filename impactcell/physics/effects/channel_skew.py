@@ -1,10 +1,10 @@
 """Channel skew: force is recorded late against position."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def delay(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def delay(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """Return the delay."""
     return p[0]
 

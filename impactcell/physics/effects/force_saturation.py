@@ -2,11 +2,11 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def shown(force: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def shown(force: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """min(F, F_max)."""
     return min(p[0], force)
 

@@ -1,10 +1,10 @@
 """Gain error of the force sensor."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def shown(force: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def shown(force: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """F (1 + e)."""
     return force * (1.0 + p[0])
 

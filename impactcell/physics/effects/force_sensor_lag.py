@@ -1,10 +1,10 @@
 """Lag of the force sensor: its amplifier is a low-pass filter."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def time_constant(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def time_constant(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """Tau."""
     return p[0]
 

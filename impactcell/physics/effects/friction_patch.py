@@ -2,11 +2,11 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def factor(x: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def factor(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """1 + a exp(-(x - x_0)²/2w²)."""
     return 1.0 + p[0] * math.exp(-0.5 * ((x - p[1]) / p[2]) ** 2)
 

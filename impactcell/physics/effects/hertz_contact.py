@@ -2,11 +2,11 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def stiffening(d: float, _b: float, k: float, _d: float, p: Numbers) -> float:
+def stiffening(d: float, _b: float, k: float, _d: float, p: FloatPointer) -> float:
     """K d^n - k d, odd in d."""
     return k * (math.copysign(abs(d) ** p[0], d) - d)
 

@@ -1,10 +1,10 @@
 """Hunt-Crossley damping: the contact's damping grows with its indentation, on approach and departure."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def damping(d: float, rate: float, _c: float, _d: float, p: Numbers) -> float:
+def damping(d: float, rate: float, _c: float, _d: float, p: FloatPointer) -> float:
     """C d d'."""
     return p[0] * d * rate
 

@@ -1,10 +1,10 @@
 """Friction that changes along the table, in proportion to the position."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def factor(x: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def factor(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """1 + a x."""
     return 1.0 + p[0] * x
 

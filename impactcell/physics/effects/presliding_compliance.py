@@ -2,11 +2,11 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def stiffness(_a: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def stiffness(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """s0."""
     return p[0]
 

@@ -1,10 +1,10 @@
 """Quadratic drag: a fluid is pushed aside."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def drag(_a: float, v: float, _c: float, _d: float, p: Numbers) -> float:
+def drag(_a: float, v: float, _c: float, _d: float, p: FloatPointer) -> float:
     """-c x' abs(x')."""
     return -p[0] * v * abs(v)
 

@@ -1,10 +1,10 @@
 """Restoring force: a spring, a cable or a membrane pulls the part towards x = 0."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def spring(x: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def spring(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """-k_r x."""
     return -p[0] * x
 

@@ -2,11 +2,11 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def excess(speed: float, _b: float, _c: float, _d: float, p: Numbers) -> float:
+def excess(speed: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """Dmu exp(-(x'/v_s)²)."""
     return p[0] * math.exp(-((speed / p[1]) ** 2))
 

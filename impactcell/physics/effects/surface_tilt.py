@@ -2,11 +2,11 @@
 
 import math
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def downhill(_a: float, _b: float, m: float, g: float, p: Numbers) -> float:
+def downhill(_a: float, _b: float, m: float, g: float, p: FloatPointer) -> float:
     """-m g sin(a)."""
     return -m * g * math.sin(p[0])
 

@@ -1,10 +1,10 @@
 """Viscous friction: a lubricated surface resists in proportion to the speed."""
 
-from impactcell.numerics.jit import Numbers
+from impactcell.numerics.jit import FloatPointer
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 
 
-def resistance(_a: float, v: float, _c: float, _d: float, p: Numbers) -> float:
+def resistance(_a: float, v: float, _c: float, _d: float, p: FloatPointer) -> float:
     """-k_v x'."""
     return -p[0] * v
 

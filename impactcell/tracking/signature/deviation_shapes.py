@@ -11,11 +11,11 @@ from impactcell.records import Samples
 from impactcell.tracking.signature import friction_profile
 
 BUMP_WIDTHS_M = (0.2e-3, 0.3e-3, 0.45e-3, 0.7e-3)
-SHORTEST_WAVE_M = 0.4e-3
+MIN_WAVE_M = 0.4e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shapes:
+class DeviationShapes:
     """Spline coefficients of the shapes looked for, in the last axis.
 
     Attributes
@@ -60,16 +60,16 @@ class Shapes:
 
 
 @lru_cache(maxsize=8)
-def shapes(length_m: float, points: int) -> Shapes:
+def deviation_shapes(length_m: float, points: int) -> DeviationShapes:
     """Make the shapes for a grid of `points` from 0 to `length_m`."""
     grid = np.linspace(0.0, length_m, points)
     to_coefficients = friction_profile.shape_coefficients(points)
     spacing = float(grid[1] - grid[0])
     bumps = np.array([[np.exp(-0.5 * ((grid - c) / w) ** 2) for c in grid] for w in BUMP_WIDTHS_M])
-    waves = length_m / np.arange(1.0, length_m / max(4.0 * spacing, SHORTEST_WAVE_M) + 0.5, 0.5)
+    waves = length_m / np.arange(1.0, length_m / max(4.0 * spacing, MIN_WAVE_M) + 0.5, 0.5)
     ripples = np.array([[f(2.0 * np.pi * grid / w) for f in (np.cos, np.sin)] for w in waves])
     plain = np.array([np.ones(points), grid / length_m])
-    return Shapes(
+    return DeviationShapes(
         bumps @ to_coefficients,
         ripples @ to_coefficients,
         plain @ to_coefficients,

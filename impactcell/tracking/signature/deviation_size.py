@@ -31,19 +31,23 @@ from impactcell.records import Samples
 from impactcell.tracking.signature import deviation_shapes, friction_profile, matched_filter_scan
 
 LEVEL, TILT, BUMP, RIPPLE = map(matched_filter_scan.FAMILIES.index, ("level", "tilt", "bump", "ripple"))
-HALF = math.sqrt(2.0 * math.log(2.0))  # half width of a bell at half of its height, over its own
+HALF_WIDTH_OF_BELL = math.sqrt(
+    2.0 * math.log(2.0)
+)  # half width of a bell at half of its height, over its own
 ROUNDS = 3
-STEPS = 7  # in place, width or wave, of every round but the first
-REACH = 3.5  # standard deviations that a round goes to either side of what the one before it found
-FAR = 50.0  # |x / b|^q beyond which a bump is nothing
-SMALLEST = 1e-30
-NOTHING = (0.0, math.inf)  # size and standard deviation of what cannot be seen
+REFINED_STEPS = 7  # in place, width or wave, of every round but the first
+REFINED_REACH_STD = (
+    3.5  # standard deviations that a round goes to either side of what the one before it found
+)
+MAX_EXPONENT = 50.0  # |x / b|^q beyond which a bump is nothing
+MIN_INFORMATION = 1e-30
+UNSEEN = (0.0, math.inf)  # size and standard deviation of what cannot be seen
 
-Said = tuple[Samples, Samples, Samples, Samples]
+ShapeScores = tuple[Samples, Samples, Samples, Samples]
 """Of shapes at a noise of one: information on their sizes, scores squared, sizes, and variances of those."""
 
 
-def sized(
+def estimate_size(
     family: int, P: Samples, u: Samples, grid_m: Samples, reached_m: float, least: float, scale: float
 ) -> tuple[float, float]:
     """Size of the shape of one family in one cycle, and its standard deviation.
@@ -73,17 +77,17 @@ def sized(
         low = np.array([0.0, math.log(deviation_shapes.BUMP_WIDTHS_M[0])])
         high = np.array([min(reached_m, length), math.log(deviation_shapes.BUMP_WIDTHS_M[-1])])
         steps = int(high[0] / spacing) + 2, len(deviation_shapes.BUMP_WIDTHS_M)
-        return _averaged(lambda at: _bumps(K, v, grid_m, at), low, high, steps, least, scale)
+        return _average_over_shapes(lambda at: _bumps(K, v, grid_m, at), low, high, steps, least, scale)
     if family == RIPPLE:
         low = np.array([max(1.0, length / reached_m)])  # waves on the grid
         high = low.copy()
-        high[0] = max(high[0], length / max(4.0 * spacing, deviation_shapes.SHORTEST_WAVE_M))
+        high[0] = max(high[0], length / max(4.0 * spacing, deviation_shapes.MIN_WAVE_M))
         waves = int(4.0 * (high[0] - low[0])) + 2
-        return _averaged(lambda at: _ripples(K, v, grid_m, at), low, high, (waves,), least, scale)
-    return _plain(family, K, v, grid_m, least, scale)
+        return _average_over_shapes(lambda at: _ripples(K, v, grid_m, at), low, high, (waves,), least, scale)
+    return _level_or_tilt(family, K, v, grid_m, least, scale)
 
 
-def _plain(
+def _level_or_tilt(
     family: int, K: Samples, v: Samples, grid: Samples, least: float, scale: float
 ) -> tuple[float, float]:
     """Size of the level alone, or of the tilt with the level free, as the scan looks for them."""
@@ -93,11 +97,11 @@ def _plain(
         turn = float(slope @ image) / known
         score = float(slope @ v) - turn * score
         known = float(slope @ K @ slope) - turn * turn * known
-    return (score / known, math.sqrt(scale / known)) if known >= least else NOTHING
+    return (score / known, math.sqrt(scale / known)) if known >= least else UNSEEN
 
 
-def _averaged(
-    told: Callable[[Samples], Said],
+def _average_over_shapes(
+    told: Callable[[Samples], ShapeScores],
     low: Samples,
     high: Samples,
     steps: tuple[int, ...],
@@ -115,7 +119,7 @@ def _averaged(
         gain = np.where(known >= least, squared / (2.0 * scale), -math.inf)
         most = gain.max()
         if most == -math.inf:
-            return NOTHING
+            return UNSEEN
         weight = np.exp(gain - most)
         weight /= weight.sum()
         size = float(np.vdot(weight, sizes))
@@ -125,8 +129,11 @@ def _averaged(
         step = (last - first) / (np.array(steps) - 1)
         # likely places between two steps have spread of their own, which the steps do not show
         spread = np.sqrt(likely @ (at - middle) ** 2 + step**2 / 16.0)
-        first, last = np.maximum(low, middle - REACH * spread), np.minimum(high, middle + REACH * spread)
-        steps = (STEPS,) * len(steps)
+        first, last = (
+            np.maximum(low, middle - REFINED_REACH_STD * spread),
+            np.minimum(high, middle + REFINED_REACH_STD * spread),
+        )
+        steps = (REFINED_STEPS,) * len(steps)
     return size, std
 
 
@@ -138,25 +145,25 @@ def _lattice(steps: tuple[int, ...]) -> Samples:
     return points
 
 
-def _bumps(K: Samples, v: Samples, grid: Samples, at: Samples) -> Said:
+def _bumps(K: Samples, v: Samples, grid: Samples, at: Samples) -> ShapeScores:
     """Bumps at places and of logarithms of widths: the bells, then steeper ones, then the boxes."""
-    off = np.abs(grid - at[:, :1]) / (HALF * np.exp(at[:, 1:]))
+    off = np.abs(grid - at[:, :1]) / (HALF_WIDTH_OF_BELL * np.exp(at[:, 1:]))
     square = off * off
     powers = np.concatenate([square, square * off, (square * square) ** 2])
-    rows = np.exp(-math.log(2.0) * np.minimum(powers, FAR))
-    known, score = np.maximum(np.einsum("ij,ij->i", rows @ K, rows), SMALLEST), rows @ v
+    rows = np.exp(-math.log(2.0) * np.minimum(powers, MAX_EXPONENT))
+    known, score = np.maximum(np.einsum("ij,ij->i", rows @ K, rows), MIN_INFORMATION), rows @ v
     return known, score**2 / known, score / known, 1.0 / known
 
 
-def _ripples(K: Samples, v: Samples, grid: Samples, at: Samples) -> Said:
+def _ripples(K: Samples, v: Samples, grid: Samples, at: Samples) -> ShapeScores:
     """Ripples of so many waves on the grid, known as well as at their worst phase, shape (n,) each."""
     phase = 2.0 * math.pi / grid[-1] * at * grid
     x, y = np.cos(phase), np.sin(phase)
     image, one, other = x @ K, x @ v, y @ v
     cc, cs, ss = (image * x).sum(axis=1), (image * y).sum(axis=1), ((y @ K) * y).sum(axis=1)
     known = (cc + ss) / 2.0 - np.hypot((cc - ss) / 2.0, cs)
-    solid = np.maximum(cc * ss - cs * cs, SMALLEST)
+    solid = np.maximum(cc * ss - cs * cs, MIN_INFORMATION)
     a, b = (ss * one - cs * other) / solid, (cc * other - cs * one) / solid
-    square = np.maximum(a * a + b * b, SMALLEST)
+    square = np.maximum(a * a + b * b, MIN_INFORMATION)
     variance = (ss * a * a - 2.0 * cs * a * b + cc * b * b) / (solid * square)
     return known, a * one + b * other, np.sqrt(square), variance

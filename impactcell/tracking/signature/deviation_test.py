@@ -34,16 +34,16 @@ from impactcell.tracking.signature.reference import Reference
 
 COMPONENTS = 3  # principal components of T^2
 KINDS = ("t_squared", "spe", *matched_filter_scan.FAMILIES)
-SHARES = (0.02, 0.02, 0.08, 0.08, 0.42, 0.38)
-LEAST_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
-INVISIBLE = 1e-9  # components smaller than this against the noise
-SMALLEST = 1e-300  # p-value
-RARE = 0.01  # p-value below which a shape is sized: no cell may be set to more false alarms
-LARGEST = 0.5  # shapes that even half of the friction would not show are not looked for
+FALSE_ALARM_SHARES = (0.02, 0.02, 0.08, 0.08, 0.42, 0.38)
+MIN_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
+MIN_COMPONENT_SIZE = 1e-9  # components smaller than this against the noise
+MIN_P_VALUE = 1e-300  # p-value
+SIZED_P_VALUE = 0.01  # p-value below which a shape is sized: no cell may be set to more false alarms
+MAX_RELATIVE_SIZE = 0.5  # shapes that even half of the friction would not show are not looked for
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class DeviationTest:
     """How normal a cycle is.
 
     Attributes
@@ -59,7 +59,7 @@ class Verdict:
         Where the cycle deviates most.
     size, size_std : float
         Friction of the likeliest family of shapes, and its standard deviation, by `sizing`; nan where the
-        p-value is not below `RARE`. A cycle that T^2 or SPE says most of is sized as a bump.
+        p-value is not below `SIZED_P_VALUE`. A cycle that T^2 or SPE says most of is sized as a bump.
     """
 
     p_value: float
@@ -72,12 +72,14 @@ class Verdict:
     size_std: float
 
 
-def judge(reference: Reference, slide: friction_profile.Information, grid_m: Samples) -> Verdict:
+def test_deviation(
+    reference: Reference, slide: friction_profile.SplineInformation, grid_m: Samples
+) -> DeviationTest:
     """Test one cycle against its material's reference."""
     cycles = float(reference.variation.cycles)
-    looked = deviation_shapes.shapes(float(grid_m[-1]), len(grid_m))
+    looked = deviation_shapes.deviation_shapes(float(grid_m[-1]), len(grid_m))
     rows, across, waves = looked.within(slide.reached_m, len(slide.vector))
-    t_squared, spe, freedom, scale, p_scan, centre, least, wider, P, u = _tested(
+    t_squared, spe, freedom, scale, p_scan, centre, least, wider, P, u = _statistics(
         reference.matrix,
         reference.strength,
         reference.mean,
@@ -96,19 +98,19 @@ def judge(reference: Reference, slide: friction_profile.Information, grid_m: Sam
         waves,
     )
     chi_squared = float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0
-    p_values = (_hotelling(t_squared, int(cycles)), chi_squared, *p_scan.tolist())
-    odds = [share / max(p, SMALLEST) for share, p in zip(SHARES, p_values, strict=True)]
+    p_values = (_hotelling_p_value(t_squared, int(cycles)), chi_squared, *p_scan.tolist())
+    odds = [share / max(p, MIN_P_VALUE) for share, p in zip(FALSE_ALARM_SHARES, p_values, strict=True)]
     most = odds.index(max(odds))
     at = float(grid_m[centre]) if centre >= 0 else math.nan
     p_value, size, std = 1.0 / sum(odds), math.nan, math.nan
-    if p_value < RARE:
+    if p_value < SIZED_P_VALUE:
         family = most - 2 if most >= 2 else deviation_size.BUMP
-        size, std = deviation_size.sized(family, P, u, grid_m, slide.reached_m, least, wider)
-    return Verdict(p_value, t_squared, spe, freedom, KINDS[most], at, size, std)
+        size, std = deviation_size.estimate_size(family, P, u, grid_m, slide.reached_m, least, wider)
+    return DeviationTest(p_value, t_squared, spe, freedom, KINDS[most], at, size, std)
 
 
 @compiled
-def _tested(
+def _statistics(
     pooled: Samples,
     strength: float,
     mean: Samples,
@@ -127,31 +129,31 @@ def _tested(
     waves: int,
 ) -> tuple[float, float, int, float, Samples, int, float, float, Samples, Samples]:
     """T^2, SPE, its freedom and the scale of the noise, what `scan.scan` finds, and what it was told."""
-    n = min(seen, references.judged(met, varied, weight, cycles))
-    known, own = references.deviating(matrix, vector, mean, n, seen)
-    G, y = references.unsure(known, own, pooled, strength)
-    C = small_linalg.part(components, 0, n, 0, MODES)
-    t_squared, spe, freedom = _squares(G, y, C, COMPONENTS)
+    n = min(seen, references.judged_coefficients(met, varied, weight, cycles))
+    known, own = references.information_on_deviation(matrix, vector, mean, n, seen)
+    G, y = references.with_mean_error(known, own, pooled, strength)
+    C = small_linalg.block(components, 0, n, 0, MODES)
+    t_squared, spe, freedom = _t_squared_and_spe(G, y, C, COMPONENTS)
     # variation beyond the modes, or noise that was declared too low, widens everything once it is certain
     usual_spe = spe_sum / spe_count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * spe_count))
     scale = max(1.0, usual_spe)
-    P, u = small_linalg.varied(C, G, y)
-    least = 30.0 / (LARGEST * references.usual(mean, n)) ** 2
-    shown, wider = small_linalg.part(rows, 0, len(rows), 0, n), scale * (1.0 + 2.0 * MODES / cycles)
+    P, u = small_linalg.with_random_effects(C, G, y)
+    least = 30.0 / (MAX_RELATIVE_SIZE * references.mean_friction(mean, n)) ** 2
+    shown, wider = small_linalg.block(rows, 0, len(rows), 0, n), scale * (1.0 + 2.0 * MODES / cycles)
     p_values, centre = matched_filter_scan.scan(shown, P, u, C, across, waves, least, wider, cycles)
     return t_squared, spe, freedom, scale, p_values, centre, least, wider, P, u
 
 
 @compiled
-def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, float, int]:
+def _t_squared_and_spe(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, float, int]:
     """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom.
 
     Whitened by a Cholesky factor that takes the best known direction next and ends where nothing is known.
     """
     n, k = C.shape
     # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
-    left, rest = small_linalg.varied(small_linalg.part(C, 0, n, leading, k), G, y)
-    image = small_linalg.product(left, small_linalg.part(C, 0, n, 0, leading))
+    left, rest = small_linalg.with_random_effects(small_linalg.block(C, 0, n, leading, k), G, y)
+    image = small_linalg.transposed_product(left, small_linalg.block(C, 0, n, 0, leading))
     whitened, inside, column = np.zeros(n), np.zeros((n, leading)), np.empty(n)
     freedom, whole = 0, 0.0
     for k in range(n):
@@ -159,7 +161,7 @@ def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, f
         for i in range(n):
             if left[i, i] > left[best, best]:
                 best = i
-        if left[best, best] < LEAST_INFORMATION:
+        if left[best, best] < MIN_INFORMATION:
             break
         root = math.sqrt(left[best, best])
         whitened[k] = rest[best] / root
@@ -175,13 +177,13 @@ def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, f
                 image[i, j] -= column[i] * inside[k, j]
         whole += whitened[k] ** 2
         freedom += 1
-    gram = small_linalg.product(inside, inside)
+    gram = small_linalg.transposed_product(inside, inside)
     along, sizes = np.zeros(leading), np.empty(leading)
     for a in range(leading):
         sizes[a] = math.sqrt(gram[a, a])
         for k in range(n):
             along[a] += inside[k, a] * whitened[k]
-    if freedom <= leading or sizes.min() < INVISIBLE:
+    if freedom <= leading or sizes.min() < MIN_COMPONENT_SIZE:
         return 0.0, whole, freedom
     for a in range(leading):
         along[a] /= sizes[a]
@@ -193,14 +195,14 @@ def _squares(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, f
             for c in range(leading):
                 spread[a, b] += gram[a, c] * sizes[c] ** 2 * gram[c, b]
     t_squared, left_over = 0.0, whole
-    seen, noise = small_linalg.solved(spread, along), small_linalg.solved(gram, along)
+    seen, noise = small_linalg.solve(spread, along), small_linalg.solve(gram, along)
     for a in range(leading):
         t_squared += along[a] * seen[a]
         left_over -= along[a] * noise[a]
     return t_squared, max(left_over, 0.0), freedom - leading
 
 
-def _hotelling(t_squared: float, cycles: int) -> float:
+def _hotelling_p_value(t_squared: float, cycles: int) -> float:
     """p-value of T^2 when the components were learned from `cycles` cycles."""
     n, k = cycles, COMPONENTS
     if n <= k + 1:

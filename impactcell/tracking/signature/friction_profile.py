@@ -23,16 +23,18 @@ import numpy as np
 from impactcell.numerics import small_linalg
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
-from impactcell.tracking.signature.slide_segment import Slide
+from impactcell.tracking.signature.slide_segment import SlideSegment
 
 Acceleration = Callable[[Samples], Samples]
 
-FINE_STEPS = 300  # of the double integral over a slide, at least
-STRENGTHS = np.logspace(-9.0, 9.0, 37)  # of the smoothing searched, over that which weighs like the data
+MIN_INTEGRATION_STEPS = 300  # of the double integral over a slide, at least
+SMOOTHING_STRENGTHS = np.logspace(
+    -9.0, 9.0, 37
+)  # of the smoothing searched, over that which weighs like the data
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Information:
+class SplineInformation:
     """What one slide says of the spline coefficients.
 
     Attributes
@@ -52,12 +54,12 @@ class Information:
 
 
 def information(
-    slide: Slide,
+    slide: SlideSegment,
     grid_m: Samples,
     gravity_m_s2: float,
     viscous_per_mass: float = 0.0,
     acceleration: Acceleration | None = None,
-) -> Information:
+) -> SplineInformation:
     """Turn a slide into information on the coefficients of the cubic B-splines of a uniform grid.
 
     Parameters
@@ -70,14 +72,16 @@ def information(
         Speeds along the tap, m/s, to the acceleration along it, m/s², that the model knows beside friction
         and k_v.
     """
-    moved_m = np.zeros(len(slide.time_s)) if acceleration is None else _moved(slide, acceleration)
+    moved_m = (
+        np.zeros(len(slide.time_s)) if acceleration is None else _known_displacement(slide, acceleration)
+    )
     seen = _information(
         slide.time_s, slide.distance_m, moved_m, slide.variance, grid_m, gravity_m_s2, viscous_per_mass
     )
-    return Information(*seen)
+    return SplineInformation(*seen)
 
 
-def _moved(slide: Slide, acceleration: Acceleration) -> Samples:
+def _known_displacement(slide: SlideSegment, acceleration: Acceleration) -> Samples:
     """Distance that an acceleration makes in the time of a slide, which passes a parabola's speeds or so."""
     t, span = slide.time_s, slide.time_s[-1]
     cubic = np.polynomial.Polynomial.fit(t, slide.distance_m, 3, domain=[0.0, span], window=[0.0, 1.0])
@@ -119,19 +123,23 @@ def roughness(coefficients: int) -> Samples:
     return penalty
 
 
-def smooth(seen: Information, grid_m: Samples) -> tuple[Samples, float]:
+def smooth(seen: SplineInformation, grid_m: Samples) -> tuple[Samples, float]:
     """Posterior mean of the coefficients seen under exp(-lambda/2 beta' D beta), and the likeliest lambda.
 
     lambda is weighted by its restricted likelihood. Coefficients beyond follow the last ones in a straight
     line, at no penalty, so that they may be left out.
     """
-    mean, strength, _, _ = _smoothed(seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, STRENGTHS)
+    mean, strength, _, _ = _smoothed(
+        seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, SMOOTHING_STRENGTHS
+    )
     return mean, strength
 
 
-def friction(seen: Information, grid_m: Samples) -> tuple[Samples, Samples]:
+def friction(seen: SplineInformation, grid_m: Samples) -> tuple[Samples, Samples]:
     """Friction and its standard deviation on the grid, by `smooth`; nan where the part did not get."""
-    _, _, value, std = _smoothed(seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, STRENGTHS)
+    _, _, value, std = _smoothed(
+        seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, SMOOTHING_STRENGTHS
+    )
     return value, std
 
 
@@ -140,7 +148,7 @@ def _smoothed(
     matrix: Samples, vector: Samples, n: int, reached: float, grid: Samples, strengths: Samples
 ) -> tuple[Samples, float, Samples, Samples]:
     """Mean and strength of `smooth`, and what `friction` gives."""
-    rough, within, trace = roughness(n), small_linalg.part(matrix, 0, n, 0, n), 0.0
+    rough, within, trace = roughness(n), small_linalg.block(matrix, 0, n, 0, n), 0.0
     for i in range(n):
         trace += within[i, i]
     scale = trace / (6.0 * (n - 2))  # of D the trace is 6 (n - 2)
@@ -149,10 +157,10 @@ def _smoothed(
             rough[i, j] *= scale
             within[i, j] += rough[i, j]
     # both matrices diagonal at once: base = L L', scale D = L Q diag(e) Q' L', matrix has 1 - e
-    lower = small_linalg.factor(within)
-    half = small_linalg.forward(lower, rough)
-    share, axes = np.linalg.eigh(small_linalg.forward(lower, half.T.copy()))
-    vectors = small_linalg.backward(lower, axes)
+    lower = small_linalg.cholesky(within)
+    half = small_linalg.solve_lower(lower, rough)
+    share, axes = np.linalg.eigh(small_linalg.solve_lower(lower, half.T.copy()))
+    vectors = small_linalg.solve_upper(lower, axes)
     many = len(strengths)
     inner, means, inverse = np.zeros(n), np.empty((n, many)), np.empty((n, many))
     fit, determinant = (n - 2) * np.log(strengths), np.ones(many)
@@ -208,12 +216,12 @@ def _information(
     gravity: float,
     viscous_per_mass: float,
 ) -> tuple[Samples, Samples, float, int]:
-    """Fields of `Information`."""
+    """Fields of `SplineInformation`."""
     points, first = len(grid), grid[0]
     spacing = grid[1] - first
     columns = _columns(t, x, first, spacing, points, gravity, viscous_per_mass)
     columns[:, -1] -= moved
-    _project(t, columns)
+    _remove_line(t, columns)
     seen = columns.shape[1] - 1
     products = columns.T @ columns
     matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
@@ -241,7 +249,7 @@ def _columns(
     columns = np.empty((n, seen + 1))
     speed, place = np.zeros(seen), np.zeros(seen)
     before, now = np.empty(4), np.empty(4)
-    parts = max(1, FINE_STEPS // n)
+    parts = max(1, MIN_INTEGRATION_STEPS // n)
     travelled = 0.0
     cell = _splines(x[0], first, spacing, points, before)
     for k in range(n):
@@ -281,7 +289,7 @@ def _splines(x: float, first: float, spacing: float, points: int, out: Samples) 
 
 
 @compiled
-def _project(t: Samples, columns: Samples) -> None:
+def _remove_line(t: Samples, columns: Samples) -> None:
     """Take mean and slope over time out of every column, in place."""
     n, width = columns.shape
     centre, square = t.mean(), 0.0

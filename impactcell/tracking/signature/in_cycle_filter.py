@@ -16,7 +16,7 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
-CONVERGED = 1e-12  # relative change of the gain a sample, held for as many samples as follow
+GAIN_TOLERANCE = 1e-12  # relative change of the gain a sample, held for as many samples as follow
 STEADY_SAMPLES = 50
 
 
@@ -49,7 +49,7 @@ class InCycleFilter:
     steady: int = 0
 
 
-def start(
+def initial_state(
     interval_s: float,
     position_std: float,
     density: float,
@@ -81,7 +81,7 @@ def process_noise(interval_s: float, density: float) -> Samples:
     )
 
 
-def filter_block(state: InCycleFilter, position_m: Samples) -> tuple[InCycleFilter, Samples]:
+def update(state: InCycleFilter, position_m: Samples) -> tuple[InCycleFilter, Samples]:
     """Filter one block of samples.
 
     Parameters
@@ -144,7 +144,7 @@ def _filter(
         s = p00 + variance
         k0, k1, k2 = p00 / s, p01 / s, p02 / s
         change = max(abs(k0 - gain[0]) / k0, abs(k1 - gain[1]) / abs(k1), abs(k2 - gain[2]) / abs(k2))
-        steady = steady + 1 if change < CONVERGED else 0
+        steady = steady + 1 if change < GAIN_TOLERANCE else 0
         gain[0], gain[1], gain[2] = k0, k1, k2
         # 1 - k0 = variance / s, written so that nothing cancels
         left = variance / s

@@ -61,29 +61,33 @@ def scan(
     level, tilt = len(rows) - 2, len(rows) - 1
     bumps = level - 2 * waves
     p_values = np.empty(4)
-    p_values[0] = _one(score[level], known[level], _dot(along[level], along[level]), least, scale, cycles)
+    p_values[0] = _single_p_value(
+        score[level], known[level], _dot(along[level], along[level]), least, scale, cycles
+    )
     # slope about the point where it does not depend on the level, so that the two are looked for apart
     turn = _dot(rows[tilt], image[level]) / known[level]
     about, left, varied = score[tilt] - turn * score[level], known[tilt] - turn**2 * known[level], 0.0
     for k in range(along.shape[1]):
         varied += (along[tilt, k] - turn * along[level, k]) ** 2
-    p_values[1] = _one(about, left, varied, least, scale, cycles)
+    p_values[1] = _single_p_value(about, left, varied, least, scale, cycles)
     p_values[2], row = _largest_bump(rows, image, along, score, known, bumps, across, least, scale, cycles)
     p_values[3] = _largest_ripple(rows, image, along, score, bumps, level, least, scale, cycles)
     return p_values, row % across if row >= 0 else -1
 
 
 @compiled
-def _one(score: float, known: float, varied: float, least: float, scale: float, cycles: float) -> float:
+def _single_p_value(
+    score: float, known: float, varied: float, least: float, scale: float, cycles: float
+) -> float:
     """Find the p-value of a single shape, of either sign; 1 where it cannot be seen."""
     if known < least:
         return 1.0
-    z = _normal(score**2 / (known * scale), varied / known, cycles)
+    z = _normal_score(score**2 / (known * scale), varied / known, cycles)
     return math.erfc(z / math.sqrt(2.0))
 
 
 @compiled
-def _normal(squared: float, learned_share: float, cycles: float) -> float:
+def _normal_score(squared: float, learned_share: float, cycles: float) -> float:
     """Make the square of a score, a share of whose variance was learned, into a normal score as rare.
 
     Student's t with nu = cycles / share^2 degrees of freedom (Satterthwaite 1946, Biometrics Bulletin 2:110),
@@ -123,12 +127,12 @@ def _largest_bump(
     for i in range(bumps):
         if known[i] >= least:
             share, squared = _dot(along[i], along[i]) / known[i], score[i] ** 2 / (known[i] * scale)
-            c = max(c, _normal(squared, share, cycles))
+            c = max(c, _normal_score(squared, share, cycles))
             if best < 0 or squared > most:
                 best, most = i, squared
     if best < 0:
         return 1.0, -1
-    euler, edge, area = _surface(rows, image, known, least, centres, bumps // centres)
+    euler, edge, area = _euler_edge_area(rows, image, known, least, centres, bumps // centres)
     high = math.exp(-0.5 * c * c)
     tail = euler * 0.5 * math.erfc(c / math.sqrt(2.0)) + edge * high / (2.0 * math.pi)
     tail += area * c * high / (2.0 * math.pi) ** 1.5
@@ -136,7 +140,7 @@ def _largest_bump(
 
 
 @compiled
-def _surface(
+def _euler_edge_area(
     rows: Samples, image: Samples, known: Samples, least: float, across: int, down: int
 ) -> tuple[float, float, float]:
     """Euler characteristic, half the edge and area of the triangulated surface of visible shapes."""
@@ -160,13 +164,13 @@ def _surface(
     for i in range(down - 1):
         for k in range(across - 1):
             a = i * across + k
-            upper = _triangle(length[0, a], length[1, a], length[2, a])
+            upper = _triangle_area(length[0, a], length[1, a], length[2, a])
             if upper == upper:
                 euler, area = euler + 1.0, area + upper
                 beside[0, a] += 1.0
                 beside[1, a] += 1.0
                 beside[2, a] += 1.0
-            lower = _triangle(length[0, a + across], length[1, a + 1], length[2, a])
+            lower = _triangle_area(length[0, a + across], length[1, a + 1], length[2, a])
             if lower == lower:
                 euler, area = euler + 1.0, area + lower
                 beside[0, a + across] += 1.0
@@ -180,7 +184,7 @@ def _surface(
 
 
 @compiled
-def _triangle(a: float, b: float, c: float) -> float:
+def _triangle_area(a: float, b: float, c: float) -> float:
     """Area from the sides (Heron); nan if one is missing."""
     half = (a + b + c) / 2.0
     inside = half * (half - a) * (half - b) * (half - c)
@@ -215,9 +219,9 @@ def _largest_ripple(
         squared, varied = score[i] * a + score[j] * b, 0.0
         for k in range(along.shape[1]):
             varied += (a * along[i, k] + b * along[j, k]) ** 2
-        c = max(c, _normal(max(squared, 0.0) / scale, varied / max(squared, 1e-300), cycles))
+        c = max(c, _normal_score(max(squared, 0.0) / scale, varied / max(squared, 1e-300), cycles))
         if before == i - 2:
-            area += 2.0 * math.pi * _between(rows, image, i - 2, i)
+            area += 2.0 * math.pi * _angle_between_planes(rows, image, i - 2, i)
         before = i
     if c < 0.0:
         return 1.0
@@ -227,7 +231,7 @@ def _largest_ripple(
 
 
 @compiled
-def _between(rows: Samples, image: Samples, one: int, other: int) -> float:
+def _angle_between_planes(rows: Samples, image: Samples, one: int, other: int) -> float:
     """Root mean square angle between the planes that two waves span with their cosines and sines."""
     shared = 0.0
     a, b = math.sqrt(_dot(rows[one], image[one])), _dot(rows[one], image[one + 1])

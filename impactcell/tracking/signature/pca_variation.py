@@ -31,8 +31,8 @@ from impactcell.records import Samples
 
 MODES = 6
 PAIRS = MODES * (MODES + 1) // 2
-FIRST_SPREAD = 0.05  # of the friction itself: how much cycles vary before anything is known
-RIDGE = 0.5  # cycles' worth of weight on no variation at all, where nothing was seen
+INITIAL_RELATIVE_STD = 0.05  # of the friction itself: how much cycles vary before anything is known
+RIDGE_CYCLES = 0.5  # cycles' worth of weight on no variation at all, where nothing was seen
 
 Sums = tuple[Samples, Samples, Samples, Samples]
 """Of `Variation`: weights, moments, seen, noise."""
@@ -64,16 +64,16 @@ class Variation:
     noise: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
 
 
-def guess(friction: float) -> Variation:
+def initial_guess(friction: float) -> Variation:
     """Before the first cycle, from the friction's own size."""
-    scale = FIRST_SPREAD * abs(friction) / np.arange(1.0, MODES + 1.0)
+    scale = INITIAL_RELATIVE_STD * abs(friction) / np.arange(1.0, MODES + 1.0)
     fresh = Variation(scale=scale)
-    _add(np.eye(MODES), np.zeros((MODES, MODES)), RIDGE, fresh.weights, fresh.moments)
+    _add_to_sums(np.eye(MODES), np.zeros((MODES, MODES)), RIDGE_CYCLES, fresh.weights, fresh.moments)
     return fresh
 
 
 @compiled
-def taken(
+def update_sums(
     B: Samples,
     matrix: Samples,
     vector: Samples,
@@ -94,8 +94,8 @@ def taken(
     weight : float
         Cycles that m rests on.
     """
-    B = small_linalg.part(B, 0, len(vector), 0, MODES)
-    K = small_linalg.product(small_linalg.product(matrix, B), B)
+    B = small_linalg.block(B, 0, len(vector), 0, MODES)
+    K = small_linalg.transposed_product(small_linalg.transposed_product(matrix, B), B)
     along = np.zeros((MODES, 1))
     for i in range(len(vector)):
         for k in range(MODES):
@@ -105,9 +105,9 @@ def taken(
         lost[i, i] += 1.0
     T = small_linalg.inverse(lost)
     r, W, TKT = (
-        small_linalg.product(T, along),
-        small_linalg.product(T, K),
-        small_linalg.product(T, small_linalg.product(K, T)),
+        small_linalg.transposed_product(T, along),
+        small_linalg.transposed_product(T, K),
+        small_linalg.transposed_product(T, small_linalg.transposed_product(K, T)),
     )
     share = weight / (weight + 1.0)
     weights, moments = weights.copy(), moments.copy()
@@ -115,21 +115,30 @@ def taken(
         for k in range(MODES):
             W[i, k] = W[k, i] = (W[i, k] + W[k, i]) / 2.0
             TKT[i, k] = share * r[i, 0] * r[k, 0] - TKT[i, k]
-    TW = small_linalg.product(T, W)
-    _add(W, TKT, 1.0, weights, moments)
-    return weights, moments, seen + small_linalg.product(W, W), noise + small_linalg.product(TW, TW)
+    TW = small_linalg.transposed_product(T, W)
+    _add_to_sums(W, TKT, 1.0, weights, moments)
+    return (
+        weights,
+        moments,
+        seen + small_linalg.transposed_product(W, W),
+        noise + small_linalg.transposed_product(TW, TW),
+    )
 
 
 @compiled
-def spread(weights: Samples, moments: Samples, seen: Samples, noise: Samples, cycles: int) -> Samples:
+def covariance(weights: Samples, moments: Samples, seen: Samples, noise: Samples, cycles: int) -> Samples:
     """Lambda, shape (6, 6)."""
-    found, upper, p = np.empty((MODES, MODES)), small_linalg.solved(small_linalg.square(weights), moments), 0
+    found, upper, p = (
+        np.empty((MODES, MODES)),
+        small_linalg.solve(small_linalg.unpack_triangle(weights), moments),
+        0,
+    )
     for i in range(MODES):
         for j in range(i, MODES):
             found[i, j] = found[j, i] = upper[p]
             p += 1
-    half = small_linalg.forward(small_linalg.factor(noise), seen)
-    squares, turned = np.linalg.eigh(small_linalg.product(half, half))
+    half = small_linalg.solve_lower(small_linalg.cholesky(noise), seen)
+    squares, turned = np.linalg.eigh(small_linalg.transposed_product(half, half))
     each, lost = np.eye(MODES) / cycles, np.eye(MODES)
     for k in range(MODES):
         known = math.sqrt(max(squares[k], 0.0))
@@ -139,14 +148,16 @@ def spread(weights: Samples, moments: Samples, seen: Samples, noise: Samples, cy
                 each[i, j] += both / math.sqrt(cycles)
                 lost[i, j] += both / math.sqrt(2.0)
     # in units of the noise of one cycle
-    root = small_linalg.factor(each)
-    values, vectors = np.linalg.eigh(small_linalg.product(small_linalg.product(found, root), root))
+    root = small_linalg.cholesky(each)
+    values, vectors = np.linalg.eigh(
+        small_linalg.transposed_product(small_linalg.transposed_product(found, root), root)
+    )
     # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
     edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0
     for k in range(MODES):
         for i in range(MODES):
             vectors[i, k] *= math.sqrt(values[k]) if values[k] > edge else 0.0
-    back = small_linalg.backward(root, vectors)
+    back = small_linalg.solve_upper(root, vectors)
     # noise in n cycles hides a variance of sqrt(2 / n) of its own
     whole = small_linalg.inverse(lost)
     for i in range(MODES):
@@ -179,7 +190,7 @@ def cosines(coefficients: int) -> Samples:
 
 
 @compiled
-def _add(W: Samples, seen: Samples, share: float, weights: Samples, moments: Samples) -> None:
+def _add_to_sums(W: Samples, seen: Samples, share: float, weights: Samples, moments: Samples) -> None:
     """Add tr(E_p W E_q W) and tr(E_p seen) to the sums."""
     n = len(W)
     p = at = 0

@@ -19,12 +19,16 @@ from impactcell.tracking.signature import friction_profile, pca_variation
 from impactcell.tracking.signature.pca_variation import MODES, Variation
 
 MEMORY = 300.0  # cycles the mean remembers
-SMOOTHED_AT = (0.0, 4.0, 16.0, 64.0)  # weights at which the mean's smoothing is settled anew
-FEWEST = 8.0  # cycles that have met a place before the mean is known there
-FEWEST_VARIED = 25.0  # cycles from which variation was learned at a place before cycles are judged there
-CONTINUES = 0.15  # of the friction itself: its steps from coefficient to coefficient where it is unknown
-LEAST = 1e-3  # friction below this is none
-VAGUE = 1.0  # information on each coefficient beforehand: friction is known to about 1
+SMOOTHING_WEIGHTS = (0.0, 4.0, 16.0, 64.0)  # weights at which the mean's smoothing is settled anew
+MIN_CYCLES = 8.0  # cycles that have met a place before the mean is known there
+MIN_VARIATION_CYCLES = (
+    25.0  # cycles from which variation was learned at a place before cycles are judged there
+)
+RELATIVE_CONTINUATION_STEP = (
+    0.15  # of the friction itself: its steps from coefficient to coefficient where it is unknown
+)
+MIN_FRICTION = 1e-3  # friction below this is none
+PRIOR_INFORMATION = 1.0  # information on each coefficient beforehand: friction is known to about 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +69,7 @@ class Reference:
     spe_count: int = 0
 
 
-def empty(coefficients: int) -> Reference:
+def initial_state(coefficients: int) -> Reference:
     """Before the first cycle."""
     triangle, line = np.zeros(coefficients * (coefficients + 1) // 2), np.zeros(coefficients)
     components = np.zeros((coefficients, MODES))
@@ -79,49 +83,51 @@ def restart(reference: Reference) -> Reference:
 
 
 @compiled
-def reach(met: Samples, weight: float) -> int:
+def known_coefficients(met: Samples, weight: float) -> int:
     """Coefficients, from the first on, that enough cycles have met for the mean to be known there."""
     n = 0
     for cycles in met:
-        n += 1 if cycles >= min(weight, FEWEST) else 0
+        n += 1 if cycles >= min(weight, MIN_CYCLES) else 0
     return n
 
 
 @compiled
-def judged(met: Samples, varied: Samples, weight: float, cycles: float) -> int:
+def judged_coefficients(met: Samples, varied: Samples, weight: float, cycles: float) -> int:
     """Coefficients, from the first on, where cycles can be judged: mean and variation are known."""
     n = 0
     for learned in varied:
-        n += 1 if learned >= min(cycles, FEWEST_VARIED) else 0
-    return min(reach(met, weight), n)
+        n += 1 if learned >= min(cycles, MIN_VARIATION_CYCLES) else 0
+    return min(known_coefficients(met, weight), n)
 
 
 @compiled
-def usual(mean: Samples, n: int) -> float:
+def mean_friction(mean: Samples, n: int) -> float:
     """Friction of the material over its first n coefficients."""
     total = 0.0
     for i in range(n):
         total += mean[i]
-    return max(abs(total / n), LEAST)
+    return max(abs(total / n), MIN_FRICTION)
 
 
 @compiled
-def deviating(matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int) -> tuple[Samples, Samples]:
+def information_on_deviation(
+    matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int
+) -> tuple[Samples, Samples]:
     """Leave of a cycle what it says of its first n coefficients, of `seen`: information, and h - G m.
 
-    Friction beyond is no better known than that it goes on from where it was, in steps of a share `CONTINUES`
-    of itself: a longer slide tells neither deviance nor how cycles vary.
+    Friction beyond is no better known than that it goes on from where it was, in steps of
+    `RELATIVE_CONTINUATION_STEP` of itself: a longer slide tells neither deviance nor how cycles vary.
     """
     own = np.empty(seen)
     for i in range(seen):
         own[i] = vector[i]
         for j in range(seen):
             own[i] -= matrix[i, j] * mean[j]
-    known = small_linalg.part(matrix, 0, n, 0, n)
+    known = small_linalg.block(matrix, 0, n, 0, n)
     if seen <= n:
         return known, own
-    continues = 1.0 / (CONTINUES * usual(mean, n)) ** 2
-    inner, cross = small_linalg.part(matrix, n, seen, n, seen), small_linalg.part(matrix, n, seen, 0, n)
+    continues = 1.0 / (RELATIVE_CONTINUATION_STEP * mean_friction(mean, n)) ** 2
+    inner, cross = small_linalg.block(matrix, n, seen, n, seen), small_linalg.block(matrix, n, seen, 0, n)
     known[n - 1, n - 1] += continues
     cross[0, n - 1] -= continues
     for i in range(seen - n):
@@ -130,39 +136,41 @@ def deviating(matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int
             inner[i - 1, i - 1] += continues
             inner[i, i - 1] -= continues
             inner[i - 1, i] -= continues
-    return small_linalg.marginal(known, own[:n], inner, cross, own[n:])
+    return small_linalg.marginalise(known, own[:n], inner, cross, own[n:])
 
 
 @compiled
-def unsure(matrix: Samples, vector: Samples, pooled: Samples, strength: float) -> tuple[Samples, Samples]:
+def with_mean_error(
+    matrix: Samples, vector: Samples, pooled: Samples, strength: float
+) -> tuple[Samples, Samples]:
     """Information (G^-1 + V)^-1 and its vector, V the covariance of the mean's error."""
     precise = precision(pooled, strength)
     n, j = len(vector), len(precise)
-    beyond, cross = small_linalg.part(precise, n, j, n, j), small_linalg.part(precise, n, j, 0, n)
-    known, _ = small_linalg.marginal(
-        small_linalg.part(precise, 0, n, 0, n), vector, beyond, cross, np.zeros(j - n)
+    beyond, cross = small_linalg.block(precise, n, j, n, j), small_linalg.block(precise, n, j, 0, n)
+    known, _ = small_linalg.marginalise(
+        small_linalg.block(precise, 0, n, 0, n), vector, beyond, cross, np.zeros(j - n)
     )
     for i in range(n):
         for k in range(n):
             known[i, k] += matrix[i, k]
-    return small_linalg.marginal(matrix, vector, known, matrix, vector)
+    return small_linalg.marginalise(matrix, vector, known, matrix, vector)
 
 
 @compiled
 def precision(pooled: Samples, strength: float) -> Samples:
     """Inverse covariance of the mean's coefficients from their pooled information, shape (j, j)."""
-    matrix = small_linalg.square(pooled)
+    matrix = small_linalg.unpack_triangle(pooled)
     rough = friction_profile.roughness(len(matrix))
     for i in range(len(matrix)):
-        matrix[i, i] += VAGUE
+        matrix[i, i] += PRIOR_INFORMATION
         for j in range(len(matrix)):
             matrix[i, j] += strength * rough[i, j]
     return matrix
 
 
-def learn(
+def update(
     reference: Reference,
-    slide: friction_profile.Information,
+    slide: friction_profile.SplineInformation,
     grid_m: Samples,
     settled: float,
     spe: float | None = None,
@@ -181,10 +189,10 @@ def learn(
     varies = reference.weight >= settled
     if not varies and reference.weight == 0.0 and known.cycles == 0:
         first, _ = friction_profile.smooth(slide, grid_m)
-        known = pca_variation.guess(float(np.median(first)))
+        known = pca_variation.initial_guess(float(np.median(first)))
         components = pca_variation.components(np.eye(MODES), pca_variation.cosines(total) * known.scale)
     cycles = known.cycles + 1 if varies else known.cycles
-    matrix, vector, mean, components, met, varied, sums = _learned(
+    matrix, vector, mean, components, met, varied, sums = _update_arrays(
         reference.matrix,
         reference.vector,
         reference.mean,
@@ -202,10 +210,12 @@ def learn(
         slide.seen,
         varies,
     )
-    if reference.weight in SMOOTHED_AT:
-        pooled = friction_profile.Information(small_linalg.square(matrix), vector, slide.reached_m, total)
+    if reference.weight in SMOOTHING_WEIGHTS:
+        pooled = friction_profile.SplineInformation(
+            small_linalg.unpack_triangle(matrix), vector, slide.reached_m, total
+        )
         _, strength = friction_profile.smooth(pooled, grid_m)
-        mean = small_linalg.solved(precision(matrix, strength), vector)
+        mean = small_linalg.solve(precision(matrix, strength), vector)
     return Reference(
         min(reference.weight + 1.0, MEMORY),
         matrix,
@@ -222,7 +232,7 @@ def learn(
 
 
 @compiled
-def _learned(
+def _update_arrays(
     pooled: Samples,
     summed: Samples,
     mean: Samples,
@@ -243,18 +253,20 @@ def _learned(
     """All that a reference keeps with one cycle more, which says less of the mean the more cycles vary."""
     met, varied, pooled, summed = met.copy(), varied.copy(), pooled.copy(), summed.copy()
     if varies:
-        n, B = min(reach(met, weight), seen), cosines.copy()
+        n, B = min(known_coefficients(met, weight), seen), cosines.copy()
         for i in range(len(B)):
             for k in range(MODES):
                 B[i, k] *= scale[k]
-        known, own = deviating(matrix, vector, mean, n, seen)
-        sums = pca_variation.taken(B, known, own, weight, *sums)
-        components = pca_variation.components(pca_variation.spread(*sums, cycles), B)
+        known, own = information_on_deviation(matrix, vector, mean, n, seen)
+        sums = pca_variation.update_sums(B, known, own, weight, *sums)
+        components = pca_variation.components(pca_variation.covariance(*sums, cycles), B)
         for i in range(min(n, seen - 1)):
             varied[i] += 1.0
     kept = 1.0 - 1.0 / MEMORY if weight >= MEMORY else 1.0
-    vary = small_linalg.part(components, 0, seen, 0, MODES)
-    left, rest = small_linalg.varied(vary, small_linalg.part(matrix, 0, seen, 0, seen), vector[:seen])
+    vary = small_linalg.block(components, 0, seen, 0, MODES)
+    left, rest = small_linalg.with_random_effects(
+        vary, small_linalg.block(matrix, 0, seen, 0, seen), vector[:seen]
+    )
     p = 0
     for i in range(len(summed)):
         met[i] = met[i] * kept + (1.0 if i < seen - 1 else 0.0)
@@ -262,5 +274,5 @@ def _learned(
         for j in range(i + 1):
             pooled[p] = pooled[p] * kept + (left[i, j] if i < seen else 0.0)
             p += 1
-    mean = small_linalg.solved(precision(pooled, strength), summed)
+    mean = small_linalg.solve(precision(pooled, strength), summed)
     return pooled, summed, mean, components, met, varied, sums

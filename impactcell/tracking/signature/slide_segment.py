@@ -8,11 +8,11 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Capture, Channel, Samples
 
-BLOCKS = (
+MAX_BLOCKS = (
     200  # a slide is averaged down to about so many block means; a ~ g curves a block by less than its noise
 )
 REST_MARGIN_M = 2e-6  # the last micrometres before rest are left out: there the stop is not yet certain
-FEWEST_SAMPLES = 12
+MIN_SAMPLES = 12
 
 
 class NoSlideError(ValueError):
@@ -20,7 +20,7 @@ class NoSlideError(ValueError):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slide:
+class SlideSegment:
     """Block means of one free slide.
 
     Attributes
@@ -38,7 +38,7 @@ class Slide:
     variance: float
 
 
-def find_slide(capture: Capture, separation_s: float | None = None) -> Slide:
+def extract_segment(capture: Capture, separation_s: float | None = None) -> SlideSegment:
     """Cut the free slide out of a capture.
 
     Parameters
@@ -57,16 +57,16 @@ def find_slide(capture: Capture, separation_s: float | None = None) -> Slide:
     start = _separation(capture) if separation_s is None else separation_s
     time, position = _contiguous(channel)
     noise = channel.noise_std or _noise(time, position, start)
-    finite, usable, size, t, x = _cut(time, position, float(capture.direction), start, noise)
-    if finite < FEWEST_SAMPLES:
+    finite, usable, size, t, x = _average_slide(time, position, float(capture.direction), start, noise)
+    if finite < MIN_SAMPLES:
         raise NoSlideError(f"the position channel has {finite} usable samples")
-    if usable < FEWEST_SAMPLES:
+    if usable < MIN_SAMPLES:
         raise NoSlideError(f"{usable} position samples after loss of contact")
     if not noise > 0.0:
         raise NoSlideError("the position is constant")
     if size == 0:
         raise NoSlideError("the part did not slide")
-    return Slide(t, x, noise**2 / size)
+    return SlideSegment(t, x, noise**2 / size)
 
 
 def _contiguous(channel: Channel) -> tuple[Samples, Samples]:
@@ -84,11 +84,11 @@ def _separation(capture: Capture) -> float:
         times = None if capture.position is None else capture.position.time_s
         return 0.0 if times is None or len(times) == 0 else float(times[0])
     time, values = _contiguous(force)
-    return _last_touch(time, values, force.noise_std or 0.0)
+    return _last_contact(time, values, force.noise_std or 0.0)
 
 
 @compiled
-def _last_touch(time: Samples, values: Samples, noise: float) -> float:
+def _last_contact(time: Samples, values: Samples, noise: float) -> float:
     """Time just after the last sample at which the force is not noise; the first without any."""
     n = len(values)
     largest, few = 0.0, min(max(3, n // 10), n)
@@ -112,14 +112,14 @@ def _last_touch(time: Samples, values: Samples, noise: float) -> float:
 def _noise(time: Samples, values: Samples, start: float) -> float:
     """Find the standard deviation of white noise from third differences, which the motion hardly moves."""
     usable = np.isfinite(values) & np.isfinite(time) & (time >= start)
-    if np.count_nonzero(usable) < FEWEST_SAMPLES:
+    if np.count_nonzero(usable) < MIN_SAMPLES:
         return 0.0
     third = np.diff(values[usable], 3)
     return float(np.median(np.abs(third))) / 0.6745 / math.sqrt(20.0)
 
 
 @compiled
-def _cut(
+def _average_slide(
     time: Samples, values: Samples, direction: float, start: float, noise: float
 ) -> tuple[int, int, int, Samples, Samples]:
     """Cut out the samples from `start` on to just before rest, and average them in blocks.
@@ -140,7 +140,7 @@ def _cut(
             if time[k] >= start:
                 t[usable], x[usable] = time[k], values[k] * direction
                 usable += 1
-    if usable < FEWEST_SAMPLES or not noise > 0.0:
+    if usable < MIN_SAMPLES or not noise > 0.0:
         return finite, usable, 0, t[:0], x[:0]
     few = max(3, usable // 50)
     # the first sample close to the end, for a later one may fall back by noise; a record that is cut before
@@ -151,9 +151,9 @@ def _cut(
     limit = end - max(REST_MARGIN_M, 4.0 * noise)
     while x[last] < limit:
         last += 1
-    if last < FEWEST_SAMPLES:
+    if last < MIN_SAMPLES:
         return finite, usable, 0, t[:0], x[:0]
-    size = max(1, last // BLOCKS)
+    size = max(1, last // MAX_BLOCKS)
     n = last // size
     for k in range(n):
         first, total, way = k * size, 0.0, 0.0

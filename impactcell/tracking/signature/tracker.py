@@ -10,10 +10,10 @@ from impactcell.records import Capture, Evidence, Quality, Samples, Signature
 from impactcell.tracking.signature import deviation_test, friction_profile
 from impactcell.tracking.signature import reference as references
 from impactcell.tracking.signature.reference import Reference
-from impactcell.tracking.signature.slide_segment import NoSlideError, find_slide
+from impactcell.tracking.signature.slide_segment import NoSlideError, extract_segment
 
-FEWEST_OF_MATERIAL = 5  # cycles of a new material before its cycles are judged
-GIVEN_UP = 10  # deviant cycles in a row that are rather another material
+MIN_MATERIAL_CYCLES = 5  # cycles of a new material before its cycles are judged
+MAX_DEVIANT_RUN = 10  # deviant cycles in a row that are rather another material
 
 
 @lru_cache(maxsize=64)
@@ -65,7 +65,7 @@ class SignatureState:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SignatureTracked:
+class SignatureResult:
     """Outcome of one capture.
 
     Attributes
@@ -84,7 +84,7 @@ class SignatureTracked:
 
 def initial_state(settings: SignatureSettings) -> SignatureState:
     """State before the first capture."""
-    return SignatureState(references.empty(settings.points + 2))
+    return SignatureState(references.initial_state(settings.points + 2))
 
 
 def update(
@@ -99,7 +99,7 @@ def update(
     acceleration: friction_profile.Acceleration | None = None,
     gravity_m_s2: float = 9.81,
     period_s: float = math.nan,
-) -> SignatureTracked:
+) -> SignatureResult:
     """Take one capture into the state.
 
     Parameters
@@ -123,22 +123,22 @@ def update(
         state = replace(state, batch_id=batch_id)
     grid = settings.grid_m
     try:
-        slide = find_slide(capture, separation_s)
+        slide = extract_segment(capture, separation_s)
     except NoSlideError as error:
         nothing = np.full(settings.points, math.nan)
         signature = Signature(grid, nothing, nothing, math.nan, math.nan, math.nan, Quality.BAD, str(error))
-        return SignatureTracked(state, signature, None, judged=False)
+        return SignatureResult(state, signature, None, judged=False)
     seen = friction_profile.information(slide, grid, gravity_m_s2, viscous_per_mass, acceleration)
     friction, std = friction_profile.friction(seen, grid)
     known = state.reference
-    if known.variation.cycles < settings.learned_cycles or known.weight < FEWEST_OF_MATERIAL:
+    if known.variation.cycles < settings.learned_cycles or known.weight < MIN_MATERIAL_CYCLES:
         left = settings.learned_cycles - known.variation.cycles
         left += int(max(settings.settled - known.weight, 0.0)) if left > 0 else 0
-        left = max(left, FEWEST_OF_MATERIAL - int(known.weight))
+        left = max(left, MIN_MATERIAL_CYCLES - int(known.weight))
         reason = f"the reference is being learned, {left} more cycles"
         signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
-        return SignatureTracked(learned(state, seen, settings, None), signature, None, judged=False)
-    verdict = deviation_test.judge(known, seen, grid)
+        return SignatureResult(update_reference(state, seen, settings, None), signature, None, judged=False)
+    verdict = deviation_test.test_deviation(known, seen, grid)
     limit = 1.0 / settings.false_alarm_cycles
     deviant = verdict.p_value < limit
     signature = Signature(
@@ -151,32 +151,34 @@ def update(
         Quality.GOOD,
     )
     evidence = _evidence(settings, verdict, capture.cycle, period_s) if deviant else None
-    return SignatureTracked(learned(state, seen, settings, verdict), signature, evidence, judged=True)
+    return SignatureResult(update_reference(state, seen, settings, verdict), signature, evidence, judged=True)
 
 
-def learned(
+def update_reference(
     state: SignatureState,
-    seen: friction_profile.Information,
+    seen: friction_profile.SplineInformation,
     settings: SignatureSettings,
-    verdict: deviation_test.Verdict | None,
+    verdict: deviation_test.DeviationTest | None,
 ) -> SignatureState:
     """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
     if verdict is None:
-        fresh = references.learn(state.reference, seen, settings.grid_m, settings.settled)
+        fresh = references.update(state.reference, seen, settings.grid_m, settings.settled)
         return SignatureState(fresh, state.batch_id)
     if verdict.p_value < 1.0 / settings.false_alarm_cycles:
         run = state.deviant_run + 1
-        if run < GIVEN_UP:
+        if run < MAX_DEVIANT_RUN:
             return SignatureState(state.reference, state.batch_id, run)
-        fresh = references.learn(references.restart(state.reference), seen, settings.grid_m, settings.settled)
+        fresh = references.update(
+            references.restart(state.reference), seen, settings.grid_m, settings.settled
+        )
         return SignatureState(fresh, state.batch_id)
     spe = verdict.spe / verdict.spe_freedom if verdict.spe_freedom > 0 else None
-    fresh = references.learn(state.reference, seen, settings.grid_m, settings.settled, spe)
+    fresh = references.update(state.reference, seen, settings.grid_m, settings.settled, spe)
     return SignatureState(fresh, state.batch_id)
 
 
 def _evidence(
-    settings: SignatureSettings, verdict: deviation_test.Verdict, cycle: int, period_s: float
+    settings: SignatureSettings, verdict: deviation_test.DeviationTest, cycle: int, period_s: float
 ) -> Evidence:
     """Statistic and threshold as -log10 of p-values."""
     rarity = -math.log10(max(verdict.p_value, 1e-300))

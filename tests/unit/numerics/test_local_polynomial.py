@@ -9,17 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from impactcell.numerics.local_polynomial import (
+    channel_statistics,
+    fit_polynomial,
     mean,
     median,
     middle_second_difference,
-    polynomial,
     running_mean,
-    spread,
-    survey,
     value_at,
+    value_std,
     widest_cubic,
 )
-from impactcell.prediction.block_averaging import blocks
+from impactcell.prediction.block_averaging import average_blocks
 from impactcell.records import Channel
 
 
@@ -37,19 +37,19 @@ def test_a_polynomial_is_that_of_least_squares(
     u = np.sort(rng.uniform(-1.0, 1.0, count))
     u[0], u[-1] = -1.0, 1.0
     values = 1e3 + rng.normal(size=count) + 5.0 * u**2
-    fitted, factor, squares = polynomial(origin + scale * u, values, origin, scale, degree)
+    fitted, factor, squares = fit_polynomial(origin + scale * u, values, origin, scale, degree)
     basis = np.vander(u, degree + 1, increasing=True)
     expected, residual, *_ = np.linalg.lstsq(basis, values)
     assert fitted == pytest.approx(expected, rel=1e-6, abs=1e-6)
     assert squares == pytest.approx(float(residual[0]), rel=1e-6)
     covariance = np.linalg.inv(basis.T @ basis)
     at = 0.3 ** np.arange(degree + 1)
-    assert spread(factor, 0.3) == pytest.approx(math.sqrt(at @ covariance @ at), rel=1e-6)
+    assert value_std(factor, 0.3) == pytest.approx(math.sqrt(at @ covariance @ at), rel=1e-6)
     assert value_at(fitted, 0.3) == pytest.approx(float(expected @ at), rel=1e-9)
 
 
 def test_samples_at_one_time_determine_no_polynomial() -> None:
-    fitted, _, _ = polynomial(np.zeros(9), np.arange(9.0), 0.0, 1.0, 2)
+    fitted, _, _ = fit_polynomial(np.zeros(9), np.arange(9.0), 0.0, 1.0, 2)
     assert not np.isfinite(fitted).all()
 
 
@@ -64,15 +64,15 @@ def test_a_running_mean_is_that_of_the_values_about_each(count: int, width: int,
 
 def test_a_survey_counts_what_is_wrong() -> None:
     times, values = np.array([0.0, 1.0, 1.0, 3.0]), np.array([2.0, -5.0, math.nan, 7.0])
-    assert survey(times, values)[:4] == (1, False, -5.0, 7.0)
-    assert survey(times[:2], values[:2])[:4] == (0, True, -5.0, 2.0)
+    assert channel_statistics(times, values)[:4] == (1, False, -5.0, 7.0)
+    assert channel_statistics(times[:2], values[:2])[:4] == (0, True, -5.0, 2.0)
 
 
 @given(st.lists(st.integers(0, 3), min_size=1, max_size=30))
 def test_a_plateau_is_the_longest_run_at_the_highest(values: list[int]) -> None:
     highest = max(values)
     runs = [len(list(run)) for value, run in groupby(values) if value == highest]
-    assert survey(np.arange(30.0), np.array(values, dtype=float))[3:] == (highest, max(runs))
+    assert channel_statistics(np.arange(30.0), np.array(values, dtype=float))[3:] == (highest, max(runs))
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30))
@@ -99,7 +99,7 @@ def test_scatter_and_means_of_blocks_hold_all_squares() -> None:
     rng = np.random.default_rng(8)
     times = np.cumsum(rng.uniform(0.2, 1.8, 500)) * 1e-5
     values = 1e3 + 2e4 * times + rng.normal(0.0, 0.3, 500)
-    made = blocks(Channel(times, values, 0.3), 2e-4, 2e-5, [])
+    made = average_blocks(Channel(times, values, 0.3), 2e-4, 2e-5, [])
     line = 990.0 + 1.5e4 * made.time_s
     direct = float(np.square((values - 990.0 - 1.5e4 * times) / 0.3).sum())
     between = float(np.square((made.values - line) / made.std).sum())

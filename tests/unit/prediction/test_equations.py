@@ -8,50 +8,50 @@ import pytest
 
 from impactcell.errors import NegativeRootError, PredictionError
 from impactcell.physics import Plant, Strike
-from impactcell.prediction import Model, Prior, calibrate, printed
-from impactcell.prediction.calibration import Regime, predictor, regimes, spans
+from impactcell.prediction import Model, Prior, calibrate, printed_predictor
+from impactcell.prediction.calibration import Regime, fit_predictor, regimes, velocity_spans
 from impactcell.prediction.equations import (
     beyond_calibration,
     by_distance,
     by_force,
     combined,
-    distance,
     force_weight,
-    mix,
+    interpolate_mass,
     out_of_range,
+    sliding_distance,
 )
-from impactcell.prediction.feature_extraction import Reading
+from impactcell.prediction.feature_extraction import MeasuredFeature
 from impactcell.records import Quality
 from tests.taps import VISCOUS, Tap
 
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects=VISCOUS)
 PRIOR = Prior(6500.0, 9.3, 0.0228)
-PRINTED = Model("printed", PLANT, PRIOR, (printed(),))
+PRINTED = Model("printed", PLANT, PRIOR, (printed_predictor(),))
 FRICTIONS = np.linspace(0.15, 0.25, 9)
 
 
 def test_the_printed_equations_are_the_printed_numbers() -> None:
-    v, peak, slid = 4000.0, 250.0, 3500.0  # mm/min, N, µm
-    mixed = mix(PRINTED, 18.9, v / 6e4)
-    force = by_force(PRINTED, mixed, v / 6e4, Reading(peak, 0.1))
+    v, peak, slide = 4000.0, 250.0, 3500.0  # mm/min, N, µm
+    mixed = interpolate_mass(PRINTED, 18.9, v / 6e4)
+    force = by_force(PRINTED, mixed, v / 6e4, MeasuredFeature(peak, 0.1))
     assert force.value == pytest.approx((peak - 0.0529 * v) / 146.2, rel=1e-12)
-    from_distance = by_distance(PRINTED, mixed, v / 6e4, Reading(slid * 1e-6, 1e-6))
-    root = math.sqrt((slid - 0.00041 * v**1.8997) / (0.07379 * v**1.6428))
+    from_distance = by_distance(PRINTED, mixed, v / 6e4, MeasuredFeature(slide * 1e-6, 1e-6))
+    root = math.sqrt((slide - 0.00041 * v**1.8997) / (0.07379 * v**1.6428))
     assert from_distance.value == pytest.approx(0.3415 - root, rel=1e-9)
 
 
 def test_equation_6_weighs_by_gradients_and_spans() -> None:
     v = 4500 / 6e4
-    mixed = mix(PRINTED, 18.9, v)
+    mixed = interpolate_mass(PRINTED, 18.9, v)
 
-    def slid(mu: float) -> float:
+    def slide(mu: float) -> float:
         return 0.07379 * 4500**1.6428 * (0.3415 - mu) ** 2 + 0.00041 * 4500**1.8997
 
     slope_d = 2 * 0.07379 * 4500**1.6428 * (0.3415 - 0.2)
-    span_ratio = 146.2 * 0.1 / (slid(0.15) - slid(0.25))
+    span_ratio = 146.2 * 0.1 / (slide(0.15) - slide(0.25))
     assert force_weight(mixed, 0.2, v) == pytest.approx(146.2 / (146.2 + slope_d * span_ratio), rel=1e-6)
-    peak = Reading(146.2 * 0.19 + 0.0529 * 4500, 0.1)
-    length = Reading(slid(0.21) * 1e-6, 1e-6)
+    peak = MeasuredFeature(146.2 * 0.19 + 0.0529 * 4500, 0.1)
+    length = MeasuredFeature(slide(0.21) * 1e-6, 1e-6)
     one, two = by_force(PRINTED, mixed, v, peak), by_distance(PRINTED, mixed, v, length)
     both = combined(PRINTED, mixed, v, (one, peak), (two, length))
     weight = force_weight(mixed, 0.2, v)
@@ -60,15 +60,15 @@ def test_equation_6_weighs_by_gradients_and_spans() -> None:
 
 def test_the_printed_coefficients_come_back_out_of_the_reference_plant() -> None:
     tap = Strike(0.1, 18.9, halts_at_separation=True)
-    found = predictor(PLANT, tap, np.linspace(0.05, 0.1, 9), FRICTIONS)
-    given = printed()
+    found = fit_predictor(PLANT, tap, np.linspace(0.05, 0.1, 9), FRICTIONS)
+    given = printed_predictor()
     mu, v = np.meshgrid(FRICTIONS, np.linspace(0.05, 0.1, 9))
     force = (found.force.friction_n * mu + found.force.velocity_n_s_per_m * v) / (
         given.force.friction_n * mu + given.force.velocity_n_s_per_m * v
     )
-    slid = distance(found.distance, mu, v) / distance(given.distance, mu, v)
+    slide = sliding_distance(found.distance, mu, v) / sliding_distance(given.distance, mu, v)
     assert np.abs(force - 1.0).max() < 0.006
-    assert np.abs(slid - 1.0).max() < 0.02
+    assert np.abs(slide - 1.0).max() < 0.02
 
 
 @pytest.mark.parametrize("stroke_m", [math.inf, 1.5e-3])
@@ -81,19 +81,19 @@ def test_calibrated_equations_invert_the_simulators_taps(stroke_m: float) -> Non
         for velocity in (0.055, 0.07, 0.095):
             for mu in (0.16, 0.2, 0.24):
                 motion = Tap(velocity, mu, mass_kg=mass, stroke_m=stroke_m).motion()
-                mixed = mix(model, mass, velocity)
-                force = by_force(model, mixed, velocity, Reading(motion.peak_force_n, 0.0))
-                slid = by_distance(model, mixed, velocity, Reading(motion.sliding_distance_m, 0.0))
+                mixed = interpolate_mass(model, mass, velocity)
+                force = by_force(model, mixed, velocity, MeasuredFeature(motion.peak_force_n, 0.0))
+                slide = by_distance(model, mixed, velocity, MeasuredFeature(motion.sliding_distance_m, 0.0))
                 assert force.value == pytest.approx(mu, rel=most)
-                assert slid.value == pytest.approx(mu, rel=2 * most)
+                assert slide.value == pytest.approx(mu, rel=2 * most)
                 assert force.std > 0.0
-                assert slid.std > 0.0
+                assert slide.std > 0.0
 
 
 def test_the_standard_deviations_follow_what_is_not_known() -> None:
     tap = Strike(0.1, 18.9, halts_at_separation=True)
     model = Model("m", PLANT, PRIOR, calibrate(PLANT, tap, [18.9], np.linspace(0.05, 0.1, 9), FRICTIONS))
-    mixed = mix(model, 18.9, 0.08)
+    mixed = interpolate_mass(model, 18.9, 0.08)
     rng = np.random.default_rng(1)
     pulls = []
     for _ in range(60):
@@ -102,10 +102,13 @@ def test_the_standard_deviations_follow_what_is_not_known() -> None:
             stiffness=6.5e5 * (1 + 0.01 * rng.normal()), damping=465 * (1 + 0.02 * rng.normal()),
         )  # fmt: skip
         motion = tap_made.motion()
-        peak, slid = Reading(motion.peak_force_n, 0.05), Reading(motion.sliding_distance_m, 1e-6)
+        peak, slide = (
+            MeasuredFeature(motion.peak_force_n, 0.05),
+            MeasuredFeature(motion.sliding_distance_m, 1e-6),
+        )
         one = by_force(model, mixed, tap_made.velocity_m_s, peak)
-        two = by_distance(model, mixed, tap_made.velocity_m_s, slid)
-        three = combined(model, mixed, tap_made.velocity_m_s, (one, peak), (two, slid))
+        two = by_distance(model, mixed, tap_made.velocity_m_s, slide)
+        three = combined(model, mixed, tap_made.velocity_m_s, (one, peak), (two, slide))
         pulls.append([(given.value - tap_made.mu_s) / given.std for given in (one, two, three)])
     spread = np.std(pulls, axis=0)
     assert (spread > 0.6).all()
@@ -113,13 +116,13 @@ def test_the_standard_deviations_follow_what_is_not_known() -> None:
 
 
 def test_a_negative_root_and_a_frictionless_part_are_named() -> None:
-    mixed = mix(PRINTED, 18.9, 0.08)
+    mixed = interpolate_mass(PRINTED, 18.9, 0.08)
     with pytest.raises(NegativeRootError, match=r"no|below .* the shortest"):
-        by_distance(PRINTED, mixed, 0.08, Reading(1e-4, 1e-6))
+        by_distance(PRINTED, mixed, 0.08, MeasuredFeature(1e-4, 1e-6))
     with pytest.raises(PredictionError, match="without friction"):
-        by_distance(PRINTED, mixed, 0.08, Reading(1.0, 1e-6))
+        by_distance(PRINTED, mixed, 0.08, MeasuredFeature(1.0, 1e-6))
     with pytest.raises(PredictionError, match="without friction"):
-        by_force(PRINTED, mixed, 0.08, Reading(10.0, 0.1))
+        by_force(PRINTED, mixed, 0.08, MeasuredFeature(10.0, 0.1))
 
 
 @pytest.mark.parametrize(
@@ -135,15 +138,15 @@ def test_a_negative_root_and_a_frictionless_part_are_named() -> None:
 def test_a_tap_outside_the_calibration_is_told_why(
     mass: float, velocity: float, mu: float, stroke: float, reason: str
 ) -> None:
-    assert out_of_range(PRINTED, mix(PRINTED, mass, velocity), velocity, mu, stroke) == reason
+    assert out_of_range(PRINTED, interpolate_mass(PRINTED, mass, velocity), velocity, mu, stroke) == reason
     if "stroke" not in reason:
         capture = replace(Tap().capture(), mass_kg=mass, velocity_m_s=velocity)
         assert bool(beyond_calibration(PRINTED, capture, mu)) == bool(reason)
 
 
 def test_a_value_outside_the_calibrated_friction_is_uncertain() -> None:
-    mixed = mix(PRINTED, 18.9, 0.08)
-    found = by_force(PRINTED, mixed, 0.08, Reading(146.2 * 0.28 + 0.0529 * 4800, 0.1))
+    mixed = interpolate_mass(PRINTED, 18.9, 0.08)
+    found = by_force(PRINTED, mixed, 0.08, MeasuredFeature(146.2 * 0.28 + 0.0529 * 4800, 0.1))
     assert found.quality is Quality.UNCERTAIN
     assert "outside the calibrated" in found.reason
 
@@ -151,12 +154,12 @@ def test_a_value_outside_the_calibrated_friction_is_uncertain() -> None:
 @pytest.mark.parametrize(("mass", "velocity"), [(math.nan, 0.08), (0.0, 0.08), (18.9, math.nan)])
 def test_an_unknown_mass_or_velocity_is_named(mass: float, velocity: float) -> None:
     with pytest.raises(PredictionError, match="is not known"):
-        mix(PRINTED, mass, velocity)
+        interpolate_mass(PRINTED, mass, velocity)
 
 
 def test_a_model_without_predictors_says_how_to_get_them() -> None:
     with pytest.raises(PredictionError, match="impactcell calibrate"):
-        mix(replace(PRINTED, predictors=()), 18.9, 0.08)
+        interpolate_mass(replace(PRINTED, predictors=()), 18.9, 0.08)
 
 
 def test_regimes_are_those_of_the_simulators_taps() -> None:
@@ -167,7 +170,7 @@ def test_regimes_are_those_of_the_simulators_taps() -> None:
         motion = Tap(velocity, mass_kg=25.2, stroke_m=1.5e-3).motion()
         halted = 1.5e-3 / velocity < motion.separation_s
         assert regime in (Regime.EITHER, Regime.HALTED if halted else Regime.CLEAN)
-    ranges = spans(found, velocities)
+    ranges = velocity_spans(found, velocities)
     assert ranges[0][0] == velocities[0]
     assert ranges[-1][1] == velocities[-1]
 

@@ -16,14 +16,14 @@ from impactcell.errors import (
     PredictionError,
 )
 from impactcell.prediction.feature_extraction import (
-    checked,
+    check_channel,
+    check_if_usable,
     displacement,
     loss_of_contact,
     noise_std,
     peak_force,
-    sensed,
 )
-from impactcell.prediction.slide_features import slide
+from impactcell.prediction.slide_features import extract_slide
 from impactcell.records import Channel
 from tests.taps import Tap
 
@@ -60,7 +60,7 @@ def test_the_peak_is_unbiased_where_the_raw_maximum_is_not(tap: Tap, rate_hz: fl
 def test_sliding_distance_and_loss_of_contact_are_those_of_the_motion(tap: Tap) -> None:
     rng = np.random.default_rng(2)
     motion = tap.motion()
-    found = [slide(tap.capture(rng)) for _ in range(20)]
+    found = [extract_slide(tap.capture(rng)) for _ in range(20)]
     distances = np.array([one.distance.value for one in found])
     assert abs(distances.mean() - motion.sliding_distance_m) < 1e-6
     assert distances.std() < 3e-6
@@ -73,13 +73,13 @@ def test_the_last_of_two_contacts_counts() -> None:
     tap = Tap(2000 / 6e4, stroke_m=5e-3)
     motion = tap.motion()
     assert [event.kind for event in motion.events].count("separation") > 1
-    found = slide(tap.capture(np.random.default_rng(3)))
+    found = extract_slide(tap.capture(np.random.default_rng(3)))
     assert found.separation_s == pytest.approx(motion.separation_s, abs=1e-4)
     assert found.distance.value == pytest.approx(motion.sliding_distance_m, abs=1e-5)
 
 
 def test_the_deceleration_of_a_slide_without_viscous_friction_is_mu_k_g() -> None:
-    found = slide(Tap(0.08, effects={}).capture(np.random.default_rng(4)))
+    found = extract_slide(Tap(0.08, effects={}).capture(np.random.default_rng(4)))
     assert found.deceleration.value == pytest.approx(0.152 * 9.81, rel=1e-3)
 
 
@@ -119,7 +119,7 @@ def channel(values: object) -> Channel:
 )
 def test_channels_nothing_can_be_read_from_are_named(given: Channel | None, message: str) -> None:
     with pytest.raises(CaptureError, match=message):
-        checked(given, "force")
+        check_channel(given, "force")
 
 
 def test_a_force_without_contact_is_named() -> None:
@@ -147,18 +147,22 @@ def test_a_record_that_ends_in_contact_or_in_motion_is_named() -> None:
     assert position is not None
     short = Channel(force.time_s[:100], force.values[:100], 0.4)
     with pytest.raises(NoSeparationError, match="when its record ended"):
-        slide(replace(capture, force=short))
+        extract_slide(replace(capture, force=short))
     with pytest.raises(NoStopError, match="still moving"):
-        slide(replace(capture, position=Channel(position.time_s[:300], position.values[:300], 1.5e-6)))
+        extract_slide(
+            replace(capture, position=Channel(position.time_s[:300], position.values[:300], 1.5e-6))
+        )
     with pytest.raises(NoSeparationError):
-        slide(replace(capture, position=Channel(position.time_s[:150], position.values[:150], 1.5e-6)))
+        extract_slide(
+            replace(capture, position=Channel(position.time_s[:150], position.values[:150], 1.5e-6))
+        )
 
 
 def test_a_part_that_does_not_move_is_named() -> None:
     capture = Tap().capture(np.random.default_rng(10))
     still = channel(np.random.default_rng(11).normal(0.0, 1.5e-6, 600))
     with pytest.raises(NoBreakawayError, match="moved less than"):
-        slide(replace(capture, position=replace(still, noise_std=1.5e-6)))
+        extract_slide(replace(capture, position=replace(still, noise_std=1.5e-6)))
 
 
 def test_any_part_of_a_capture_is_read_or_refused_by_name() -> None:
@@ -173,7 +177,7 @@ def test_any_part_of_a_capture_is_read_or_refused_by_name() -> None:
             )
             try:
                 peak_force(force)
-                found = slide(replace(capture, force=force, position=position))
+                found = extract_slide(replace(capture, force=force, position=position))
             except (PredictionError, PhysicsError):
                 continue
             assert math.isfinite(found.distance.value)
@@ -195,7 +199,7 @@ def test_a_channel_whose_noise_was_found_before_is_read_alike(known_n: float | N
         values=force.values + np.random.default_rng(3).normal(0.0, 0.4, len(force.values)),
         noise_std=known_n,
     )
-    once = sensed(noisy, "force")
+    once = check_if_usable(noisy, "force")
     assert once is not None
     assert noise_std(once) == noise_std(noisy)
     assert peak_force(once) == peak_force(noisy)
@@ -205,5 +209,5 @@ def test_a_channel_whose_noise_was_found_before_is_read_alike(known_n: float | N
 def test_a_channel_that_cannot_be_used_is_still_refused_after_its_noise_was_asked_for() -> None:
     flat = Channel(np.arange(20) * 1e-3, np.ones(20))
     with pytest.raises(CaptureError, match="constant"):
-        checked(sensed(flat, "force"), "force")
-    assert sensed(None, "force") is None
+        check_channel(check_if_usable(flat, "force"), "force")
+    assert check_if_usable(None, "force") is None

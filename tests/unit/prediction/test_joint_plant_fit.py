@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from impactcell.errors import PredictionError
-from impactcell.prediction.joint_plant_fit import contact_constants, fit_plant, weigh
-from impactcell.prediction.slide_features import slide
+from impactcell.prediction.joint_plant_fit import contact_constants, estimate_mass, fit_plant
+from impactcell.prediction.slide_features import extract_slide
 from impactcell.records import Capture
 from tests.taps import Tap
 
@@ -52,11 +52,11 @@ def test_a_law_that_the_model_lacks_bends_it_little_and_is_seen() -> None:
 def test_contact_constants_and_mass_need_no_law_of_friction() -> None:
     for effects in ({}, DRAG):
         for capture in campaign(3, effects)[4:]:
-            read = slide(capture)
+            read = extract_slide(capture)
             stiffness, damping = contact_constants(capture, read)
             assert stiffness == pytest.approx(7.1e5, rel=0.01)
             assert damping == pytest.approx(520.0, rel=0.05)
-            assert weigh(capture, read) == pytest.approx(capture.mass_kg, rel=0.03)
+            assert estimate_mass(capture, read) == pytest.approx(capture.mass_kg, rel=0.03)
 
 
 def test_bad_shots_are_left_out_and_a_campaign_of_them_is_refused() -> None:

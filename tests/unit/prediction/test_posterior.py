@@ -7,14 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.prediction.block_averaging import blocks
-from impactcell.prediction.phase_reweighting import doubt
-from impactcell.prediction.posterior import Side, mixture
+from impactcell.prediction.block_averaging import average_blocks
+from impactcell.prediction.phase_reweighting import std_factors
+from impactcell.prediction.posterior import TruncatedGaussian, mixture
 from impactcell.records import Channel
 
 FORM, OFFSET = np.array([1.0, -1.0]), 0.3
-ABOVE = Side(np.array([0.2, 0.4]), np.array([[1.0, 0.3], [0.3, 0.5]]), 0.0, float(np.log(0.41)), 1)
-BELOW = Side(np.array([-0.5, 0.1]), np.array([[0.6, -0.2], [-0.2, 0.4]]), 0.2, float(np.log(0.2)), -1)
+ABOVE = TruncatedGaussian(
+    np.array([0.2, 0.4]), np.array([[1.0, 0.3], [0.3, 0.5]]), 0.0, float(np.log(0.41)), 1
+)
+BELOW = TruncatedGaussian(
+    np.array([-0.5, 0.1]), np.array([[0.6, -0.2], [-0.2, 0.4]]), 0.2, float(np.log(0.2)), -1
+)
 
 
 @pytest.mark.parametrize("of", [np.array([0.7, 0.9]), np.array([1.0, 0.0]), np.array([1.0, -1.0])])
@@ -39,14 +43,14 @@ def test_moments_and_intervals_are_those_of_samples(of: np.ndarray) -> None:
 
 
 def test_a_side_far_beyond_its_end_is_squeezed_against_it() -> None:
-    far = Side(np.array([-30.0, 0.0]), np.eye(2), 0.0, 0.0, 1)
+    far = TruncatedGaussian(np.array([-30.0, 0.0]), np.eye(2), 0.0, 0.0, 1)
     mean, std = mixture((far,), FORM, 0.0).moments(FORM)
     assert 0.0 < mean < 0.1
     assert 0.0 < std < 0.1
 
 
 def test_one_whole_gaussian_is_itself() -> None:
-    whole = Side(ABOVE.mean, ABOVE.covariance, 0.0, ABOVE.log_volume, 0)
+    whole = TruncatedGaussian(ABOVE.mean, ABOVE.covariance, 0.0, ABOVE.log_volume, 0)
     of = np.array([1.0, 1.0])
     mean, std = mixture((whole,), FORM, OFFSET).moments(of)
     assert (mean, std) == pytest.approx((0.6, np.sqrt(2.1)))
@@ -67,7 +71,7 @@ def test_blocks_hold_every_sample_once(
     rng = np.random.default_rng(count)
     times = np.cumsum(rng.uniform(0.2, 1.8, count)) / rate
     channel = Channel(times, rng.normal(size=count), 1.0)
-    made = blocks(channel, 1e-4, 1e-5, [(a, a + width) for a, width in fine], [edge])
+    made = average_blocks(channel, 1e-4, 1e-5, [(a, a + width) for a, width in fine], [edge])
     sizes = np.round(made.std**-2.0).astype(int)
     assert sizes.sum() == count
     assert sizes @ made.values == pytest.approx(channel.values.sum(), abs=1e-9)
@@ -82,8 +86,8 @@ def test_doubt_leaves_noise_alone_and_widens_what_is_missed() -> None:
     rng = np.random.default_rng(2)
     phase = np.repeat(np.arange(4), 50)
     residual = rng.normal(size=200)
-    assert (doubt(residual, phase) == 1.0).all()
+    assert (std_factors(residual, phase) == 1.0).all()
     residual[50:100] += 3.0
-    factor = doubt(residual, phase)
+    factor = std_factors(residual, phase)
     assert (factor[50:100] > 15.0).all()
     assert (np.delete(factor, slice(50, 100)) == 1.0).all()

@@ -11,7 +11,7 @@ from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError
 from impactcell.physics import Plant, strike
 from impactcell.prediction import Model, Prior
 from impactcell.prediction.feature_extraction import noise_std
-from impactcell.prediction.linearised_model import commanded, with_parameters
+from impactcell.prediction.linearised_model import tap_input, with_parameters
 from impactcell.prediction.waveform import fit
 from impactcell.records import Channel
 from tests.taps import VISCOUS, Tap
@@ -132,7 +132,7 @@ def test_noise_above_what_the_sensors_state_widens_the_standard_deviation() -> N
 def test_the_gap_is_that_of_every_sample(stroke_m: float) -> None:
     capture = Tap(2500 / 6e4, 0.2, stroke_m=stroke_m).capture(np.random.default_rng(7), force_hz=1e5)
     found = fit(capture, MODEL)
-    motion = strike(with_parameters(MODEL.plant, found.theta), commanded(capture))
+    motion = strike(with_parameters(MODEL.plant, found.theta), tap_input(capture))
     squares = []
     for channel, name in ((capture.force, "force_n"), (capture.position, "position_m")):
         assert channel is not None

@@ -63,7 +63,7 @@ def drawn(name, score, seed):
         * (1.0 if family == deviation_size.RIPPLE else rng.choice([-1.0, 1.0]))
     )
     u = P @ s * true + math.sqrt(SCALE) * ROOT @ rng.normal(size=25)
-    return (*deviation_size.sized(family, P, u, GRID, LENGTH_M, 10.0, SCALE), true)
+    return (*deviation_size.estimate_size(family, P, u, GRID, LENGTH_M, 10.0, SCALE), true)
 
 
 @pytest.mark.parametrize("score", [7.0, 20.0, 60.0])
@@ -79,13 +79,13 @@ def test_size_is_off_by_as_much_as_its_standard_deviation_says(name, score):
 
 def test_what_cannot_be_seen_has_no_size():
     for family in range(4):
-        assert deviation_size.sized(family, P, P[0], GRID, LENGTH_M, 1e12, 1.0) == (0.0, math.inf)
+        assert deviation_size.estimate_size(family, P, P[0], GRID, LENGTH_M, 1e12, 1.0) == (0.0, math.inf)
 
 
 def test_a_short_slide_shows_the_size_of_a_bump_on_its_way():
     seen = TO_COEFFICIENTS.T[:, :17]
     s = (0.05 * bell((GRID - 1e-3) / 0.3e-3)) @ seen
     short = P[:17, :17]
-    size, std = deviation_size.sized(deviation_size.BUMP, short, short @ s, GRID, 1.7e-3, 10.0, 1.0)
+    size, std = deviation_size.estimate_size(deviation_size.BUMP, short, short @ s, GRID, 1.7e-3, 10.0, 1.0)
     assert size == pytest.approx(0.05, rel=0.02)
     assert 0.0 < std < 0.005

@@ -19,7 +19,7 @@ def slide(rate, n, seed=0):
 def test_equals_filterpy(rate, density):
     n, T = 4000, 1.0 / rate
     z = slide(rate, n)
-    _, ours = in_cycle_filter.filter_block(in_cycle_filter.start(T, 0.42e-6, density), z)
+    _, ours = in_cycle_filter.update(in_cycle_filter.initial_state(T, 0.42e-6, density), z)
     oracle = KalmanFilter(3, 1)
     oracle.F = np.array([[1.0, T, T * T / 2.0], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
     oracle.H = np.array([[1.0, 0.0, 0.0]])
@@ -39,17 +39,17 @@ def test_equals_filterpy(rate, density):
 @given(st.lists(st.integers(1, 4000), max_size=8))
 def test_blocks_make_no_difference(cuts):
     z = slide(1e5, 4000)
-    whole, expected = in_cycle_filter.filter_block(in_cycle_filter.start(1e-5, 0.42e-6, 1e3), z)
-    state, parts = in_cycle_filter.start(1e-5, 0.42e-6, 1e3), []
+    whole, expected = in_cycle_filter.update(in_cycle_filter.initial_state(1e-5, 0.42e-6, 1e3), z)
+    state, parts = in_cycle_filter.initial_state(1e-5, 0.42e-6, 1e3), []
     for part in np.split(z, sorted(set(cuts))):
-        state, filtered = in_cycle_filter.filter_block(state, part)
+        state, filtered = in_cycle_filter.update(state, part)
         parts.append(filtered)
     assert np.concatenate(parts).tobytes() == expected.tobytes()
     assert json_text.dumps(state) == json_text.dumps(whole)
 
 
 def test_the_gain_becomes_constant():
-    state, _ = in_cycle_filter.filter_block(in_cycle_filter.start(1e-5, 0.42e-6, 1e3), slide(1e5, 3000))
+    state, _ = in_cycle_filter.update(in_cycle_filter.initial_state(1e-5, 0.42e-6, 1e3), slide(1e5, 3000))
     assert state.steady == in_cycle_filter.STEADY_SAMPLES
-    again, _ = in_cycle_filter.filter_block(state, slide(1e5, 100))
+    again, _ = in_cycle_filter.update(state, slide(1e5, 100))
     assert again.gain.tobytes() == state.gain.tobytes()

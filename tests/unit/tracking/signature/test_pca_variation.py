@@ -18,14 +18,14 @@ def information(level):
 def learned(true_sizes, cycles, seed):
     """First guess, and Lambda of cycles whose modes vary by `true_sizes` of it, far above their noise."""
     rng = np.random.default_rng(seed)
-    first = pca_variation.guess(0.2)
+    first = pca_variation.initial_guess(0.2)
     sums, basis = (first.weights, first.moments, first.seen, first.noise), first.scale * MODES
     G = information(1e8)
     for _ in range(cycles):
         deviation = basis @ (np.array(true_sizes) * rng.normal(size=pca_variation.MODES))
         vector = G @ deviation + 1e4 * rng.normal(size=COEFFICIENTS)
-        sums = pca_variation.taken(basis, G, vector, 1e12, *sums)
-    return first, pca_variation.spread(*sums, cycles)
+        sums = pca_variation.update_sums(basis, G, vector, 1e12, *sums)
+    return first, pca_variation.covariance(*sums, cycles)
 
 
 def test_sizes_of_the_modes_are_found_without_bias():
@@ -42,11 +42,11 @@ def test_modes_that_do_not_vary_are_zero():
 
 
 def test_what_was_never_seen_keeps_the_first_guess():
-    first = pca_variation.guess(0.2)
+    first = pca_variation.initial_guess(0.2)
     sums = (first.weights, first.moments, first.seen, first.noise)
     for _ in range(50):
-        sums = pca_variation.taken(MODES, information(0.0), np.zeros(COEFFICIENTS), 100.0, *sums)
-    assert pca_variation.spread(*sums, 50) == pytest.approx(np.eye(pca_variation.MODES))
+        sums = pca_variation.update_sums(MODES, information(0.0), np.zeros(COEFFICIENTS), 100.0, *sums)
+    assert pca_variation.covariance(*sums, 50) == pytest.approx(np.eye(pca_variation.MODES))
 
 
 def test_precise_cycles_are_not_judged_by_what_noisy_ones_leave_unknown():
@@ -54,7 +54,7 @@ def test_precise_cycles_are_not_judged_by_what_noisy_ones_leave_unknown():
     precise, noisy, level, odd = 0.01, 0.1, 0.05, []
     unit = np.eye(pca_variation.MODES)
     for seed in range(20):
-        rng, first = np.random.default_rng(seed), pca_variation.guess(0.2)
+        rng, first = np.random.default_rng(seed), pca_variation.initial_guess(0.2)
         sums = (first.weights, first.moments, first.seen, first.noise)
 
         def drawn(noise, rng=rng):
@@ -62,8 +62,8 @@ def test_precise_cycles_are_not_judged_by_what_noisy_ones_leave_unknown():
 
         for cycle in range(60):
             noise = precise if cycle % 2 else noisy
-            sums = pca_variation.taken(unit, unit / noise**2, drawn(noise) / noise**2, 1e12, *sums)
-        covariance = pca_variation.spread(*sums, 60) + precise**2 * unit
+            sums = pca_variation.update_sums(unit, unit / noise**2, drawn(noise) / noise**2, 1e12, *sums)
+        covariance = pca_variation.covariance(*sums, 60) + precise**2 * unit
         scores = np.array([drawn(precise) for _ in range(400)])
         distances = np.einsum("ni,ij,nj->n", scores, np.linalg.inv(covariance), scores)
         odd.append(np.mean(distances > 22.46))  # one in a thousand of chi squared with six degrees of freedom
@@ -79,7 +79,7 @@ def test_components_are_the_principal_ones_of_the_covariance():
 
 
 def test_tail_of_every_family_against_drawn_normal_scores():
-    rows, across, waves = deviation_shapes.shapes(4e-3, 33).within(4e-3, COEFFICIENTS)
+    rows, across, waves = deviation_shapes.deviation_shapes(4e-3, 33).within(4e-3, COEFFICIENTS)
     rng = np.random.default_rng(1)
     # as a slide sees it: the higher the wave the less
     cosines = np.cos(np.pi * np.outer(np.arange(COEFFICIENTS) + 0.5, np.arange(20)) / COEFFICIENTS)

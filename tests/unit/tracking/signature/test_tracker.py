@@ -12,7 +12,7 @@ from impactcell.records import Channel, Quality
 from impactcell.serialization import json_text
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import friction_profile, tracker
-from impactcell.tracking.signature.slide_segment import find_slide
+from impactcell.tracking.signature.slide_segment import extract_segment
 from tests.benchmarks._slides import slide
 
 SETTINGS = tracker.SignatureSettings()
@@ -265,10 +265,10 @@ def test_a_restored_state_replays_to_the_same_bits(learned):
 
 def test_smoothing_is_the_posterior_averaged_over_its_strength():
     capture, _ = slide(textured(4, bump=0.2), 0.09, 1e4, NOISE, 4)
-    seen = friction_profile.information(find_slide(capture), GRID, 9.81)
+    seen = friction_profile.information(extract_segment(capture), GRID, 9.81)
     n = seen.seen
     G, h, D = seen.matrix[:n, :n], seen.vector[:n], friction_profile.roughness(n)
-    strengths = friction_profile.STRENGTHS * np.trace(G) / np.trace(D)
+    strengths = friction_profile.SMOOTHING_STRENGTHS * np.trace(G) / np.trace(D)
     means = np.array([np.linalg.solve(G + strength * D, h) for strength in strengths])
     fits = (n - 2) * np.log(strengths) - [np.linalg.slogdet(G + strength * D)[1] for strength in strengths]
     weights = np.exp(0.5 * (fits + means @ h - (fits + means @ h).max()))
