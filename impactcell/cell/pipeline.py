@@ -18,7 +18,6 @@ from functools import partial
 from impactcell import alarms
 from impactcell.alarms import AlarmEvent, AlarmSetState, AlarmSettings, RuleResult, Transition
 from impactcell.cell.preprocessing import (
-    BatchAnnouncement,
     BatchNaming,
     CaptureDefaults,
     OperatorBatch,
@@ -32,6 +31,7 @@ from impactcell.prediction import Model, estimate
 from impactcell.records import (
     Alarm,
     AlarmName,
+    BatchAnnouncement,
     Capture,
     Evidence,
     FrictionEstimate,

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
-from impactcell.records import Capture, Channel, FrictionEstimate, Quality
+from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality
 
 PERIOD_GAIN = 0.05
 """How fast the mean time between cycles follows."""
@@ -34,14 +34,6 @@ class OperatorBatch:
     batch_id: str
     module_said: str | None
     expected: bool
-
-
-@dataclass(frozen=True, slots=True)
-class BatchAnnouncement:
-    """A batch change that the PLC announces through the module; `sequence` 0 before the first."""
-
-    sequence: int = 0
-    from_cycle: int = 0
 
 
 @dataclass(frozen=True, slots=True)

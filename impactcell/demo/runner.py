@@ -20,10 +20,9 @@ from impactcell.demo.auto_teach import Remedy
 from impactcell.demo.scenario_setup import USER, Stage, set_up
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
-from impactcell.fieldbus.acquisition import ModuleStatus
 from impactcell.process.console import quiet
 from impactcell.process.signals import signalled
-from impactcell.records import Snapshot
+from impactcell.records import ModuleStatus, Snapshot
 from impactcell.service import Service
 
 SHOWN = 400

@@ -16,15 +16,16 @@ from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceEr
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader
-from impactcell.fieldbus.capture_ring import Mark, distance, next_wanted
+from impactcell.fieldbus.capture_ring import distance, next_wanted
 from impactcell.fieldbus.decoding import ModuleReport
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.poll_schedule import PollSchedule
-from impactcell.fieldbus.received_cycle import ModuleStatus, Reception
+from impactcell.fieldbus.received_cycle import Reception
 from impactcell.fieldbus.register_client import MappedDevice
 from impactcell.fieldbus.registers import RegisterMap, Value
 from impactcell.fieldbus.transport import ModbusClient
 from impactcell.process.cell_logger import CellLogger
+from impactcell.records import CycleId, ModuleStatus
 
 __all__ = ["Module", "ModuleStatus", "Reception"]
 
@@ -70,8 +71,8 @@ class Module:
         self._status = ModuleStatus()
         self._on_change = on_change
         self._ready = asyncio.Event()
-        self._durable: Mark | None = None
-        self._acknowledged: Mark | None = None
+        self._durable: CycleId | None = None
+        self._acknowledged: CycleId | None = None
         self._connections = 0
 
     @property
@@ -111,7 +112,7 @@ class Module:
             self.report, self._polled = decoding.report(self.registers, values), values
         return self.report
 
-    async def acknowledge(self, mark: Mark) -> None:
+    async def acknowledge(self, mark: CycleId) -> None:
         """Tell the module that the cycle `mark` and all before it are durable.
 
         Without a connection it is told as soon as there is one; a module without the registers is not told.
@@ -123,24 +124,24 @@ class Module:
             except FieldbusError as error:
                 self._log.info("the acknowledgement will be repeated: %s", error, cycle=mark.cycle)
 
-    async def captures(self, after: Mark | None = None) -> AsyncGenerator[Reception]:
+    async def captures(self, after: CycleId | None = None) -> AsyncGenerator[Reception]:
         """Yield each cycle after `after` once, in order; ends only when it is closed.
 
         Parameters
         ----------
-        after : Mark or None
+        after : CycleId or None
             Last cycle that is durable; None: begin with the oldest that the module still has.
         """
         last, backoff, schedule = after, Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
-        newest = Mark(0, 0)
+        newest = CycleId(0, 0)
         overtaken = 0
         while True:
             try:
                 asked_s = loop.time()
                 polled = await self._poll()
                 backoff.reset()
-                shown = Mark(polled.session, polled.cycle_counter)
+                shown = CycleId(polled.session, polled.cycle_counter)
                 schedule.polled(asked_s, loop.time(), new=shown != newest)
                 newest = shown
                 want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, overtaken // 2)

@@ -7,15 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from impactcell.records import CycleId
+
 PERIOD: Final = 2**32 - 1
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A cycle in the module's life: the session (start) of the module and its number in it."""
-
-    session: int
-    cycle: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +27,7 @@ class Want:
         and the restart nobody knows; `missed` counts those of the new session.
     """
 
-    mark: Mark
+    mark: CycleId
     slot: int
     missed: int
     restarted: bool
@@ -49,13 +43,13 @@ def distance(after: int, to: int) -> int:
 
 
 def next_wanted(
-    last: Mark | None, session: int, counter: int, ring: Sequence[int], skip: int = 0
+    last: CycleId | None, session: int, counter: int, ring: Sequence[int], skip: int = 0
 ) -> Want | None:
     """Return the oldest cycle of the ring that comes after `last`, or None if there is nothing new.
 
     Parameters
     ----------
-    last : Mark or None
+    last : CycleId or None
         Last cycle taken; None: none ever, then the ring's oldest comes first and nothing counts as missed.
     session, counter : int
         The module's present session and last complete cycle.
@@ -64,7 +58,7 @@ def next_wanted(
     skip : int
         Leave out so many of the oldest, because they are overwritten faster than they are read.
     """
-    if counter == 0 or last == Mark(session, counter):
+    if counter == 0 or last == CycleId(session, counter):
         return None
     ages = {distance(cycle, counter): slot for slot, cycle in enumerate(ring) if cycle != 0}
     restarted = last is not None and (last.session != session or distance(last.cycle, counter) > PERIOD // 2)
@@ -81,4 +75,4 @@ def next_wanted(
     missed = 0 if last is None else max(0, behind - age - 1)
     if restarted and missed > PERIOD // 2:
         missed = 0  # no module makes so many cycles between two polls: its counter was set
-    return Want(Mark(session, ring[slot]), slot, missed, restarted)
+    return Want(CycleId(session, ring[slot]), slot, missed, restarted)

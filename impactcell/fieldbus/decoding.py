@@ -11,16 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.fieldbus.registers import Register, RegisterMap, Value, Words
-from impactcell.records import Capture, Channel, Summary, uniform_times
-
-
-@dataclass(frozen=True, slots=True)
-class BatchAnnouncement:
-    """A change of batch that the PLC expects; `sequence` 0 before the first."""
-
-    sequence: int = 0
-    from_cycle: int = 0
-    batch_id: str = ""
+from impactcell.records import BatchAnnouncement, Capture, Channel, Summary, uniform_times
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,20 +21,12 @@ from impactcell.journal.history import Page, PastValue, Question, past_alarms, p
 from impactcell.journal.lock import locked
 from impactcell.journal.retention import Retention, thin
 from impactcell.journal.schema import COLUMNS
-from impactcell.records import Alarm, Capture, Snapshot
+from impactcell.records import Alarm, Capture, CycleId, Snapshot
 from impactcell.serialization import json_text
 
 _INSERT_CYCLE = (
     f"INSERT INTO cycles ({', '.join(c.name for c in COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"  # noqa: S608
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Position:
-    """The last durable cycle: the module's session and its number in that session."""
-
-    session: int
-    cycle: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +64,7 @@ class Journal:
 
     def __init__(self, path: Path, cell: str | None, *, read_only: bool = False) -> None:
         self.path = path
-        self._appended: Position | None = None
+        self._appended: CycleId | None = None
         with self._errors():
             if read_only and not path.is_file():
                 raise JournalError(f"{path}: there is no such journal")
@@ -125,7 +117,7 @@ class Journal:
         JournalError
             If the cycle is stored already, or the file cannot be written.
         """
-        made = Position(capture.session, capture.cycle)
+        made = CycleId(capture.session, capture.cycle)
         with self._transaction():
             if made == self.position():
                 raise JournalError(f"{self.path}: cycle {capture.cycle} is stored already")
@@ -157,13 +149,13 @@ class Journal:
             row = self._db.execute("SELECT blob FROM state").fetchone()
         return None if row is None else bytes(row[0])
 
-    def position(self) -> Position | None:
+    def position(self) -> CycleId | None:
         """Return the last durable cycle; None in a new journal."""
         if self._appended is not None:
             return self._appended
         with self._errors():
             row = self._db.execute("SELECT session, cycle FROM cycles ORDER BY seq DESC LIMIT 1").fetchone()
-        return None if row is None else Position(*row)
+        return None if row is None else CycleId(*row)
 
     def captures(self, first_cycle: int | None = None, last_cycle: int | None = None) -> Iterator[Capture]:
         """Yield the stored captures in order of their cycles; thinned ones are gone."""

@@ -117,16 +117,6 @@ class CellDescription:
 
 
 @dataclass(frozen=True, slots=True)
-class ModuleState:
-    """The link to a module, as last seen."""
-
-    connected: bool
-    cycles_received: int
-    cycles_missed: int
-    round_trip_time_s: float
-
-
-@dataclass(frozen=True, slots=True)
 class Actor:
     """Who acts: the user as logged in, the role, and the client's address."""
 

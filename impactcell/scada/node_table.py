@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from impactcell.records import Coefficient, Quality, Samples, Snapshot
-from impactcell.scada.interface import ModuleState, Ranges
+from impactcell.records import Coefficient, ModuleStatus, Quality, Samples, Snapshot
+from impactcell.scada.interface import Ranges
 
 MM_PER_M: Final = 1e3
 UM_PER_M: Final = 1e6
@@ -140,10 +140,10 @@ CYCLE: Final[Mapping[str, Row]] = {
 }
 """Variables that each cycle writes."""
 
-MODULE: Final[Mapping[str, Callable[[ModuleState], Value]]] = {
+MODULE: Final[Mapping[str, Callable[[ModuleStatus], Value]]] = {
     "Module/Connected": lambda m: m.connected,
-    "Module/CyclesReceived": lambda m: m.cycles_received,
-    "Module/CyclesMissed": lambda m: m.cycles_missed,
-    "Module/RoundTripTime": lambda m: m.round_trip_time_s * MS_PER_S,
+    "Module/CyclesReceived": lambda m: m.received,
+    "Module/CyclesMissed": lambda m: m.missed,
+    "Module/RoundTripTime": lambda m: m.round_trip_s * MS_PER_S,
 }
 """Variables of the link, which change without a cycle too."""

@@ -17,9 +17,8 @@ from impactcell.opcua.node_values import (
     moment,
 )
 from impactcell.opcua.type_instances import read
-from impactcell.records import Quality, Snapshot
+from impactcell.records import ModuleStatus, Quality, Snapshot
 from impactcell.scada.cell_nodes import CellSpace
-from impactcell.scada.interface import ModuleState
 from impactcell.scada.node_table import CYCLE, MODULE
 from impactcell.scada.node_table import Value as NodeValue
 
@@ -57,7 +56,7 @@ class CellValues:
             value, quality = row.read(snapshot)
             self._write(path, value, quality, time, now)
 
-    def module(self, state: ModuleState, time_ns: int) -> None:
+    def module(self, state: ModuleStatus, time_ns: int) -> None:
         """Write the state of the link."""
         time, now = moment(time_ns), datetime.now(UTC)
         for path, pick in MODULE.items():

@@ -14,10 +14,10 @@ from impactcell.opcua.history_service import Histories
 from impactcell.opcua.node_values import Values
 from impactcell.opcua.service_host import Host, aggregate_functions
 from impactcell.opcua.type_instances import link
-from impactcell.records import Alarm, AlarmName, Snapshot
+from impactcell.records import Alarm, AlarmName, ModuleStatus, Snapshot
 from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
 from impactcell.scada.conditions import Condition
-from impactcell.scada.interface import Actions, CellDescription, HistorySource, ModuleState, ServerSettings
+from impactcell.scada.interface import Actions, CellDescription, HistorySource, ServerSettings
 from impactcell.scada.methods import bind_cell, bind_condition, bind_refresh
 from impactcell.scada.node_table import HISTORY
 from impactcell.scada.publishing import CellValues
@@ -123,7 +123,7 @@ class Server:
         if event is not None and self._host is not None:
             self._host.monitoring.event(event)
 
-    def module(self, cell: str, state: ModuleState, time_ns: int) -> None:
+    def module(self, cell: str, state: ModuleStatus, time_ns: int) -> None:
         """Show the state of the link to the module."""
         self._cells[cell].module(state, time_ns)
 

@@ -9,14 +9,21 @@ from dataclasses import replace
 from functools import partial
 
 from impactcell.alarms import RuleResult
-from impactcell.cell.preprocessing import BatchAnnouncement
 from impactcell.errors import ImpactCellError, JournalError, PositioningError
-from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
+from impactcell.fieldbus.acquisition import Module, Reception
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Alarm, AlarmName, Evidence, PositioningState, Snapshot
-from impactcell.scada import ModuleState, Server
+from impactcell.records import (
+    Alarm,
+    AlarmName,
+    BatchAnnouncement,
+    Evidence,
+    ModuleStatus,
+    PositioningState,
+    Snapshot,
+)
+from impactcell.scada import Server
 from impactcell.service.factory import cell_design, module_link, retention
 from impactcell.service.monitoring import CellHealth
 from impactcell.service.positioning import PositioningTask
@@ -221,7 +228,7 @@ class RunningCell:
         report = self._module.report
         if report is None or report.batch is None or not report.batch.sequence:
             return None
-        return BatchAnnouncement(report.batch.sequence, report.batch.from_cycle)
+        return report.batch
 
     def _link_changed(self, status: ModuleStatus) -> None:
         self._link_news.put_nowait(status)
@@ -290,6 +297,4 @@ class RunningCell:
             (self._active.add if alarm.active else self._active.discard)(alarm.name)
 
     def _show_module(self, server: Server) -> None:
-        status = self._module.status
-        state = ModuleState(status.connected, status.received, status.missed, status.round_trip_s)
-        server.module(self.cell.name, state, time.time_ns())
+        server.module(self.cell.name, self._module.status, time.time_ns())

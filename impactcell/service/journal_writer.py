@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import Callable
 
 from impactcell.errors import JournalError
-from impactcell.fieldbus.capture_ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.process.cell_logger import CellLogger
+from impactcell.records import CycleId
 
 BACKLOG = 64
 """Entries kept in memory while the journal cannot be written."""
@@ -47,10 +47,9 @@ class Keeper:
         self._since_thinned, self._since_checkpoint = THIN_EVERY, CHECKPOINT_EVERY
 
     @property
-    def durable(self) -> Mark | None:
+    def durable(self) -> CycleId | None:
         """The last cycle that is safely stored; None where there is none."""
-        position = None if self.journal is None else self.journal.position()
-        return None if position is None else Mark(position.session, position.cycle)
+        return None if self.journal is None else self.journal.position()
 
     @property
     def waits(self) -> bool:

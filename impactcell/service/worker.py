@@ -12,13 +12,20 @@ from typing import TypeVar
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, RuleResult, Transition
 from impactcell.cell import CellDesign, CellState, StepResult
-from impactcell.cell.preprocessing import BatchAnnouncement
-from impactcell.fieldbus.capture_ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.positioning import Belief
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Alarm, AlarmName, Capture, PositioningState, Shelving, Snapshot
+from impactcell.records import (
+    Alarm,
+    AlarmName,
+    BatchAnnouncement,
+    Capture,
+    CycleId,
+    PositioningState,
+    Shelving,
+    Snapshot,
+)
 from impactcell.serialization import json_text
 from impactcell.serialization.message_pack import pack, unpack
 from impactcell.service.journal_writer import Keeper
@@ -46,7 +53,7 @@ class CycleResult:
     """Outcome of one cycle, and the last cycle that is safely stored (None: none yet)."""
 
     stepped: StepResult
-    durable: Mark | None
+    durable: CycleId | None
 
 
 class Worker:
@@ -68,7 +75,7 @@ class Worker:
         self.log = CellLogger(logging.getLogger(__name__), design.name)
         self._keeper = Keeper(design.name, journal, keep)
         self._closing = threading.Event()
-        self.last: Mark | None = None
+        self.last: CycleId | None = None
         """The last cycle taken in since the start, durable or not."""
         restored = self._restore()
         self._state = restored.state
@@ -92,7 +99,7 @@ class Worker:
         return self._state.period_s
 
     @property
-    def durable(self) -> Mark | None:
+    def durable(self) -> CycleId | None:
         """The last cycle that is safely stored."""
         return self._keeper.durable
 
@@ -213,7 +220,7 @@ class Worker:
     ) -> CycleResult:
         with _computing:
             stepped = self._stepped(capture, positioning, announcement, faults)
-        self.last = Mark(capture.session, capture.cycle)
+        self.last = CycleId(capture.session, capture.cycle)
         self._state, self._snapshot = stepped.state, stepped.snapshot
         if self._keeper.journal is None:
             return CycleResult(stepped, self.last)

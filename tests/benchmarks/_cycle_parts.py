@@ -14,8 +14,8 @@ import numpy as np
 
 from impactcell import cell as core
 from impactcell.journal import store
-from impactcell.records import Capture, Channel, PositioningState, Summary, uniform_times
-from impactcell.scada import ModuleState, Server
+from impactcell.records import Capture, Channel, ModuleStatus, PositioningState, Summary, uniform_times
+from impactcell.scada import Server
 from impactcell.service.cell_task import RunningCell
 from impactcell.service.factory import cell_description, server_settings
 from impactcell.service.history_source import JournalHistory
@@ -103,7 +103,11 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
             with timed(spent):
                 done = running.worker._process(capture, PositioningState(), None, ())
                 server.publish(cell.name, done.stepped.snapshot)
-                server.module(cell.name, ModuleState(True, cycle, 0, 1e-3), capture.time_ns)
+                server.module(
+                    cell.name,
+                    ModuleStatus(connected=True, received=cycle, round_trip_s=1e-3),
+                    capture.time_ns,
+                )
             rows.append(spent)
         await running.close()
     return rows[LEARNING:]

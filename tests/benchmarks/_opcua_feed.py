@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import psutil
 
-from impactcell.records import Snapshot
-from impactcell.scada import Limits, ModuleState
+from impactcell.records import ModuleStatus, Snapshot
+from impactcell.scada import Limits
 from tests.opcua_server import CELL, PASSWORDS, Site, site
 from tests.snapshots import make_capture, make_snapshot
 
@@ -79,7 +79,7 @@ async def main(rate_hz: float) -> None:
         while True:
             number += 1
             here.server.publish(CELL, cycle(number))
-            state = ModuleState(True, number, 0, 1e-3 + 1e-9 * number)
+            state = ModuleStatus(connected=True, received=number, round_trip_s=1e-3 + 1e-9 * number)
             here.server.module(CELL, state, time.time_ns())
             due = max(due + 1.0 / rate_hz, loop.time() - 1.0)
             await asyncio.sleep(max(0.0, due - loop.time()))

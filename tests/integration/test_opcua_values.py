@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from asyncua import Client, ua
 
-from impactcell.records import AlarmName, Quality
-from impactcell.scada import ModuleState
+from impactcell.records import AlarmName, ModuleStatus, Quality
 from tests.opcua_server import CELL, START_NS, Site, site
 
 codes = ua.StatusCodes
@@ -178,10 +177,12 @@ async def test_status_value_and_time() -> None:
         here.server.mark_bad(CELL, time.time_ns())
         lost = await _read(here, client, "Friction/StaticFriction")
         assert (lost.StatusCode.value, lost.Value.Value) == (codes.BadNoCommunication, 0.22)
-        here.server.module(CELL, ModuleState(False, 5, 1, math.nan), time.time_ns())
+        here.server.module(CELL, ModuleStatus(connected=False, received=5, missed=1), time.time_ns())
         assert (await _read(here, client, "Module/Connected")).Value.Value is False
         assert (await _read(here, client, "Module/RoundTripTime")).StatusCode.is_bad()
-        here.server.module(CELL, ModuleState(True, 5, 1, 0.002), time.time_ns())
+        here.server.module(
+            CELL, ModuleStatus(connected=True, received=5, missed=1, round_trip_s=0.002), time.time_ns()
+        )
         assert (await _read(here, client, "Module/RoundTripTime")).Value.Value == pytest.approx(2.0)
         here.publish(0.22)
         assert (await _read(here, client, "Friction/StaticFriction")).StatusCode.is_good()

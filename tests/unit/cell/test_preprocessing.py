@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from impactcell.cell.preprocessing import BatchAnnouncement, BatchNaming, OperatorBatch, assign_batch
+from impactcell.cell.preprocessing import BatchNaming, OperatorBatch, assign_batch
+from impactcell.records import BatchAnnouncement
 from tests.snapshots import make_capture
 
 

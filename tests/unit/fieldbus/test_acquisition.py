@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from impactcell.fieldbus.acquisition import Module, ModuleStatus, Reception
-from impactcell.fieldbus.capture_ring import PERIOD, Mark
+from impactcell.fieldbus.acquisition import Module, Reception
+from impactcell.fieldbus.capture_ring import PERIOD
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap, Words
+from impactcell.records import CycleId, ModuleStatus
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
@@ -62,7 +63,7 @@ def assert_whole(reception: Reception) -> None:
 async def running(
     fpga: RegisterMap,
     device: ScriptedDevice,
-    after: Mark | None = None,
+    after: CycleId | None = None,
     statuses: list[ModuleStatus] | None = None,
     **link: Any,
 ) -> AsyncIterator[tuple[ModbusServer, Module, AsyncIterator[Reception]]]:
@@ -86,7 +87,7 @@ async def test_a_cycle_arrives_whole_in_si(fpga: RegisterMap, window: int, max_r
     async with running(fpga, device, window=window, max_registers=max_registers) as (_, module, receptions):
         [reception] = await take(receptions, 1)
         assert_whole(reception)
-        assert reception.mark == Mark(9, 1)
+        assert reception.mark == CycleId(9, 1)
         assert reception.faults == ()
         capture = reception.capture
         assert capture.velocity_m_s == pytest.approx(0.05, rel=1e-6)
@@ -140,27 +141,27 @@ async def test_an_outage_loses_exactly_what_the_ring_lost(fpga: RegisterMap, awa
 async def test_goes_on_after_the_last_durable_cycle(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga, session=4)
     make(device, 10)
-    async with running(fpga, device, after=Mark(4, 7)) as (_, _, receptions):
-        assert [r.mark for r in await take(receptions, 3)] == [Mark(4, 8), Mark(4, 9), Mark(4, 10)]
+    async with running(fpga, device, after=CycleId(4, 7)) as (_, _, receptions):
+        assert [r.mark for r in await take(receptions, 3)] == [CycleId(4, 8), CycleId(4, 9), CycleId(4, 10)]
 
 
 async def test_a_restart_of_the_module_is_told(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga, session=4)
     make(device, 10)
-    async with running(fpga, device, after=Mark(4, 9)) as (server, module, receptions):
+    async with running(fpga, device, after=CycleId(4, 9)) as (server, module, receptions):
         await take(receptions, 1)
         server.drop_clients()
         device.start(session=5)
         make(device, 2)
         received = await take(receptions, 2)
-        assert [r.mark for r in received] == [Mark(5, 1), Mark(5, 2)]
+        assert [r.mark for r in received] == [CycleId(5, 1), CycleId(5, 2)]
         assert [(r.restarted, r.missed) for r in received] == [(True, 0), (False, 0)]
         assert (module.status.restarts, module.status.reconnects) == (1, 1)
 
 
 async def test_the_counter_wraps_without_loss(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga, counter=PERIOD - 3)
-    async with running(fpga, device, after=Mark(1, PERIOD - 3)) as (_, module, receptions):
+    async with running(fpga, device, after=CycleId(1, PERIOD - 3)) as (_, module, receptions):
         make(device, 6)
         received = await take(receptions, 6)
         assert [r.capture.cycle for r in received] == [PERIOD - 2, PERIOD - 1, PERIOD, 1, 2, 3]
@@ -178,7 +179,7 @@ async def test_a_capture_overwritten_while_it_is_read_is_never_mixed(
     device = ScriptedDevice(fpga)
     make(device, 17)
     device.on_read.append((fpga[where].address, lambda: make(device, made)))
-    async with running(fpga, device, after=Mark(1, 1)) as (_, _, receptions):
+    async with running(fpga, device, after=CycleId(1, 1)) as (_, _, receptions):
         received = await take(receptions, 16)
         assert [r.capture.cycle for r in received] == list(range(2 + made, 18 + made))
         assert [r.missed for r in received] == [made] + [0] * 15

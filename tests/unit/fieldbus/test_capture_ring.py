@@ -3,7 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.fieldbus.capture_ring import PERIOD, Mark, distance, next_wanted
+from impactcell.fieldbus.capture_ring import PERIOD, distance, next_wanted
+from impactcell.records import CycleId
 
 SLOTS = 8
 
@@ -28,7 +29,7 @@ def ring_of(newest: int, oldest: int) -> list[int]:
 def test_every_cycle_once_in_order_or_counted_as_missed(first: int, taken: int, made: list[int]) -> None:
     """`taken` were taken before; then cycles are made in bursts, and the ring is emptied after each."""
     newest = first + taken
-    last_absolute, last = newest, Mark(7, number(newest))
+    last_absolute, last = newest, CycleId(7, number(newest))
     missed = 0
     received: list[int] = []
     for burst in made:
@@ -56,7 +57,7 @@ def test_distance_counts_steps(start: int, steps: int) -> None:
 def test_first_contact_begins_with_the_oldest_and_misses_nothing() -> None:
     want = next_wanted(None, 3, 20, ring_of(20, 1))
     assert want is not None
-    assert (want.mark, want.missed, want.restarted) == (Mark(3, 13), 0, False)
+    assert (want.mark, want.missed, want.restarted) == (CycleId(3, 13), 0, False)
 
 
 def test_first_contact_across_the_wrap() -> None:
@@ -67,45 +68,45 @@ def test_first_contact_across_the_wrap() -> None:
 
 
 def test_nothing_new() -> None:
-    assert next_wanted(Mark(1, 20), 1, 20, ring_of(20, 1)) is None
+    assert next_wanted(CycleId(1, 20), 1, 20, ring_of(20, 1)) is None
     assert next_wanted(None, 1, 0, [0] * SLOTS) is None
-    assert next_wanted(Mark(1, 20), 2, 0, [0] * SLOTS) is None
+    assert next_wanted(CycleId(1, 20), 2, 0, [0] * SLOTS) is None
 
 
 def test_a_restart_is_seen_and_begins_at_one() -> None:
-    want = next_wanted(Mark(1, 5000), 2, 3, ring_of(3, 1))
+    want = next_wanted(CycleId(1, 5000), 2, 3, ring_of(3, 1))
     assert want is not None
-    assert (want.mark, want.missed, want.restarted) == (Mark(2, 1), 0, True)
+    assert (want.mark, want.missed, want.restarted) == (CycleId(2, 1), 0, True)
 
 
 def test_a_restart_longer_ago_than_the_ring_counts_what_is_gone() -> None:
-    want = next_wanted(Mark(1, 5000), 2, 30, ring_of(30, 1))
+    want = next_wanted(CycleId(1, 5000), 2, 30, ring_of(30, 1))
     assert want is not None
-    assert (want.mark, want.missed, want.restarted) == (Mark(2, 23), 22, True)
+    assert (want.mark, want.missed, want.restarted) == (CycleId(2, 23), 22, True)
 
 
 def test_a_counter_that_goes_back_is_a_restart_even_in_the_same_session() -> None:
-    want = next_wanted(Mark(1, 5000), 1, 2, ring_of(2, 1))
+    want = next_wanted(CycleId(1, 5000), 1, 2, ring_of(2, 1))
     assert want is not None
-    assert (want.mark, want.restarted) == (Mark(1, 1), True)
+    assert (want.mark, want.restarted) == (CycleId(1, 1), True)
 
 
 def test_a_counter_that_was_set_close_to_its_wrap_misses_nothing() -> None:
     newest = PERIOD - 1
-    want = next_wanted(Mark(1, 5), 1, newest, ring_of(newest, newest))
+    want = next_wanted(CycleId(1, 5), 1, newest, ring_of(newest, newest))
     assert want is not None
     assert (want.mark.cycle, want.missed, want.restarted) == (newest, 0, True)
 
 
 def test_a_cycle_beyond_the_counter_is_not_taken_yet() -> None:
     ring = ring_of(21, 1)
-    want = next_wanted(Mark(1, 19), 1, 20, ring)
+    want = next_wanted(CycleId(1, 19), 1, 20, ring)
     assert want is not None
     assert want.mark.cycle == 20
-    assert next_wanted(Mark(1, 20), 1, 20, ring) is None
+    assert next_wanted(CycleId(1, 20), 1, 20, ring) is None
 
 
 def test_skipping_leaves_out_the_oldest_and_counts_them() -> None:
-    want = next_wanted(Mark(1, 12), 1, 20, ring_of(20, 1), skip=3)
+    want = next_wanted(CycleId(1, 12), 1, 20, ring_of(20, 1), skip=3)
     assert want is not None
     assert (want.mark.cycle, want.missed) == (16, 3)

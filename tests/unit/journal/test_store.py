@@ -9,8 +9,8 @@ import pytest
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
 from impactcell.journal.history import Question
 from impactcell.journal.retention import ROOM, Retention
-from impactcell.journal.store import AuditEntry, Journal, Position
-from impactcell.records import Alarm, AlarmName
+from impactcell.journal.store import AuditEntry, Journal
+from impactcell.records import Alarm, AlarmName, CycleId
 from tests.snapshots import make_capture, make_snapshot
 
 
@@ -33,7 +33,7 @@ def test_cycle_capture_and_state_come_back_after_reopening(tmp_path: Path) -> No
         append(journal, 2)
     with Journal(path, "press-1") as journal:
         assert journal.state() == b"state 2"
-        assert journal.position() == Position(1, 2)
+        assert journal.position() == CycleId(1, 2)
         first, second = journal.captures()
         assert (first.cycle, second.cycle) == (1, 2)
         assert [capture.cycle for capture in journal.captures(2, 2)] == [2]
@@ -46,7 +46,7 @@ def test_a_cycle_is_stored_once(tmp_path: Path) -> None:
             append(journal, 1)
         assert journal.state() == b"state 1"
         append(journal, 1, session=2)
-        assert journal.position() == Position(2, 1)
+        assert journal.position() == CycleId(2, 1)
     with Journal(tmp_path / "j", "c") as journal, pytest.raises(JournalError, match="stored already"):
         append(journal, 1, session=2)
 
@@ -58,7 +58,7 @@ def test_cycle_numbers_may_come_again(tmp_path: Path) -> None:
         for number in numbers:
             append(journal, number)
         assert [capture.cycle for capture in journal.captures()] == numbers
-        assert journal.position() == Position(1, 1)
+        assert journal.position() == CycleId(1, 1)
 
 
 def test_a_failed_append_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_failed_append_leaves_nothing_behind(tmp_path: Path) -> None:
         assert stored == list(range(1, last.cycle + 1))
         journal._db.execute("PRAGMA max_page_count = 1000000")
         append(journal, last.cycle + 1)
-        assert journal.position() == Position(1, last.cycle + 1)
+        assert journal.position() == CycleId(1, last.cycle + 1)
 
 
 def test_actions_are_audited_with_their_state(tmp_path: Path) -> None:
@@ -204,7 +204,7 @@ def test_age_drops_captures_then_cycles_but_never_the_last(tmp_path: Path) -> No
         now_ns = make_capture(3).time_ns
         journal.thin(Retention(days=10, captures_days=5), now_ns + 6 * day_ns)
         assert list(journal.captures()) == []
-        assert journal.position() == Position(1, 3)
+        assert journal.position() == CycleId(1, 3)
         journal.thin(Retention(days=10, captures_days=5), now_ns + 11 * day_ns)
         assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(3,)]
         assert journal.state() == b"state 3"

@@ -12,10 +12,9 @@ import pytest
 
 from impactcell import cell as core
 from impactcell.errors import JournalFullError
-from impactcell.fieldbus.capture_ring import Mark
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
-from impactcell.records import Capture, Channel, PositioningState, Quality
+from impactcell.records import Capture, Channel, CycleId, PositioningState, Quality
 from impactcell.service.factory import cell_design
 from impactcell.service.journal_writer import Keeper
 from impactcell.service.worker import Worker
@@ -34,7 +33,7 @@ def cycles(path: Path) -> list[int]:
         return [capture.cycle for capture in journal.captures()]
 
 
-async def process(worker: Worker, capture: Capture) -> Mark | None:
+async def process(worker: Worker, capture: Capture) -> CycleId | None:
     return (await worker.process(capture, PositioningState(), None)).durable
 
 
@@ -42,11 +41,11 @@ async def test_an_entry_that_can_never_be_stored_blocks_nothing(
     tmp_path: Path, design: core.CellDesign
 ) -> None:
     worker = Worker(design, Journal(tmp_path / "j", "c"), Retention())
-    assert await process(worker, make_capture(1)) == Mark(1, 1)
-    assert await process(worker, make_capture(1)) == Mark(1, 1)
+    assert await process(worker, make_capture(1)) == CycleId(1, 1)
+    assert await process(worker, make_capture(1)) == CycleId(1, 1)
     assert "stored already" in worker.journal_fault
-    assert await process(worker, replace(make_capture(2), time_ns=2**63)) == Mark(1, 1)
-    assert await process(worker, make_capture(3)) == Mark(1, 3)
+    assert await process(worker, replace(make_capture(2), time_ns=2**63)) == CycleId(1, 1)
+    assert await process(worker, make_capture(3)) == CycleId(1, 3)
     assert worker.journal_fault == ""
     await worker.close()
     assert cycles(tmp_path / "j") == [1, 3]
@@ -71,7 +70,7 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
     monkeypatch.setattr(journal, "checkpoint", late("checkpoint"))
     for cycle in range(1, 6):
         shown.clear()
-        assert await process(worker, make_capture(cycle)) == Mark(1, cycle)
+        assert await process(worker, make_capture(cycle)) == CycleId(1, cycle)
         shown.set()
         await worker.run(lambda: None)
     await worker.close()
@@ -127,7 +126,7 @@ async def test_what_cannot_be_stored_now_is_stored_later_in_order(
         assert worker.journal_fault == "the disk is full"
     await worker.retry()
     assert worker.journal_fault == ""
-    assert worker.durable == Mark(1, 3)
+    assert worker.durable == CycleId(1, 3)
     await worker.close()
     assert cycles(tmp_path / "j") == [1, 2, 3]
 
@@ -149,7 +148,7 @@ async def test_a_capture_that_cannot_be_computed_counts_as_unreadable(
     processed = await worker.process(make_capture(1), PositioningState(), None)
     assert processed.stepped.snapshot.cycle == 1
     assert processed.stepped.snapshot.friction.mu_s.quality is Quality.BAD
-    assert worker.last == Mark(1, 1)
+    assert worker.last == CycleId(1, 1)
     await worker.close()
 
 
@@ -180,7 +179,7 @@ async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, desig
     await process(worker, make_capture(2))
     await worker.close()
     again = Worker(design, Journal(tmp_path / "j", "c"), Retention())
-    assert again.durable == Mark(1, 2)
+    assert again.durable == CycleId(1, 2)
     await process(again, make_capture(3))
     await again.close()
 
@@ -201,7 +200,7 @@ async def test_a_state_of_other_fields_is_refused_with_a_message_and_learned_ane
     again = Worker(design, Journal(tmp_path / "j", "c"), Retention())
     assert "not a stored Durable" in caplog.text
     assert "tracking begins anew" in caplog.text
-    assert again.durable == Mark(1, 2)  # cycles go on
+    assert again.durable == CycleId(1, 2)  # cycles go on
     await process(again, make_capture(3))
     await again.close()
     assert cycles(tmp_path / "j") == [1, 2, 3]

@@ -1,0 +1,43 @@
+"""The nouns of impactcell: what flows from the module to SCADA, as frozen values in SI units.
+
+A `Capture` comes in; `FrictionEstimate`, `WearState`, `BatchState`, `Signature` and `Alarm` are made
+from it; a `Snapshot` holds them together for one cycle and is what is published and journalled.
+"""
+
+from impactcell.records.alarm import Alarm, AlarmName, Evidence, Shelving
+from impactcell.records.capture import Capture, Channel, Samples, Summary, uniform_times
+from impactcell.records.friction import (
+    BatchState,
+    Coefficient,
+    Estimator,
+    FrictionEstimate,
+    Quality,
+    Signature,
+    WearState,
+)
+from impactcell.records.module import BatchAnnouncement, CycleId, ModuleStatus
+from impactcell.records.snapshot import PositioningState, Snapshot
+
+__all__ = [
+    "Alarm",
+    "AlarmName",
+    "BatchAnnouncement",
+    "BatchState",
+    "Capture",
+    "Channel",
+    "Coefficient",
+    "CycleId",
+    "Estimator",
+    "Evidence",
+    "FrictionEstimate",
+    "ModuleStatus",
+    "PositioningState",
+    "Quality",
+    "Samples",
+    "Shelving",
+    "Signature",
+    "Snapshot",
+    "Summary",
+    "WearState",
+    "uniform_times",
+]

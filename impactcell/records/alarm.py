@@ -1,0 +1,81 @@
+"""The conditions of a cell and their states."""
+
+import enum
+from dataclasses import dataclass, field
+
+
+class AlarmName(enum.Enum):
+    """The conditions of a cell, by their OPC UA browse names."""
+
+    WEAR_LIMIT = "WearLimit"
+    BATCH_SHIFT = "BatchShift"
+    DEVIANT_CYCLE = "DeviantCycle"
+    MODULE_CONNECTION = "ModuleConnection"
+    MODEL_GAP = "ModelGap"
+    POSITIONING_FAULT = "PositioningFault"
+    JOURNAL_FAULT = "JournalFault"
+
+
+class Shelving(enum.Enum):
+    """Shelved states of OPC UA Part 9, ShelvedStateMachineType."""
+
+    UNSHELVED = "unshelved"
+    TIMED = "timed"
+    ONE_SHOT = "one_shot"
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Why an alarm was raised; nan and 0 where a rule has no such figure.
+
+    Attributes
+    ----------
+    statistic, threshold : float
+        What was compared with what.
+    change_cycle : int
+        Estimated first cycle after the change.
+    size, size_std : float
+        Estimated size of the change, in the unit of what is watched.
+    false_alarm_cycles, false_alarm_days : float
+        Designed mean time between false alarms, in cycles and in days at the present rate.
+    """
+
+    statistic: float = float("nan")
+    threshold: float = float("nan")
+    change_cycle: int = 0
+    size: float = float("nan")
+    size_std: float = float("nan")
+    false_alarm_cycles: float = float("nan")
+    false_alarm_days: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """State of one condition after ISA-18.2 / OPC UA Part 9; moved only by `impactcell.alarms`.
+
+    Attributes
+    ----------
+    severity : int
+        1-1000, as in OPC UA.
+    cycle, time_ns : int
+        Cycle and time of the last transition.
+    comment, user : str
+        Of the last action by a person.
+    """
+
+    name: AlarmName
+    enabled: bool = True
+    active: bool = False
+    acknowledged: bool = True
+    confirmed: bool = True
+    shelving: Shelving = Shelving.UNSHELVED
+    shelved_until_ns: int = 0
+    suppressed: bool = False
+    out_of_service: bool = False
+    severity: int = 500
+    message: str = ""
+    cycle: int = 0
+    time_ns: int = 0
+    evidence: Evidence = field(default_factory=Evidence)
+    comment: str = ""
+    user: str = ""

@@ -1,0 +1,100 @@
+"""What a module measured in one cycle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """Samples of one sensor during one cycle.
+
+    Attributes
+    ----------
+    time_s : ndarray, shape (n,)
+        Strictly increasing, 0 at first contact (at the first sample where there is no contact).
+        Sampling need not be uniform: a campaign may have gaps.
+    values : ndarray, shape (n,)
+        SI units of the quantity.
+    noise_std : float or None
+        Standard deviation of the sensor's white noise, None where it is not known.
+    full_scale : tuple of float or None
+        Smallest and largest value the channel can show; a sample at either end is saturated.
+    resolution : float or None
+        Value of one step of the sensor's integer code; None where values are not such multiples.
+    """
+
+    time_s: Samples
+    values: Samples
+    noise_std: float | None = None
+    full_scale: tuple[float, float] | None = None
+    resolution: float | None = None
+
+
+def uniform_times(start_s: float, rate_hz: float, count: int) -> Samples:
+    """Give sample times `start_s + i / rate_hz` of a channel without gaps: the same bits wherever made."""
+    return start_s + np.arange(count) / rate_hz
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Capture:
+    """One cycle as measured: an actuator taps a part, it slides and stops.
+
+    `force` is the contact force, positive in compression; `position` and `actuator` are positive along
+    the +1 axis, so that a tap with `direction` -1 moves negative. A channel that was not recorded is None.
+
+    Attributes
+    ----------
+    cycle : int
+        The module's cycle number, or the shot number of a campaign.
+    time_ns : int
+        The cycle's own time, nanoseconds since 1970-01-01 UTC; 0 where it is not known.
+    velocity_m_s : float
+        Commanded actuator velocity, positive; nan for an excitation without an actuator.
+    mass_kg : float
+        Mass of the part; nan where it is not known.
+    direction : int
+        +1 or -1.
+    stroke_m : float
+        Travel of the actuator from first contact, after which it halts; inf if it never does.
+    batch_id : str or None
+        Material batch as the PLC names it; None where it says nothing.
+    dwell_s : float
+        Time the part had been at rest before the tap; nan where it is not known.
+    start_m : float
+        Position on the table at which the part lay.
+    session : int
+        Changes when the module has restarted and counts its cycles anew.
+    covariates : mapping
+        Any further numeric or text column of a campaign.
+    summary : Summary or None
+        The module's own figures for this cycle, where it reports them.
+    """
+
+    cycle: int
+    velocity_m_s: float
+    mass_kg: float
+    force: Channel | None
+    position: Channel | None
+    actuator: Channel | None = None
+    direction: int = 1
+    stroke_m: float = float("inf")
+    time_ns: int = 0
+    batch_id: str | None = None
+    dwell_s: float = float("nan")
+    start_m: float = 0.0
+    session: int = 0
+    covariates: Mapping[str, float | str] = field(default_factory=dict)
+    summary: "Summary | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The module's own figures: peak force over all contacts, distance slid since the last of them."""
+
+    peak_force_n: float
+    sliding_distance_m: float
