@@ -1,0 +1,267 @@
+"""How the tree is built, in numbers; `python -m tests.benchmarks.structure [TREE] [--list]` measures another.
+
+Everything is counted by the same rules in every tree, so that two of them can be compared. Where a rule can
+only be as good as a list written by hand (which functions integrate a tap), the list stands here.
+"""
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.benchmarks import _syntax
+from tests.benchmarks.table import Table
+
+ROOT = Path(__file__).resolve().parents[2]
+BEFORE = Path(__file__).with_name("rows") / "structure-before.json"
+"""As this script measured the last tree before the rooms were set up."""
+MANY_ARGUMENTS = 8
+COMPLEX = 20
+GENERATED = re.compile(r"generated (from|by)", re.IGNORECASE)
+"""What a file that nobody edits says in its first lines."""
+SOURCES = {".py", ".xml", ".j2", ".js"}
+
+DEFINITIONS: Mapping[str, tuple[str, ...]] = {
+    "integrators of a tap in the product": (
+        "physics.(course|integrator):integrate_all",
+        "physics.modified_euler:strike_modified_euler",
+        "positioning.(response|displacement_model):displacements",
+        "positioning.(slide|free_slide):along_profile",
+    ),
+    "noise estimators of a channel": (
+        "prediction.(reading|feature_extraction):noise_std",
+        "tracking.(slide|signature.slide_segment):_noise",
+        "discrepancy.(noise|data.noise_floor):white_noise",
+        "discrepancy.(drives|data.measured_drive):_noise",
+    ),
+    "slide extractors": (
+        "prediction.(sliding|slide_features):slide",
+        "tracking.(slide|signature.slide_segment):find_slide",
+    ),
+}
+"""Definitions that do the same work, `module:function` below `impactcell`, under all names they have had.
+
+A double that is taken away, or that comes to call the one that stays, leaves this list or its home; a
+renaming is followed here, and a row of which nothing is found fails.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """One measured figure and what was counted."""
+
+    value: int
+    items: tuple[str, ...] = ()
+
+
+def duplicate_names(parsed: Sequence[_syntax.Module]) -> Count:
+    """Names of dataclasses of the product that are defined more than once."""
+    homes = _syntax.dataclass_homes(list(parsed))
+    items = tuple(f"{name}: {', '.join(at)}" for name, at in sorted(homes.items()) if len(at) > 1)
+    return Count(len(items), items)
+
+
+def glossary(root: Path) -> tuple[list[str], list[str]]:
+    """Give the words of the glossary, as often as they are listed, and the names it has retired."""
+    page = root / "docs" / "glossary.md"
+    if not page.is_file():
+        return [], []
+    words, retired = [], []
+    section = ""
+    for line in page.read_text(encoding="utf-8").splitlines():
+        if line.startswith("#"):
+            section = line.lstrip("# ").lower()
+        cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []
+        if len(cells) < 2 or set(cells[0]) <= set("-: ") or cells[0] in {"word", "name"}:
+            continue
+        named = re.findall(r"`([^`]+)`", cells[0]) if "retired" in section else cells[0].split(",")
+        (retired if "retired" in section else words).extend(name.strip().strip("`") for name in named)
+    return words, retired
+
+
+def twice_listed(words: Iterable[str]) -> Count:
+    """Words that the glossary lists more than once."""
+    folded = [word.lower() for word in words]
+    items = tuple(sorted({word for word in folded if folded.count(word) > 1}))
+    return Count(len(items), items)
+
+
+def retired_names(parsed: Sequence[_syntax.Module], retired: Iterable[str]) -> Count:
+    """Names that the glossary has retired and that still name a class, a module or a function."""
+    gone = frozenset(retired)
+    items = []
+    for module in parsed:
+        if ".".join(module.name.split(".")[1:]) in gone:
+            items.append(module.name)
+        nodes = (*_syntax.classes(module), *_syntax.functions(module))
+        items.extend(f"{module.name}:{node.lineno} {node.name}" for node in nodes if node.name in gone)
+    return Count(len(items), tuple(items))
+
+
+def files_that_list(root: Path, kind: Sequence[tuple[str, ...]], homes: int) -> Count:
+    """Files that a new item must be written into: its homes, and every file that lists its kind.
+
+    A file of product, simulator or tests lists a kind if it names more than half of its items, in any of
+    their spellings.
+    """
+    patterns = [re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b") for names in kind]
+    items = []
+    for package in ("impactcell", "simulator", "tests"):
+        for path in sorted((root / package).rglob("*")):
+            below = path.relative_to(root)
+            if path.suffix not in SOURCES or {"node_modules", "benchmarks"} & set(below.parts):
+                continue
+            text = path.read_text(encoding="utf-8")
+            if GENERATED.search(text[:400]):
+                continue
+            if 2 * sum(bool(pattern.search(text)) for pattern in patterns) > len(kind):
+                items.append(str(below))
+    return Count(homes + len(items), tuple(items))
+
+
+def alarms(root: Path) -> Count:
+    """Files to edit for an alarm rule, by those that list the rules there are."""
+    names = ("WearLimit", "BatchShift", "DeviantCycle", "ModuleConnection", "ModelGap", "PositioningFault")
+    spellings = []
+    for name in names:
+        snake = re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+        spellings.append((name, snake, snake.upper()))
+    one_file_a_rule = any((root / "impactcell" / "alarms").rglob("deviant_cycle.py"))
+    return files_that_list(root, spellings, int(one_file_a_rule))
+
+
+def values(root: Path) -> Count:
+    """Files to edit for a published value, by those that list values of all origins."""
+    probes = (
+        ("peak_force_n", "PeakForce"),
+        ("sliding_distance_m", "SlidingDistance"),
+        ("by_distance", "mu_s_distance", "StaticFrictionByDistance"),
+        ("mu_k", "KineticFriction"),
+        ("rate_per_cycle", "wear_rate_per_cycle", "RatePer1000Cycles"),
+        ("cycles_to_limit", "CyclesToLimit"),
+        ("cycles_to_limit_low", "CyclesToLimitLow"),
+        ("offset_std", "batch_offset_std", "OffsetStdDev"),
+        ("last_shift", "LastShift"),
+        ("t_squared", "TSquared"),
+        ("spe", "Spe"),
+        ("round_trip_ms", "round_trip_s", "RoundTripTime"),
+    )
+    return files_that_list(root, probes, 0)
+
+
+def effects(root: Path) -> Count:
+    """Files to edit for an effect: its own, its independent law, and those that list the effects."""
+    folder = root / "impactcell" / "physics" / "effects"
+    names = [(path.stem,) for path in sorted(folder.glob("*.py")) if path.stem != "__init__"]
+    return files_that_list(root, names, 2)
+
+
+def definitions(parsed: Sequence[_syntax.Module], patterns: Sequence[str]) -> Count:
+    """Which of the listed definitions there are."""
+    items = []
+    for pattern in patterns:
+        home, name = pattern.split(":")
+        for module in parsed:
+            if re.fullmatch(rf"impactcell\.{home}", module.name):
+                items += [f"{module.name}:{name}" for node in _syntax.functions(module) if node.name == name]
+    return Count(len(items), tuple(items))
+
+
+def measure(root: Path) -> dict[str, Count]:
+    """Measure one tree."""
+    parsed = _syntax.modules(root, "impactcell")
+    words, retired = glossary(ROOT)
+    bare = [item for module in parsed for item in _syntax.bare_constants(module)[0]]
+    functions = [(module, node) for module in parsed for node in _syntax.functions(module)]
+    wide = [
+        f"{module.name}:{node.lineno} {node.name}: {_syntax.arguments(node)}"
+        for module, node in functions
+        if _syntax.arguments(node) >= MANY_ARGUMENTS
+    ]
+    knotted = [
+        f"{module.name}:{node.lineno} {node.name}: {_syntax.complexity(node)}"
+        for module, node in functions
+        if _syntax.complexity(node) >= COMPLEX
+    ]
+    lines = {module.name: len(module.lines) for module in parsed}
+    return {
+        "names of dataclasses defined more than once": duplicate_names(parsed),
+        "words listed twice in the glossary": twice_listed(words),
+        "retired words that still name something": retired_names(parsed, retired),
+        "numeric constants without a word of meaning": Count(len(bare), tuple(bare)),
+        "functions with 8 and more arguments": Count(len(wide), tuple(wide)),
+        "functions of cyclomatic complexity 20 and more": Count(len(knotted), tuple(knotted)),
+        "files to edit for an alarm rule": alarms(root),
+        "files to edit for a published value": values(root),
+        "files to edit for an effect": effects(root),
+        **{row: definitions(parsed, patterns) for row, patterns in DEFINITIONS.items()},
+        "lines of impactcell/": Count(sum(lines.values())),
+    }
+
+
+BARS: Mapping[str, int | str] = {
+    "names of dataclasses defined more than once": 0,
+    "words listed twice in the glossary": 0,
+    "retired words that still name something": 0,
+    "numeric constants without a word of meaning": 0,
+    "functions with 8 and more arguments": 8,
+    "functions of cyclomatic complexity 20 and more": "half",
+    "files to edit for an alarm rule": 1,
+    "files to edit for a published value": 1,
+    "files to edit for an effect": 2,
+    "integrators of a tap in the product": 1,
+    "noise estimators of a channel": 1,
+    "slide extractors": 1,
+    "lines of impactcell/": 31_000,
+}
+"""What the tree is held to; no bar is a promise about quality, each only keeps a known evil small."""
+
+NOTE = (
+    "Counted by `python -m tests.benchmarks.structure --list`, which prints what was counted; *before* is the "
+    "last tree before the rooms were set up, counted by the same script. A constant counts as explained if a "
+    "docstring or a comment stands with it: whether that says enough, no script can tell. Files to edit are the "
+    "item's own files and every file of product, simulator and tests that names more than half of the items "
+    "there are; documentation and generated files are not counted. Integrators, noise estimators and slide "
+    "extractors are those of a list kept by hand, under all names they have had."
+)
+
+
+def verdict(name: str, value: int, before: int) -> str:
+    """Write a figure, in bold where it misses its bar."""
+    bar = BARS[name]
+    allowed = before // 2 if bar == "half" else int(bar)
+    return f"{value}" if value <= allowed else f"**{value}**"
+
+
+def tables() -> list[Table]:
+    """Every table of this topic."""
+    now, before = measure(ROOT), json.loads(BEFORE.read_text(encoding="utf-8"))
+    rows = [
+        (name, str(before[name]), str(BARS[name]), verdict(name, count.value, before[name]))
+        for name, count in now.items()
+    ]
+    return [Table("Structure", ("what", "before", "bar", "now"), rows, NOTE)]
+
+
+def main() -> int:
+    """Print what is counted in a tree, as JSON or as a list."""
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.structure", description=__doc__)
+    parser.add_argument("tree", nargs="?", type=Path, default=ROOT, help="root of a checkout (this one)")
+    parser.add_argument("--list", action="store_true", help="also print what was counted")
+    chosen = parser.parse_args()
+    counts = measure(chosen.tree)
+    if not chosen.list:
+        print(json.dumps({name: count.value for name, count in counts.items()}, indent=1))
+        return 0
+    for name, count in counts.items():
+        print(f"{name}: {count.value}")
+        for item in count.items:
+            print(f"  {item}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
