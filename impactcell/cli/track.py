@@ -4,43 +4,14 @@ import csv
 import json
 import math
 import sys
-from dataclasses import dataclass, replace
 from pathlib import Path
 
-from impactcell import alarms
-from impactcell.alarms import AlarmSettings, Notification
+from impactcell.cell.series_replay import TrackedSeries, replay
 from impactcell.errors import SeriesError
-from impactcell.records import AlarmName, Evidence
-from impactcell.tracking import wear_batch
-from impactcell.tracking.wear_batch import (
-    BatchKnowledge,
-    FrictionObservation,
-    TrackerSettings,
-    TrackingResult,
-    initial_state,
-)
+from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
 FEWEST = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Raised:
-    """One activation of an alarm, with its evidence."""
-
-    alarm: AlarmName
-    cycle: int
-    evidence: Evidence
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Replayed:
-    """A series after its last cycle."""
-
-    last: TrackingResult
-    raised: tuple[Raised, ...]
-    used: int
-    notes: tuple[tuple[int, str], ...]
 
 
 def track(
@@ -71,50 +42,14 @@ def track(
     if knowledge is None:
         knowledge = BatchKnowledge.KNOWN if has_batch else BatchKnowledge.UNKNOWN
     settings = TrackerSettings(wear_limit=math.inf if limit is None else limit, batch=knowledge)
-    replayed = replay(settings, readings)
-    if replayed.used < FEWEST:
-        why = f"; {replayed.notes[0][1]}" if replayed.notes else ""
+    tracked = replay(settings, readings)
+    if tracked.used < FEWEST:
+        why = f"; {tracked.notes[0][1]}" if tracked.notes else ""
         raise SeriesError(
-            f"{series}: only {replayed.used} of {len(readings)} cycles can be used, it takes {FEWEST}{why}"
+            f"{series}: only {tracked.used} of {len(readings)} cycles can be used, it takes {FEWEST}{why}"
         )
-    text = json.dumps(_as_json(replayed)) if as_json else _as_text(replayed)
+    text = json.dumps(_as_json(tracked)) if as_json else _as_text(tracked)
     sys.stdout.write(text + "\n")
-
-
-def replay(settings: TrackerSettings, readings: list[FrictionObservation]) -> Replayed:
-    """Track a series and its alarms; a shift is reported as the cycles after it came to see it."""
-    rules = AlarmSettings()
-    state, book = initial_state(), alarms.initial_state(rules)
-    raised: list[Raised] = []
-    notes: list[tuple[int, str]] = []
-    used, open_shift, tracked = 0, -1, None
-    for reading in readings:
-        tracked = wear_batch.update(settings, state, reading)
-        state = tracked.state
-        used += tracked.used
-        notes.extend((reading.cycle, note) for note in tracked.notes)
-        active = book.alarm(AlarmName.WEAR_LIMIT).active
-        findings = [
-            alarms.wear_limit(rules, tracked.wear, reading.cycle, active=active),
-            alarms.batch_shift(tracked.shift),
-        ]
-        book, moved = alarms.update(
-            rules, book, findings, reading.cycle, reading.time_ns, announced=tracked.expected
-        )
-        raised.extend(
-            Raised(t.alarm.name, reading.cycle, t.alarm.evidence)
-            for t in moved
-            if Notification.ANNUNCIATE in t.notifications and t.alarm.name is not AlarmName.BATCH_SHIFT
-        )
-        if tracked.shift is not None:
-            # a second shift while the first still stands is news too
-            open_shift = len(raised)
-            raised.append(Raised(AlarmName.BATCH_SHIFT, reading.cycle, tracked.shift))
-        elif open_shift >= 0:
-            raised[open_shift] = _refined(raised[open_shift], tracked)
-    if tracked is None:
-        raise SeriesError("the series has no cycles")
-    return Replayed(tracked, tuple(raised), used, tuple(notes))
 
 
 def read_series(path: Path) -> tuple[list[FrictionObservation], bool]:
@@ -180,21 +115,10 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
         ) from None
 
 
-def _refined(raised: Raised, tracked: TrackingResult) -> Raised:
-    """Let what is now believed of the shift replace what was believed when it was found."""
-    batch, evidence = tracked.batch, raised.evidence
-    if not math.isfinite(batch.last_shift):
-        return raised
-    newer = replace(
-        evidence, change_cycle=batch.last_shift_cycle, size=batch.last_shift, size_std=batch.last_shift_std
-    )
-    return replace(raised, evidence=newer)
-
-
-def _as_json(replayed: Replayed) -> dict[str, object]:
-    wear, batch = replayed.last.wear, replayed.last.batch
+def _as_json(series: TrackedSeries) -> dict[str, object]:
+    wear, batch = series.wear, series.batch
     return {
-        "cycles": replayed.used,
+        "cycles": series.used,
         "slope_per_cycle": wear.rate_per_cycle,
         "slope_std": wear.rate_std,
         "level": wear.level,
@@ -215,9 +139,9 @@ def _as_json(replayed: Replayed) -> dict[str, object]:
                 "threshold": r.evidence.threshold,
                 "false_alarm_cycles": _finite(r.evidence.false_alarm_cycles),
             }
-            for r in replayed.raised
+            for r in series.alarms
         ],
-        "notes": [{"cycle": cycle, "note": note} for cycle, note in replayed.notes],
+        "notes": [{"cycle": cycle, "note": note} for cycle, note in series.notes],
     }
 
 
@@ -230,10 +154,10 @@ def _cycles(count: float) -> str:
     return f"{count:.0f}" if math.isfinite(count) else "never"
 
 
-def _as_text(replayed: Replayed) -> str:
-    wear = replayed.last.wear
+def _as_text(series: TrackedSeries) -> str:
+    wear = series.wear
     lines = [
-        f"{replayed.used} cycles used",
+        f"{series.used} cycles used",
         f"level   {wear.level:.5f} ± {wear.level_std:.5f}",
         f"wear    {wear.rate_per_cycle * 1e3:+.6f} ± {wear.rate_std * 1e3:.6f} per 1000 cycles",
     ]
@@ -242,11 +166,11 @@ def _as_text(replayed: Replayed) -> str:
             _cycles, (wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high)
         )
         lines.append(f"limit   {wear.limit:g}, cycles to it: {left}, 95 %: {low} .. {high}")
-    for r in replayed.raised:
+    for r in series.alarms:
         e = r.evidence
         lines.append(
             f"{r.alarm.value} at cycle {r.cycle}: "
             f"changed at {e.change_cycle}, {e.size:+.5f} ± {e.size_std:.5f}"
         )
-    lines.extend(f"cycle {cycle}: {note}" for cycle, note in replayed.notes)
+    lines.extend(f"cycle {cycle}: {note}" for cycle, note in series.notes)
     return "\n".join(lines)

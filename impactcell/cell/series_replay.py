@@ -1,0 +1,145 @@
+"""A friction series replayed through the tracker of wear and batch, and through its alarm rules."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell import alarms
+from impactcell.alarms import AlarmSettings, Notification
+from impactcell.errors import SeriesError
+from impactcell.records import AlarmName, BatchState, Evidence, Samples, WearState
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import (
+    FrictionObservation,
+    TrackerSettings,
+    TrackingResult,
+    initial_state,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RaisedAlarm:
+    """One activation of an alarm.
+
+    Attributes
+    ----------
+    alarm : AlarmName
+    cycle : int
+        At which it was raised.
+    evidence : Evidence
+        What was compared with what, when the change began and how large it is; of a batch shift, as the
+        cycles after it came to see it.
+    """
+
+    alarm: AlarmName
+    cycle: int
+    evidence: Evidence
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedSeries:
+    """A friction series after its last cycle, and its course.
+
+    Attributes
+    ----------
+    wear : WearState
+        Level, rate per cycle and cycles left, after the last cycle.
+    batch : BatchState
+        Offset of the present batch and the last shift found, after the last cycle.
+    alarms : tuple of RaisedAlarm
+        In the order in which they were raised.
+    cycle, level, level_std, batch_offset : ndarray, shape (cycles,)
+        What was known after each cycle: mu_s at the reference batch, its standard deviation, and the offset
+        of the batch from it.
+    used : int
+        Cycles that went into the state.
+    notes : tuple of (int, str)
+        Cycle, and what was wrong with it.
+    """
+
+    wear: WearState
+    batch: BatchState
+    alarms: tuple[RaisedAlarm, ...]
+    cycle: Samples
+    level: Samples
+    level_std: Samples
+    batch_offset: Samples
+    used: int
+    notes: tuple[tuple[int, str], ...]
+
+
+def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation]) -> TrackedSeries:
+    """Track a series and its alarms.
+
+    Raises
+    ------
+    SeriesError
+        The series has no cycles.
+    """
+    rules = AlarmSettings()
+    state, alarm_set = initial_state(), alarms.initial_state(rules)
+    raised: list[RaisedAlarm] = []
+    course: list[tuple[float, float, float, float]] = []
+    notes: list[tuple[int, str]] = []
+    result: TrackingResult | None = None
+    used, open_shift = 0, -1
+    for observation in observations:
+        result = wear_batch.update(settings, state, observation)
+        state = result.state
+        used += result.used
+        notes.extend((observation.cycle, note) for note in result.notes)
+        course.append((observation.cycle, result.wear.level, result.wear.level_std, result.batch.offset))
+        active = alarm_set.alarm(AlarmName.WEAR_LIMIT).active
+        rule_results = [
+            alarms.wear_limit(rules, result.wear, observation.cycle, active=active),
+            alarms.batch_shift(result.shift),
+        ]
+        alarm_set, transitions = alarms.update(
+            rules,
+            alarm_set,
+            rule_results,
+            observation.cycle,
+            observation.time_ns,
+            announced=result.expected,
+        )
+        raised.extend(
+            RaisedAlarm(event.alarm.name, observation.cycle, event.alarm.evidence)
+            for event in transitions
+            if Notification.ANNUNCIATE in event.notifications
+            and event.alarm.name is not AlarmName.BATCH_SHIFT
+        )
+        if result.shift is not None:
+            # a second shift while the first still stands is news too
+            open_shift = len(raised)
+            raised.append(RaisedAlarm(AlarmName.BATCH_SHIFT, observation.cycle, result.shift))
+        elif open_shift >= 0:
+            raised[open_shift] = _refined(raised[open_shift], result.batch)
+    if result is None:
+        raise SeriesError("the series has no cycles")
+    cycle, level, level_std, batch_offset = np.array(course).T
+    return TrackedSeries(
+        wear=result.wear,
+        batch=result.batch,
+        alarms=tuple(raised),
+        cycle=cycle,
+        level=level,
+        level_std=level_std,
+        batch_offset=batch_offset,
+        used=used,
+        notes=tuple(notes),
+    )
+
+
+def _refined(raised: RaisedAlarm, batch: BatchState) -> RaisedAlarm:
+    """Let what is now estimated of the shift replace what was estimated when it was found."""
+    if not math.isfinite(batch.last_shift):
+        return raised
+    evidence = replace(
+        raised.evidence,
+        change_cycle=batch.last_shift_cycle,
+        size=batch.last_shift,
+        size_std=batch.last_shift_std,
+    )
+    return replace(raised, evidence=evidence)
