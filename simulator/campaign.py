@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from impactcell.errors import CampaignError
 from simulator.campaign_scenario import CampaignScenario, SensorScenario
-from simulator.plant import Motion, Plant, Shot, Strike, driven, free_slide, tap
+from simulator.plant import Motion, Plant, Shot, TapInput, simulate_driven, simulate_free_slide, simulate_tap
 
 Samples = NDArray[np.float64]
 MM_PER_MIN = 1e-3 / 60.0
@@ -111,7 +111,7 @@ def _shot(
     drive: _Drive | None = None
     match scenario.excitation:
         case "tap":
-            strike = Strike(
+            strike = TapInput(
                 velocity_m_s=plan.velocity * MM_PER_MIN,
                 mass_kg=plan.mass_kg,
                 stroke_m=scenario.stroke_m,
@@ -122,12 +122,14 @@ def _shot(
                 shots=shots,
                 batch=plan.batch,
             )
-            motion = tap(plant, strike)
+            motion = simulate_tap(plant, strike)
         case "free_slide":
-            motion = free_slide(plant, plan.mass_kg, plan.velocity, covariates)
+            motion = simulate_free_slide(plant, plan.mass_kg, plan.velocity, covariates)
         case _:
             drive = _Drive(scenario, random)
-            motion = driven(plant, plan.mass_kg, drive.force_n, scenario.drive.duration_s, covariates)
+            motion = simulate_driven(
+                plant, plan.mass_kg, drive.force_n, scenario.drive.duration_s, covariates
+            )
     # The actuator's laws may outlast the part's last stop; nothing of interest happens after either.
     last = motion.end_s if drive is not None else max(motion.stop_s, 0.0) + scenario.tail_s
     channels = {}

@@ -4,7 +4,7 @@ import enum
 from typing import Final
 
 from simulator.image import Image
-from simulator.plant import Strike
+from simulator.plant import TapInput
 from simulator.scenario import Positioning
 from simulator.tasks import PartSequence
 
@@ -44,7 +44,7 @@ class CommandResult(enum.IntEnum):
     FAULT = 6
 
 
-def commanded(image: Image, positioning: Positioning, parts: PartSequence) -> Strike | None:
+def commanded(image: Image, positioning: Positioning, parts: PartSequence) -> TapInput | None:
     """Return the tap that the registers ask for; None where the actuator cannot do it."""
     velocity, stroke = float(image.get("command_velocity")), float(image.get("command_stroke"))
     direction = int(image.get("command_direction"))
@@ -53,7 +53,7 @@ def commanded(image: Image, positioning: Positioning, parts: PartSequence) -> St
         return None
     if direction not in positioning.directions:
         return None
-    return Strike(velocity, parts.part.mass_kg, stroke, direction, start_m=parts.position_m)
+    return TapInput(velocity, parts.part.mass_kg, stroke, direction, start_m=parts.position_m)
 
 
 def show_result(image: Image, sequence: int, result: CommandResult) -> None:

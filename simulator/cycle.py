@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from simulator.plant import Motion, Strike
+from simulator.plant import Motion, TapInput
 from simulator.process import Encounter
 
 
@@ -13,7 +13,7 @@ from simulator.process import Encounter
 class Tap:
     """A tap under way; `began_s` is the module's own time, `sequence` the command's number or 0."""
 
-    strike: Strike
+    strike: TapInput
     met: Encounter
     motion: Motion
     began_s: float

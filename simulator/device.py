@@ -24,7 +24,7 @@ from simulator.commands import (
 )
 from simulator.cycle import Tap
 from simulator.image import Image
-from simulator.plant import NeverAtRestError, Strike, tap
+from simulator.plant import NeverAtRestError, TapInput, simulate_tap
 from simulator.process import encounter
 from simulator.recorder import record
 from simulator.scenario import Scenario
@@ -156,9 +156,9 @@ class Device:
             direction = 1 if random.choice(directions) == 1 else -1
         # The part is put back after every strike of a schedule.
         mass_kg = self.scenario.part.mass_kg
-        self._strike(Strike(velocity * MM_PER_MIN, mass_kg, strikes.stroke_m, direction), sequence=0)
+        self._strike(TapInput(velocity * MM_PER_MIN, mass_kg, strikes.stroke_m, direction), sequence=0)
 
-    def _strike(self, commanded: Strike, sequence: int) -> None:
+    def _strike(self, commanded: TapInput, sequence: int) -> None:
         self._made += 1
         met = encounter(self.scenario, self._made, commanded.start_m, commanded.direction)
         strike = replace(
@@ -169,7 +169,7 @@ class Device:
             batch=self.scenario.batches.index(met.batch),
         )
         try:
-            motion = tap(met.plant, strike)
+            motion = simulate_tap(met.plant, strike)
         except NeverAtRestError:
             self._image.put("state", ModuleState.FAULT)
             self._image.put("positioning_state", PositioningState.FAULT)
@@ -272,7 +272,7 @@ class Device:
             return
         travelled = abs(float(under_way.motion.actuator_m(np.array([elapsed_s]))[0]))
         strike = replace(under_way.strike, stroke_m=max(travelled, 1e-9))
-        self._tap = replace(under_way, strike=strike, motion=tap(under_way.met.plant, strike))
+        self._tap = replace(under_way, strike=strike, motion=simulate_tap(under_way.met.plant, strike))
 
     def restart(self) -> int:
         """Lose everything and start anew with the counter at zero; returns the new session."""

@@ -15,14 +15,24 @@ from simulator.effects import Shot
 from simulator.plant_forces import Contact, Forces, Phase, Plant
 from simulator.plant_integrator import Event, NeverAtRestError, Path, Piece, integrate
 
-__all__ = ["Event", "Motion", "NeverAtRestError", "Plant", "Shot", "Strike", "driven", "free_slide", "tap"]
+__all__ = [
+    "Event",
+    "Motion",
+    "NeverAtRestError",
+    "Plant",
+    "Shot",
+    "TapInput",
+    "simulate_driven",
+    "simulate_free_slide",
+    "simulate_tap",
+]
 
 Samples = NDArray[np.float64]
 REFINEMENTS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Strike:
+class TapInput:
     """One tap as commanded.
 
     Attributes
@@ -223,7 +233,7 @@ class Motion:
         return out
 
 
-def tap(plant: Plant, strike: Strike) -> Motion:
+def simulate_tap(plant: Plant, strike: TapInput) -> Motion:
     """One tap, from first contact until the part is at rest for good.
 
     Raises
@@ -250,14 +260,14 @@ def tap(plant: Plant, strike: Strike) -> Motion:
     return Motion(forces, path)
 
 
-def free_slide(plant: Plant, mass_kg: float, speed_m_s: float, shot: Shot | None = None) -> Motion:
+def simulate_free_slide(plant: Plant, mass_kg: float, speed_m_s: float, shot: Shot | None = None) -> Motion:
     """Let a part slide from `speed_m_s` along the shot's direction at time 0 until it is at rest."""
     forces = Forces(plant, shot or Shot(), mass_kg)
     phase = Phase(slip=1, contact=Contact.APART, closing=False, halted=True)
     return Motion(forces, integrate(forces, phase, speed_m_s, math.inf, 60.0))
 
 
-def driven(
+def simulate_driven(
     plant: Plant,
     mass_kg: float,
     force_n: Callable[[float], float],

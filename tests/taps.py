@@ -33,7 +33,7 @@ class Tap:
 
     def motion(self) -> simulated.Motion:
         plant = simulated.Plant(self.stiffness, self.damping, self.mu_s, self.mu_k, effects=self.effects)
-        strike = simulated.Strike(
+        strike = simulated.TapInput(
             self.velocity_m_s,
             self.mass_kg,
             self.stroke_m,
@@ -41,7 +41,7 @@ class Tap:
             math.isinf(self.stroke_m),
             self.start_m,
         )
-        return simulated.tap(plant, strike)
+        return simulated.simulate_tap(plant, strike)
 
     def capture(
         self,

@@ -26,7 +26,7 @@ from impactcell.cell.preprocessing import (
     fill_defaults,
     update_period,
 )
-from impactcell.physics import Plant, Strike, free_motion
+from impactcell.physics import Plant, TapInput, free_motion
 from impactcell.prediction import Model, estimate
 from impactcell.records import (
     Alarm,
@@ -238,7 +238,7 @@ def _known(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | Non
     }
     if not others or not capture.mass_kg > 0.0:
         return None
-    tap = Strike(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
+    tap = TapInput(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
     return partial(free_motion.acceleration, replace(plant, effects=others), tap)
 
 

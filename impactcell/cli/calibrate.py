@@ -9,7 +9,7 @@ import numpy as np
 
 from impactcell.cli.paths import check_target
 from impactcell.errors import SettingsError
-from impactcell.physics import Strike
+from impactcell.physics import TapInput
 from impactcell.prediction import Model
 from impactcell.prediction import calibrate as fit_predictors
 from impactcell.process.console import tell
@@ -66,7 +66,7 @@ def calibrated(cell: Cell) -> Model:
     highest = max((1.0 + FRICTION_SPAN) * model.plant.mu_s, 1.04 * settings.alarms.wear_limit)
     frictions = np.linspace(lowest, highest, FRICTIONS)
     masses = _masses(settings.part.mass_kg)
-    tap = Strike(fastest, float(masses[0]), stroke, halts_at_separation=math.isinf(stroke))
+    tap = TapInput(fastest, float(masses[0]), stroke, halts_at_separation=math.isinf(stroke))
     with progress("calibrating", len(masses)) as done:
         predictors = fit_predictors(
             model.plant, tap, masses.tolist(), velocities, frictions, lambda at, _: done() if at else None

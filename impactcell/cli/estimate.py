@@ -13,7 +13,7 @@ import numpy as np
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.cli.paths import check_target
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
-from impactcell.physics import Strike
+from impactcell.physics import TapInput
 from impactcell.prediction import Model, calibrate
 from impactcell.prediction import estimate as estimate_tap
 from impactcell.prediction.free_slide import free_slide_friction
@@ -109,7 +109,7 @@ def calibrated(model: Model, shots: Sequence[Capture]) -> Model:
     fastest = max(shot.velocity_m_s for shot in known)
     slowest = min(0.8 * fastest, *(shot.velocity_m_s for shot in known))
     frictions = np.linspace(1.0 - WIDEST, 1.0 + WIDEST, FRICTIONS) * model.plant.mu_s
-    tap = Strike(fastest, masses[0], stroke, halts_at_separation=math.isinf(stroke))
+    tap = TapInput(fastest, masses[0], stroke, halts_at_separation=math.isinf(stroke))
     velocities = np.linspace(slowest, fastest, VELOCITIES)
     with progress("calibrating", len(masses)) as done:
         predictors = calibrate(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from impactcell.physics import EventKind, Plant, Strike, strike
+from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
 from impactcell.prediction import Model, Prior, calibrate, estimate, printed_predictor
 from impactcell.prediction.equations import MassInterpolation, force_weight
 from impactcell.records import Capture, Channel, Samples
@@ -69,9 +69,9 @@ def plant(mu_s: float, ratio: float = RATIO) -> Plant:
     return Plant(6.5e5, 465.0, mu_s, ratio * mu_s, effects=viscous)
 
 
-def tap(velocity_mm_per_min: float) -> Strike:
+def tap(velocity_mm_per_min: float) -> TapInput:
     """Strike the reference part; the actuator halts as it loses it."""
-    return Strike(velocity_mm_per_min / 6e4, MASS_KG, halts_at_separation=True)
+    return TapInput(velocity_mm_per_min / 6e4, MASS_KG, halts_at_separation=True)
 
 
 def response(figure: "Figure") -> None:
@@ -79,7 +79,7 @@ def response(figure: "Figure") -> None:
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     times = np.linspace(-3e-3, 0.115, 2400)
     for mu, colour in zip(FRICTIONS, COLOURS, strict=True):
-        motion = strike(plant(mu), tap(4000))
+        motion = simulate_tap(plant(mu), tap(4000))
         seen = motion.sample(times)
         top.plot(1e3 * times, seen.force_n, color=colour, label=rf"$\mu_s$ = {mu:.2f}")
         middle.plot(1e3 * times, 1e3 * seen.velocity_m_s, color=colour)
@@ -87,7 +87,7 @@ def response(figure: "Figure") -> None:
         bottom.plot([1e3 * motion.stop_s], [1e3 * motion.displacement_m], "o", color=colour, markersize=4)
         peak = np.argmax(seen.force_n)
         top.plot([1e3 * times[peak]], [motion.peak_force_n], "o", color=colour, markersize=4)
-    last = strike(plant(FRICTIONS[0]), tap(4000))
+    last = simulate_tap(plant(FRICTIONS[0]), tap(4000))
     seen = last.sample(times)
     driven = times <= last.separation_s
     bottom.plot(1e3 * times[driven], 1e3 * seen.actuator_m[driven], color=GREY, linestyle="--")
@@ -97,7 +97,7 @@ def response(figure: "Figure") -> None:
     middle.plot([0.0, 1e3 * last.separation_s], [driven_at, driven_at], color=GREY, linestyle="--")
     middle.annotate("actuator", (14.0, driven_at), (24.0, 30.0), color=GREY, va="center",
                     arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6})  # fmt: skip
-    separation_s = [event.time_s for event in last.events if event.kind is EventKind.SEPARATION][-1]
+    separation_s = [event.time_s for event in last.events if event.kind is TapEventKind.SEPARATION][-1]
     for axis in (top, middle, bottom):
         axis.axvline(1e3 * separation_s, color=GREY, linewidth=0.6, linestyle=":")
     top.annotate(
@@ -118,7 +118,7 @@ def force_and_distance(figure: "Figure") -> None:
     curve = np.linspace(2000, 6000, 200)
     paper = MassInterpolation(MASS_KG, ((1.0, printed_predictor()),), inside=True)
     for mu, colour in zip(FRICTIONS, COLOURS, strict=True):
-        motions = [strike(plant(mu), tap(float(v))) for v in velocities]
+        motions = [simulate_tap(plant(mu), tap(float(v))) for v in velocities]
         left.plot(velocities, [one.peak_force_n for one in motions], "o", color=colour, markersize=3.2)
         right.plot(
             velocities, [1e3 * one.sliding_distance_m for one in motions], "o", color=colour, markersize=3.2
@@ -180,7 +180,7 @@ def _mean_errors(model: Model, velocity_mm_per_min: float) -> Samples:
     found = []
     for mu, ratio in zip(frictions.tolist(), ratios.tolist(), strict=True):
         command = tap(velocity_mm_per_min)
-        motion = strike(plant(mu, ratio), command)
+        motion = simulate_tap(plant(mu, ratio), command)
         times = np.arange(1, round((motion.stop_s + 0.02) * RATE_HZ)) / RATE_HZ
         seen = motion.sample(times)
         capture = Capture(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from impactcell.figures.friction import COLOURS, GREY, STYLE
-from impactcell.physics import Plant, Strike, strike
+from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.positioning import Tap, TapPlanner
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _courses() -> dict[float, list[list[float]]]:
                     break
                 mu_s = MU_S * (1.0 + SCATTER * rng.standard_normal())
                 plant = Plant(STIFFNESS, DAMPING, mu_s, RATIO * mu_s)
-                moved = strike(plant, Strike(tap.velocity_m_s, mass, tap.stroke_m)).displacement_m
+                moved = simulate_tap(plant, TapInput(tap.velocity_m_s, mass, tap.stroke_m)).displacement_m
                 planner.observe(tap, moved, mass)
                 course.append(course[-1] - moved)
             courses[mass].append(course)

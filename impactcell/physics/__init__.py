@@ -3,18 +3,19 @@
 One tap, with its events, figures and samples::
 
     plant = Plant(6.5e5, 465.0, mu_s=0.2, mu_k=0.152, effects={"surface_tilt": {"tilt_rad": 0.002}})
-    motion = strike(plant, Strike(velocity_m_s=0.05, mass_kg=18.9, stroke_m=1.5e-3))
+    motion = simulate_tap(plant, TapInput(velocity_m_s=0.05, mass_kg=18.9, stroke_m=1.5e-3))
     motion.peak_force_n, motion.sliding_distance_m, motion.displacement_m, motion.events
     motion.sample(time_s).force_n
 
 Positions count from where the part lay, positive along +1, whatever `start_m` is; the laws of effects see the
-position on the table. `slide` is the same without an actuator, `drive` under a measured force.
+position on the table. `simulate_free_slide` is the same without an actuator, `simulate_driven` under a
+measured force.
 
 For fits and planners, `Ensemble` integrates many taps for a vector of parameters in one compiled call, at
 some tens of microseconds a tap:
 
 >>> import numpy as np
->>> taps = [Strike(v, 18.9, 1.5e-3, direction=s) for v in (0.04, 0.06, 0.09) for s in (1, -1)]
+>>> taps = [TapInput(v, 18.9, 1.5e-3, direction=s) for v in (0.04, 0.06, 0.09) for s in (1, -1)]
 >>> times = [np.arange(1, 1200) * 1e-4] * len(taps)
 >>> ensemble = Ensemble(taps, ["viscous_friction"], force_time_s=times, position_time_s=times)
 >>> ensemble.names[2:]
@@ -34,20 +35,17 @@ a `Plant`. Samples are smooth in the parameters while the sequence of events is 
 `impactcell.physics.effects.LIBRARY` holds every effect by its identifier; a new effect is one new file there.
 """
 
-from impactcell.physics.drive import drive
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
-from impactcell.physics.ensemble import Ensemble, Figures, Traces
-from impactcell.physics.modified_euler import GridMotion, strike_modified_euler
-from impactcell.physics.motion import Event, EventKind, Motion, Sampled
-from impactcell.physics.plant import Plant, Strike
-from impactcell.physics.simulate import slide, strike
+from impactcell.physics.ensemble import Ensemble, TapOutputs, Traces
+from impactcell.physics.modified_euler import GridMotion, simulate_modified_euler
+from impactcell.physics.motion import ChannelSamples, Motion, TapEvent, TapEventKind
+from impactcell.physics.plant import Plant, TapInput
+from impactcell.physics.simulate import simulate_driven, simulate_free_slide, simulate_tap
 
 __all__ = [
+    "ChannelSamples",
     "Effect",
     "Ensemble",
-    "Event",
-    "EventKind",
-    "Figures",
     "GridMotion",
     "Kind",
     "LawKind",
@@ -55,11 +53,13 @@ __all__ = [
     "Parameter",
     "Phase",
     "Plant",
-    "Sampled",
-    "Strike",
+    "TapEvent",
+    "TapEventKind",
+    "TapInput",
+    "TapOutputs",
     "Traces",
-    "drive",
-    "slide",
-    "strike",
-    "strike_modified_euler",
+    "simulate_driven",
+    "simulate_free_slide",
+    "simulate_modified_euler",
+    "simulate_tap",
 ]

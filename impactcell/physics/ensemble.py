@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import PhysicsError
+from impactcell.numerics.jit import IntArray
 from impactcell.physics import memory_layout as at
 from impactcell.physics.integrator import integrate_all
-from impactcell.physics.law_table import assemble, columns, parameter_range, parameter_vector
-from impactcell.physics.plant import Plant, Strike
+from impactcell.physics.law_table import build_law_table, parameter_range, parameter_vector, tap_columns
+from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
 LONGEST_S = 600.0
@@ -34,7 +35,7 @@ class Traces:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Figures:
+class TapOutputs:
     """Figures of every tap, each of shape (n,); nan where a tap has no such figure.
 
     Attributes
@@ -62,7 +63,7 @@ class Ensemble:
 
     Parameters
     ----------
-    taps : sequence of Strike
+    taps : sequence of TapInput
         n taps.
     effects : sequence of str
         Identifiers of the effects at work; their parameters join the parameter vector.
@@ -89,7 +90,7 @@ class Ensemble:
 
     def __init__(
         self,
-        taps: Sequence[Strike],
+        taps: Sequence[TapInput],
         effects: Sequence[str] = (),
         *,
         force_time_s: Sequence[Samples] | None = None,
@@ -100,11 +101,11 @@ class Ensemble:
         initial_speed_m_s: Samples | None = None,
         drives: Sequence[tuple[Samples, Samples]] | None = None,
     ) -> None:
-        self._columns = columns(taps)
+        self._columns = tap_columns(taps)
         if initial_speed_m_s is not None:
             self._columns["initial_speed_m_s"] = np.asarray(initial_speed_m_s, dtype=np.float64)
         self.batches = 1 + max((tap.batch for tap in taps), default=0)
-        self._program = assemble(tuple(effects), self.batches)
+        self._program = build_law_table(tuple(effects), self.batches)
         self.names = self._program.names
         self.gravity_m_s2 = gravity_m_s2
         self._count = len(taps)
@@ -272,13 +273,13 @@ class Ensemble:
         *,
         mass_kg: Samples | None = None,
         horizon_s: float = LONGEST_S,
-    ) -> Figures:
+    ) -> TapOutputs:
         """Peak force, displacement, sliding distance and times of events, without any samples."""
         rows = self._rows(parameters, friction_factor, mass_kg, None)
-        return figures_of(rows, self._program.laws, horizon_s)
+        return compute_outputs(rows, self._program.laws, horizon_s)
 
 
-def figures_of(rows: Samples, laws: at.Whole, horizon_s: float = LONGEST_S) -> Figures:
+def compute_outputs(rows: Samples, laws: IntArray, horizon_s: float = LONGEST_S) -> TapOutputs:
     """Figures of taps given by `rows`, shape (n, width)."""
     table = np.empty((rows.shape[0], at.FIGURES))
     cursors = np.zeros((rows.shape[0], at.CURSORS), dtype=np.int64)
@@ -286,7 +287,7 @@ def figures_of(rows: Samples, laws: at.Whole, horizon_s: float = LONGEST_S) -> F
     integrate_all(
         rows, laws, NONE, undriven, horizon_s, at.TO_REST, cursors, NONE, NONE, NO_KINDS, NONE, table
     )
-    return Figures(
+    return TapOutputs(
         peak_force_n=table[:, at.PEAK_FORCE],
         displacement_m=table[:, at.DISPLACEMENT],
         sliding_distance_m=table[:, at.DISTANCE],

@@ -4,8 +4,8 @@ import numpy as np
 
 from impactcell.physics.effect import LawKind
 from impactcell.physics.effects import LIBRARY
-from impactcell.physics.law_table import assemble, parameter_vector
-from impactcell.physics.plant import Plant, Strike
+from impactcell.physics.law_table import build_law_table, parameter_vector
+from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
 
@@ -14,7 +14,7 @@ def acts_on_speed(identifier: str) -> bool:
     return not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(LIBRARY[identifier].laws)
 
 
-def acceleration(plant: Plant, tap: Strike, speed_m_s: Samples) -> Samples:
+def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
     """Evaluate the laws of a plant's effects for a free part, mu_k itself left out.
 
     Along the tap, a = s sum_i F_i(x_0, s v, m, g) / m - g sum_j dmu_j(v), with s its direction, F the laws
@@ -24,7 +24,7 @@ def acceleration(plant: Plant, tap: Strike, speed_m_s: Samples) -> Samples:
     Parameters
     ----------
     plant : Plant
-    tap : Strike
+    tap : TapInput
         Its mass, direction and place.
     speed_m_s : ndarray, shape (n,)
         Along the tap, not negative.
@@ -34,7 +34,7 @@ def acceleration(plant: Plant, tap: Strike, speed_m_s: Samples) -> Samples:
     ndarray, shape (n,)
         Along the tap, m/s².
     """
-    program = assemble(tuple(plant.effects))
+    program = build_law_table(tuple(plant.effects))
     values = parameter_vector(plant, program)
     mass, g, sign = tap.mass_kg, plant.gravity_m_s2, tap.direction
     total = np.zeros(len(speed_m_s))

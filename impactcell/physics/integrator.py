@@ -4,7 +4,15 @@ import math
 
 import numpy as np
 
-from impactcell.numerics.jit import FloatPointer, IntPointer, advance, compiled, float_pointer, int_pointer
+from impactcell.numerics.jit import (
+    FloatPointer,
+    IntArray,
+    IntPointer,
+    advance,
+    compiled,
+    float_pointer,
+    int_pointer,
+)
 from impactcell.physics import memory_layout as at
 from impactcell.physics.boundary_samples import after_end, before_contact, finish, last_sample, rests
 from impactcell.physics.events import first_event, margin, next_kink, state_at
@@ -197,15 +205,15 @@ def follow(
 @compiled
 def integrate_all(
     rows: Samples,
-    program: at.Whole,
+    program: IntArray,
     drives: Samples,
-    drive_ends: at.Whole,
+    drive_ends: IntArray,
     horizon: float,
     goal: int,
-    cursors: at.Whole,
+    cursors: IntArray,
     times: Samples,
     out: Samples,
-    event_kinds: at.Whole,
+    event_kinds: IntArray,
     event_times: Samples,
     figures: Samples,
 ) -> None:

@@ -8,11 +8,11 @@ from functools import lru_cache
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.numerics.jit import address
+from impactcell.numerics.jit import IntArray, address
 from impactcell.physics import memory_layout as at
 from impactcell.physics.effect import Covariates, Effect, LawKind
 from impactcell.physics.effects import LIBRARY
-from impactcell.physics.plant import Plant, Strike
+from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
 NOMINAL_NAMES = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
@@ -20,7 +20,7 @@ MOST_STATES = at.WIDTH - at.EXTRA
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Program:
+class LawTable:
     """Effects at work, their laws as compiled code finds them, and where their parameters lie.
 
     Attributes
@@ -38,12 +38,12 @@ class Program:
     batches: int
     names: tuple[str, ...]
     spans: tuple[tuple[tuple[int, int], ...], ...]
-    laws: at.Whole
+    laws: IntArray
     width: int
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel to another process by name: addresses of laws mean nothing there."""
-        return assemble, (self.effects, self.batches)
+        return build_law_table, (self.effects, self.batches)
 
     def rows(self, parameters: Samples, gravity_m_s2: float, taps: Mapping[str, Samples]) -> Samples:
         """One row a tap, shape (n, width), from parameters of shape (n, len(names)) and the taps' columns."""
@@ -78,7 +78,7 @@ class Program:
 
 
 @lru_cache(maxsize=256)
-def assemble(effects: tuple[str, ...], batches: int = 1) -> Program:
+def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
     """Lay out the laws and parameters of a set of effects, in their given order.
 
     Raises
@@ -92,7 +92,7 @@ def assemble(effects: tuple[str, ...], batches: int = 1) -> Program:
     if len(set(effects)) != len(effects):
         raise PhysicsError(f"an effect is named twice among {', '.join(effects)}")
     for identifier in effects:
-        effect = known(identifier)
+        effect = find_effect(identifier)
         mine: list[tuple[int, int]] = []
         for parameter in effect.parameters:
             begin = len(names)
@@ -117,7 +117,7 @@ def assemble(effects: tuple[str, ...], batches: int = 1) -> Program:
         for _, where, first in sorted(lists[kind], key=lambda entry: entry[0]):
             entries += [where, first]
     starts.append(at.KINDS + 1 + len(entries))
-    return Program(
+    return LawTable(
         effects=effects,
         batches=batches,
         names=tuple(names),
@@ -127,14 +127,14 @@ def assemble(effects: tuple[str, ...], batches: int = 1) -> Program:
     )
 
 
-def known(identifier: str) -> Effect:
+def find_effect(identifier: str) -> Effect:
     """Look an effect up; raises `PhysicsError` with what there is."""
     if identifier not in LIBRARY:
         raise PhysicsError(f"no effect is called {identifier!r}; there are {', '.join(LIBRARY)}")
     return LIBRARY[identifier]
 
 
-def parameter_vector(plant: Plant, program: Program, batches: int = 1) -> Samples:
+def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Samples:
     """Parameters of `plant` in the order of `program.names`; effects it lacks are at their null value.
 
     Raises
@@ -169,7 +169,7 @@ def parameter_vector(plant: Plant, program: Program, batches: int = 1) -> Sample
     return np.array(values, dtype=np.float64)
 
 
-def columns(taps: Sequence[Strike]) -> dict[str, Samples]:
+def tap_columns(taps: Sequence[TapInput]) -> dict[str, Samples]:
     """Columns of `rows` from taps, each of shape (n,); they strike, so there is no initial speed."""
     made = {
         name: np.array([getattr(tap, name) for tap in taps], dtype=np.float64)

@@ -6,11 +6,6 @@ those are; `mode` and `memo` hold what is constant within one smooth phase; `fig
 
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
-Whole = NDArray[np.int64]
-
 # row: the nominal plant and one tap
 STIFFNESS: Final = 0
 DAMPING: Final = 1

@@ -1,7 +1,8 @@
 """The source paper's own scheme: modified Euler (Heun) at a fixed step, switching on grid points.
 
 Kept by name for comparison. Stick, slip and contact change only on the grid, so its results carry errors of
-the order of the step and are not smooth in the parameters; `impactcell.physics.strike` has neither fault.
+the order of the step and are not smooth in the parameters; `impactcell.physics.simulate_tap` has neither
+fault.
 """
 
 import math
@@ -11,7 +12,7 @@ import numpy as np
 
 from impactcell.errors import NoStopError, PhysicsError
 from impactcell.numerics.jit import compiled
-from impactcell.physics.plant import Plant, Strike
+from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
 LONGEST_S = 20.0
@@ -100,7 +101,7 @@ def _heun(
     return -1
 
 
-def strike_modified_euler(plant: Plant, tap: Strike, step_s: float) -> GridMotion:
+def simulate_modified_euler(plant: Plant, tap: TapInput, step_s: float) -> GridMotion:
     """One tap of the nominal plant, with viscous friction if it has that effect, by the paper's scheme.
 
     Raises

@@ -13,7 +13,7 @@ from impactcell.errors import NoBreakawayError, NoSeparationError
 from impactcell.records import Samples
 
 
-class EventKind(enum.Enum):
+class TapEventKind(enum.Enum):
     """What joins two smooth phases."""
 
     BREAKAWAY = "breakaway"
@@ -24,14 +24,14 @@ class EventKind(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class TapEvent:
     """Something that happened at a time located inside a step."""
 
-    kind: EventKind
+    kind: TapEventKind
     time_s: float
 
 
-class Sampled(NamedTuple):
+class ChannelSamples(NamedTuple):
     """Channels at the times asked for.
 
     Force is positive in compression; the others count along +1, from where the part lay.
@@ -43,7 +43,7 @@ class Sampled(NamedTuple):
     velocity_m_s: Samples
 
 
-Course = Callable[[Samples], Sampled]
+Sampler = Callable[[Samples], ChannelSamples]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,14 +66,14 @@ class Motion:
         Samples at ascending or any other times.
     """
 
-    events: tuple[Event, ...]
+    events: tuple[TapEvent, ...]
     peak_force_n: float
     displacement_m: float
     stop_s: float
     first_breakaway_s: float
     last_separation_s: float
     distance_after_separation_m: float
-    course: Course
+    course: Sampler
 
     @property
     def breakaway_s(self) -> float:
@@ -110,6 +110,6 @@ class Motion:
             return self.distance_after_separation_m
         raise NoSeparationError("the part never left the actuator after it had moved")
 
-    def sample(self, time_s: ArrayLike) -> Sampled:
+    def sample(self, time_s: ArrayLike) -> ChannelSamples:
         """Channels at `time_s`, shape (n,), in any order; 0 is first contact, before it all is at rest."""
         return self.course(np.atleast_1d(np.asarray(time_s, dtype=np.float64)))

@@ -45,7 +45,7 @@ class Plant:
 
 
 @dataclass(frozen=True, slots=True)
-class Strike:
+class TapInput:
     """One tap as commanded: constant velocity from first contact at t = 0 until the stroke is used up.
 
     Parameters

@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.numerics.jit import compiled
-from impactcell.positioning.displacement_quantiles import COARSE_Z, Z, distribution
-from impactcell.positioning.dynamic_programming import CostToGo, between, expect
+from impactcell.positioning.displacement_quantiles import COARSE_Z, Z, displacement_quantiles
+from impactcell.positioning.dynamic_programming import ValueFunction, expected_cost, interval_probabilities
 from impactcell.records import Samples
 
 KEPT = 5  # taps of the table that are refined
 FINE = 11  # strokes tried between the neighbours of one of them, and again between the best two
 
 
-class Chosen(NamedTuple):
+class SelectedAction(NamedTuple):
     """A tap with what is expected of it."""
 
     velocity_m_s: float
@@ -45,7 +45,7 @@ def shortlist(
             if centre <= 0.0 or math.isnan(table[i, j].sum()):
                 continue
             if centre <= remaining + 2.0 * tolerance:
-                c, _ = expect(
+                c, _ = expected_cost(
                     remaining, table[i, j], z, mass, tolerance, penalty, step, cost, overshoot,
                     cost.size, bound,
                 )  # fmt: skip
@@ -65,7 +65,7 @@ def shortlist(
                     part = (wanted - centre) / (following - centre)
                     for q in range(nodes):
                         row[q] = table[i, j, q] + part * (table[i, j + 1, q] - table[i, j, q])
-                    c, _ = expect(
+                    c, _ = expected_cost(
                         remaining, row, z, mass, tolerance, penalty, step, cost, overshoot, cost.size, bound
                     )  # fmt: skip
                     if c < best:
@@ -80,39 +80,39 @@ def shortlist(
 
 
 @compiled
-def weigh(
+def evaluate_actions(
     velocity: float, strokes: Samples, rows: Samples, z: Samples, mass: Samples, part: Samples,
     remaining: float, tolerance: float, penalty: float,
     step: float, cost: Samples, overshoot: Samples,
 ) -> tuple[Samples, Samples]:  # fmt: skip
     """Weigh each stroke at one velocity by the model itself: expected cost and overshoot probability."""
     moved = np.empty((strokes.size, z.size))
-    distribution(velocity, strokes, rows, z, part, moved)
+    displacement_quantiles(velocity, strokes, rows, z, part, moved)
     costs, risks = np.empty(strokes.size), np.empty(strokes.size)
     for j in range(strokes.size):
         if math.isnan(moved[j].sum()):
             costs[j], risks[j] = math.inf, 1.0
         else:
-            costs[j], risks[j] = expect(
+            costs[j], risks[j] = expected_cost(
                 remaining, moved[j], z, mass, tolerance, penalty, step, cost, overshoot, cost.size, math.inf
             )  # fmt: skip
     return costs, risks
 
 
-def choose(
+def select_action(
     remaining: float, table: Samples, velocities: Samples, strokes: Samples, rows: Samples,
-    value: CostToGo, aims: Samples, *, tolerance: float, penalty: float, bound: float, part: Samples,
+    value: ValueFunction, aims: Samples, *, tolerance: float, penalty: float, bound: float, part: Samples,
     caps: Samples,
-) -> tuple[Chosen | None, float]:  # fmt: skip
+) -> tuple[SelectedAction | None, float]:  # fmt: skip
     """Tap of least cost with an overshoot probability within `bound`, and the least probability met.
 
     The tap is None where none is within the bound. `caps` is the longest stroke allowed at each velocity.
     """
-    coarse, mass = between(COARSE_Z), between(Z)
+    coarse, mass = interval_probabilities(COARSE_Z), interval_probabilities(Z)
     which, where, what = shortlist(
         table, remaining, COARSE_Z, coarse, tolerance, penalty, *value, aims, KEPT
     )  # fmt: skip
-    best: Chosen | None = None
+    best: SelectedAction | None = None
     least = 1.0
     for i, place, first in zip(which, where, what, strict=True):
         if first == math.inf or (best is not None and first > best.cost + 1.0):
@@ -120,7 +120,7 @@ def choose(
         for velocity, tried in _neighbours(int(i), float(place), velocities, strokes, caps):
             fine = tried
             for _ in range(2):
-                costs, risks = weigh(
+                costs, risks = evaluate_actions(
                     velocity, fine, rows, Z, mass, part, remaining,
                     tolerance, penalty, *value,
                 )  # fmt: skip
@@ -128,7 +128,7 @@ def choose(
                 costs = np.where(risks <= bound, costs, np.inf)
                 n = int(costs.argmin())
                 if costs[n] < (best.cost if best is not None else math.inf):
-                    best = Chosen(float(velocity), float(fine[n]), float(costs[n]), float(risks[n]))
+                    best = SelectedAction(float(velocity), float(fine[n]), float(costs[n]), float(risks[n]))
                 if fine.size < 3 or costs[n] == math.inf:
                     break
                 fine = np.linspace(fine[max(n - 1, 0)], fine[min(n + 1, fine.size - 1)], FINE)

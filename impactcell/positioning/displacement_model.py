@@ -4,7 +4,7 @@ The nominal plant, equations (1)-(3) with viscous friction, is linear between it
 actuator runs, its stroke does not matter; once it has halted, what is left is one half wave of an
 oscillator and a slide. One course of the running actuator therefore answers for every stroke at once,
 which is what a planner asks thousands of times a step and an integrator of single taps does not offer.
-`impactcell.physics.strike` is the model; agreement with it is tested.
+`impactcell.physics.simulate_tap` is the model; agreement with it is tested.
 
 With indentation d = y - x, the static indentation L = (mu_k m g + k_v v) / k and e = d - L::
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from impactcell.numerics.jit import compiled
 from impactcell.positioning.displacement_model import displacements
-from impactcell.positioning.planner_posterior import FRICTION, Belief
+from impactcell.positioning.planner_posterior import FRICTION, PlannerPosterior
 from impactcell.records import Samples
 
 Z = np.array([-4.2, -3.3, -2.6, -1.9, -1.2, -0.6, 0.0, 0.6, 1.2, 1.9, 2.6, 3.3, 4.2])
@@ -19,7 +19,7 @@ COARSE_Z = np.array([-3.8, -2.8, -1.8, -0.85, 0.0, 0.85, 1.8, 2.8, 3.8])  # for 
 ACROSS = 4
 
 
-def scenarios(belief: Belief, z: Samples) -> Samples:
+def parameter_scenarios(belief: PlannerPosterior, z: Samples) -> Samples:
     """Parameter rows (k, b, mu_s, mu_k, k_v), shape (len(z) + 2 * ACROSS, 5): the line, then +-1 across."""
     cov = belief.cov.copy()
     cov[FRICTION, FRICTION] += belief.scatter**2
@@ -35,10 +35,10 @@ def scenarios(belief: Belief, z: Samples) -> Samples:
     theta[: z.size, FRICTION] -= 0.5 * min(sigma, 0.1) ** 2 * z**2
     theta[z.size : z.size + ACROSS, 1:] += steps
     theta[z.size + ACROSS :, 1:] -= steps
-    return plants(theta)
+    return plant_parameters(theta)
 
 
-def plants(theta: Samples) -> Samples:
+def plant_parameters(theta: Samples) -> Samples:
     """Rows (k, b, mu_s, mu_k, k_v) of rows of the belief's parameters."""
     rows = np.empty((theta.shape[0], 5))
     mu_k = np.exp(theta[:, 0])
@@ -51,13 +51,13 @@ def plants(theta: Samples) -> Samples:
 
 
 @compiled
-def distribution(
+def displacement_quantiles(
     velocity: float, strokes: Samples, rows: Samples, z: Samples, part: Samples,
     out: Samples,
 ) -> None:  # fmt: skip
     """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m.
 
-    `rows` as from `scenarios`.
+    `rows` as from `parameter_scenarios`.
     """
     nodes, count = z.size, strokes.size
     middle = nodes // 2
@@ -113,11 +113,11 @@ def reach(line: Samples, z: Samples, q: int, middle: int, aside: float) -> float
 
 
 @compiled
-def spread_table(
+def quantile_table(
     velocities: Samples, strokes: Samples, rows: Samples, z: Samples, part: Samples
 ) -> Samples:  # fmt: skip
     """Displacements (m), shape (velocities, strokes, nodes)."""
     table = np.empty((velocities.size, strokes.size, z.size))
     for i in range(velocities.size):
-        distribution(velocities[i], strokes, rows, z, part, table[i])
+        displacement_quantiles(velocities[i], strokes, rows, z, part, table[i])
     return table

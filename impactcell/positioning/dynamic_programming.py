@@ -26,7 +26,7 @@ FAR = 0.7  # a tap whose median leaves this much more to do than the best is not
 SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
 
 
-class CostToGo(NamedTuple):
+class ValueFunction(NamedTuple):
     """W and the overshoot probability at remaining distances 0, step, 2 step, ... (m), shape (n,)."""
 
     step_m: float
@@ -35,14 +35,14 @@ class CostToGo(NamedTuple):
 
 
 @compiled
-def beyond(z: float) -> float:
+def normal_tail(z: float) -> float:
     """P(Z > z) of a standard normal Z."""
     half: float = 0.5 * math.erfc(0.7071067811865476 * z)
     return half
 
 
 @compiled
-def ahead(step: float, values: Samples, known: int, r: float) -> float:
+def interpolate_value(step: float, values: Samples, known: int, r: float) -> float:
     """Interpolate `values`, of which `known` are there; beyond them, the mean slope of their second half."""
     place = r / step
     n = int(place)
@@ -55,7 +55,7 @@ def ahead(step: float, values: Samples, known: int, r: float) -> float:
 
 
 @compiled
-def expect(
+def expected_cost(
     remaining: float, moved: Samples, z: Samples, mass: Samples, tolerance: float, penalty: float,
     step: float, cost: Samples, overshoot: Samples, known: int, bound: float,
 ) -> tuple[float, float]:  # fmt: skip
@@ -87,8 +87,8 @@ def expect(
                 again += mass[q]
                 total += mass[q] * STALL_PENALTY
             elif whole or r <= reached:
-                total += mass[q] * ahead(step, cost, known, r)
-                risk += mass[q] * ahead(step, overshoot, known, min(r, reached))
+                total += mass[q] * interpolate_value(step, cost, known, r)
+                risk += mass[q] * interpolate_value(step, overshoot, known, min(r, reached))
             else:
                 again += mass[q]
         elif far < -tolerance:
@@ -99,16 +99,24 @@ def expect(
             slope = (z[q + 1] - z[q]) / (b - a)
             if near < -tolerance:
                 cut = z[q] + (-tolerance - a) * slope
-                part = beyond(z[q]) - beyond(cut) if a < b else beyond(cut) - beyond(z[q + 1])
+                part = (
+                    normal_tail(z[q]) - normal_tail(cut)
+                    if a < b
+                    else normal_tail(cut) - normal_tail(z[q + 1])
+                )
                 total += part * penalty
                 risk += part
             if far > tolerance:
                 cut = z[q] + (tolerance - a) * slope
-                part = beyond(cut) - beyond(z[q + 1]) if a < b else beyond(z[q]) - beyond(cut)
+                part = (
+                    normal_tail(cut) - normal_tail(z[q + 1])
+                    if a < b
+                    else normal_tail(z[q]) - normal_tail(cut)
+                )
                 r = min(0.5 * (tolerance + far), reached)
                 if r > tolerance:
-                    total += part * ahead(step, cost, known, r)
-                    risk += part * ahead(step, overshoot, known, r)
+                    total += part * interpolate_value(step, cost, known, r)
+                    risk += part * interpolate_value(step, overshoot, known, r)
                 else:
                     again += part
         if total > bound:
@@ -156,7 +164,7 @@ def taps_by_displacement(table: Samples, targets: Samples, z: Samples) -> Sample
 
 
 @compiled
-def sweep(
+def bellman_sweep(
     grid: Samples, targets: Samples, taps: Samples, aims: Samples, z: Samples, mass: Samples,
     tolerance: float, penalty: float, step: float, cost: Samples, overshoot: Samples,
 ) -> None:  # fmt: skip
@@ -174,11 +182,11 @@ def sweep(
             if targets[m] < 0.2 * r and targets[m] < 0.5 * targets[targets.size - 1]:
                 break
             left = r - targets[m]
-            if left > tolerance and 1.0 + ahead(step, cost, known, left) > best + FAR:
+            if left > tolerance and 1.0 + interpolate_value(step, cost, known, left) > best + FAR:
                 continue
             for s in range(SLOTS):
                 if not math.isnan(taps[m, s, 0]):
-                    c, p = expect(
+                    c, p = expected_cost(
                         r, taps[m, s], z, mass, tolerance, penalty, step, cost, overshoot, known, best
                     )  # fmt: skip
                     if c < best:
@@ -195,7 +203,9 @@ def sweep(
                 for q in range(nodes):
                     row[q] = before_it[q] + part * (behind_it[q] - before_it[q])
                 if not math.isnan(row[0]):
-                    c, p = expect(r, row, z, mass, tolerance, penalty, step, cost, overshoot, known, best)
+                    c, p = expected_cost(
+                        r, row, z, mass, tolerance, penalty, step, cost, overshoot, known, best
+                    )
                     if c < best:
                         best, risk = c, p
         if best == math.inf:  # nothing helps from here: as costly as an overshoot
@@ -210,7 +220,7 @@ def sweep(
         before, cost_before, risk_before = r, best, risk
 
 
-def spacing(first: float, last: float, step: float, ratio: float) -> Samples:
+def graded_grid(first: float, last: float, step: float, ratio: float) -> Samples:
     """Increasing grid from `first` to `last` with steps of at least `step`, and of `ratio` further out."""
     points = [first]
     while points[-1] < last:
@@ -218,21 +228,23 @@ def spacing(first: float, last: float, step: float, ratio: float) -> Samples:
     return np.array(points)
 
 
-def between(z: Samples) -> Samples:
+def interval_probabilities(z: Samples) -> Samples:
     """Probability between neighbouring nodes, shape (q - 1,); the tails go to the outermost intervals."""
-    below = np.array([1.0 - beyond(float(v)) for v in z])
+    below = np.array([1.0 - normal_tail(float(v)) for v in z])
     below[0], below[-1] = 0.0, 1.0
     return np.diff(below)
 
 
-def cost_to_go(table: Samples, z: Samples, tolerance: float, penalty: float) -> CostToGo:
+def solve_value_function(table: Samples, z: Samples, tolerance: float, penalty: float) -> ValueFunction:
     """Sweep for one part: `table` (m) as from `spread_table`, shape (velocities, strokes, nodes)."""
     furthest = float(np.nanmax(table[:, :, z.size // 2]))
     step = max(0.5 * tolerance, 2.5e-4 * furthest)
-    grid = spacing(1.25 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
-    targets = spacing(min(0.5 * tolerance, 5e-6), furthest, 0.25 * tolerance, 0.03)
+    grid = graded_grid(1.25 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
+    targets = graded_grid(min(0.5 * tolerance, 5e-6), furthest, 0.25 * tolerance, 0.03)
     targets = targets[targets <= furthest]
     taps = taps_by_displacement(table, targets, z)
     cost, overshoot = np.zeros(int(grid[-1] / step)), np.zeros(int(grid[-1] / step))
-    sweep(grid, targets, taps, AIMS, z, between(z), tolerance, penalty, step, cost, overshoot)
-    return CostToGo(step, cost, overshoot)
+    bellman_sweep(
+        grid, targets, taps, AIMS, z, interval_probabilities(z), tolerance, penalty, step, cost, overshoot
+    )
+    return ValueFunction(step, cost, overshoot)

@@ -22,7 +22,7 @@ MEMORY = 30.0  # signatures after which the old ones fade
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Profile:
+class StrokeFriction:
     """Relative friction on a grid of distances slid since loss of contact.
 
     Attributes
@@ -49,9 +49,9 @@ class Profile:
         return np.concatenate([steps[1:2], np.interp(steps, at_mean, grid)])
 
 
-def learn_profile(
-    known: Profile | None, position_m: Samples, friction: Samples, friction_std: Samples
-) -> Profile | None:
+def update_stroke_friction(
+    known: StrokeFriction | None, position_m: Samples, friction: Samples, friction_std: Samples
+) -> StrokeFriction | None:
     """Profile after one more signature; the old one where the new one says nothing.
 
     Parameters
@@ -74,7 +74,7 @@ def learn_profile(
     if np.count_nonzero(seen) < 3:
         return known
     if known is None or not np.array_equal(known.position_m, position_m):
-        known = Profile(position_m, np.ones(position_m.size), np.zeros(position_m.size))
+        known = StrokeFriction(position_m, np.ones(position_m.size), np.zeros(position_m.size))
     mean = float(np.average(friction[seen] / known.ratio[seen], weights=friction_std[seen] ** -2.0))
     fresh = np.where(seen, friction / mean, 1.0)
     weight = np.where(seen, 1.0 / ((friction_std / mean) ** 2 + ROUGHNESS_STD**2), 0.0)
@@ -83,4 +83,4 @@ def learn_profile(
     ratio = np.where(
         information > 0.0, (old * known.ratio + weight * fresh) / np.maximum(information, 1e-300), 1.0
     )
-    return Profile(position_m, ratio, information)
+    return StrokeFriction(position_m, ratio, information)

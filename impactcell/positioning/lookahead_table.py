@@ -6,9 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from impactcell.positioning.displacement_quantiles import COARSE_Z, plants, scenarios, spread_table
-from impactcell.positioning.dynamic_programming import CostToGo, cost_to_go
-from impactcell.positioning.planner_posterior import Belief, foreseen
+from impactcell.positioning.displacement_quantiles import (
+    COARSE_Z,
+    parameter_scenarios,
+    plant_parameters,
+    quantile_table,
+)
+from impactcell.positioning.dynamic_programming import ValueFunction, solve_value_function
+from impactcell.positioning.planner_posterior import PlannerPosterior, anticipate_learning
 from impactcell.positioning.safety_limits import allowed_strokes
 from impactcell.records import Samples
 
@@ -21,7 +26,7 @@ STALE = np.array([0.02, 0.04, 0.08, 0.03, 2.0])  # change of the belief after wh
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class PlannerLimits:
     """What a planner may do; see `TapPlanner`."""
 
     tolerance_m: float
@@ -49,28 +54,28 @@ class Bounds:
         fine = np.linspace(knee / STROKES, knee, STROKES // 2, endpoint=False)
         return np.concatenate([fine, np.linspace(knee, self.max_stroke_m, STROKES // 2)])
 
-    def caps(self, belief: Belief, part: Samples) -> Samples:
+    def caps(self, belief: PlannerPosterior, part: Samples) -> Samples:
         """Longest stroke at each velocity that the limit of force allows."""
         if math.isinf(self.max_force_n):
             return np.full(self.velocities.size, math.inf)
         return allowed_strokes(self.velocities, self.max_force_n, stiffest(belief), part[0], part[1])
 
 
-class Outlook(NamedTuple):
+class LookaheadTable(NamedTuple):
     """Taps and cost to go for parts of one mass, and the belief they were worked out from."""
 
     part: Samples
     caution: float
-    belief: Belief
+    belief: PlannerPosterior
     table: Samples
-    value: CostToGo
+    value: ValueFunction
 
     @property
     def furthest_m(self) -> float:
         """Largest median displacement; 0 where nothing moves the part."""
         return float(np.nanmax(self.table[:, :, COARSE_Z.size // 2], initial=0.0))
 
-    def serves(self, part: Samples, caution: float, belief: Belief) -> bool:
+    def serves(self, part: Samples, caution: float, belief: PlannerPosterior) -> bool:
         """Whether it need not be made anew for this part and belief."""
         if caution != self.caution or part.size != self.part.size:
             return False
@@ -84,29 +89,31 @@ class Outlook(NamedTuple):
         )
 
 
-def stiffest(belief: Belief) -> Samples:
+def stiffest(belief: PlannerPosterior) -> Samples:
     """Plant (k, b, mu_s, mu_k, k_v) that presses hardest, within three standard deviations."""
     worst = belief.mean + 3.0 * np.sqrt(np.diag(belief.cov))
-    plant: Samples = plants(worst[None])[0] * np.array([1.0, 1.0, 1.1, 1.1, 1.0])
+    plant: Samples = plant_parameters(worst[None])[0] * np.array([1.0, 1.0, 1.1, 1.1, 1.0])
     return plant
 
 
-def look_ahead(bounds: Bounds, belief: Belief, part: Samples, caution: float) -> Outlook:
+def build_lookahead(
+    bounds: PlannerLimits, belief: PlannerPosterior, part: Samples, caution: float
+) -> LookaheadTable:
     """Work out taps and cost to go; `part` as in `response.displacements`."""
     table = _table(bounds, belief, part)
-    value = CostToGo(1.0, np.ones(1), np.ones(1))
+    value = ValueFunction(1.0, np.ones(1), np.ones(1))
     if np.nanmax(table[:, :, COARSE_Z.size // 2], initial=0.0) > 0.0:
-        later = foreseen(belief)
+        later = anticipate_learning(belief)
         will_learn = (np.diag(belief.cov) > 1.2 * np.diag(later.cov)).any()
         ahead = _table(bounds, later, part) if will_learn else table
         if math.isinf(bounds.max_stroke_m):
             ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
-        value = cost_to_go(ahead, COARSE_Z, bounds.tolerance_m, bounds.penalty(caution))
-    return Outlook(part, caution, belief, table, value)
+        value = solve_value_function(ahead, COARSE_Z, bounds.tolerance_m, bounds.penalty(caution))
+    return LookaheadTable(part, caution, belief, table, value)
 
 
-def _table(bounds: Bounds, belief: Belief, part: Samples) -> Samples:
+def _table(bounds: PlannerLimits, belief: PlannerPosterior, part: Samples) -> Samples:
     velocities, strokes = bounds.velocities, bounds.strokes
-    table = spread_table(velocities, strokes, scenarios(belief, COARSE_Z), COARSE_Z, part)
+    table = quantile_table(velocities, strokes, parameter_scenarios(belief, COARSE_Z), COARSE_Z, part)
     table[strokes > bounds.caps(belief, part)[:, None]] = math.nan
     return table

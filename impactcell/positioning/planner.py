@@ -9,15 +9,20 @@ import numpy as np
 
 from impactcell.errors import PositioningError
 from impactcell.physics import Plant
-from impactcell.positioning import planner_posterior as beliefs
-from impactcell.positioning.action_selection import choose
+from impactcell.positioning import planner_posterior
+from impactcell.positioning.action_selection import select_action
 from impactcell.positioning.displacement_model import displacement_of
-from impactcell.positioning.displacement_quantiles import Z, distribution, plants, scenarios
+from impactcell.positioning.displacement_quantiles import (
+    Z,
+    displacement_quantiles,
+    parameter_scenarios,
+    plant_parameters,
+)
 from impactcell.positioning.dynamic_programming import AIMS
-from impactcell.positioning.friction_along_stroke import Profile, learn_profile
-from impactcell.positioning.lookahead_table import Bounds, Outlook, look_ahead, stiffest
-from impactcell.positioning.planner_posterior import Belief
-from impactcell.positioning.posterior_update import learn
+from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
+from impactcell.positioning.lookahead_table import LookaheadTable, PlannerLimits, build_lookahead, stiffest
+from impactcell.positioning.planner_posterior import PlannerPosterior
+from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.safety_limits import largest_force
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.records import Quality, Samples, Signature
@@ -61,11 +66,11 @@ class TapPlanner:
     plant: Plant | Mapping[str, float] | None = None
     max_force_n: float = math.inf
     two_sided: bool = False
-    _belief: Belief = field(init=False, repr=False)
+    _belief: PlannerPosterior = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
-    _bounds: Bounds = field(init=False, repr=False)
-    _profile: Profile | None = field(init=False, repr=False, default=None)
-    _outlooks: list[Outlook] = field(init=False, repr=False, default_factory=list)
+    _bounds: PlannerLimits = field(init=False, repr=False)
+    _profile: StrokeFriction | None = field(init=False, repr=False, default=None)
+    _outlooks: list[LookaheadTable] = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have, and start from the nominal plant."""
@@ -83,21 +88,21 @@ class TapPlanner:
             plant = Plant(**plant)  # type: ignore[arg-type]
         viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
         self._gravity = plant.gravity_m_s2
-        self._bounds = Bounds(
+        self._bounds = PlannerLimits(
             self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
             self.overshoot_probability,
         )  # fmt: skip
         _ready()
-        self._belief = beliefs.prior(
+        self._belief = planner_posterior.prior(
             plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, float(np.max(viscous))
         )
 
     @property
-    def belief(self) -> Belief:
+    def belief(self) -> PlannerPosterior:
         """What has been learned so far; a value, to be kept and given back with `resume`."""
         return self._belief
 
-    def resume(self, belief: Belief) -> None:
+    def resume(self, belief: PlannerPosterior) -> None:
         """Go on from a belief kept earlier."""
         self._belief = belief
 
@@ -131,7 +136,7 @@ class TapPlanner:
                 "and this cell cannot push it back"
             )
         distance = abs(remaining_m)
-        rows, part = scenarios(self._belief, Z), self._part(mass_kg)
+        rows, part = parameter_scenarios(self._belief, Z), self._part(mass_kg)
         least = 1.0
         for caution in CAUTION:
             outlook = self._outlook(part, caution)
@@ -140,7 +145,7 @@ class TapPlanner:
                     f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
                     f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
                 )
-            chosen, met = choose(
+            chosen, met = select_action(
                 distance, outlook.table, self._bounds.velocities, self._bounds.strokes, rows, outlook.value,
                 AIMS, tolerance=self.tolerance_m, penalty=self._bounds.penalty(caution),
                 bound=self.overshoot_probability, part=part, caps=self._bounds.caps(self._belief, part),
@@ -156,8 +161,8 @@ class TapPlanner:
             )
         moved = np.empty((1, BAND_Z.size))
         stroke = np.array([chosen.stroke_m])
-        band = scenarios(self._belief, BAND_Z)
-        distribution(chosen.velocity_m_s, stroke, band, BAND_Z, part, moved)
+        band = parameter_scenarios(self._belief, BAND_Z)
+        displacement_quantiles(chosen.velocity_m_s, stroke, band, BAND_Z, part, moved)
         return Tap(
             velocity_m_s=chosen.velocity_m_s,
             stroke_m=chosen.stroke_m,
@@ -184,9 +189,11 @@ class TapPlanner:
 
         def response(states: Samples) -> Samples:
             factor = np.maximum(1.0 + states[:, 5], 0.05)
-            return displacement_of(tap.velocity_m_s, tap.stroke_m, plants(states[:, :5]), factor, part)
+            return displacement_of(
+                tap.velocity_m_s, tap.stroke_m, plant_parameters(states[:, :5]), factor, part
+            )
 
-        self._belief = learn(self._belief, response, moved_m)
+        self._belief = update_posterior(self._belief, response, moved_m)
 
     def observe_friction(self, mu_k: float, std: float, batch_changed: bool = False) -> None:  # noqa: FBT001, FBT002
         """Take over the tracker's kinetic coefficient; `batch_changed`: friction has just stepped.
@@ -198,7 +205,9 @@ class TapPlanner:
         """
         if not (math.isfinite(mu_k) and mu_k > 0.0 and math.isfinite(std) and std >= 0.0):
             raise PositioningError(f"cannot use a friction of {mu_k} +- {std}")
-        self._belief = beliefs.told_friction(self._belief, mu_k, std, batch_changed=batch_changed)
+        self._belief = planner_posterior.condition_on_friction(
+            self._belief, mu_k, std, batch_changed=batch_changed
+        )
 
     def observe_signature(self, signature: Signature) -> None:
         """Take over how friction varies along the slide; a signature of bad quality says nothing.
@@ -209,12 +218,12 @@ class TapPlanner:
             For a signature whose arrays do not belong together.
         """
         if signature.quality is not Quality.BAD:
-            self._profile = learn_profile(
+            self._profile = update_stroke_friction(
                 self._profile, signature.position_m, signature.friction, signature.friction_std
             )
 
     def force(self, tap: Tap, mass_kg: float) -> float:
-        """Bound on the contact force of a tap (N), for `impactcell.positioning.safety_limits.released`."""
+        """Bound on the contact force of a tap (N), for `impactcell.positioning.safety_limits.check_tap`."""
         return largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(self._belief), mass_kg, self._gravity)
 
     def _part(self, mass_kg: float) -> Samples:
@@ -222,13 +231,13 @@ class TapPlanner:
             [[mass_kg, self._gravity], [] if self._profile is None else self._profile.warp()]
         )
 
-    def _outlook(self, part: Samples, caution: float) -> Outlook:
+    def _outlook(self, part: Samples, caution: float) -> LookaheadTable:
         """Outlook for this part, made anew where the belief has moved on."""
         for n, outlook in enumerate(self._outlooks):
             if outlook.serves(part, caution, self._belief):
                 self._outlooks.append(self._outlooks.pop(n))
                 return outlook
-        outlook = look_ahead(self._bounds, self._belief, part, caution)
+        outlook = build_lookahead(self._bounds, self._belief, part, caution)
         self._outlooks.append(outlook)
         del self._outlooks[:-REMEMBERED]
         return outlook
@@ -237,14 +246,15 @@ class TapPlanner:
 @cache
 def _ready() -> None:
     """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
-    belief = beliefs.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
-    bounds = Bounds(50e-6, 0.05, 4e-4, 1e3, 0.1)
+    belief = planner_posterior.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
+    bounds = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
     part = np.array([20.0, 9.81])
-    outlook = look_ahead(bounds, belief, part, 1.0)
-    choose(
-        2e-3, outlook.table, bounds.velocities, bounds.strokes, scenarios(belief, Z), outlook.value, AIMS,
-        tolerance=50e-6, penalty=100.0, bound=0.1, part=part, caps=bounds.caps(belief, part),
+    outlook = build_lookahead(bounds, belief, part, 1.0)
+    select_action(
+        2e-3, outlook.table, bounds.velocities, bounds.strokes, parameter_scenarios(belief, Z),
+        outlook.value, AIMS, tolerance=50e-6, penalty=100.0, bound=0.1, part=part,
+        caps=bounds.caps(belief, part),
     )  # fmt: skip
-    plant = plants(belief.mean[None])
+    plant = plant_parameters(belief.mean[None])
     displacement_of(0.02, 2e-4, plant, np.ones(1), part)
     largest_force(0.02, 2e-4, plant[0], 20.0, 9.81)

@@ -24,7 +24,7 @@ LEVEL_STD = 0.007  # the tracker's level is believed no better than this: succes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Belief:
+class PlannerPosterior:
     """Sum of Gaussians over the parameters and inverse-gamma over the variance of the friction factor.
 
     Attributes
@@ -73,14 +73,14 @@ class Belief:
         return math.exp(float(self.mean[FRICTION]))
 
 
-def gaussian(belief: Belief, mean: Samples, cov: Samples) -> Belief:
+def with_single_gaussian(belief: PlannerPosterior, mean: Samples, cov: Samples) -> PlannerPosterior:
     """Belief with one Gaussian over the parameters in place of what it had."""
     return replace(belief, weights=np.ones(1), means=mean[None], covs=cov[None])
 
 
 def prior(
     stiffness: float, damping: float, mu_s: float, mu_k: float, viscous: float, friction_std: float = 0.35
-) -> Belief:
+) -> PlannerPosterior:
     """Belief before the first tap: contact within some 10 %, friction within a factor of 1.4.
 
     Parameters
@@ -100,10 +100,10 @@ def prior(
         ]
     )
     std = np.array([friction_std, 0.12, 0.13, 0.03, 0.5 + 0.15 * viscous])
-    return Belief(np.ones(1), mean[None], np.diag(std**2)[None])
+    return PlannerPosterior(np.ones(1), mean[None], np.diag(std**2)[None])
 
 
-def foreseen(belief: Belief) -> Belief:
+def anticipate_learning(belief: PlannerPosterior) -> PlannerPosterior:
     """Belief as the next taps will leave it, for what is to be expected of the taps after them.
 
     One strike tells friction about as well as the scatter allows, and a few tell the contact; to plan as
@@ -111,10 +111,12 @@ def foreseen(belief: Belief) -> Belief:
     """
     mean, cov = belief.mean, belief.cov
     factor = np.minimum(1.0, LEARNED_STD / np.sqrt(np.diag(cov)))
-    return gaussian(belief, mean, cov * np.outer(factor, factor))
+    return with_single_gaussian(belief, mean, cov * np.outer(factor, factor))
 
 
-def told_friction(belief: Belief, mu_k: float, std: float, *, batch_changed: bool) -> Belief:
+def condition_on_friction(
+    belief: PlannerPosterior, mu_k: float, std: float, *, batch_changed: bool
+) -> PlannerPosterior:
     """Belief after the tracker reported its level of the kinetic coefficient.
 
     The tracker's level is itself an average over the cycles this belief has learned from, so the two are
@@ -132,10 +134,10 @@ def told_friction(belief: Belief, mu_k: float, std: float, *, batch_changed: boo
         mean[FRICTION] = level
         cov[FRICTION, :] = cov[:, FRICTION] = 0.0
         cov[FRICTION, FRICTION] = variance
-        return replace(gaussian(belief, mean, cov), surprise=0.0)
+        return replace(with_single_gaussian(belief, mean, cov), surprise=0.0)
     if variance >= own:
         return belief
     regression = cov[:, FRICTION] / own
     mean = mean + regression * difference
     cov = cov - np.outer(regression, regression) * (own - variance)
-    return gaussian(belief, mean, cov)
+    return with_single_gaussian(belief, mean, cov)

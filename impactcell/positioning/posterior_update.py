@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from impactcell.positioning.planner_posterior import BATCH_STD, FRICTION, STIFFNESS, Belief
+from impactcell.positioning.planner_posterior import BATCH_STD, FRICTION, STIFFNESS, PlannerPosterior
 from impactcell.records import Samples
 
 DEGREES = 8.0  # of freedom of the likelihood
@@ -32,11 +32,11 @@ Response = Callable[[Samples], Samples]
 """Displacements (m), shape (n,), for rows of (theta, z sigma), shape (n, 6)."""
 
 
-def learn(belief: Belief, response: Response, moved_m: float) -> Belief:
+def update_posterior(belief: PlannerPosterior, response: Response, moved_m: float) -> PlannerPosterior:
     """Belief after a tap displaced the part by `moved_m`, `response` being the model of that tap."""
-    belief = split(belief)
+    belief = split_components(belief)
     steps = [
-        step(mean, cov + np.diag(WALK**2), belief.scatter, response, moved_m)
+        update_component(mean, cov + np.diag(WALK**2), belief.scatter, response, moved_m)
         for mean, cov in zip(belief.means, belief.covs, strict=True)
     ]
     with np.errstate(divide="ignore"):
@@ -65,10 +65,10 @@ def learn(belief: Belief, response: Response, moved_m: float) -> Belief:
         taps=belief.taps + 1,
         surprise=surprise,
     )
-    return merge(learned)
+    return merge_components(learned)
 
 
-def split(belief: Belief) -> Belief:
+def split_components(belief: PlannerPosterior) -> PlannerPosterior:
     """Sum of Gaussians narrow each in friction, then in stiffness, equal to the belief in mean and spread."""
     weights, means, covs = [], [], []
     for weight, mean, cov in zip(belief.weights, belief.means, belief.covs, strict=True):
@@ -92,7 +92,7 @@ def split(belief: Belief) -> Belief:
     return replace(belief, weights=np.array(weights), means=np.array(means), covs=np.array(covs))
 
 
-def merge(belief: Belief) -> Belief:
+def merge_components(belief: PlannerPosterior) -> PlannerPosterior:
     """One Gaussian, as soon as together they are narrow enough for one to be trusted."""
     if belief.weights.size == 1:
         return belief
@@ -102,7 +102,7 @@ def merge(belief: Belief) -> Belief:
     return replace(belief, weights=np.ones(1), means=belief.mean[None], covs=belief.cov[None])
 
 
-def step(
+def update_component(
     mean: Samples, cov: Samples, sigma: float, response: Response, moved_m: float
 ) -> tuple[Samples, Samples, float, float, float, float]:
     """One Gaussian after one displacement.

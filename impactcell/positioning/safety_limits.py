@@ -12,7 +12,7 @@ from impactcell.records import Samples
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class SafetyLimits:
     """What a cell allows.
 
     Attributes
@@ -64,7 +64,7 @@ def allowed_strokes(
     return strokes
 
 
-def released(tap: Tap, limits: Limits, position_m: float, force_n: float, cell: str = "cell") -> Tap:
+def check_tap(tap: Tap, limits: SafetyLimits, position_m: float, force_n: float, cell: str = "cell") -> Tap:
     """Return the tap, if the cell allows it.
 
     Parameters

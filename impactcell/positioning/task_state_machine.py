@@ -7,8 +7,8 @@
                         └── abort ──► IDLE       ├── abort ──► IDLE
                         └── failed ─► FAULTED    └── failed, moved nothing, out of its band ──► FAULTED
 
-`begin` may follow IDLE, SETTLED and FAULTED. Every transition is a pure function of sequence and event, but
-for the planner, which learns from each observation.
+`begin_task` may follow IDLE, SETTLED and FAULTED. Every transition is a pure function of task and event,
+but for the planner, which learns from each observation.
 """
 
 import enum
@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 from impactcell.errors import PositioningError
 from impactcell.positioning.planner import TapPlanner
-from impactcell.positioning.safety_limits import Limits, released
+from impactcell.positioning.safety_limits import SafetyLimits, check_tap
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.records import Evidence, PositioningState
 
@@ -25,7 +25,7 @@ BAND_SIGMAS = 3.29  # the band of a displacement holds 99.9 %
 MOST_TAPS = 200  # of one task; a task that needs more is not converging
 
 
-class Phase(enum.Enum):
+class TaskPhase(enum.Enum):
     """Where a task stands."""
 
     IDLE = "idle"
@@ -36,7 +36,7 @@ class Phase(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class PositioningCell:
     """What the sequence has to know of the cell.
 
     Attributes
@@ -50,13 +50,13 @@ class Cell:
     """
 
     name: str
-    limits: Limits
+    limits: SafetyLimits
     resolution_m: float
     two_sided: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
+class TaskState:
     """A task between two events.
 
     Attributes
@@ -71,7 +71,7 @@ class Sequence:
         Of the fault, for the alarm.
     """
 
-    phase: Phase = Phase.IDLE
+    phase: TaskPhase = TaskPhase.IDLE
     target_m: float = math.nan
     position_m: float = math.nan
     mass_kg: float = math.nan
@@ -88,7 +88,7 @@ class Sequence:
     @property
     def running(self) -> bool:
         """Whether a tap is to be commanded or awaited."""
-        return self.phase in {Phase.COMMANDING, Phase.WAITING}
+        return self.phase in {TaskPhase.COMMANDING, TaskPhase.WAITING}
 
     def published(self) -> PositioningState:
         """Return the task as it is published."""
@@ -104,16 +104,16 @@ class Sequence:
         )
 
 
-def begin(
-    sequence: Sequence,
-    cell: Cell,
+def begin_task(
+    sequence: TaskState,
+    cell: PositioningCell,
     planner: TapPlanner,
     *,
     target_m: float,
     position_m: float,
     mass_kg: float,
     trained: bool,
-) -> Sequence:
+) -> TaskState:
     """Start a task; SETTLED at once where the part is in place already.
 
     Parameters
@@ -163,24 +163,24 @@ def begin(
         )
     if not trained:
         raise PositioningError(f"{name}: friction is not known yet; let the estimator see some cycles first")
-    fresh = Sequence(Phase.IDLE, target_m, position_m, mass_kg)
+    fresh = TaskState(TaskPhase.IDLE, target_m, position_m, mass_kg)
     begun = _plan(fresh, cell, planner)
-    if begun.phase is Phase.FAULTED:
+    if begun.phase is TaskPhase.FAULTED:
         raise PositioningError(f"{name}: {begun.reason}")
     return begun
 
 
-def commanded(sequence: Sequence) -> Sequence:
+def commanded(sequence: TaskState) -> TaskState:
     """Go on after the module has accepted the tap; its outcome is awaited."""
-    if sequence.phase is not Phase.COMMANDING:
+    if sequence.phase is not TaskPhase.COMMANDING:
         return sequence
-    return replace(sequence, phase=Phase.WAITING, taps=sequence.taps + 1)
+    return replace(sequence, phase=TaskPhase.WAITING, taps=sequence.taps + 1)
 
 
-def observed(sequence: Sequence, cell: Cell, planner: TapPlanner, position_m: float) -> Sequence:
+def observed(sequence: TaskState, cell: PositioningCell, planner: TapPlanner, position_m: float) -> TaskState:
     """Go on after the tap has moved the part to `position_m`: next tap, SETTLED, or FAULTED with evidence."""
     tap = sequence.tap
-    if sequence.phase is not Phase.WAITING or tap is None:
+    if sequence.phase is not TaskPhase.WAITING or tap is None:
         return sequence
     if not math.isfinite(position_m):
         return failed(sequence, f"{cell.name}: the module reported no position after tap {sequence.taps}")
@@ -209,35 +209,35 @@ def observed(sequence: Sequence, cell: Cell, planner: TapPlanner, position_m: fl
     return _plan(lies, cell, planner)
 
 
-def failed(sequence: Sequence, reason: str, evidence: Evidence | None = None) -> Sequence:
+def failed(sequence: TaskState, reason: str, evidence: Evidence | None = None) -> TaskState:
     """Stop with an alarm: link lost, command refused or not answered, or a tap that did not do its work."""
     if not sequence.running:
         return sequence
-    return replace(sequence, phase=Phase.FAULTED, tap=None, reason=reason, evidence=evidence)
+    return replace(sequence, phase=TaskPhase.FAULTED, tap=None, reason=reason, evidence=evidence)
 
 
-def aborted(sequence: Sequence, by: str) -> Sequence:
+def aborted(sequence: TaskState, by: str) -> TaskState:
     """Stop because a person or the PLC says so; not a fault. An outstanding tap is to be cancelled."""
     if not sequence.running:
         return sequence
-    return replace(sequence, phase=Phase.IDLE, tap=None, reason=f"aborted by {by}")
+    return replace(sequence, phase=TaskPhase.IDLE, tap=None, reason=f"aborted by {by}")
 
 
-def _plan(sequence: Sequence, cell: Cell, planner: TapPlanner) -> Sequence:
+def _plan(sequence: TaskState, cell: PositioningCell, planner: TapPlanner) -> TaskState:
     answer = planner.next_tap(sequence.remaining_m, sequence.mass_kg)
     if answer is None:
-        return replace(sequence, phase=Phase.SETTLED, tap=None, reason="in place")
+        return replace(sequence, phase=TaskPhase.SETTLED, tap=None, reason="in place")
     if isinstance(answer, Unreachable):
         return replace(
             sequence,
-            phase=Phase.FAULTED,
+            phase=TaskPhase.FAULTED,
             tap=None,
             reason=f"{cell.name}: {answer.reason}",
             evidence=Evidence(),
         )
     force = planner.force(answer, sequence.mass_kg)
     try:
-        tap = released(answer, cell.limits, sequence.position_m, force, cell.name)
+        tap = check_tap(answer, cell.limits, sequence.position_m, force, cell.name)
     except PositioningError as refused:
-        return replace(sequence, phase=Phase.FAULTED, tap=None, reason=str(refused), evidence=Evidence())
-    return replace(sequence, phase=Phase.COMMANDING, tap=tap)
+        return replace(sequence, phase=TaskPhase.FAULTED, tap=None, reason=str(refused), evidence=Evidence())
+    return replace(sequence, phase=TaskPhase.COMMANDING, tap=tap)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from impactcell.errors import PhysicsError, PredictionError
-from impactcell.physics import EventKind, Plant, Strike, strike
+from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
 from impactcell.prediction.equations import MassInterpolation
 from impactcell.prediction.model import (
     REFERENCE_VELOCITY,
@@ -55,7 +55,7 @@ class Regime(enum.Enum):
     CAUGHT = "caught again, or stuck"
 
 
-def regimes(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> list[Regime]:
+def regimes(plant: Plant, tap: TapInput, velocities: Samples, frictions: Samples) -> list[Regime]:
     """Tell the regime of each velocity over all frictions."""
     ratio = plant.mu_k / plant.mu_s
     found = []
@@ -71,10 +71,10 @@ def regimes(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) 
     return found
 
 
-def _regime(plant: Plant, tap: Strike) -> Regime:
+def _regime(plant: Plant, tap: TapInput) -> Regime:
     try:
-        motion = strike(plant, tap)
-        separations = [event.time_s for event in motion.events if event.kind is EventKind.SEPARATION]
+        motion = simulate_tap(plant, tap)
+        separations = [event.time_s for event in motion.events if event.kind is TapEventKind.SEPARATION]
         if len(separations) != 1 or motion.sliding_distance_m <= 0.0:
             return Regime.CAUGHT
     except PhysicsError:
@@ -100,7 +100,7 @@ def velocity_spans(found: Sequence[Regime], velocities: Samples) -> list[tuple[f
     return kept
 
 
-def sweep(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Sweep:
+def sweep(plant: Plant, tap: TapInput, velocities: Samples, frictions: Samples) -> Sweep:
     """Strike the plant at every velocity and friction, mu_k / mu_s kept.
 
     Raises
@@ -123,9 +123,9 @@ def sweep(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) ->
     return Sweep(velocities, frictions, table[:, :, 0], table[:, :, 1])
 
 
-def peak_and_distance(plant: Plant, tap: Strike) -> tuple[float, float]:
+def peak_and_distance(plant: Plant, tap: TapInput) -> tuple[float, float]:
     """Peak force, N, and sliding distance, m, of one tap."""
-    motion = strike(plant, tap)
+    motion = simulate_tap(plant, tap)
     return motion.peak_force_n, motion.sliding_distance_m
 
 
@@ -161,7 +161,7 @@ def fit_distance(swept: Sweep) -> DistanceForm:
     return DistanceForm(limit, math.exp(square), square_power, math.exp(offset), offset_power, rms)
 
 
-def fit_predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Samples) -> Predictor:
+def fit_predictor(plant: Plant, tap: TapInput, velocities: Samples, frictions: Samples) -> Predictor:
     """Fit both equations for one mass in one regime; find how they depend on what is taken as known."""
     swept = sweep(plant, tap, velocities, frictions)
     fitted = Predictor(
@@ -184,7 +184,7 @@ def fit_predictor(plant: Plant, tap: Strike, velocities: Samples, frictions: Sam
 
 def calibrate(
     plant: Plant,
-    tap: Strike,
+    tap: TapInput,
     masses_kg: Sequence[float],
     velocities_m_s: Samples,
     frictions: Samples,
@@ -232,7 +232,7 @@ def calibrate(
     return tuple(found)
 
 
-def _sensitivities(fitted: Predictor, plant: Plant, other: Plant, tap: Strike) -> tuple[float, float]:
+def _sensitivities(fitted: Predictor, plant: Plant, other: Plant, tap: TapInput) -> tuple[float, float]:
     """Mean relative change of both predicted mu_s per relative change of one property of the plant."""
     ratio = other.mu_k / other.mu_s
     mixed = MassInterpolation(tap.mass_kg, ((1.0, fitted),), inside=True)

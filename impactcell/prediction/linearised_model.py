@@ -11,7 +11,7 @@ import numpy as np
 
 from impactcell.errors import PhysicsError
 from impactcell.numerics.jit import compiled
-from impactcell.physics import Ensemble, EventKind, Plant, Strike, strike
+from impactcell.physics import Ensemble, Plant, TapEventKind, TapInput, simulate_tap
 from impactcell.prediction.block_averaging import (
     FINE_FORCE_BLOCK_S,
     FINE_POSITION_BLOCK_S,
@@ -36,9 +36,9 @@ STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT)])
 KINK_SPAN_S = 1.5e-4
 
 
-def tap_input(capture: Capture) -> Strike:
+def tap_input(capture: Capture) -> TapInput:
     """Turn a capture's command into a tap for the model; without a stroke the actuator halts by itself."""
-    return Strike(
+    return TapInput(
         velocity_m_s=capture.velocity_m_s,
         mass_kg=capture.mass_kg,
         stroke_m=capture.stroke_m,
@@ -96,7 +96,7 @@ class LinearisedModel:
     force, position : Blocks
     """
 
-    def __init__(self, plant: Plant, tap: Strike, force: BlockMeans, position: BlockMeans) -> None:
+    def __init__(self, plant: Plant, tap: TapInput, force: BlockMeans, position: BlockMeans) -> None:
         self.tap = tap
         self.force_time_s, self.position_time_s = force.time_s, position.time_s
         self.size = len(force.values) + len(position.values)
@@ -192,7 +192,7 @@ def linearised_model(capture: Capture, plant: Plant, separation_s: float) -> Lin
         Last loss of contact as read off the force; nan where it was not.
     """
     tap = tap_input(capture)
-    motion = strike(plant, tap)
+    motion = simulate_tap(plant, tap)
     kinks = [event.time_s for event in motion.events]
     if math.isfinite(separation_s):
         kinks.append(separation_s)
@@ -202,7 +202,7 @@ def linearised_model(capture: Capture, plant: Plant, separation_s: float) -> Lin
     force = NO_BLOCKS
     if capture.force is not None:
         force = average_blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
-        jumps = [event.time_s for event in motion.events if event.kind is EventKind.CONTACT]
+        jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
         if jumps:
             force = replace(force, std=force.std * _std_factors_at_jumps(force.time_s, jumps))
     position = average_blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)

@@ -10,8 +10,8 @@ from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import Module
 from impactcell.fieldbus.decoding import PositioningReport
 from impactcell.fieldbus.tap_commands import Positioner, TapCommand
-from impactcell.positioning import Belief, Limits, TapPlanner, task_state_machine
-from impactcell.positioning.task_state_machine import Phase, Sequence
+from impactcell.positioning import PlannerPosterior, SafetyLimits, TapPlanner, task_state_machine
+from impactcell.positioning.task_state_machine import TaskPhase, TaskState
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Evidence, PositioningState, Quality, Snapshot
 from impactcell.service.worker import Worker
@@ -42,14 +42,14 @@ class PositioningTask:
         settings, actuator = cell.settings.positioning, cell.settings.actuator
         if settings is None:
             raise PositioningError(f"{cell.name}: this cell has no positioning; add it to {cell.path}")
-        limits = Limits(
+        limits = SafetyLimits(
             velocity_m_s=actuator.max_velocity_mm_per_min / 60e3,
             stroke_m=actuator.max_stroke_mm * 1e-3,
             force_n=math.inf if actuator.max_force_n is None else actuator.max_force_n,
             travel_m=(0.0, settings.travel_mm * 1e-3),
         )
         self._log = CellLogger(logging.getLogger(__name__), cell.name)
-        self._cell = task_state_machine.Cell(
+        self._cell = task_state_machine.PositioningCell(
             cell.name, limits, settings.encoder_resolution_um * 1e-6, two_sided=actuator.both_ends
         )
         self._planner = TapPlanner(
@@ -69,7 +69,7 @@ class PositioningTask:
         self._positioner = Positioner(module)
         self._worker = worker
         self._changed = changed
-        self._sequence = Sequence()
+        self._sequence = TaskState()
         self._wake = asyncio.Event()
         self._plc_target: int | None = None
         self._batch_shift_cycle = 0
@@ -82,12 +82,12 @@ class PositioningTask:
     @property
     def fault(self) -> tuple[str, Evidence] | None:
         """Why the last task stopped, where it was a fault."""
-        if self._sequence.phase is not Phase.FAULTED:
+        if self._sequence.phase is not TaskPhase.FAULTED:
             return None
         return self._sequence.reason, self._sequence.evidence or Evidence()
 
     @property
-    def belief(self) -> Belief:
+    def belief(self) -> PlannerPosterior:
         """What the planner has learned."""
         return self._planner.belief
 
@@ -105,7 +105,7 @@ class PositioningTask:
             mass_kg = self._mass_kg
         before = self._sequence
         begun = await self._worker.run(
-            lambda: task_state_machine.begin(
+            lambda: task_state_machine.begin_task(
                 before,
                 self._cell,
                 self._planner,
@@ -180,11 +180,11 @@ class PositioningTask:
             await self.begin(report.target_m)
         except PositioningError as error:
             self._log.warning("the PLC's target is refused: %s", error)
-            self._set(Sequence(Phase.FAULTED, reason=str(error), evidence=Evidence()))
+            self._set(TaskState(TaskPhase.FAULTED, reason=str(error), evidence=Evidence()))
 
     async def _drive(self) -> None:
         """Command and observe, tap by tap, until the task no longer runs."""
-        while self._sequence.phase is Phase.COMMANDING:
+        while self._sequence.phase is TaskPhase.COMMANDING:
             tap = self._sequence.tap
             assert tap is not None  # noqa: S101 - COMMANDING has one
             waiting = task_state_machine.commanded(self._sequence)
@@ -223,7 +223,7 @@ class PositioningTask:
             )
         return report
 
-    def _set(self, now: Sequence) -> None:
+    def _set(self, now: TaskState) -> None:
         if now is not self._sequence:
             self._sequence = now
             self._changed()

@@ -10,7 +10,7 @@ import numpy as np
 from impactcell import cell as core
 from impactcell.cell import CellDesign
 from impactcell.journal.capture_codec import encode_capture
-from impactcell.physics import Strike, strike
+from impactcell.physics import TapInput, simulate_tap
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
 
 CYCLES = 8
@@ -49,13 +49,13 @@ def _rehearse(design: CellDesign, stop: Callable[[], bool]) -> bool:
 
 
 def _capture(design: CellDesign, cycle: int) -> Capture:
-    tap = Strike(
+    tap = TapInput(
         velocity_m_s=0.06,
         mass_kg=design.known.mass_kg or 18.9,
         stroke_m=design.known.stroke_m or float("inf"),
         halts_at_separation=design.known.stroke_m is None,
     )
-    motion = strike(design.model.plant, tap)
+    motion = simulate_tap(design.model.plant, tap)
     random = np.random.default_rng(cycle)
     force_s = uniform_times(0.0, FORCE_HZ, int(motion.separation_s * 1.2 * FORCE_HZ))
     position_s = uniform_times(0.0, POSITION_HZ, int((motion.stop_s * 1.1 + 0.005) * POSITION_HZ))

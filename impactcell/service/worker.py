@@ -14,7 +14,7 @@ from impactcell.alarms import AlarmEvent, RuleResult, Transition
 from impactcell.cell import CellDesign, CellState, StepResult
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
-from impactcell.positioning import Belief
+from impactcell.positioning import PlannerPosterior
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
     Alarm,
@@ -45,7 +45,7 @@ class Durable:
 
     state: CellState
     snapshot: Snapshot | None = None
-    belief: Belief | None = None
+    belief: PlannerPosterior | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

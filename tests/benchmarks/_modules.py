@@ -14,7 +14,7 @@ import yaml
 
 from impactcell.fieldbus.registers import RegisterMap
 from simulator.modbus_server import ModbusServer
-from simulator.plant import Plant, Strike, tap
+from simulator.plant import Plant, TapInput, simulate_tap
 from simulator.scripted import ScriptedDevice
 from tests.integration.processes import CONFIG
 
@@ -37,7 +37,7 @@ def taps() -> list[tuple[dict[str, np.ndarray], dict[str, float | str]]]:
             effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}},
         )
         velocity = float(draw.uniform(0.05, 0.09))
-        motion = tap(plant, Strike(velocity_m_s=velocity, mass_kg=18.9, stroke_m=1.5e-3))
+        motion = simulate_tap(plant, TapInput(velocity_m_s=velocity, mass_kg=18.9, stroke_m=1.5e-3))
         force_s = np.arange(FORCE_SAMPLES) / FORCE_HZ
         position_s = np.arange(POSITION_SAMPLES) / POSITION_HZ
         samples = {

@@ -12,7 +12,7 @@ import numpy as np
 
 from impactcell.physics import Plant
 from impactcell.positioning import Tap, TapPlanner, Unreachable
-from impactcell.positioning.planner_posterior import DAMPING, FRICTION, STIFFNESS, gaussian
+from impactcell.positioning.planner_posterior import DAMPING, FRICTION, STIFFNESS, with_single_gaussian
 from simulator.plant_nominal import nominal_taps
 
 RESULTS = Path("bench-results")
@@ -114,7 +114,7 @@ class Known(Learned):
         belief = self.planner.belief
         std = np.full(5, 1e-4)
         std[[FRICTION, STIFFNESS, DAMPING]] = 0.01, 1e-4, 1e-4
-        self.planner.resume(gaussian(belief, belief.mean, np.diag(std**2)))
+        self.planner.resume(with_single_gaussian(belief, belief.mean, np.diag(std**2)))
 
 
 class Fixed(Learned):
@@ -123,7 +123,7 @@ class Fixed(Learned):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         belief = self.planner.belief
-        self.planner.resume(gaussian(belief, belief.mean, np.diag(np.full(5, 1e-4) ** 2)))
+        self.planner.resume(with_single_gaussian(belief, belief.mean, np.diag(np.full(5, 1e-4) ** 2)))
 
     def start(self, task: Task) -> None:
         pass

@@ -40,7 +40,9 @@ class Truth:
 
 def motion(truth: Truth) -> simulated.Motion:
     plant = simulated.Plant(truth.stiffness, truth.damping, truth.mu_s, truth.mu_k, effects=EFFECTS)
-    return simulated.tap(plant, simulated.Strike(truth.velocity_m_s, MASS_KG, halts_at_separation=True))
+    return simulated.simulate_tap(
+        plant, simulated.TapInput(truth.velocity_m_s, MASS_KG, halts_at_separation=True)
+    )
 
 
 def shot(

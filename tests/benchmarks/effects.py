@@ -6,7 +6,7 @@ import math
 import numpy as np
 from scipy.integrate import DOP853
 
-from impactcell.physics import Plant, Strike, strike
+from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.physics.effects import LIBRARY
 from simulator import plant as simulated
 from simulator import plant_integrator
@@ -55,8 +55,8 @@ def agreement(*, quick: bool) -> Table:
                 "dwell_s": rng.uniform(0.01, 1000.0),
                 "batch": int(rng.integers(0, 2)),
             }
-            ours = strike(Plant(**plant), Strike(**tap))
-            theirs = simulated.tap(simulated.Plant(**plant), simulated.Strike(**tap))
+            ours = simulate_tap(Plant(**plant), TapInput(**tap))
+            theirs = simulated.simulate_tap(simulated.Plant(**plant), simulated.TapInput(**tap))
             if "force_sensor_lag" not in names:
                 force.append(abs(ours.peak_force_n / theirs.sensed(theirs.peak_force_n) - 1.0))
             if math.isnan(theirs.sliding_distance_m) or ("presliding_compliance" in names and len(names) > 1):

@@ -15,7 +15,7 @@ import psutil
 
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
-from impactcell.physics import Strike, strike
+from impactcell.physics import TapInput, simulate_tap
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
 from impactcell.service.factory import cell_design
 from impactcell.service.worker import Worker
@@ -36,7 +36,7 @@ def captures() -> list[Capture]:
     design = cell_design(read_cell(CONFIG / "cells" / "prototype.yaml"))
     made = []
     for velocity in draw.uniform(0.05, 0.09, 16):
-        motion = strike(design.model.plant, Strike(float(velocity), 18.9, 1.5e-3))
+        motion = simulate_tap(design.model.plant, TapInput(float(velocity), 18.9, 1.5e-3))
         force_s, position_s = uniform_times(0.0, FORCE_HZ, 400), uniform_times(0.0, POSITION_HZ, 800)
         force = motion.sample(force_s).force_n + draw.normal(0.0, 0.4, 400)
         position = motion.sample(position_s).position_m + draw.normal(0.0, 1.5e-6, 800)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import least_squares
 
-from impactcell.physics import Ensemble, Plant, Strike, strike, strike_modified_euler
+from impactcell.physics import Ensemble, Plant, TapInput, simulate_modified_euler, simulate_tap
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks._scipy_tap import K_V, MASS, RATIO, SAMPLES, B, K, scipy_tap
 from tests.benchmarks.table import Table
@@ -34,7 +34,7 @@ def seconds(run: Callable[[], object], repeats: int) -> tuple[float, float, floa
 def speed(*, quick: bool) -> Table:
     """One tap with 1200 samples of force and position, beside scipy, in turns within one run."""
     v = 4500.0 * MM_PER_MIN
-    tap = Strike(v, MASS, halts_at_separation=True)
+    tap = TapInput(v, MASS, halts_at_separation=True)
     ensemble = Ensemble([tap], ["viscous_friction"], force_time_s=[SAMPLES], position_time_s=[SAMPLES])
     theta = ensemble.parameters(reference_plant(0.2))
     many = Ensemble(
@@ -47,17 +47,17 @@ def speed(*, quick: bool) -> Table:
     single: list[float] = []
     figures: list[float] = []
     ensemble.traces(theta)
-    strike(reference_plant(0.2), tap)
+    simulate_tap(reference_plant(0.2), tap)
     for _ in range(rounds):
         ours.append(seconds(lambda: ensemble.traces(theta), 50)[0])
         batch.append(seconds(lambda: many.traces(theta), 5)[0] / 60)
         figures.append(seconds(lambda: many.figures(theta), 5)[0] / 60)
-        single.append(seconds(lambda: strike(reference_plant(0.2), tap).sample(SAMPLES), 20)[0])
+        single.append(seconds(lambda: simulate_tap(reference_plant(0.2), tap).sample(SAMPLES), 20)[0])
         theirs.append(seconds(lambda: scipy_tap(0.2, v, 1e-6), 3)[0])
     exact = scipy_tap(0.2, v, 1e-13, peak=True, method="DOP853", max_step=1e-4)
     loose = scipy_tap(0.2, v, 1e-6, peak=True)
     traces = ensemble.traces(theta)
-    motion = strike(reference_plant(0.2), tap)
+    motion = simulate_tap(reference_plant(0.2), tap)
 
     def misses(peak: float, distance: float, force: np.ndarray, position: np.ndarray) -> str:
         return (
@@ -82,7 +82,7 @@ def speed(*, quick: bool) -> Table:
             ("one tap by `Ensemble.traces`: faster than solve_ivp", "30 x or more", *ratio(ours)),
             ("a tap of 60 at once: time", "", *micro(batch)),
             ("a tap of 60 at once: faster than solve_ivp", "30 x or more", *ratio(batch)),
-            ("`strike(...).sample(...)`, figures and all four channels", "", *micro(single)),
+            ("`simulate_tap(...).sample(...)`, figures and all four channels", "", *micro(single)),
             ("figures only, a tap of 60 at once", "", *micro(figures)),
             ("error of solve_ivp at rtol 1e-6", "", misses(loose[0], loose[1], *loose[2]), ""),
             (
@@ -109,7 +109,7 @@ def coefficients(*, quick: bool) -> Table:
             np.linspace(0.15, 0.25, 6 if quick else 11), np.linspace(low, high, 7 if quick else 13)
         )
         mu, v = mu.ravel(), v.ravel()
-        taps = [Strike(one * MM_PER_MIN, MASS, halts_at_separation=True) for one in v]
+        taps = [TapInput(one * MM_PER_MIN, MASS, halts_at_separation=True) for one in v]
         ensemble = Ensemble(taps, ["viscous_friction"])
         k, b, ratio, k_v = plant
         theta = np.column_stack(
@@ -179,7 +179,7 @@ def smoothness(*, quick: bool) -> Table:
     """Finite differences of a least-squares objective, at ever smaller steps, against Richardson's limit."""
     velocities = (2000.0, 4000.0) if quick else (1500.0, 2000.0, 3000.0, 4000.0, 6000.0)
     taps = [
-        Strike(v * MM_PER_MIN, m, 1.5e-3, direction=d)
+        TapInput(v * MM_PER_MIN, m, 1.5e-3, direction=d)
         for v in velocities
         for m in (12.6, 18.9, 25.2)
         for d in (1, -1)
@@ -246,11 +246,11 @@ def smoothness(*, quick: bool) -> Table:
 
 def modified_euler() -> Table:
     """The paper's scheme at its step and finer ones."""
-    tap = Strike(4500.0 * MM_PER_MIN, MASS, halts_at_separation=True)
-    exact = strike(reference_plant(0.2), tap)
+    tap = TapInput(4500.0 * MM_PER_MIN, MASS, halts_at_separation=True)
+    exact = simulate_tap(reference_plant(0.2), tap)
     rows = []
     for step in (1e-4, 1e-5, 1e-6):
-        grid = strike_modified_euler(reference_plant(0.2), tap, step)
+        grid = simulate_modified_euler(reference_plant(0.2), tap, step)
         rows.append(
             (
                 f"modified Euler, step {step:g} s",

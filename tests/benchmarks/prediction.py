@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 
-from impactcell.physics import Strike
+from impactcell.physics import TapInput
 from impactcell.prediction import Model, calibrate, estimate, printed_predictor
 from impactcell.prediction.calibration import fit_predictor
 from impactcell.prediction.equations import sliding_distance
@@ -37,7 +37,7 @@ from tests.benchmarks.table import Table
 
 def table_of_coefficients() -> Table:
     velocities = np.linspace(0.05, 0.1, 17)
-    tap = Strike(0.1, MASS_KG, halts_at_separation=True)
+    tap = TapInput(0.1, MASS_KG, halts_at_separation=True)
     fitted, given = fit_predictor(PLANT, tap, velocities, FRICTIONS), printed_predictor()
     mu, v = np.meshgrid(FRICTIONS, velocities)
 
@@ -60,7 +60,7 @@ def table_of_coefficients() -> Table:
 
 def table_of_equations(shots: int) -> Table:
     rng = np.random.default_rng(34)
-    tap = Strike(0.1, MASS_KG, halts_at_separation=True)
+    tap = TapInput(0.1, MASS_KG, halts_at_separation=True)
     predictors = calibrate(PLANT, tap, [MASS_KG], np.linspace(0.05, 0.1, 17), FRICTIONS)
     model = Model("reference", PLANT, PRIOR, predictors)
     rows: list[tuple[float, ...]] = []

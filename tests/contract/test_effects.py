@@ -16,11 +16,11 @@ from impactcell.physics import (
     LawKind,
     Parameter,
     Plant,
-    Strike,
+    TapInput,
     effects,
     law_table,
-    slide,
-    strike,
+    simulate_free_slide,
+    simulate_tap,
 )
 from impactcell.physics.effects import LIBRARY
 
@@ -52,7 +52,7 @@ VOCABULARY = {
     "direction_asymmetry": ("relative_amplitude",),
 }
 TAPS = [
-    Strike(v, m, 1.5e-3, direction=d, start_m=0.001, dwell_s=30.0, shot=3, shots=10, batch=b)
+    TapInput(v, m, 1.5e-3, direction=d, start_m=0.001, dwell_s=30.0, shot=3, shots=10, batch=b)
     for v, m, d, b in (
         (0.02, 18.9, 1, 0),
         (0.04, 12.6, -1, 1),
@@ -112,8 +112,8 @@ def test_it_vanishes_at_its_null_value(identifier: str) -> None:
     with_it, without = ensemble(identifier).traces(theta), ensemble().traces(NOMINAL)
     np.testing.assert_allclose(flat(with_it), flat(without), rtol=0.0, atol=2e-9)
     left_out = Plant(*NOMINAL, effects={identifier: {}})
-    assert strike(left_out, TAPS[2]).displacement_m == pytest.approx(
-        strike(Plant(*NOMINAL), TAPS[2]).displacement_m, rel=1e-9
+    assert simulate_tap(left_out, TAPS[2]).displacement_m == pytest.approx(
+        simulate_tap(Plant(*NOMINAL), TAPS[2]).displacement_m, rel=1e-9
     )
 
 
@@ -187,15 +187,18 @@ def test_a_slide_with_it_is_never_longer(identifier: str) -> None:
     given_values = {p.name: p.typical for p in LIBRARY[identifier].parameters}
     plain, with_it = Plant(*NOMINAL), Plant(*NOMINAL, effects={identifier: given_values})
     for speed in (0.01, 0.1, 0.3):
-        tap = Strike(1.0, 18.9)
-        assert slide(with_it, tap, speed).displacement_m <= slide(plain, tap, speed).displacement_m
+        tap = TapInput(1.0, 18.9)
+        assert (
+            simulate_free_slide(with_it, tap, speed).displacement_m
+            <= simulate_free_slide(plain, tap, speed).displacement_m
+        )
 
 
 def test_effects_compose_in_any_order() -> None:
     some = ("surface_tilt", "hertz_contact", "force_sensor_gain", "force_sensor_offset", "periodic_friction")
     typical = {name: {p.name: p.typical for p in LIBRARY[name].parameters} for name in some}
     there, back = (
-        strike(Plant(*NOMINAL, effects={name: typical[name] for name in order}), TAPS[3])
+        simulate_tap(Plant(*NOMINAL, effects={name: typical[name] for name in order}), TAPS[3])
         for order in (some, some[::-1])
     )
     assert there.displacement_m == pytest.approx(back.displacement_m, rel=1e-9)
@@ -207,7 +210,7 @@ def test_all_effects_at_once() -> None:
         name: {p.name: [p.typical, p.typical] if p.per_batch else p.typical for p in effect.parameters}
         for name, effect in LIBRARY.items()
     }
-    motion = strike(Plant(*NOMINAL, effects=everything), TAPS[3])
+    motion = simulate_tap(Plant(*NOMINAL, effects=everything), TAPS[3])
     assert math.isfinite(motion.displacement_m)
     assert motion.peak_force_n <= LIBRARY["force_saturation"].parameters[0].typical
 
@@ -239,7 +242,7 @@ def test_a_new_file_is_all_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert set(library) == {*LIBRARY, "constant_pull"}
     monkeypatch.setattr(law_table, "LIBRARY", library)
     pulled = Plant(*NOMINAL, effects={"constant_pull": {"pull_n": 5.0}})
-    moved = slide(pulled, Strike(1.0, 18.9), 0.1)
+    moved = simulate_free_slide(pulled, TapInput(1.0, 18.9), 0.1)
     assert moved.displacement_m == pytest.approx(0.1**2 / 2.0 / (0.152 * 9.81 - 5.0 / 18.9), rel=1e-9)
 
 

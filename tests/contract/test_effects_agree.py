@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import DOP853
 
-from impactcell.physics import Plant, Strike, drive, slide, strike
+from impactcell.physics import Plant, TapInput, simulate_driven, simulate_free_slide, simulate_tap
 from impactcell.physics.effects import LIBRARY
 from simulator import plant as simulated
 from simulator import plant_integrator
@@ -62,8 +62,8 @@ def draw(identifiers: list[str], rng: np.random.Generator) -> tuple[dict, dict]:
 
 def compare(identifiers: list[str], rng: np.random.Generator) -> None:
     plant, tap = draw(identifiers, rng)
-    ours = strike(Plant(**plant), Strike(**tap))
-    theirs = simulated.tap(simulated.Plant(**plant), simulated.Strike(**tap))
+    ours = simulate_tap(Plant(**plant), TapInput(**tap))
+    theirs = simulated.simulate_tap(simulated.Plant(**plant), simulated.TapInput(**tap))
     told = f"{plant} {tap}"
     rings = "presliding_compliance" in identifiers and len(identifiers) > 1
     # Elastic stick under a load rings for ever; there is no rest to compare, only the stop before it.
@@ -105,8 +105,10 @@ def test_free_slides_agree(identifiers: list[str]) -> None:
     rng = np.random.default_rng(22)
     for direction in (1, -1):
         plant, _ = draw(identifiers, rng)
-        ours = slide(Plant(**plant), Strike(1.0, 10.0, direction=direction, start_m=0.01), 0.12)
-        theirs = simulated.free_slide(
+        ours = simulate_free_slide(
+            Plant(**plant), TapInput(1.0, 10.0, direction=direction, start_m=0.01), 0.12
+        )
+        theirs = simulated.simulate_free_slide(
             simulated.Plant(**plant), 10.0, 0.12, simulated.Shot(direction=direction, start_m=0.01)
         )
         assert ours.displacement_m == pytest.approx(theirs.displacement_m, rel=1e-7)
@@ -120,8 +122,8 @@ def test_driven_parts_agree(identifier: str | None) -> None:
     time = np.arange(0.0, 0.4, 1e-3)
     force = 60.0 * np.sin(2.0 * np.pi * 4.0 * time) + 30.0 * np.sin(2.0 * np.pi * 11.0 * time + 1.0)
     samples = np.linspace(0.0, 0.39, 100)
-    ours = drive(Plant(**plant), Strike(1.0, 30.0), time, force, samples)
-    theirs = simulated.driven(
+    ours = simulate_driven(Plant(**plant), TapInput(1.0, 30.0), time, force, samples)
+    theirs = simulated.simulate_driven(
         simulated.Plant(**plant), 30.0, lambda t: float(np.interp(t, time, force)), 0.395
     )
     np.testing.assert_allclose(ours.position_m, theirs.position_m(samples), rtol=0.0, atol=1e-8)

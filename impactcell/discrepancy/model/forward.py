@@ -7,10 +7,11 @@ import numpy as np
 
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.data.shots import Index, Shots
-from impactcell.physics import Strike
+from impactcell.numerics.jit import IntArray
+from impactcell.physics import TapInput
 from impactcell.physics import memory_layout as at
 from impactcell.physics.integrator import integrate_all
-from impactcell.physics.law_table import assemble, columns
+from impactcell.physics.law_table import build_law_table, tap_columns
 from impactcell.records import Samples
 
 LONGEST_S = 60.0
@@ -18,11 +19,11 @@ LONGEST_S = 60.0
 
 def _integrate_shots(
     rows: Samples,
-    laws: at.Whole,
+    laws: IntArray,
     drive: Samples,
-    drive_bounds: at.Whole,
+    drive_bounds: IntArray,
     horizon: float,
-    cursors: at.Whole,
+    cursors: IntArray,
     times: Samples,
     out: Samples,
     figures: Samples,
@@ -99,7 +100,7 @@ class Forward:
         self.shots = shots
         free = shots.excitation is not Excitation.TAP
         taps = [
-            Strike(
+            TapInput(
                 velocity_m_s=1.0 if free else shot.velocity_m_s,
                 mass_kg=shot.mass_kg if math.isfinite(shot.mass_kg) else 1.0,
                 stroke_m=shots.stroke_m,
@@ -112,7 +113,7 @@ class Forward:
             )
             for shot in shots.items
         ]
-        self._columns = columns(taps)
+        self._columns = tap_columns(taps)
         self.batches = batches
         self._times = shots.times
         self._cursors = np.zeros((len(taps), at.CURSORS), dtype=np.int64)
@@ -128,13 +129,13 @@ class Forward:
 
     def names(self, effects: tuple[str, ...]) -> tuple[str, ...]:
         """Parameters of a row: nominal four, then those of the effects."""
-        return assemble(effects, self.batches).names
+        return build_law_table(effects, self.batches).names
 
     def rows(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Samples:
         """Rows for the integrator; `parameters` has shape (P,) or (n, P)."""
         taps = self._columns | {"mass_kg": local.mass_kg, "initial_speed_m_s": local.speed_m_s}
         table = np.broadcast_to(parameters, (len(self.shots), parameters.shape[-1]))
-        rows = assemble(effects, self.batches).rows(table, self.shots.gravity_m_s2, taps)
+        rows = build_law_table(effects, self.batches).rows(table, self.shots.gravity_m_s2, taps)
         factor = np.exp(local.log_factor)
         rows[:, at.MU_S] *= factor
         rows[:, at.MU_K] *= factor
@@ -145,7 +146,7 @@ class Forward:
         out = np.empty(self._times.size)
         figures = np.empty((len(self.shots), at.FIGURES))
         rows = self.rows(effects, parameters, local)
-        laws = assemble(effects, self.batches).laws
+        laws = build_law_table(effects, self.batches).laws
         _integrate_shots(
             rows, laws, self._drive, self._drive_bounds, LONGEST_S, self._cursors, self._times, out, figures
         )
@@ -160,7 +161,7 @@ class Forward:
         found = np.empty((3, times.size))
         figures = np.empty((len(self.shots), at.FIGURES))
         rows = self.rows(effects, parameters, local)
-        laws = assemble(effects, self.batches).laws
+        laws = build_law_table(effects, self.batches).laws
         for k, channel in enumerate((at.POSITION, at.PART_VELOCITY, at.ACTUATOR)):
             cursors = np.zeros_like(self._cursors)
             cursors[:, channel] = self.shots.bounds[:-1]
@@ -174,8 +175,8 @@ class Forward:
         return Course(*(sign * found[k][back] for k in range(3)))
 
 
-def _sorted_within(shots: Shots, times: Samples) -> at.Whole:
+def _sorted_within(shots: Shots, times: Samples) -> IntArray:
     """Order that sorts the samples of every shot by time."""
     owner = np.repeat(np.arange(len(shots)), np.diff(shots.bounds))
-    order: at.Whole = np.lexsort((times, owner)).astype(np.int64)
+    order: IntArray = np.lexsort((times, owner)).astype(np.int64)
     return order

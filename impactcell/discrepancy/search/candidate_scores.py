@@ -16,7 +16,7 @@ from impactcell.discrepancy.search.effect_grid import SMALL, Probe, Range, probe
 from impactcell.errors import PhysicsError
 from impactcell.physics.effect import Covariates
 from impactcell.physics.effects import LIBRARY
-from impactcell.physics.law_table import assemble
+from impactcell.physics.law_table import build_law_table
 from impactcell.records import Samples
 
 FORWARD = 0.1
@@ -127,7 +127,7 @@ def log_factors(problem: Problem, identifier: str, probe: Probe) -> Samples | No
     if effect.between is None or effect.laws:
         return None
     items = problem.shots.items
-    names = assemble((identifier,), problem.forward.batches).names
+    names = build_law_table((identifier,), problem.forward.batches).names
     coordinates = of_effect(identifier, problem.forward.batches)
     values = {plant_name(one): one.value(float(at)) for one, at in zip(coordinates, probe.at, strict=True)}
     row = np.array([values[one] for one in names[len(NOMINAL) :]])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from impactcell.physics import Plant, Strike, strike
+from impactcell.physics import Plant, TapInput, simulate_tap
 
 
 def reference(k: float, b: float, mu_s: float, mu_k: float, k_v: float, m: float, v: float, stroke: float):
@@ -58,7 +58,7 @@ def test_a_tap_is_scipy_s(velocity: float, mass: float, stroke: float) -> None:
     plant = Plant(
         6.5e5, 465.0, 0.2, 0.152, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}}
     )
-    motion = strike(plant, Strike(velocity, mass, stroke))
+    motion = simulate_tap(plant, TapInput(velocity, mass, stroke))
     force, distance = reference(6.5e5, 465.0, 0.2, 0.152, 85.0, mass, velocity, stroke)
     # The reference takes its peak from points 20 µs apart: 2e-6 of a half oscillation's top at most.
     assert motion.peak_force_n == pytest.approx(force, rel=2e-6)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import PhysicsError
-from impactcell.physics import Ensemble, Plant, Strike, drive, slide, strike
+from impactcell.physics import Ensemble, Plant, TapInput, simulate_driven, simulate_free_slide, simulate_tap
 
 EFFECTS = {
     "viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0},
@@ -16,7 +16,7 @@ EFFECTS = {
 }
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects=EFFECTS)
 TAPS = [
-    Strike(v, 18.9, 1.5e-3, direction=d, batch=b)
+    TapInput(v, 18.9, 1.5e-3, direction=d, batch=b)
     for v, b in ((0.03, 0), (0.06, 1), (0.1, 2))
     for d in (1, -1)
 ]
@@ -34,7 +34,7 @@ def test_an_ensemble_is_its_taps() -> None:
     )
     theta = ensemble.parameters(PLANT)
     traces = ensemble.traces(theta)
-    motions = [strike(PLANT, tap) for tap in TAPS]
+    motions = [simulate_tap(PLANT, tap) for tap in TAPS]
     alone = [motion.sample(time) for motion, time in zip(motions, TIMES, strict=True)]
     np.testing.assert_allclose(
         traces.force_n, np.concatenate([s.force_n for s in alone]), rtol=1e-9, atol=1e-9
@@ -83,12 +83,12 @@ def test_factors_masses_and_vectors_may_differ_from_tap_to_tap() -> None:
     figures = ensemble.figures(theta, factor, mass_kg=mass)
     for i, tap in enumerate(TAPS):
         plant = Plant(theta[i, 0], 465.0, 0.2 * factor[i], 0.152 * factor[i])
-        alone = strike(plant, Strike(tap.velocity_m_s, mass[i], 1.5e-3))
+        alone = simulate_tap(plant, TapInput(tap.velocity_m_s, mass[i], 1.5e-3))
         assert figures.displacement_m[i] == pytest.approx(alone.displacement_m, rel=1e-12)
 
 
 def test_derivatives_of_a_slide_are_the_closed_form() -> None:
-    taps = [Strike(1.0, 18.9), Strike(1.0, 12.6, direction=-1)]
+    taps = [TapInput(1.0, 18.9), TapInput(1.0, 12.6, direction=-1)]
     speed = np.array([0.1, 0.07])
     times = [np.linspace(0.0, 0.04, 20)] * 2
     ensemble = Ensemble(taps, position_time_s=times, initial_speed_m_s=speed)
@@ -124,11 +124,11 @@ def test_driven_parts_in_an_ensemble() -> None:
     samples = np.linspace(0.0, 0.39, 77)
     plant = Plant(6.5e5, 465.0, 0.2, 0.152)
     ensemble = Ensemble(
-        [Strike(1.0, 20.0), Strike(1.0, 25.0)], position_time_s=[samples] * 2, drives=[(time, force)] * 2
+        [TapInput(1.0, 20.0), TapInput(1.0, 25.0)], position_time_s=[samples] * 2, drives=[(time, force)] * 2
     )
     traces = ensemble.traces(ensemble.parameters(plant))
     for i, mass in enumerate((20.0, 25.0)):
-        alone = drive(plant, Strike(1.0, mass), time, force, samples)
+        alone = simulate_driven(plant, TapInput(1.0, mass), time, force, samples)
         np.testing.assert_array_equal(traces.position_m.reshape(2, -1)[i], alone.position_m)
     assert np.ptp(traces.position_m) > 1e-3
 
@@ -138,8 +138,8 @@ def test_a_driven_part_slides_by_the_closed_form() -> None:
     m, rate = 20.0, 200.0
     plant = Plant(6.5e5, 465.0, 0.2, 0.15)
     samples = np.linspace(0.0, 0.5, 40)
-    moved = drive(
-        plant, Strike(1.0, m), np.array([0.0, 0.5]), np.array([0.0, 0.5 * rate]), samples
+    moved = simulate_driven(
+        plant, TapInput(1.0, m), np.array([0.0, 0.5]), np.array([0.0, 0.5 * rate]), samples
     ).position_m
     since = np.maximum(samples - 0.2 * m * 9.81 / rate, 0.0)
     exact = (0.05 * 9.81) * since**2 / 2.0 + rate / m * since**3 / 6.0
@@ -152,8 +152,10 @@ def test_the_force_sensor_s_laws_are_undone_before_a_measured_force_drives() -> 
     samples = np.linspace(0.0, 0.35, 50)
     sensor = {"force_sensor_gain": {"relative_error": 0.1}, "force_sensor_offset": {"offset_n": 3.0}}
     shown = Plant(6.5e5, 465.0, 0.2, 0.152, effects=sensor)
-    there = drive(shown, Strike(1.0, 20.0), time, 1.1 * force + 3.0, samples).position_m
-    plain = drive(Plant(6.5e5, 465.0, 0.2, 0.152), Strike(1.0, 20.0), time, force, samples).position_m
+    there = simulate_driven(shown, TapInput(1.0, 20.0), time, 1.1 * force + 3.0, samples).position_m
+    plain = simulate_driven(
+        Plant(6.5e5, 465.0, 0.2, 0.152), TapInput(1.0, 20.0), time, force, samples
+    ).position_m
     np.testing.assert_allclose(there, plain, atol=1e-12)
 
 
@@ -171,7 +173,7 @@ def test_bad_questions_are_refused() -> None:
 
 
 def test_a_slide_in_an_ensemble() -> None:
-    ensemble = Ensemble([Strike(1.0, 18.9)], position_time_s=[TIMES[0]], initial_speed_m_s=np.array([0.1]))
+    ensemble = Ensemble([TapInput(1.0, 18.9)], position_time_s=[TIMES[0]], initial_speed_m_s=np.array([0.1]))
     theta = np.array([6.5e5, 465.0, 0.2, 0.152])
-    alone = slide(Plant(*theta), Strike(1.0, 18.9), 0.1).sample(TIMES[0])
+    alone = simulate_free_slide(Plant(*theta), TapInput(1.0, 18.9), 0.1).sample(TIMES[0])
     np.testing.assert_allclose(ensemble.traces(theta).position_m, alone.position_m, atol=1e-14)

@@ -3,7 +3,7 @@
 import pytest
 
 from impactcell.errors import NoStopError, PhysicsError
-from impactcell.physics import Plant, Strike, strike, strike_modified_euler
+from impactcell.physics import Plant, TapInput, simulate_modified_euler, simulate_tap
 
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}})
 
@@ -11,16 +11,16 @@ PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects={"viscous_friction": {"viscous_c
 @pytest.mark.parametrize(
     "tap",
     [
-        Strike(0.1, 18.9, 1.5e-3),
-        Strike(0.02, 18.9, 1.5e-3),
-        Strike(0.05, 18.9, halts_at_separation=True),
+        TapInput(0.1, 18.9, 1.5e-3),
+        TapInput(0.02, 18.9, 1.5e-3),
+        TapInput(0.05, 18.9, halts_at_separation=True),
     ],
 )
-def test_it_converges(tap: Strike) -> None:
-    exact = strike(PLANT, tap)
+def test_it_converges(tap: TapInput) -> None:
+    exact = simulate_tap(PLANT, tap)
     errors = []
     for step in (1e-5, 1e-6):
-        grid = strike_modified_euler(PLANT, tap, step)
+        grid = simulate_modified_euler(PLANT, tap, step)
         assert grid.sliding_distance_m == pytest.approx(exact.sliding_distance_m, rel=1e-3)
         errors.append(
             max(
@@ -35,8 +35,8 @@ def test_it_converges(tap: Strike) -> None:
 def test_it_knows_no_effects_and_no_endless_push() -> None:
     tilted = Plant(6.5e5, 465.0, 0.2, 0.152, effects={"surface_tilt": {"tilt_rad": 0.01}})
     with pytest.raises(PhysicsError, match="without surface_tilt"):
-        strike_modified_euler(tilted, Strike(0.05, 18.9, 1e-3), 1e-5)
+        simulate_modified_euler(tilted, TapInput(0.05, 18.9, 1e-3), 1e-5)
     with pytest.raises(PhysicsError, match="step_s must be positive"):
-        strike_modified_euler(PLANT, Strike(0.05, 18.9, 1e-3), 0.0)
+        simulate_modified_euler(PLANT, TapInput(0.05, 18.9, 1e-3), 0.0)
     with pytest.raises(NoStopError, match="command a stroke"):
-        strike_modified_euler(PLANT, Strike(0.05, 18.9), 1e-3)
+        simulate_modified_euler(PLANT, TapInput(0.05, 18.9), 1e-3)

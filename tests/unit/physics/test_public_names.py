@@ -1,16 +1,16 @@
 """The names others build on."""
 
 from impactcell import physics
-from impactcell.physics import Effect, Motion, Parameter, Plant, Strike
+from impactcell.physics import Effect, Motion, Parameter, Plant, TapInput
 
 
 def test_what_the_package_offers() -> None:
     assert set(physics.__all__) == {
         "Effect",
         "Ensemble",
-        "Event",
-        "EventKind",
-        "Figures",
+        "TapEvent",
+        "TapEventKind",
+        "TapOutputs",
         "GridMotion",
         "Kind",
         "LawKind",
@@ -18,13 +18,13 @@ def test_what_the_package_offers() -> None:
         "Parameter",
         "Phase",
         "Plant",
-        "Sampled",
-        "Strike",
+        "ChannelSamples",
+        "TapInput",
         "Traces",
-        "drive",
-        "slide",
-        "strike",
-        "strike_modified_euler",
+        "simulate_driven",
+        "simulate_free_slide",
+        "simulate_tap",
+        "simulate_modified_euler",
     }
 
 
@@ -40,7 +40,7 @@ def test_what_the_records_hold() -> None:
         "gravity_m_s2",
         "effects",
     )
-    assert fields(Strike) == (
+    assert fields(TapInput) == (
         "velocity_m_s",
         "mass_kg",
         "stroke_m",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError, PhysicsError
-from impactcell.physics import EventKind, Plant, Strike, slide, strike
+from impactcell.physics import Plant, TapEventKind, TapInput, simulate_free_slide, simulate_tap
 
 K, B, MU_S, MU_K, G = 6.5e5, 465.0, 0.2, 0.152, 9.81
 NOMINAL = Plant(K, B, MU_S, MU_K)
@@ -29,7 +29,7 @@ def undamped(velocity: float, mass: float) -> tuple[float, float, float]:
 @pytest.mark.parametrize("velocity", [0.02, 0.05, 0.1])
 @pytest.mark.parametrize("mass", [5.0, 18.9, 40.0])
 def test_an_undamped_tap_is_the_closed_form(velocity: float, mass: float) -> None:
-    motion = strike(Plant(K, 0.0, MU_S, MU_K), Strike(velocity, mass, halts_at_separation=True))
+    motion = simulate_tap(Plant(K, 0.0, MU_S, MU_K), TapInput(velocity, mass, halts_at_separation=True))
     peak, separation, speed = undamped(velocity, mass)
     assert motion.peak_force_n == pytest.approx(peak, rel=3e-9)
     assert motion.breakaway_s == pytest.approx(MU_S * mass * G / (K * velocity), rel=1e-12)
@@ -39,7 +39,7 @@ def test_an_undamped_tap_is_the_closed_form(velocity: float, mass: float) -> Non
 
 
 def test_preload_is_the_damper_s_first_force_and_then_the_spring() -> None:
-    motion = strike(NOMINAL, Strike(0.01, 18.9, 1.5e-3))
+    motion = simulate_tap(NOMINAL, TapInput(0.01, 18.9, 1.5e-3))
     time = np.array([0.0, 1e-3, 2e-3])
     assert motion.breakaway_s == pytest.approx((MU_S * 18.9 * G - B * 0.01) / (K * 0.01), rel=1e-12)
     np.testing.assert_allclose(motion.sample(time).force_n, B * 0.01 + K * 0.01 * time, rtol=1e-12)
@@ -47,17 +47,17 @@ def test_preload_is_the_damper_s_first_force_and_then_the_spring() -> None:
 
 
 def test_a_part_whose_friction_the_damper_exceeds_moves_at_once() -> None:
-    motion = strike(NOMINAL, Strike(0.1, 18.9, 1.5e-3))
+    motion = simulate_tap(NOMINAL, TapInput(0.1, 18.9, 1.5e-3))
     assert B * 0.1 > MU_S * 18.9 * G
     assert motion.breakaway_s == 0.0
-    assert motion.events[0].kind is EventKind.BREAKAWAY
+    assert motion.events[0].kind is TapEventKind.BREAKAWAY
 
 
 @pytest.mark.parametrize("speed", [0.01, 0.2])
 def test_a_viscous_slide_is_the_closed_form(speed: float) -> None:
     k_v, m = 85.0, 12.6
     plant = Plant(K, B, MU_S, MU_K, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": k_v}})
-    motion = slide(plant, Strike(1.0, m), speed)
+    motion = simulate_free_slide(plant, TapInput(1.0, m), speed)
     dry = MU_K * m * G
     stop = m / k_v * math.log1p(k_v * speed / dry)
     assert motion.stop_s == pytest.approx(stop, rel=1e-10)
@@ -71,14 +71,16 @@ def test_a_drag_slide_is_the_closed_form() -> None:
     c, m, speed = 50.0, 18.9, 0.2
     plant = Plant(K, B, MU_S, MU_K, effects={"quadratic_drag": {"drag_coefficient_n_s2_per_m2": c}})
     distance = m / (2.0 * c) * math.log1p(c * speed**2 / (MU_K * m * G))
-    assert slide(plant, Strike(1.0, m), speed).displacement_m == pytest.approx(distance, rel=1e-10)
+    assert simulate_free_slide(plant, TapInput(1.0, m), speed).displacement_m == pytest.approx(
+        distance, rel=1e-10
+    )
 
 
 def test_a_slide_uphill_and_downhill_is_the_closed_form() -> None:
     plant = Plant(K, B, MU_S, MU_K, effects={"surface_tilt": {"tilt_rad": 0.01}})
     for direction in (1, -1):
         deceleration = G * (MU_K + direction * math.sin(0.01))
-        moved = slide(plant, Strike(1.0, 18.9, direction=direction), 0.1)
+        moved = simulate_free_slide(plant, TapInput(1.0, 18.9, direction=direction), 0.1)
         assert moved.displacement_m == pytest.approx(0.1**2 / (2.0 * deceleration), rel=1e-10)
 
 
@@ -87,12 +89,12 @@ def test_a_spring_lets_the_part_slide_back_until_friction_holds_it() -> None:
     spring, m, speed = 5000.0, 10.0, 0.5
     mu = 0.1
     plant = Plant(K, B, mu, mu, effects={"restoring_force": {"stiffness_n_per_m": spring}})
-    motion = slide(plant, Strike(1.0, m), speed)
+    motion = simulate_free_slide(plant, TapInput(1.0, m), speed)
     shift = mu * m * G / spring
     extreme = math.hypot(shift, speed / math.sqrt(spring / m)) - shift
     while extreme > shift:
         extreme, last = extreme - 2.0 * shift, extreme
-    stops = [event for event in motion.events if event.kind is EventKind.STOP]
+    stops = [event for event in motion.events if event.kind is TapEventKind.STOP]
     assert len(stops) > 2
     sign = -1.0 if len(stops) % 2 == 0 else 1.0
     del last
@@ -100,31 +102,31 @@ def test_a_spring_lets_the_part_slide_back_until_friction_holds_it() -> None:
 
 
 def test_the_actuator_halts_when_its_stroke_is_used_up() -> None:
-    motion = strike(NOMINAL, Strike(0.1, 18.9, 1.5e-3))
-    halt = next(event for event in motion.events if event.kind is EventKind.HALT)
+    motion = simulate_tap(NOMINAL, TapInput(0.1, 18.9, 1.5e-3))
+    halt = next(event for event in motion.events if event.kind is TapEventKind.HALT)
     assert halt.time_s == pytest.approx(0.015, rel=1e-12)
     np.testing.assert_allclose(motion.sample([0.005, 0.015, 1.0]).actuator_m, [5e-4, 1.5e-3, 1.5e-3])
 
 
 def test_a_slow_part_is_caught_and_pushed_again() -> None:
-    motion = strike(NOMINAL, Strike(1000.0 / 60000.0, 18.9, 1.5e-3))
+    motion = simulate_tap(NOMINAL, TapInput(1000.0 / 60000.0, 18.9, 1.5e-3))
     kinds = [event.kind for event in motion.events]
-    assert kinds.count(EventKind.SEPARATION) > 1
-    assert EventKind.CONTACT in kinds
+    assert kinds.count(TapEventKind.SEPARATION) > 1
+    assert TapEventKind.CONTACT in kinds
     times = [event.time_s for event in motion.events]
     assert times == sorted(times)
-    assert motion.separation_s == max(e.time_s for e in motion.events if e.kind is EventKind.SEPARATION)
+    assert motion.separation_s == max(e.time_s for e in motion.events if e.kind is TapEventKind.SEPARATION)
 
 
 def test_a_push_that_ends_in_contact_has_no_sliding_distance() -> None:
-    motion = strike(NOMINAL, Strike(0.005, 18.9, 1.5e-3))
+    motion = simulate_tap(NOMINAL, TapInput(0.005, 18.9, 1.5e-3))
     assert motion.displacement_m > 1e-3
     with pytest.raises(NoSeparationError, match="never left"):
         _ = motion.sliding_distance_m
 
 
 def test_a_tap_too_short_to_break_friction_moves_nothing() -> None:
-    motion = strike(NOMINAL, Strike(0.005, 18.9, 1e-5))
+    motion = simulate_tap(NOMINAL, TapInput(0.005, 18.9, 1e-5))
     assert motion.displacement_m == 0.0
     assert motion.stop_s == 0.0
     assert motion.peak_force_n == pytest.approx(K * 1e-5 + B * 0.005, rel=1e-9)
@@ -134,8 +136,8 @@ def test_a_tap_too_short_to_break_friction_moves_nothing() -> None:
 
 def test_directions_mirror_each_other() -> None:
     time = np.linspace(-0.001, 0.2, 300)
-    there = strike(NOMINAL, Strike(0.06, 18.9, 1.5e-3, start_m=0.3)).sample(time)
-    back = strike(NOMINAL, Strike(0.06, 18.9, 1.5e-3, direction=-1)).sample(time)
+    there = simulate_tap(NOMINAL, TapInput(0.06, 18.9, 1.5e-3, start_m=0.3)).sample(time)
+    back = simulate_tap(NOMINAL, TapInput(0.06, 18.9, 1.5e-3, direction=-1)).sample(time)
     np.testing.assert_array_equal(there.force_n, back.force_n)
     np.testing.assert_array_equal(there.position_m, -back.position_m)
     np.testing.assert_array_equal(there.actuator_m, -back.actuator_m)
@@ -143,7 +145,7 @@ def test_directions_mirror_each_other() -> None:
 
 
 def test_samples_may_be_asked_for_in_any_order() -> None:
-    motion = strike(NOMINAL, Strike(0.06, 18.9, 1.5e-3))
+    motion = simulate_tap(NOMINAL, TapInput(0.06, 18.9, 1.5e-3))
     time = np.linspace(-0.001, 0.2, 300)
     shuffled = np.random.default_rng(1).permutation(300)
     np.testing.assert_array_equal(
@@ -152,7 +154,7 @@ def test_samples_may_be_asked_for_in_any_order() -> None:
 
 
 def test_before_first_contact_all_is_at_rest_and_after_the_stop_again() -> None:
-    motion = strike(NOMINAL, Strike(0.06, 18.9, 1.5e-3))
+    motion = simulate_tap(NOMINAL, TapInput(0.06, 18.9, 1.5e-3))
     early, late = motion.sample([-1.0, 10.0]), motion.sample([motion.stop_s, 10.0])
     assert early.force_n[0] == 0.0
     assert early.position_m[0] == 0.0
@@ -161,7 +163,7 @@ def test_before_first_contact_all_is_at_rest_and_after_the_stop_again() -> None:
 
 
 def test_the_peak_is_the_maximum_of_the_force() -> None:
-    motion = strike(NOMINAL, Strike(0.06, 18.9, 1.5e-3))
+    motion = simulate_tap(NOMINAL, TapInput(0.06, 18.9, 1.5e-3))
     dense = motion.sample(np.linspace(0.0, 0.03, 200_001)).force_n.max()
     assert motion.peak_force_n == pytest.approx(dense, rel=1e-8)
     assert motion.peak_force_n >= dense * (1.0 - 1e-12)
@@ -169,13 +171,13 @@ def test_the_peak_is_the_maximum_of_the_force() -> None:
 
 def test_a_push_without_end_is_refused() -> None:
     with pytest.raises(NoStopError, match="pushed it without end"):
-        strike(NOMINAL, Strike(0.05, 18.9))
+        simulate_tap(NOMINAL, TapInput(0.05, 18.9))
 
 
 def test_a_part_on_a_slope_too_steep_never_stops() -> None:
     steep = Plant(K, B, 0.05, 0.04, effects={"surface_tilt": {"tilt_rad": -0.06}})
     with pytest.raises(NoStopError, match="still moving"):
-        strike(steep, Strike(0.05, 18.9, 1e-3))
+        simulate_tap(steep, TapInput(0.05, 18.9, 1e-3))
 
 
 @pytest.mark.parametrize(
@@ -205,7 +207,7 @@ def test_an_impossible_plant_is_refused(plant: dict[str, float], message: str) -
 def test_an_impossible_tap_is_refused(tap: dict[str, float], message: str) -> None:
     whole = {"velocity_m_s": 0.05, "mass_kg": 18.9, **tap}
     with pytest.raises(PhysicsError, match=message):
-        Strike(**whole)  # type: ignore[arg-type]
+        TapInput(**whole)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -219,11 +221,11 @@ def test_an_impossible_tap_is_refused(tap: dict[str, float], message: str) -> No
 )
 def test_an_impossible_effect_is_refused(effects: dict[str, dict[str, float]], message: str) -> None:
     with pytest.raises(PhysicsError, match=message):
-        strike(Plant(K, B, MU_S, MU_K, effects=effects), Strike(0.05, 18.9, 1e-3))
+        simulate_tap(Plant(K, B, MU_S, MU_K, effects=effects), TapInput(0.05, 18.9, 1e-3))
 
 
 def test_a_long_stick_slip_keeps_its_last_events_in_its_figures() -> None:
-    motion = strike(Plant(1.6e6, 20.0, 0.3, 0.2), Strike(0.001, 0.9, 1.5e-2))
+    motion = simulate_tap(Plant(1.6e6, 20.0, 0.3, 0.2), TapInput(0.001, 0.9, 1.5e-2))
     assert len(motion.events) == 4096
     assert motion.stop_s > motion.events[-1].time_s
     assert motion.displacement_m > 1.49e-2
@@ -232,6 +234,8 @@ def test_a_long_stick_slip_keeps_its_last_events_in_its_figures() -> None:
 
 def test_an_actuator_that_stalls_against_the_part_leaves_it_at_rest() -> None:
     droop = {"speed_loss_m_per_s_n": 8e-5, "time_constant_s": 2e-3}
-    held = strike(Plant(K, B, 0.19, 0.18, effects={"actuator_droop": droop}), Strike(0.004, 28.5, 1e-3))
+    held = simulate_tap(
+        Plant(K, B, 0.19, 0.18, effects={"actuator_droop": droop}), TapInput(0.004, 28.5, 1e-3)
+    )
     assert held.displacement_m == 0.0
     assert held.sample([100.0]).force_n[0] == pytest.approx(0.004 / 8e-5, rel=1e-9)

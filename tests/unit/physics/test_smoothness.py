@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from impactcell.physics import Ensemble, Plant, Strike, strike
+from impactcell.physics import Ensemble, Plant, TapInput, simulate_tap
 
 TIMES = np.arange(1, 1201) * 1e-4 + 1.3e-5
 STEPS = (1e-4, 1e-5, 1e-6)
@@ -16,7 +16,7 @@ def objective(ensemble: Ensemble, target: np.ndarray, theta: np.ndarray) -> floa
 
 
 def problem(velocities: tuple[float, ...]) -> tuple[Ensemble, np.ndarray, np.ndarray]:
-    taps = [Strike(v, m, 1.5e-3) for v in velocities for m in (12.6, 25.2)]
+    taps = [TapInput(v, m, 1.5e-3) for v in velocities for m in (12.6, 25.2)]
     times = [TIMES] * len(taps)
     ensemble = Ensemble(taps, ["viscous_friction"], force_time_s=times, position_time_s=times)
     theta = np.array([6.5e5, 465.0, 0.2, 0.152, 85.0])
@@ -41,7 +41,7 @@ def test_gradients_are_one_sided_where_the_damper_alone_breaks_stick() -> None:
     # At b v = mu_s m g the part begins to move at once, and mu_s is seen no more.
     mass, velocity = 12.6, 0.05
     edge = 0.2 * mass * 9.81 / velocity
-    ensemble = Ensemble([Strike(velocity, mass, 1.5e-3)], position_time_s=[TIMES])
+    ensemble = Ensemble([TapInput(velocity, mass, 1.5e-3)], position_time_s=[TIMES])
 
     def slope(damping: float, step: float) -> np.ndarray:
         ends = [
@@ -58,9 +58,9 @@ def test_gradients_are_one_sided_where_the_damper_alone_breaks_stick() -> None:
 
 
 def test_noise_of_a_figure_along_a_parameter_is_rounding() -> None:
-    tap = Strike(0.05, 18.9, 1.5e-3)
+    tap = TapInput(0.05, 18.9, 1.5e-3)
     line = np.linspace(-1e-6, 1e-6, 41)
     plants = [Plant(6.5e5 * (1.0 + change), 465.0, 0.2, 0.152) for change in line]
-    moved = np.array([strike(plant, tap).displacement_m for plant in plants])
+    moved = np.array([simulate_tap(plant, tap).displacement_m for plant in plants])
     left = moved - np.polynomial.Polynomial.fit(line, moved, 2)(line)
     assert np.abs(left).max() < 2e-12 * moved.mean()

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from impactcell.physics import Plant, Strike, strike
+from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.positioning.displacement_model import displacement_of, displacements
 from impactcell.positioning.safety_limits import allowed_strokes, largest_force
 from simulator.plant import Plant as TruePlant
-from simulator.plant import Strike as TrueStrike
-from simulator.plant import tap as true_tap
+from simulator.plant import TapInput as TrueStrike
+from simulator.plant import simulate_tap as true_tap
 from simulator.plant_nominal import nominal_taps
 
 
@@ -64,7 +64,7 @@ def test_agrees_with_the_physics() -> None:
             row[0], row[1], row[2], row[3],
             effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": float(row[4])}},
         )  # fmt: skip
-        truth = strike(plant, Strike(row[6], row[5], stroke_m=row[7])).displacement_m
+        truth = simulate_tap(plant, TapInput(row[6], row[5], stroke_m=row[7])).displacement_m
         assert of(row) == pytest.approx(truth, rel=1e-6, abs=1e-9)
 
 

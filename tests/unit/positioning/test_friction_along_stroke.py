@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from impactcell.errors import PositioningError
 from impactcell.positioning.free_slide import along_profile
-from impactcell.positioning.friction_along_stroke import Profile, learn_profile
+from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 
 GRID = np.linspace(0.0, 12e-3, 121)
 
@@ -15,11 +15,11 @@ def rho(x: float | np.ndarray) -> np.ndarray:
     return 1.0 + 0.2 * np.sin(2.0 * np.pi * np.asarray(x) / 8e-3)
 
 
-def taught(signatures: int, noise: float) -> Profile:
+def taught(signatures: int, noise: float) -> StrokeFriction:
     rng, known = np.random.default_rng(1), None
     for _ in range(signatures):
         friction = 0.15 * (rho(GRID) + noise * rng.standard_normal(GRID.size))
-        known = learn_profile(known, GRID, friction, np.full(GRID.size, 0.15 * max(noise, 1e-3)))
+        known = update_stroke_friction(known, GRID, friction, np.full(GRID.size, 0.15 * max(noise, 1e-3)))
     assert known is not None
     return known
 
@@ -44,7 +44,7 @@ def test_slide_over_varying_friction_against_an_integrator(speed: float) -> None
 
 
 def test_even_friction_changes_nothing() -> None:
-    known = learn_profile(None, GRID, np.full(GRID.size, 0.2), np.full(GRID.size, 1e-3))
+    known = update_stroke_friction(None, GRID, np.full(GRID.size, 0.2), np.full(GRID.size, 1e-3))
     assert known is not None
     part = np.concatenate([[10.0, 9.81], known.warp()])
     for distance in (1e-4, 3e-3, 11e-3, 40e-3):
@@ -53,7 +53,7 @@ def test_even_friction_changes_nothing() -> None:
 
 def test_noise_is_not_taken_for_structure() -> None:
     rng = np.random.default_rng(2)
-    noisy = learn_profile(
+    noisy = update_stroke_friction(
         None, GRID, 0.2 * (1.0 + 0.2 * rng.standard_normal(GRID.size)), np.full(GRID.size, 0.04)
     )
     assert noisy is not None
@@ -63,14 +63,14 @@ def test_noise_is_not_taken_for_structure() -> None:
 
 def test_a_part_that_went_less_far_says_nothing_of_the_rest() -> None:
     friction = np.where(GRID < 6e-3, 0.15 * rho(GRID), np.nan)
-    known = learn_profile(taught(3, 0.002), GRID, friction, np.full(GRID.size, 1e-3))
+    known = update_stroke_friction(taught(3, 0.002), GRID, friction, np.full(GRID.size, 1e-3))
     assert known is not None
     np.testing.assert_allclose(known.ratio[GRID > 7e-3], rho(GRID)[GRID > 7e-3] / rho(GRID).mean(), rtol=0.01)
-    assert learn_profile(None, GRID, np.full(GRID.size, np.nan), friction) is None
+    assert update_stroke_friction(None, GRID, np.full(GRID.size, np.nan), friction) is None
 
 
 def test_refuses_arrays_that_do_not_belong_together() -> None:
     with pytest.raises(PositioningError, match="length"):
-        learn_profile(None, GRID, GRID[:-1], GRID)
+        update_stroke_friction(None, GRID, GRID[:-1], GRID)
     with pytest.raises(PositioningError, match="increase"):
-        learn_profile(None, GRID[::-1], GRID + 0.1, GRID + 0.1)
+        update_stroke_friction(None, GRID[::-1], GRID + 0.1, GRID + 0.1)

@@ -7,32 +7,38 @@ import numpy as np
 import pytest
 
 from impactcell.positioning.displacement_model import displacement_of
-from impactcell.positioning.displacement_quantiles import plants
-from impactcell.positioning.planner_posterior import Belief, foreseen, gaussian, prior, told_friction
-from impactcell.positioning.posterior_update import learn, merge, split
+from impactcell.positioning.displacement_quantiles import plant_parameters
+from impactcell.positioning.planner_posterior import (
+    PlannerPosterior,
+    anticipate_learning,
+    condition_on_friction,
+    prior,
+    with_single_gaussian,
+)
+from impactcell.positioning.posterior_update import merge_components, split_components, update_posterior
 from simulator.plant_nominal import nominal_taps
 
 START = prior(6.5e5, 465.0, 0.2, 0.152, 0.0)
 
 
-def std(belief: Belief) -> np.ndarray:
+def std(belief: PlannerPosterior) -> np.ndarray:
     return np.sqrt(np.diag(belief.cov))
 
 
 def test_splitting_keeps_mean_and_covariance() -> None:
-    parts = split(START)
+    parts = split_components(START)
     assert parts.weights.size > 5
     np.testing.assert_allclose(parts.weights.sum(), 1.0)
     np.testing.assert_allclose(parts.mean, START.mean, atol=1e-12)
     np.testing.assert_allclose(parts.cov, START.cov, rtol=0.02, atol=1e-6)
     assert all(np.linalg.eigvalsh(cov).min() > -1e-12 for cov in parts.covs)
-    narrow = merge(
+    narrow = merge_components(
         replace(parts, means=START.mean + 0.05 * (parts.means - START.mean), covs=parts.covs * 0.01)
     )
     assert narrow.weights.size == 1
 
 
-def taught(noise: float, taps: int, seed: int, sigma: float = 0.03) -> tuple[Belief, np.ndarray]:
+def taught(noise: float, taps: int, seed: int, sigma: float = 0.03) -> tuple[PlannerPosterior, np.ndarray]:
     """Belief after `taps` random taps on a cell that is a tenth off, and the true parameters."""
     rng = np.random.default_rng(seed)
     k, b = 6.5e5 * (1.0 + 0.1 * rng.choice([-1, 1])), 465.0 * (1.0 + 0.1 * rng.choice([-1, 1]))
@@ -49,9 +55,11 @@ def taught(noise: float, taps: int, seed: int, sigma: float = 0.03) -> tuple[Bel
             states: np.ndarray, mass: float = mass, velocity: float = velocity, stroke: float = stroke
         ) -> np.ndarray:
             factors = np.maximum(1.0 + states[:, 5], 0.05)
-            return displacement_of(velocity, stroke, plants(states[:, :5]), factors, np.array([mass, 9.81]))
+            return displacement_of(
+                velocity, stroke, plant_parameters(states[:, :5]), factors, np.array([mass, 9.81])
+            )
 
-        belief = learn(belief, response, float(moved) + noise * rng.standard_normal())
+        belief = update_posterior(belief, response, float(moved) + noise * rng.standard_normal())
     return belief, np.array([math.log(0.76 * mu_s), math.log(k), math.log(b)])
 
 
@@ -79,52 +87,52 @@ def test_an_outlier_teaches_little() -> None:
 
     def response(states: np.ndarray) -> np.ndarray:
         factors = np.maximum(1.0 + states[:, 5], 0.05)
-        return displacement_of(0.08, 1.2e-3, plants(states[:, :5]), factors, np.array([15.0, 9.81]))
+        return displacement_of(0.08, 1.2e-3, plant_parameters(states[:, :5]), factors, np.array([15.0, 9.81]))
 
     expected = float(response(np.append(belief.mean, 0.0)[None])[0])
-    after = learn(belief, response, 2.5 * expected)
+    after = update_posterior(belief, response, 2.5 * expected)
     assert abs(after.mean[0] - belief.mean[0]) < 0.03
     assert after.surprise > 8.0
-    again = learn(after, response, 2.5 * expected)
+    again = update_posterior(after, response, 2.5 * expected)
     assert std(again)[0] > 3.0 * std(belief)[0]  # twice the same: friction has changed
 
 
 def test_what_cannot_be_modelled_teaches_nothing() -> None:
-    after = learn(START, lambda states: np.full(len(states), math.nan), 1e-3)
-    np.testing.assert_array_equal(after.cov, split(START).cov)
+    after = update_posterior(START, lambda states: np.full(len(states), math.nan), 1e-3)
+    np.testing.assert_array_equal(after.cov, split_components(START).cov)
     assert after.taps == 1
 
 
 def test_the_tracker_informs_a_new_cell() -> None:
-    told = told_friction(START, 0.2, 0.004, batch_changed=False)
+    told = condition_on_friction(START, 0.2, 0.004, batch_changed=False)
     assert told.mu_k == pytest.approx(0.2, rel=1e-9)
     assert std(told)[0] == pytest.approx(math.hypot(0.02, 0.007))
     np.testing.assert_allclose(std(told)[1:], std(START)[1:])
 
 
 def test_a_vague_tracker_changes_nothing() -> None:
-    sure = told_friction(START, 0.2, 0.001, batch_changed=False)
-    assert told_friction(sure, 0.203, 0.02, batch_changed=False) is sure
+    sure = condition_on_friction(START, 0.2, 0.001, batch_changed=False)
+    assert condition_on_friction(sure, 0.203, 0.02, batch_changed=False) is sure
 
 
 def test_a_tracker_that_contradicts_prevails_but_is_doubted() -> None:
-    sure = told_friction(START, 0.2, 0.001, batch_changed=False)
-    moved = told_friction(sure, 0.25, 0.001, batch_changed=False)
+    sure = condition_on_friction(START, 0.2, 0.001, batch_changed=False)
+    moved = condition_on_friction(sure, 0.25, 0.001, batch_changed=False)
     assert moved.mu_k == pytest.approx(0.25, rel=1e-9)
     assert std(moved)[0] > 0.05
 
 
 def test_a_batch_change_frees_friction_and_nothing_else() -> None:
     belief, _ = taught(0.0, 20, 4)
-    new = told_friction(belief, belief.mu_k, 0.001, batch_changed=True)
+    new = condition_on_friction(belief, belief.mu_k, 0.001, batch_changed=True)
     assert std(new)[0] > 0.08
     np.testing.assert_allclose(std(new)[1:], std(belief)[1:])
     assert (new.cov[0, 1:] == 0.0).all()
 
 
 def test_foreseen_never_knows_less() -> None:
-    later = foreseen(START)
+    later = anticipate_learning(START)
     assert (std(later) <= std(START) * (1.0 + 1e-12)).all()
     assert std(later)[0] < 0.02
-    tight = gaussian(START, START.mean, np.diag(np.full(5, 1e-8)))
-    np.testing.assert_allclose(foreseen(tight).cov, tight.cov)
+    tight = with_single_gaussian(START, START.mean, np.diag(np.full(5, 1e-8)))
+    np.testing.assert_allclose(anticipate_learning(tight).cov, tight.cov)

@@ -8,21 +8,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from impactcell.errors import PositioningError
-from impactcell.positioning import Limits, Tap, TapPlanner
-from impactcell.positioning.safety_limits import released
+from impactcell.positioning import SafetyLimits, Tap, TapPlanner
+from impactcell.positioning.safety_limits import check_tap
 from impactcell.positioning.task_state_machine import (
-    Cell,
-    Phase,
-    Sequence,
+    PositioningCell,
+    TaskPhase,
+    TaskState,
     aborted,
-    begin,
+    begin_task,
     commanded,
     failed,
     observed,
 )
 
-LIMITS = Limits(velocity_m_s=0.1, stroke_m=1.5e-3, travel_m=(0.0, 60e-3))
-CELL = Cell("press 3", LIMITS, resolution_m=1e-6)
+LIMITS = SafetyLimits(velocity_m_s=0.1, stroke_m=1.5e-3, travel_m=(0.0, 60e-3))
+CELL = PositioningCell("press 3", LIMITS, resolution_m=1e-6)
 GOOD = {"target_m": 20e-3, "position_m": 2e-3, "mass_kg": 12.0, "trained": True}
 
 
@@ -32,24 +32,24 @@ def planner() -> TapPlanner:
     return made
 
 
-def waiting() -> tuple[Sequence, TapPlanner]:
+def waiting() -> tuple[TaskState, TapPlanner]:
     made = planner()
-    return commanded(begin(Sequence(), CELL, made, **GOOD)), made
+    return commanded(begin_task(TaskState(), CELL, made, **GOOD)), made
 
 
 def test_a_task_from_start_to_end() -> None:
     made = planner()
-    sequence = begin(Sequence(), CELL, made, **GOOD)
-    assert sequence.phase is Phase.COMMANDING
+    sequence = begin_task(TaskState(), CELL, made, **GOOD)
+    assert sequence.phase is TaskPhase.COMMANDING
     while sequence.running:
         assert sequence.tap is not None
         state = sequence.published()
         assert state.running
         assert state.next_velocity_m_s == sequence.tap.velocity_m_s
         sequence = commanded(sequence)
-        assert sequence.phase is Phase.WAITING
+        assert sequence.phase is TaskPhase.WAITING
         sequence = observed(sequence, CELL, made, sequence.position_m + sequence.tap.expected_m)
-    assert sequence.phase is Phase.SETTLED
+    assert sequence.phase is TaskPhase.SETTLED
     assert abs(sequence.remaining_m) <= 50e-6
     assert made.belief.taps == sequence.taps == sequence.published().taps
 
@@ -70,31 +70,31 @@ def test_a_task_from_start_to_end() -> None:
 )
 def test_refuses_with_the_reason(change: dict[str, float], message: str) -> None:
     with pytest.raises(PositioningError, match=message) as refusal:
-        begin(Sequence(), CELL, planner(), **{**GOOD, **change})
+        begin_task(TaskState(), CELL, planner(), **{**GOOD, **change})
     assert str(refusal.value).startswith("press 3: ")
 
 
 def test_refuses_a_tolerance_below_the_encoder() -> None:
     with pytest.raises(PositioningError, match="finer than the encoder"):
-        begin(Sequence(), replace(CELL, resolution_m=100e-6), planner(), **GOOD)
+        begin_task(TaskState(), replace(CELL, resolution_m=100e-6), planner(), **GOOD)
 
 
 def test_refuses_a_second_task() -> None:
     sequence, made = waiting()
     with pytest.raises(PositioningError, match="is running"):
-        begin(sequence, CELL, made, **GOOD)
+        begin_task(sequence, CELL, made, **GOOD)
 
 
 def test_in_place_already() -> None:
-    sequence = begin(Sequence(), CELL, planner(), **{**GOOD, "target_m": 2.02e-3})
-    assert sequence.phase is Phase.SETTLED
+    sequence = begin_task(TaskState(), CELL, planner(), **{**GOOD, "target_m": 2.02e-3})
+    assert sequence.phase is TaskPhase.SETTLED
     assert sequence.taps == 0
 
 
 def test_two_sided_goes_back() -> None:
     made = TapPlanner(tolerance_m=50e-6, two_sided=True)
     cell = replace(CELL, two_sided=True)
-    sequence = begin(Sequence(), cell, made, **{**GOOD, "target_m": 10e-3, "position_m": 20e-3})
+    sequence = begin_task(TaskState(), cell, made, **{**GOOD, "target_m": 10e-3, "position_m": 20e-3})
     assert sequence.tap is not None
     assert sequence.tap.direction == -1
 
@@ -102,7 +102,7 @@ def test_two_sided_goes_back() -> None:
 def test_a_tap_that_moved_nothing_stops_with_an_alarm() -> None:
     sequence, made = waiting()
     stopped = observed(sequence, CELL, made, sequence.position_m)
-    assert stopped.phase is Phase.FAULTED
+    assert stopped.phase is TaskPhase.FAULTED
     assert "moved nothing" in stopped.reason
     assert stopped.evidence is not None
     assert stopped.tap is None
@@ -115,33 +115,33 @@ def test_a_displacement_outside_its_band_stops_with_evidence(side: float) -> Non
     assert tap is not None
     moved = tap.highest_m * 1.05 if side > 0.0 else tap.lowest_m * 0.95
     stopped = observed(sequence, CELL, made, sequence.position_m + moved)
-    assert stopped.phase is Phase.FAULTED
+    assert stopped.phase is TaskPhase.FAULTED
     assert "outside the 99.9 % band" in stopped.reason
     assert stopped.evidence is not None
     assert stopped.evidence.threshold == pytest.approx(3.29)
     assert stopped.evidence.size == pytest.approx(moved - tap.expected_m)
     inside = observed(sequence, CELL, made, sequence.position_m + 0.999 * tap.expected_m)
-    assert inside.phase in {Phase.COMMANDING, Phase.SETTLED}
+    assert inside.phase in {TaskPhase.COMMANDING, TaskPhase.SETTLED}
 
 
 def test_a_lost_link_and_an_abort_at_any_moment() -> None:
     sequence, made = waiting()
-    commanding = begin(Sequence(), CELL, made, **GOOD)
+    commanding = begin_task(TaskState(), CELL, made, **GOOD)
     for running in (sequence, commanding):
         lost = failed(running, "press 3: link lost")
-        assert lost.phase is Phase.FAULTED
+        assert lost.phase is TaskPhase.FAULTED
         assert lost.reason == "press 3: link lost"
         stopped = aborted(running, "operator")
-        assert stopped.phase is Phase.IDLE
+        assert stopped.phase is TaskPhase.IDLE
         assert stopped.tap is None
-        assert begin(stopped, CELL, made, **GOOD).phase is Phase.COMMANDING
-        assert begin(lost, CELL, made, **GOOD).phase is Phase.COMMANDING
-    assert observed(aborted(sequence, "PLC"), CELL, made, 9e-3).phase is Phase.IDLE  # a late answer
+        assert begin_task(stopped, CELL, made, **GOOD).phase is TaskPhase.COMMANDING
+        assert begin_task(lost, CELL, made, **GOOD).phase is TaskPhase.COMMANDING
+    assert observed(aborted(sequence, "PLC"), CELL, made, 9e-3).phase is TaskPhase.IDLE  # a late answer
 
 
 def test_no_position_is_a_fault() -> None:
     sequence, made = waiting()
-    assert observed(sequence, CELL, made, math.nan).phase is Phase.FAULTED
+    assert observed(sequence, CELL, made, math.nan).phase is TaskPhase.FAULTED
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_no_position_is_a_fault() -> None:
 )
 def test_limits_are_the_last_gate(tap: Tap, force: float, message: str) -> None:
     with pytest.raises(PositioningError, match=message):
-        released(tap, replace(LIMITS, force_n=200.0), 20e-3, force, "press 3")
+        check_tap(tap, replace(LIMITS, force_n=200.0), 20e-3, force, "press 3")
 
 
 EVENTS = st.lists(
@@ -175,12 +175,12 @@ EVENTS = st.lists(
 @settings(max_examples=60, deadline=None)
 @given(EVENTS)
 def test_any_course_of_events_keeps_the_invariants(events: list[str | float]) -> None:
-    made, sequence = planner(), Sequence()
+    made, sequence = planner(), TaskState()
     for event in events:
         before = sequence
         if event == "begin":
             try:
-                sequence = begin(sequence, CELL, made, **GOOD)
+                sequence = begin_task(sequence, CELL, made, **GOOD)
             except PositioningError:
                 assert sequence == before
         elif event == "commanded":
@@ -194,9 +194,9 @@ def test_any_course_of_events_keeps_the_invariants(events: list[str | float]) ->
             reach = sequence.tap.expected_m if sequence.tap else 0.0
             sequence = observed(sequence, CELL, made, sequence.position_m + share * reach)
         assert sequence.running == (sequence.tap is not None)
-        assert sequence.running or sequence.phase is Phase.IDLE or sequence.reason
+        assert sequence.running or sequence.phase is TaskPhase.IDLE or sequence.reason
         if sequence.tap is not None:
             assert sequence.tap.velocity_m_s <= LIMITS.velocity_m_s
             assert sequence.tap.stroke_m <= LIMITS.stroke_m
-        if sequence.phase is Phase.WAITING and before.phase is not Phase.WAITING:
+        if sequence.phase is TaskPhase.WAITING and before.phase is not TaskPhase.WAITING:
             assert event == "commanded"

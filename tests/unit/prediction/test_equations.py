@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import NegativeRootError, PredictionError
-from impactcell.physics import Plant, Strike
+from impactcell.physics import Plant, TapInput
 from impactcell.prediction import Model, Prior, calibrate, printed_predictor
 from impactcell.prediction.calibration import Regime, fit_predictor, regimes, velocity_spans
 from impactcell.prediction.equations import (
@@ -59,7 +59,7 @@ def test_equation_6_weighs_by_gradients_and_spans() -> None:
 
 
 def test_the_printed_coefficients_come_back_out_of_the_reference_plant() -> None:
-    tap = Strike(0.1, 18.9, halts_at_separation=True)
+    tap = TapInput(0.1, 18.9, halts_at_separation=True)
     found = fit_predictor(PLANT, tap, np.linspace(0.05, 0.1, 9), FRICTIONS)
     given = printed_predictor()
     mu, v = np.meshgrid(FRICTIONS, np.linspace(0.05, 0.1, 9))
@@ -73,7 +73,7 @@ def test_the_printed_coefficients_come_back_out_of_the_reference_plant() -> None
 
 @pytest.mark.parametrize("stroke_m", [math.inf, 1.5e-3])
 def test_calibrated_equations_invert_the_simulators_taps(stroke_m: float) -> None:
-    tap = Strike(0.1, 18.9, stroke_m, halts_at_separation=math.isinf(stroke_m))
+    tap = TapInput(0.1, 18.9, stroke_m, halts_at_separation=math.isinf(stroke_m))
     velocities = np.linspace(0.05, 0.1, 9)
     predictors = calibrate(PLANT, tap, [13.5, 16.0, 18.9, 22.5], velocities, FRICTIONS)
     model = Model("calibrated", PLANT, PRIOR, predictors, stroke_m)
@@ -91,7 +91,7 @@ def test_calibrated_equations_invert_the_simulators_taps(stroke_m: float) -> Non
 
 
 def test_the_standard_deviations_follow_what_is_not_known() -> None:
-    tap = Strike(0.1, 18.9, halts_at_separation=True)
+    tap = TapInput(0.1, 18.9, halts_at_separation=True)
     model = Model("m", PLANT, PRIOR, calibrate(PLANT, tap, [18.9], np.linspace(0.05, 0.1, 9), FRICTIONS))
     mixed = interpolate_mass(model, 18.9, 0.08)
     rng = np.random.default_rng(1)
@@ -164,7 +164,7 @@ def test_a_model_without_predictors_says_how_to_get_them() -> None:
 
 def test_regimes_are_those_of_the_simulators_taps() -> None:
     velocities = np.linspace(2000, 6000, 9) / 6e4
-    tap = Strike(0.1, 25.2, 1.5e-3)
+    tap = TapInput(0.1, 25.2, 1.5e-3)
     found = regimes(PLANT, tap, velocities, FRICTIONS[[0, 4, 8]])
     for velocity, regime in zip(velocities.tolist(), found, strict=True):
         motion = Tap(velocity, mass_kg=25.2, stroke_m=1.5e-3).motion()
@@ -176,7 +176,7 @@ def test_regimes_are_those_of_the_simulators_taps() -> None:
 
 
 def test_calibration_is_deterministic_and_tells_its_progress() -> None:
-    tap = Strike(0.1, 18.9, 1.5e-3)
+    tap = TapInput(0.1, 18.9, 1.5e-3)
     seen: list[tuple[int, int]] = []
     velocities = np.linspace(0.05, 0.1, 5)
     first = calibrate(
@@ -188,4 +188,4 @@ def test_calibration_is_deterministic_and_tells_its_progress() -> None:
 
 def test_a_part_that_never_slides_free_cannot_be_calibrated() -> None:
     with pytest.raises(PredictionError, match="slides free"):
-        calibrate(PLANT, Strike(0.1, 18.9, 1e-5), [18.9], np.linspace(0.01, 0.02, 5), FRICTIONS)
+        calibrate(PLANT, TapInput(0.1, 18.9, 1e-5), [18.9], np.linspace(0.01, 0.02, 5), FRICTIONS)

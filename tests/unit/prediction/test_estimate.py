@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from impactcell.physics import Plant, Strike
+from impactcell.physics import Plant, TapInput
 from impactcell.prediction import Model, Prior, calibrate, estimate
 from impactcell.records import Capture, Channel, Estimator, FrictionEstimate, Quality, Summary
 from tests.taps import VISCOUS, Tap
 
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects=VISCOUS)
-TAP = Strike(0.1, 18.9, halts_at_separation=True)
+TAP = TapInput(0.1, 18.9, halts_at_separation=True)
 MODEL = Model(
     "reference",
     PLANT,

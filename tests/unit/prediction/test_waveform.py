@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError, NotConvergedError
-from impactcell.physics import Plant, strike
+from impactcell.physics import Plant, simulate_tap
 from impactcell.prediction import Model, Prior
 from impactcell.prediction.feature_extraction import noise_std
 from impactcell.prediction.linearised_model import tap_input, with_parameters
@@ -132,7 +132,7 @@ def test_noise_above_what_the_sensors_state_widens_the_standard_deviation() -> N
 def test_the_gap_is_that_of_every_sample(stroke_m: float) -> None:
     capture = Tap(2500 / 6e4, 0.2, stroke_m=stroke_m).capture(np.random.default_rng(7), force_hz=1e5)
     found = fit(capture, MODEL)
-    motion = strike(with_parameters(MODEL.plant, found.theta), tap_input(capture))
+    motion = simulate_tap(with_parameters(MODEL.plant, found.theta), tap_input(capture))
     squares = []
     for channel, name in ((capture.force, "force_n"), (capture.position, "position_m")):
         assert channel is not None

@@ -11,11 +11,11 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from simulator.effects import LIBRARY, UNLISTED, build
-from simulator.plant import Motion, Plant, Shot, Strike, free_slide, tap
+from simulator.plant import Motion, Plant, Shot, TapInput, simulate_free_slide, simulate_tap
 
 G = 9.81
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152)
-STRIKE = Strike(0.06, 18.9, stroke_m=0.0015, start_m=0.002, dwell_s=20.0, shot=3, shots=10, batch=1)
+STRIKE = TapInput(0.06, 18.9, stroke_m=0.0015, start_m=0.002, dwell_s=20.0, shot=3, shots=10, batch=1)
 TIME = np.arange(1, 1200) * 1e-4
 
 VOCABULARY = {
@@ -38,12 +38,12 @@ NULL = {
 }
 
 
-def struck(effects: dict[str, dict[str, object]], strike: Strike = STRIKE) -> Motion:
-    return tap(replace(PLANT, effects=effects), strike)
+def struck(effects: dict[str, dict[str, object]], strike: TapInput = STRIKE) -> Motion:
+    return simulate_tap(replace(PLANT, effects=effects), strike)
 
 
 def slid(name: str, speed: float = 0.15, shot: Shot | None = None, **parameters: float) -> Motion:
-    return free_slide(replace(PLANT, effects={name: parameters}), 18.9, speed, shot)
+    return simulate_free_slide(replace(PLANT, effects={name: parameters}), 18.9, speed, shot)
 
 
 def test_the_whole_vocabulary_and_nothing_else() -> None:
@@ -63,7 +63,7 @@ def test_vanishes_at_its_null_value(name: str) -> None:
     # The damper's first jolt b v makes elastic stick ring at any stiffness: without b the limit is rigid.
     elastic = name == "presliding_compliance"
     plant = replace(PLANT, damping_n_s_per_m=0.0) if elastic else PLANT
-    nominal, motion = tap(plant, STRIKE), tap(replace(plant, effects={name: null}), STRIKE)
+    nominal, motion = simulate_tap(plant, STRIKE), simulate_tap(replace(plant, effects={name: null}), STRIKE)
     tolerance = 3e-4 if elastic else 1e-9
     assert motion.sliding_distance_m == pytest.approx(nominal.sliding_distance_m, rel=tolerance)
     assert motion.peak_force_n == pytest.approx(nominal.peak_force_n, rel=tolerance)
@@ -213,7 +213,7 @@ def test_ramp_travels_half_as_far_meanwhile() -> None:
 
 def test_adhesion_takes_its_work_from_the_slide() -> None:
     # An actuator that halts at separation leaves the whole gap to be pulled open: A l/2 of work.
-    strike = Strike(0.06, 18.9, halts_at_separation=True)
+    strike = TapInput(0.06, 18.9, halts_at_separation=True)
     with_pull, without = struck({"adhesion": {"force_n": 15.0, "range_m": 3e-4}}, strike), struck({}, strike)
     lost = 0.5 * 15.0 * 3e-4
     expected = without.sliding_distance_m - lost / (0.152 * 18.9 * G)
@@ -252,8 +252,8 @@ def test_mass_error_is_another_mass() -> None:
 def test_loose_mass_shares_the_momentum() -> None:
     # By the time the part stops the loose mass rings no more: contact and friction share out all momentum.
     effects = {"loose_mass": {"mass_kg": 2.0, "stiffness_n_per_m": 2e5, "damping_n_s_per_m": 60.0}}
-    motion = tap(
-        Plant(6.5e5, 465.0, 0.02, 0.02, effects=effects), Strike(0.06, 10.0, halts_at_separation=True)
+    motion = simulate_tap(
+        Plant(6.5e5, 465.0, 0.02, 0.02, effects=effects), TapInput(0.06, 10.0, halts_at_separation=True)
     )
     turns = [event.time_s for event in motion.events if event.time_s < motion.separation_s]
     impulse = 0.0
@@ -263,7 +263,7 @@ def test_loose_mass_shares_the_momentum() -> None:
         impulse += 0.5 * (end - begin) * float(weights @ motion.contact_force_n(time))
     friction = 0.02 * 10.0 * G * (motion.stop_s - motion.breakaway_s)
     assert impulse == pytest.approx(friction, rel=1e-4)
-    solid = tap(Plant(6.5e5, 465.0, 0.02, 0.02), Strike(0.06, 10.0, halts_at_separation=True))
+    solid = simulate_tap(Plant(6.5e5, 465.0, 0.02, 0.02), TapInput(0.06, 10.0, halts_at_separation=True))
     assert abs(motion.peak_force_n / solid.peak_force_n - 1.0) > 0.001
 
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from simulator.plant import Motion, Plant, Strike, tap
+from simulator.plant import Motion, Plant, TapInput, simulate_tap
 
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152)
-STRIKE = Strike(0.06, 18.9, stroke_m=0.0015, start_m=0.002, dwell_s=20.0, shot=3, shots=10, batch=1)
+STRIKE = TapInput(0.06, 18.9, stroke_m=0.0015, start_m=0.002, dwell_s=20.0, shot=3, shots=10, batch=1)
 TIME = np.arange(1, 1200) * 1e-4
 
 
-def struck(effects: dict[str, dict[str, object]], strike: Strike = STRIKE) -> Motion:
-    return tap(replace(PLANT, effects=effects), strike)
+def struck(effects: dict[str, dict[str, object]], strike: TapInput = STRIKE) -> Motion:
+    return simulate_tap(replace(PLANT, effects=effects), strike)
 
 
 def test_sensor_chain_gain_then_offset_then_saturation() -> None:
@@ -66,7 +66,7 @@ def test_between_shots(name: str, parameters: dict[str, object], static: float, 
     assert motion.mu_s == pytest.approx(0.2 * static, rel=1e-12)
     assert motion.mu_k == pytest.approx(0.152 * kinetic, rel=1e-12)
     plant = replace(PLANT, mu_s=0.2 * static, mu_k=0.152 * kinetic)
-    assert motion.displacement_m == pytest.approx(tap(plant, STRIKE).displacement_m, rel=1e-9)
+    assert motion.displacement_m == pytest.approx(simulate_tap(plant, STRIKE).displacement_m, rel=1e-9)
 
 
 def test_covariates_at_their_ends() -> None:

@@ -11,7 +11,15 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from simulator.plant import NeverAtRestError, Plant, Shot, Strike, driven, free_slide, tap
+from simulator.plant import (
+    NeverAtRestError,
+    Plant,
+    Shot,
+    TapInput,
+    simulate_driven,
+    simulate_free_slide,
+    simulate_tap,
+)
 from simulator.plant_nominal import nominal_taps
 
 MM_PER_MIN = 1e-3 / 60.0
@@ -30,7 +38,9 @@ def propagate(matrix: np.ndarray, forcing: np.ndarray, state: np.ndarray, time: 
 
 def test_a_tap_against_matrix_exponentials() -> None:
     k, b, mass, mu_s, mu_k, kv, v = 6.5e5, 465.0, 18.9, 0.2, 0.152, 85.0, 3000 * MM_PER_MIN
-    motion = tap(Plant(k, b, mu_s, mu_k, effects=VISCOUS), Strike(v, mass, halts_at_separation=True))
+    motion = simulate_tap(
+        Plant(k, b, mu_s, mu_k, effects=VISCOUS), TapInput(v, mass, halts_at_separation=True)
+    )
     breakaway = (mu_s * mass * G - b * v) / (k * v)
     forcing = np.array([v, mu_k * G + kv / mass * v])
 
@@ -63,7 +73,7 @@ def test_reproduces_the_printed_equations() -> None:
     for mu_s in (0.15, 0.2, 0.25):
         for v in (3000.0, 4500.0, 6000.0):
             plant = Plant(6.5e5, 465.0, mu_s, 0.76 * mu_s, effects=VISCOUS)
-            motion = tap(plant, Strike(v * MM_PER_MIN, 18.9, halts_at_separation=True))
+            motion = simulate_tap(plant, TapInput(v * MM_PER_MIN, 18.9, halts_at_separation=True))
             force = 146.2 * mu_s + 0.0529 * v
             distance = 0.00041 * v**1.8997 + 0.07379 * v**1.6428 * (0.3415 - mu_s) ** 2
             force_errors.append(abs(motion.peak_force_n / force - 1.0))
@@ -77,7 +87,7 @@ def test_reproduces_the_printed_equations() -> None:
 @pytest.mark.parametrize("velocity", [500.0, 1000.0, 4000.0])
 def test_energy_balance(velocity: float) -> None:
     mass, k = 18.9, 6.5e5
-    motion = tap(PLANT, Strike(velocity * MM_PER_MIN, mass, stroke_m=0.0015))
+    motion = simulate_tap(PLANT, TapInput(velocity * MM_PER_MIN, mass, stroke_m=0.0015))
     edges = sorted({0.0, motion.end_s, *(event.time_s for event in motion.events)})
     work = heat = 0.0
     for begin, end in itertools.pairwise(edges):
@@ -97,7 +107,7 @@ def test_energy_balance(velocity: float) -> None:
 
 
 def test_event_order_when_the_part_is_caught_and_pushed_again() -> None:
-    motion = tap(PLANT, Strike(1000 * MM_PER_MIN, 18.9, stroke_m=0.0015))
+    motion = simulate_tap(PLANT, TapInput(1000 * MM_PER_MIN, 18.9, stroke_m=0.0015))
     kinds = [event.kind for event in motion.events]
     assert kinds == [
         *("breakaway", "turn", "separation", "contact", "turn"),
@@ -110,18 +120,18 @@ def test_event_order_when_the_part_is_caught_and_pushed_again() -> None:
 
 
 def test_stroke_ends_inside_the_contact() -> None:
-    long = tap(PLANT, Strike(6000 * MM_PER_MIN, 25.2, stroke_m=0.01)).sliding_distance_m
-    short = tap(PLANT, Strike(6000 * MM_PER_MIN, 25.2, stroke_m=0.0015)).sliding_distance_m
+    long = simulate_tap(PLANT, TapInput(6000 * MM_PER_MIN, 25.2, stroke_m=0.01)).sliding_distance_m
+    short = simulate_tap(PLANT, TapInput(6000 * MM_PER_MIN, 25.2, stroke_m=0.0015)).sliding_distance_m
     assert 1.0 - short / long == pytest.approx(0.14, abs=0.02)
 
 
 def test_breakaway_at_once_when_the_damper_alone_exceeds_static_friction() -> None:
-    assert tap(PLANT, Strike(5000 * MM_PER_MIN, 18.9, stroke_m=0.0015)).breakaway_s == 0.0
-    assert tap(PLANT, Strike(4500 * MM_PER_MIN, 18.9, stroke_m=0.0015)).breakaway_s > 0.0
+    assert simulate_tap(PLANT, TapInput(5000 * MM_PER_MIN, 18.9, stroke_m=0.0015)).breakaway_s == 0.0
+    assert simulate_tap(PLANT, TapInput(4500 * MM_PER_MIN, 18.9, stroke_m=0.0015)).breakaway_s > 0.0
 
 
 def test_a_tap_too_short_moves_nothing() -> None:
-    motion = tap(PLANT, Strike(0.005, 18.9, stroke_m=2e-5))
+    motion = simulate_tap(PLANT, TapInput(0.005, 18.9, stroke_m=2e-5))
     assert motion.displacement_m == 0.0
     assert math.isnan(motion.sliding_distance_m)
     assert motion.peak_force_n == pytest.approx(6.5e5 * 2e-5 + 465.0 * 0.005)
@@ -131,8 +141,8 @@ def test_a_tap_too_short_moves_nothing() -> None:
 
 def test_the_other_direction_is_the_mirror_image() -> None:
     time = np.linspace(-0.001, 0.12, 300)
-    forth = tap(PLANT, Strike(0.06, 18.9, stroke_m=0.0015))
-    back = tap(PLANT, Strike(0.06, 18.9, stroke_m=0.0015, direction=-1))
+    forth = simulate_tap(PLANT, TapInput(0.06, 18.9, stroke_m=0.0015))
+    back = simulate_tap(PLANT, TapInput(0.06, 18.9, stroke_m=0.0015, direction=-1))
     np.testing.assert_array_equal(forth.position_m(time), -back.position_m(time))
     np.testing.assert_array_equal(forth.actuator_m(time), -back.actuator_m(time))
     np.testing.assert_array_equal(forth.force_n(time), back.force_n(time))
@@ -140,7 +150,7 @@ def test_the_other_direction_is_the_mirror_image() -> None:
 
 
 def test_samples_before_and_after() -> None:
-    motion = tap(PLANT, Strike(0.06, 18.9, stroke_m=0.0015))
+    motion = simulate_tap(PLANT, TapInput(0.06, 18.9, stroke_m=0.0015))
     time = np.array([-1.0, 0.0, 1e-9, 50.0])
     np.testing.assert_allclose(motion.force_n(time), [0.0, 27.9, 27.9, 0.0], atol=1e-3)
     np.testing.assert_allclose(motion.position_m(time), [0.0, 0.0, 0.0, motion.displacement_m], atol=1e-12)
@@ -149,17 +159,17 @@ def test_samples_before_and_after() -> None:
 
 def test_an_actuator_that_never_halts_is_refused() -> None:
     with pytest.raises(ValueError, match="halt at separation"):
-        tap(PLANT, Strike(0.06, 18.9))
+        simulate_tap(PLANT, TapInput(0.06, 18.9))
 
 
 def test_a_slide_that_cannot_end_is_reported() -> None:
     downhill = Plant(6.5e5, 465.0, 0.02, 0.01, effects={"surface_tilt": {"tilt_rad": -0.2}})
     with pytest.raises(NeverAtRestError, match="still slides"):
-        free_slide(downhill, 5.0, 0.1)
+        simulate_free_slide(downhill, 5.0, 0.1)
 
 
 def test_free_slide_is_a_parabola() -> None:
-    motion = free_slide(PLANT, 5.0, 0.2, Shot(direction=-1))
+    motion = simulate_free_slide(PLANT, 5.0, 0.2, Shot(direction=-1))
     stop = 0.2 / (0.152 * G)
     time = np.linspace(0.0, stop, 50)
     assert motion.stop_s == pytest.approx(stop, rel=1e-12)
@@ -168,7 +178,7 @@ def test_free_slide_is_a_parabola() -> None:
 
 def test_driven_part_sticks_then_accelerates() -> None:
     mass, ramp = 5.0, 100.0
-    motion = driven(PLANT, mass, lambda t: -ramp * t, 0.4)
+    motion = simulate_driven(PLANT, mass, lambda t: -ramp * t, 0.4)
     breakaway = 0.2 * mass * G / ramp
     time = np.linspace(breakaway, 0.4, 50)
     late = time - breakaway
@@ -179,7 +189,7 @@ def test_driven_part_sticks_then_accelerates() -> None:
 
 
 def test_driven_part_reverses() -> None:
-    motion = driven(PLANT, 5.0, lambda t: 30.0 * math.cos(2.0 * math.pi * t), 2.0)
+    motion = simulate_driven(PLANT, 5.0, lambda t: 30.0 * math.cos(2.0 * math.pi * t), 2.0)
     kinds = [event.kind for event in motion.events]
     assert kinds.count("stop") >= 3
     assert kinds.count("breakaway") >= 3
@@ -194,7 +204,7 @@ def test_a_drive_that_peaks_briefly_breaks_a_resting_part_away() -> None:
     def force(t: float) -> float:
         return 0.2 * mass * G * peak * math.exp(-(((t - 0.9) / 0.02) ** 2))
 
-    motion = driven(PLANT, mass, force, 1.5)
+    motion = simulate_driven(PLANT, mass, force, 1.5)
     breakaway = 0.9 - 0.02 * math.sqrt(math.log(peak))
     assert motion.breakaway_s == pytest.approx(breakaway, rel=1e-8)
     assert motion.events[-1].kind == "stop"
@@ -223,7 +233,7 @@ def test_closed_form_and_integrator_agree(
 ) -> None:
     effects = {"viscous_friction": {"viscous_coefficient_n_s_per_m": viscous}} if viscous else {}
     plant = Plant(stiffness, damping, mu_s, mu_s * ratio, effects=effects)
-    motion = tap(plant, Strike(velocity, mass, stroke))
+    motion = simulate_tap(plant, TapInput(velocity, mass, stroke))
     fast = nominal_taps(stiffness, damping, mu_s, mu_s * ratio, mass, velocity, stroke, viscous)
     assert fast.displacement_m[0] == pytest.approx(motion.displacement_m, rel=1e-8, abs=1e-11)
     assert fast.peak_force_n[0] == pytest.approx(motion.peak_force_n, rel=1e-8)
@@ -242,13 +252,15 @@ def test_closed_form_refuses_what_it_cannot_do() -> None:
     with pytest.raises(ValueError, match="halt at separation"):
         nominal_taps(*good[:6], math.inf)
     free = nominal_taps(*good[:6], math.inf, halts_at_separation=True)
-    strike = Strike(0.05, 18.9, halts_at_separation=True)
-    assert free.sliding_distance_m[0] == pytest.approx(tap(PLANT, strike).sliding_distance_m, rel=1e-8)
+    strike = TapInput(0.05, 18.9, halts_at_separation=True)
+    assert free.sliding_distance_m[0] == pytest.approx(
+        simulate_tap(PLANT, strike).sliding_distance_m, rel=1e-8
+    )
 
 
 def test_stribeck_slide_against_quadrature() -> None:
     effects = {"stribeck_friction": {"friction_increase": 0.03, "stribeck_velocity_m_s": 0.04}}
-    motion = free_slide(Plant(6.5e5, 465.0, 0.2, 0.152, effects=effects), 5.0, 0.2)
+    motion = simulate_free_slide(Plant(6.5e5, 465.0, 0.2, 0.152, effects=effects), 5.0, 0.2)
 
     def friction(v: float) -> float:
         return (0.152 + 0.03 * math.exp(-((v / 0.04) ** 2))) * G

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from impactcell.physics import Plant, Strike, free_motion
+from impactcell.physics import Plant, TapInput, free_motion
 from impactcell.records import Channel, Quality
 from impactcell.serialization import json_text
 from impactcell.tracking.model_gap import gap_cusum
@@ -58,7 +58,7 @@ def test_what_the_model_knows_to_depend_on_the_speed_is_taken_out():
         noisy = direction * path.sol(t)[0] + NOISE * np.random.default_rng(0).normal(size=len(t))
         capture, _ = slide(textured(0), 0.09, 1e4, NOISE, 0)
         capture = replace(capture, position=Channel(t, noisy, NOISE), direction=direction)
-        known = partial(free_motion.acceleration, plant, Strike(0.05, mass, direction=direction))
+        known = partial(free_motion.acceleration, plant, TapInput(0.05, mass, direction=direction))
         state = tracker.initial_state(SETTINGS)
         found = tracker.update(SETTINGS, state, capture, acceleration=known).signature
         inner = 0.85 * path.y[0, -1] > GRID
