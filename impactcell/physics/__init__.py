@@ -37,7 +37,6 @@ a `Plant`. Samples are smooth in the parameters while the sequence of events is 
 
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 from impactcell.physics.ensemble import Ensemble, TapOutputs, Traces
-from impactcell.physics.modified_euler import GridMotion, simulate_modified_euler
 from impactcell.physics.motion import ChannelSamples, Motion, TapEvent, TapEventKind
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.physics.simulate import simulate_driven, simulate_free_slide, simulate_tap
@@ -46,7 +45,6 @@ __all__ = [
     "ChannelSamples",
     "Effect",
     "Ensemble",
-    "GridMotion",
     "Kind",
     "LawKind",
     "Motion",
@@ -60,6 +58,5 @@ __all__ = [
     "Traces",
     "simulate_driven",
     "simulate_free_slide",
-    "simulate_modified_euler",
     "simulate_tap",
 ]

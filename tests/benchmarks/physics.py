@@ -6,10 +6,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import least_squares
 
-from impactcell.physics import Ensemble, Plant, TapInput, simulate_modified_euler, simulate_tap
+from impactcell.physics import Ensemble, Plant, TapInput, simulate_tap
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks._scipy_tap import K_V, MASS, RATIO, SAMPLES, B, K, scipy_tap
 from tests.benchmarks.table import Table
+from tests.modified_euler import simulate_modified_euler
 
 COLUMNS = ("what", "bar", "measured", "interval")
 MM_PER_MIN = 1.0 / 60000.0

@@ -3,7 +3,8 @@
 import pytest
 
 from impactcell.errors import NoStopError, PhysicsError
-from impactcell.physics import Plant, TapInput, simulate_modified_euler, simulate_tap
+from impactcell.physics import Plant, TapInput, simulate_tap
+from tests.modified_euler import simulate_modified_euler
 
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}})
 

@@ -11,7 +11,6 @@ def test_what_the_package_offers() -> None:
         "TapEvent",
         "TapEventKind",
         "TapOutputs",
-        "GridMotion",
         "Kind",
         "LawKind",
         "Motion",
@@ -24,7 +23,6 @@ def test_what_the_package_offers() -> None:
         "simulate_driven",
         "simulate_free_slide",
         "simulate_tap",
-        "simulate_modified_euler",
     }
 
 
