@@ -18,14 +18,15 @@ from impactcell.scada import (
     Actor,
     AlarmPage,
     CellDescription,
+    HistoryRequest,
     HistoryValue,
-    Limits,
     Machine,
     Ranges,
     RefusedError,
     Role,
     SecurityPolicy,
     Server,
+    ServerLimits,
     ServerSettings,
     ValuePage,
 )
@@ -51,31 +52,24 @@ class MemoryHistory:
         self.stored: dict[tuple[str, str], list[HistoryValue]] = {}
         self.transitions: dict[str, list[Alarm]] = {}
 
-    async def values(
-        self, cell, variable, start_ns, end_ns, limit, *, newest_first=False, resume=None
-    ) -> ValuePage:
-        found = self._between(self.stored.get((cell, variable), []), start_ns, end_ns, newest_first)
-        part, rest = self._page(found, limit, resume)
-        return ValuePage(part, rest)
+    async def values(self, cell: str, variable: str, request: HistoryRequest) -> ValuePage:
+        return ValuePage(*self._page(self.stored.get((cell, variable), []), request))
 
-    async def alarms(self, cell, start_ns, end_ns, limit, *, newest_first=False, resume=None) -> AlarmPage:
-        found = self._between(self.transitions.get(cell, []), start_ns, end_ns, newest_first)
-        part, rest = self._page(found, limit, resume)
-        return AlarmPage(part, rest)
+    async def alarms(self, cell: str, request: HistoryRequest) -> AlarmPage:
+        return AlarmPage(*self._page(self.transitions.get(cell, []), request))
 
     @staticmethod
-    def _between(entries, start_ns, end_ns, newest_first):
-        inside = [
+    def _page(entries, request: HistoryRequest):
+        start_ns, end_ns = request.start_ns, request.end_ns
+        found = [
             e
             for e in entries
             if (start_ns is None or e.time_ns >= start_ns) and (end_ns is None or e.time_ns <= end_ns)
         ]
-        return inside[::-1] if newest_first else inside
-
-    @staticmethod
-    def _page(found, limit, resume):
-        at = int.from_bytes(resume, "big") if resume else 0
-        stop = at + limit
+        if request.newest_first:
+            found.reverse()
+        at = int.from_bytes(request.resume, "big") if request.resume else 0
+        stop = at + request.limit
         return tuple(found[at:stop]), stop.to_bytes(8, "big") if stop < len(found) else None
 
 
@@ -231,7 +225,7 @@ def users() -> dict[str, User]:
 @contextlib.asynccontextmanager
 async def site(
     cells: Iterable[str] = (CELL,),
-    limits: Limits | None = None,
+    limits: ServerLimits | None = None,
     directory: Path | None = None,
     **settings: object,
 ) -> AsyncIterator[Site]:
@@ -251,11 +245,11 @@ async def site(
             ServerSettings(
                 endpoint="opc.tcp://127.0.0.1:0/impactcell",
                 pki=place / "pki",
-                users=place / "users.yaml",
                 application_uri=SERVER_URI,
-                limits=limits or Limits(),
+                limits=limits or ServerLimits(),
                 **settings,  # type: ignore[arg-type]
             ),
+            place / "users.yaml",
             [
                 CellDescription(
                     name,

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from impactcell.errors import AccessError
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
+from impactcell.opcua.host_interface import Role
 from impactcell.opcua.trust_list import FOLDERS, der, fingerprint, read_certificate, thumbprint
 from impactcell.process.console import tell
-from impactcell.scada.interface import Role, default_application_uri
+from impactcell.scada.interface import default_application_uri
 from impactcell.scada.rights import matrix_table
 from impactcell.scada.users import User, read_users, with_password, write_users
 

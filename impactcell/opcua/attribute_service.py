@@ -4,7 +4,6 @@ Mended: asyncua ignores index ranges, data encodings and the timestamps asked fo
 access level, and lets users write what is not meant to be written.
 """
 
-from collections.abc import Callable
 from typing import Final
 
 from asyncua import ua
@@ -12,24 +11,20 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.data_change_filter import cut, parse_range
+from impactcell.opcua.host_interface import AccessPolicy, Permission, Role
 from impactcell.opcua.node_values import with_timestamps
 from impactcell.opcua.request_dispatch import Context, Service, bounded
-from impactcell.scada.interface import Role
-from impactcell.scada.rights import Area, Right, allowed
 
 KNOWN_ATTRIBUTES: Final = frozenset(int(attribute) for attribute in ua.AttributeIds)
 BINARY: Final = ua.QualifiedName("Default Binary", 0)
-
-MayCall = Callable[[ua.NodeId, Role], bool]
-"""Whether a role may call a method."""
 
 
 class Attributes:
     """Answers Read and Write."""
 
-    def __init__(self, space: AddressSpace, may_call: MayCall) -> None:
+    def __init__(self, space: AddressSpace, access: AccessPolicy) -> None:
         self._space = space
-        self._may_call = may_call
+        self._access = access
 
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
@@ -59,7 +54,7 @@ class Attributes:
     def _value(self, wanted: ua.ReadValueId, timestamps: ua.TimestampsToReturn, role: Role) -> ua.DataValue:
         if wanted.NodeId not in self._space:
             raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
-        if not allowed(role, Area.NODES, Right.READ):
+        if not self._access.permits(role, Permission.READ, wanted.NodeId):
             raise FaultError(ua.StatusCodes.BadUserAccessDenied)
         if wanted.AttributeId not in KNOWN_ATTRIBUTES:
             raise FaultError(ua.StatusCodes.BadAttributeIdInvalid)
@@ -85,7 +80,8 @@ class Attributes:
             attribute == ua.AttributeIds.UserExecutable
             and ua.AttributeIds.Executable in self._space[node].attributes
         ):
-            return ua.DataValue(ua.Variant(self._may_call(node, role), ua.VariantType.Boolean))
+            may_call = self._access.permits(role, Permission.CALL, node)
+            return ua.DataValue(ua.Variant(may_call, ua.VariantType.Boolean))
         return held
 
     async def write(self, context: Context, wanted: ua.WriteParameters) -> ua.WriteResponse:
@@ -102,6 +98,6 @@ class Attributes:
             return int(codes.BadNodeIdUnknown)
         if wanted.AttributeId not in self._space[wanted.NodeId].attributes:
             return int(codes.BadAttributeIdInvalid)
-        if not allowed(role, Area.NODES, Right.WRITE):
+        if not self._access.permits(role, Permission.WRITE, wanted.NodeId):
             return int(codes.BadUserAccessDenied)
         return int(codes.BadNotWritable)

@@ -16,12 +16,10 @@ from asyncua import ua
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import padding, rsa
 
-from impactcell.errors import AccessError
 from impactcell.opcua.asyncua_adapter import SIGNATURE_CHECKS, InvalidSignature, x509_from_der
 from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.host_interface import Actor, UserDirectory
 from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain
-from impactcell.scada.interface import Actor
-from impactcell.scada.users import User, Users, verify
 
 _log = logging.getLogger(__name__)
 
@@ -83,7 +81,7 @@ class Throttle:
 class Logins:
     """Turns identity tokens into actors."""
 
-    def __init__(self, users: Users, trust: TrustList) -> None:
+    def __init__(self, users: UserDirectory, trust: TrustList) -> None:
         self._users = users
         self._trust = trust
         self._throttle = Throttle()
@@ -92,14 +90,6 @@ class Logins:
     def close(self) -> None:
         """End the threads."""
         self._pool.shutdown(wait=False, cancel_futures=True)
-
-    def users(self) -> dict[str, User]:
-        """Users as the file has them now; nobody, while it cannot be read."""
-        try:
-            return self._users.current()
-        except AccessError as error:
-            _log.error("nobody can log in: %s", error)
-            return {}
 
     async def identify(
         self,
@@ -132,8 +122,10 @@ class Logins:
         name = token.UserName or ""
         known = self._throttle.of(address)
         async with known.lock:
-            user = self.users().get(name)
-            right = await asyncio.get_running_loop().run_in_executor(self._pool, verify, user, password)
+            user = self._users.find(name)
+            right = await asyncio.get_running_loop().run_in_executor(
+                self._pool, self._users.verify_password, user, password
+            )
             if right and user is not None:
                 known.wrong.pop(name, None)
                 return Actor(user.name, user.role, address)
@@ -194,8 +186,7 @@ class Logins:
             check(certificate, self._trust.own_certificate + nonce, signature.Signature)
         except (InvalidSignature, ValueError, TypeError, AttributeError):
             raise FaultError(ua.StatusCodes.BadUserSignatureInvalid) from None
-        self.users()
-        user = self._users.by_certificate(fingerprint(data))
+        user = self._users.find_by_certificate(fingerprint(data))
         if user is None or not self._trust.is_valid_now(certificate):
             _log.warning("unknown user certificate %s from %s", fingerprint(data), address)
             raise FaultError(ua.StatusCodes.BadUserAccessDenied)

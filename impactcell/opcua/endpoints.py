@@ -6,10 +6,8 @@ from urllib.parse import urlsplit
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import SECURITY_POLICIES, SecurityPolicyNone
-from impactcell.scada.interface import SecurityPolicy, ServerSettings
+from impactcell.opcua.host_interface import Product, SecurityPolicy, ServerSettings
 
-PRODUCT_URI: Final = "urn:impactcell"
-PRODUCT_NAME: Final = "impactcell"
 TRANSPORT: Final = "http://opcfoundation.org/UA-Profile/Transport/uatcp-uasc-uabinary"
 
 POLICIES: Final = {
@@ -23,8 +21,9 @@ POLICIES: Final = {
 class Endpoints:
     """Answers discovery."""
 
-    def __init__(self, settings: ServerSettings, certificate: bytes) -> None:
+    def __init__(self, settings: ServerSettings, product: Product, certificate: bytes) -> None:
         self._settings = settings
+        self._product = product
         self._certificate = certificate
         self.port = 0
 
@@ -43,8 +42,8 @@ class Endpoints:
     def _server(self, url: str) -> ua.ApplicationDescription:
         description = ua.ApplicationDescription()
         description.ApplicationUri = self._settings.application_uri
-        description.ProductUri = PRODUCT_URI
-        description.ApplicationName = ua.LocalizedText(PRODUCT_NAME)
+        description.ProductUri = self._product.uri
+        description.ApplicationName = ua.LocalizedText(self._product.name)
         description.ApplicationType = ua.ApplicationType.Server
         description.DiscoveryUrls = [url]
         return description

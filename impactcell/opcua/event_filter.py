@@ -1,4 +1,4 @@
-"""Event filters: which events a client wants, and which of their fields (Part 4, 7.7 and 7.22.3).
+"""EventNotification filters: which events a client wants, and which of their fields (Part 4, 7.7 and 7.22.3).
 
 Mended: asyncua's OfType matches the very type only, so that a filter for ConditionType lets no alarm
 through; it logs an exception for every operand it does not know, and follows operands that refer to each
@@ -7,40 +7,17 @@ other without end.
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.type_instances import supertypes
 
-Path = tuple[str, ...]
 NULL: Final = ua.Variant()
 MAX_CLAUSES: Final = 200
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """An event as it happened.
-
-    Attributes
-    ----------
-    kind : NodeId
-        Its type.
-    fields : mapping
-        Browse path below the type, names only, to value; the empty path is the ConditionId.
-    notifiers : frozenset of NodeId
-        Nodes that report it.
-    unfiltered : bool
-        True for the events around a refresh, which pass every filter.
-    """
-
-    kind: ua.NodeId
-    fields: Mapping[Path, ua.Variant]
-    notifiers: frozenset[ua.NodeId]
-    unfiltered: bool = False
 
 
 def _ordered(compare: Callable[[Any, Any], bool]) -> Callable[..., bool | None]:
@@ -174,30 +151,30 @@ class EventFilter:
         return ua.StatusCode(ua.StatusCodes.Good if known else ua.StatusCodes.BadTypeDefinitionInvalid)
 
     @staticmethod
-    def _path(clause: ua.SimpleAttributeOperand) -> Path | None:
+    def _path(clause: ua.SimpleAttributeOperand) -> BrowsePath | None:
         names = tuple(name.Name for name in clause.BrowsePath or [])
         if not names:
             return () if clause.AttributeId == ua.AttributeIds.NodeId else None
         return names if clause.AttributeId == ua.AttributeIds.Value else None
 
-    def select(self, event: Event) -> ua.EventFieldList:
+    def select(self, event: EventNotification) -> ua.EventFieldList:
         """Take the wanted fields out of an event; a field that it does not have is null."""
         fields = ua.EventFieldList()
         fields.EventFields = [NULL if path is None else event.fields.get(path, NULL) for path in self._paths]
         return fields
 
-    def passes(self, event: Event) -> bool:
+    def passes(self, event: EventNotification) -> bool:
         """Whether the client wants to hear of an event."""
         return event.unfiltered or not self._elements or self._element(0, event) is True
 
-    def _element(self, index: int, event: Event) -> bool | None:
+    def _element(self, index: int, event: EventNotification) -> bool | None:
         element = self._elements[index]
         operands = [self._operand(operand, event) for operand in element.FilterOperands]
         if element.FilterOperator == ua.FilterOperator.OfType:
-            return operands[0] in supertypes(self._space, event.kind)
+            return operands[0] in supertypes(self._space, event.event_type)
         return _OPERATORS[element.FilterOperator][2](*operands)
 
-    def _operand(self, operand: Any, event: Event) -> Any:
+    def _operand(self, operand: Any, event: EventNotification) -> Any:
         if isinstance(operand, ua.ElementOperand):
             return self._element(operand.Index, event)
         if isinstance(operand, ua.LiteralOperand):

@@ -18,8 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from impactcell.records import Quality
-from impactcell.scada.interface import HistoryValue
+from impactcell.opcua.host_interface import HistoricalValue
 
 RAW: Final = 0x400
 CALCULATED: Final = 0x401
@@ -31,6 +30,12 @@ GOOD: Final = 0x0000_0000
 SUB_NORMAL: Final = 0x40A4_0000
 BAD: Final = 0x8000_0000
 NO_DATA: Final = 0x809B_0000
+
+
+SEVERITY_SHIFT: Final = 30
+SEVERITY_GOOD: Final = 0b00
+SEVERITY_UNCERTAIN: Final = 0b01
+"""The two uppermost bits of a status code (Part 4, 7.39.1)."""
 
 
 class Aggregate(enum.Enum):
@@ -99,7 +104,7 @@ def intervals(start_ns: int, end_ns: int, step_ns: int) -> Iterator[Interval]:
 def process(
     aggregate: Aggregate,
     interval: Interval,
-    values: Sequence[HistoryValue],
+    values: Sequence[HistoricalValue],
     treatment: Treatment,
     *,
     within: bool,
@@ -108,7 +113,7 @@ def process(
 
     Parameters
     ----------
-    values : sequence of HistoryValue
+    values : sequence of HistoricalValue
         All that lie in the interval, in any order.
     within : bool
         Whether the interval touches the span of what is stored at all.
@@ -127,7 +132,7 @@ def process(
 
 
 def _count(
-    interval: Interval, values: Sequence[HistoryValue], treatment: Treatment, *, within: bool
+    interval: Interval, values: Sequence[HistoricalValue], treatment: Treatment, *, within: bool
 ) -> Processed:
     bits = CALCULATED | (PARTIAL if interval.partial else 0)
     if not values:
@@ -141,8 +146,8 @@ def _count(
 def _extreme(
     pick: Callable[..., float],
     interval: Interval,
-    values: Sequence[HistoryValue],
-    good: Sequence[HistoryValue],
+    values: Sequence[HistoricalValue],
+    good: Sequence[HistoricalValue],
     status: int,
 ) -> Processed:
     found = pick(value.value for value in good)
@@ -155,10 +160,9 @@ def _extreme(
     return Processed(interval.start_ns, found, status | bits)
 
 
-def _is_good(value: HistoryValue, treatment: Treatment) -> bool:
-    if value.quality is Quality.UNCERTAIN:
-        return not treatment.uncertain_as_bad
-    return value.quality is Quality.GOOD
+def _is_good(value: HistoricalValue, treatment: Treatment) -> bool:
+    severity = value.status >> SEVERITY_SHIFT
+    return severity == SEVERITY_GOOD or (severity == SEVERITY_UNCERTAIN and not treatment.uncertain_as_bad)
 
 
 def _status(good: int, all_values: int, treatment: Treatment) -> int:

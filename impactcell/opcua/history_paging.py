@@ -8,9 +8,8 @@ from typing import Final
 from asyncua import ua
 
 from impactcell.opcua.binary_codec import FaultError
-from impactcell.opcua.node_values import STATUS, moment, nanoseconds
-from impactcell.records import Quality
-from impactcell.scada.interface import HistorySource, HistoryValue
+from impactcell.opcua.host_interface import HistoricalValue, HistoricalValues, HistoryProvider, HistoryRequest
+from impactcell.opcua.node_values import moment, nanoseconds
 
 PAGE: Final = 1_000
 BEGINNING: Final = ua.get_win_epoch()
@@ -36,10 +35,10 @@ class Span:
     resume: bytes | None = None
     bounds: tuple[int, int] | None = None
 
-    @property
-    def page(self) -> int:
-        """Number of entries to ask for at once."""
-        return PAGE if self.left is None else min(PAGE, self.left)
+    def request(self) -> HistoryRequest:
+        """Ask for the next page."""
+        limit = PAGE if self.left is None else min(PAGE, self.left)
+        return HistoryRequest(self.start_ns, self.end_ns, limit, self.newest_first, self.resume)
 
 
 def rest(span: Span, given: int, resume: bytes | None) -> Span | None:
@@ -79,48 +78,37 @@ def span(start: datetime | None, end: datetime | None, most: int, *, bounds: boo
 class Series:
     """One stored variable."""
 
-    def __init__(self, source: HistorySource, cell: str, variable: str) -> None:
-        self._source = source
-        self._cell = cell
-        self._variable = variable
+    def __init__(self, history: HistoryProvider, node: ua.NodeId) -> None:
+        self._history = history
+        self._node = node
 
-    async def page(self, asked: Span) -> tuple[Sequence[HistoryValue], Span | None]:
+    async def page(self, asked: Span) -> tuple[Sequence[HistoricalValue], Span | None]:
         """Read a page, and say what is left."""
-        page = await self._source.values(
-            self._cell,
-            self._variable,
-            asked.start_ns,
-            asked.end_ns,
-            asked.page,
-            newest_first=asked.newest_first,
-            resume=asked.resume,
-        )
+        page = await self._history.read_values(self._node, asked.request())
         return page.values, rest(asked, len(page.values), page.resume)
 
     async def ends(self) -> tuple[int, int] | None:
         """Find the times of the first and the last stored value."""
-        first = await self._source.values(self._cell, self._variable, None, None, 1)
-        last = await self._source.values(self._cell, self._variable, None, None, 1, newest_first=True)
+        first = await self._nearest(None, later=True)
+        last = await self._nearest(None, later=False)
         if not first.values or not last.values:
             return None
         return first.values[0].time_ns, last.values[0].time_ns
 
     async def bound(self, time_ns: int, *, later: bool) -> ua.DataValue:
         """Find the value at a time, or the nearest on one side; BadBoundNotFound where there is none."""
-        page = await self._source.values(
-            self._cell,
-            self._variable,
-            time_ns if later else None,
-            None if later else time_ns,
-            1,
-            newest_first=not later,
-        )
+        page = await self._nearest(time_ns, later=later)
         if page.values:
             return data_value(page.values[0])
         return ua.DataValue(None, NO_BOUND, moment(time_ns), moment(time_ns))
 
+    async def _nearest(self, time_ns: int | None, *, later: bool) -> HistoricalValues:
+        start_ns, end_ns = (time_ns, None) if later else (None, time_ns)
+        request = HistoryRequest(start_ns, end_ns, limit=1, newest_first=not later)
+        return await self._history.read_values(self._node, request)
 
-def data_value(value: HistoryValue) -> ua.DataValue:
+
+def data_value(value: HistoricalValue) -> ua.DataValue:
     """Make the DataValue of a stored value."""
     variant = ua.Variant(value.value, ua.VariantType.Double)
-    return ua.DataValue(variant, STATUS[Quality(value.quality)], moment(value.time_ns), moment(value.time_ns))
+    return ua.DataValue(variant, ua.StatusCode(value.status), moment(value.time_ns), moment(value.time_ns))

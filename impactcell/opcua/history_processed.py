@@ -8,8 +8,8 @@ from asyncua import ua
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.history_aggregates import Aggregate, Interval, Processed, Treatment, intervals, process
 from impactcell.opcua.history_paging import BEGINNING, PAGE, Series, Span
+from impactcell.opcua.host_interface import HistoricalValue
 from impactcell.opcua.node_values import moment, nanoseconds
-from impactcell.scada.interface import HistoryValue
 
 MOST_INTERVALS: Final = 1_000_000
 
@@ -66,7 +66,7 @@ async def _aggregate(
         newest_first=wanted[0].start_ns > wanted[0].end_ns,
         left=None,
     )
-    held: list[HistoryValue] = []
+    held: list[HistoricalValue] = []
     results = []
     for interval in wanted:
         # Values come in the order of the intervals: read on until one lies beyond this interval.
@@ -81,7 +81,7 @@ async def _aggregate(
     return results
 
 
-def _beyond(value: HistoryValue, interval: Interval) -> bool:
+def _beyond(value: HistoricalValue, interval: Interval) -> bool:
     """Whether a value comes after an interval, in the direction of the intervals."""
     if interval.start_ns <= interval.end_ns:
         return value.time_ns >= interval.end_ns

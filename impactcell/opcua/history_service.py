@@ -4,43 +4,29 @@ Mended: asyncua keeps history in memory or in a table of its own, mistakes the e
 continuation points that survive values with equal times, and no aggregates.
 """
 
-from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
-from impactcell.opcua.event_filter import Event, EventFilter
+from impactcell.opcua.event_filter import EventFilter
 from impactcell.opcua.history_paging import Series, Span, data_value, rest, span
 from impactcell.opcua.history_processed import read_processed
+from impactcell.opcua.host_interface import AccessPolicy, HistoryProvider, Permission, RefusedError
 from impactcell.opcua.node_values import with_timestamps
 from impactcell.opcua.request_dispatch import Context, Service, bounded
-from impactcell.scada.interface import HistorySource, RefusedError
-from impactcell.scada.rights import Area, Right, allowed
 
 MOST_NODES: Final = 100
-
-EventOf = Callable[[str, Any], Event]
-"""Makes the event again that an alarm's transition was told with."""
 
 
 class Histories:
     """Answers HistoryRead."""
 
-    def __init__(
-        self,
-        space: AddressSpace,
-        source: HistorySource,
-        variables: Mapping[ua.NodeId, tuple[str, str]],
-        notifiers: Mapping[ua.NodeId, str],
-        event_of: EventOf,
-    ) -> None:
+    def __init__(self, space: AddressSpace, access: AccessPolicy, history: HistoryProvider) -> None:
         self._space = space
-        self._source = source
-        self._variables = variables
-        self._notifiers = notifiers
-        self._event_of = event_of
+        self._access = access
+        self._history = history
 
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
@@ -112,21 +98,17 @@ class Histories:
     def _check(self, node: ua.HistoryReadValueId, context: Context, *, events: bool) -> None:
         if node.NodeId not in self._space:
             raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
-        area = Area.EVENTS if events else Area.VALUES
-        if not allowed(context.actor.role, area, Right.HISTORY):
+        if not self._access.permits(context.actor.role, Permission.READ_HISTORY, node.NodeId):
             raise FaultError(ua.StatusCodes.BadUserAccessDenied)
-        if node.NodeId not in (self._notifiers if events else self._variables):
+        if not (self._history.has_events if events else self._history.has_values)(node.NodeId):
             raise FaultError(ua.StatusCodes.BadHistoryOperationUnsupported)
         if node.IndexRange:
             raise FaultError(ua.StatusCodes.BadIndexRangeInvalid)
 
-    def _series(self, node: ua.NodeId) -> Series:
-        return Series(self._source, *self._variables[node])
-
     async def _raw(
         self, node: ua.NodeId, details: ua.ReadRawModifiedDetails, state: Span | None
     ) -> tuple[ua.HistoryData, Span | None]:
-        series = self._series(node)
+        series = Series(self._history, node)
         asked = state or span(
             details.StartTime, details.EndTime, details.NumValuesPerNode, bounds=details.ReturnBounds
         )
@@ -145,7 +127,7 @@ class Histories:
         self, node: ua.NodeId, details: ua.ReadProcessedDetails, kind: ua.NodeId, state: int | None
     ) -> tuple[ua.HistoryData, int | None]:
         data = ua.HistoryData()
-        data.DataValues, left = await read_processed(self._series(node), details, kind, state)
+        data.DataValues, left = await read_processed(Series(self._history, node), details, kind, state)
         return data, left
 
     async def _events(
@@ -153,17 +135,8 @@ class Histories:
     ) -> tuple[ua.HistoryEvent, Span | None]:
         wanted = EventFilter(self._space, details.Filter)
         asked = state or span(details.StartTime, details.EndTime, details.NumValuesPerNode)
-        cell = self._notifiers[node]
-        page = await self._source.alarms(
-            cell,
-            asked.start_ns,
-            asked.end_ns,
-            asked.page,
-            newest_first=asked.newest_first,
-            resume=asked.resume,
-        )
+        page = await self._history.read_events(node, asked.request())
         data = ua.HistoryEvent()
-        events = [self._event_of(cell, alarm) for alarm in page.alarms]
-        passed = [event for event in events if wanted.passes(event)]
+        passed = [event for event in page.events if wanted.passes(event)]
         data.Events = [ua.HistoryEventFieldList(wanted.select(event).EventFields) for event in passed]
         return data, rest(asked, len(passed), page.resume)

@@ -12,9 +12,8 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.host_interface import AccessPolicy, Permission, RefusedError, Role
 from impactcell.opcua.request_dispatch import Context, Service, bounded
-from impactcell.scada.interface import RefusedError, Role
-from impactcell.scada.rights import Area, Right, allowed
 
 MOST_CALLS = 100
 
@@ -43,7 +42,6 @@ Run = Callable[[Context, Sequence[Any]], Awaitable[None]]
 class Method:
     """A method as it can be called on one object."""
 
-    area: Area
     arguments: tuple[Argument, ...]
     run: Run
 
@@ -51,10 +49,10 @@ class Method:
 class Calls:
     """Answers Call. Methods are bound to (object, method) pairs; anything else is no method of the object."""
 
-    def __init__(self, space: AddressSpace) -> None:
+    def __init__(self, space: AddressSpace, access: AccessPolicy) -> None:
         self._space = space
+        self._access = access
         self._bound: dict[tuple[ua.NodeId, ua.NodeId], Method] = {}
-        self._areas: dict[ua.NodeId, Area] = {}
 
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
@@ -63,12 +61,6 @@ class Calls:
     def bind(self, owner: ua.NodeId, method: ua.NodeId, bound: Method) -> None:
         """Make a method callable on an object."""
         self._bound[owner, method] = bound
-        self._areas[method] = bound.area
-
-    def may_call(self, method: ua.NodeId, role: Role) -> bool:
-        """Whether a role may call a method."""
-        area = self._areas.get(method)
-        return area is not None and allowed(role, area, Right.CALL)
 
     async def call(self, context: Context, wanted: ua.CallParameters) -> ua.CallResponse:
         """Call methods, one after the other."""
@@ -100,7 +92,7 @@ class Calls:
     def _find(self, wanted: ua.CallMethodRequest, role: Role) -> Method:
         method = self._bound.get((wanted.ObjectId, wanted.MethodId))
         if method is not None:
-            if not allowed(role, method.area, Right.CALL):
+            if not self._access.permits(role, Permission.CALL, wanted.MethodId):
                 raise FaultError(ua.StatusCodes.BadUserAccessDenied)
             return method
         if wanted.ObjectId not in self._space:

@@ -13,10 +13,11 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError, encode
 from impactcell.opcua.data_change_filter import ChangeFilter, change_filter, cut, parse_range
-from impactcell.opcua.event_filter import Event, EventFilter
+from impactcell.opcua.event_filter import EventFilter
+from impactcell.opcua.event_notification import EventNotification
+from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.node_values import Sample, Values
 from impactcell.opcua.type_instances import read
-from impactcell.scada.interface import Limits
 
 OVERFLOW: Final = 0x0480
 """Bits of a status code: it describes a DataValue, and values before it were lost."""
@@ -44,7 +45,7 @@ class DataItem:
         timestamps: ua.TimestampsToReturn,
         space: AddressSpace,
         values: Values,
-        limits: Limits,
+        limits: ServerLimits,
         ready: Ready,
     ) -> None:
         target = request.ItemToMonitor
@@ -140,7 +141,7 @@ class EventItem:
         item_id: int,
         request: ua.MonitoredItemCreateRequest,
         space: AddressSpace,
-        limits: Limits,
+        limits: ServerLimits,
         ready: Ready,
     ) -> None:
         self.id = item_id
@@ -169,7 +170,7 @@ class EventItem:
         """Size of the queue and result of the filter, as the client is told."""
         return self._size, self._filter.result
 
-    def offer(self, event: Event) -> None:
+    def offer(self, event: EventNotification) -> None:
         """Take in an event."""
         if self.mode == ua.MonitoringMode.Disabled or not self._filter.passes(event):
             return
@@ -179,11 +180,13 @@ class EventItem:
                 # One event that tells of the loss stands where the first lost one stood.
                 self._overflowed = True
                 self._queue.popleft()
-                self._queue.appendleft(self._encode(Event(OVERFLOW_EVENT, overflow_fields(), frozenset())))
+                self._queue.appendleft(
+                    self._encode(EventNotification(OVERFLOW_EVENT, overflow_fields(), frozenset()))
+                )
         self._queue.append(self._encode(event))
         self._ready(self)
 
-    def _encode(self, event: Event) -> bytes:
+    def _encode(self, event: EventNotification) -> bytes:
         fields = self._filter.select(event)
         fields.ClientHandle = self.handle
         return encode(fields)

@@ -6,19 +6,27 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.host_interface import AccessPolicy, Permission, Role, ServerLimits
 from impactcell.opcua.monitored_item import DataItem, EventItem
 from impactcell.opcua.node_values import Values
 from impactcell.opcua.request_dispatch import Context, Service, bounded
 from impactcell.opcua.subscription import Item, Subscription
 from impactcell.opcua.subscription_service import Monitoring, each
-from impactcell.scada.interface import Limits
 
 
 class MonitoredItems:
     """Answers what clients ask of the items of their subscriptions."""
 
-    def __init__(self, space: AddressSpace, values: Values, limits: Limits, monitoring: Monitoring) -> None:
+    def __init__(
+        self,
+        space: AddressSpace,
+        values: Values,
+        access: AccessPolicy,
+        limits: ServerLimits,
+        monitoring: Monitoring,
+    ) -> None:
         self._space = space
+        self._access = access
         self._values = values
         self._limits = limits
         self._monitoring = monitoring
@@ -40,17 +48,21 @@ class MonitoredItems:
         _check_timestamps(wanted.TimestampsToReturn)
         response = ua.CreateMonitoredItemsResponse()
         response.Results = [
-            self._create_item(found, item, wanted.TimestampsToReturn)
+            self._create_item(found, item, wanted.TimestampsToReturn, context.actor.role)
             for item in bounded(wanted.ItemsToCreate)
         ]
         return response
 
     def _create_item(
-        self, found: Subscription, wanted: ua.MonitoredItemCreateRequest, timestamps: ua.TimestampsToReturn
+        self,
+        found: Subscription,
+        wanted: ua.MonitoredItemCreateRequest,
+        timestamps: ua.TimestampsToReturn,
+        role: Role,
     ) -> ua.MonitoredItemCreateResult:
         result = ua.MonitoredItemCreateResult()
         try:
-            item = self._make_item(found, wanted, timestamps)
+            item = self._make_item(found, wanted, timestamps, role)
         except FaultError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
@@ -62,12 +74,18 @@ class MonitoredItems:
         return result
 
     def _make_item(
-        self, found: Subscription, wanted: ua.MonitoredItemCreateRequest, timestamps: ua.TimestampsToReturn
+        self,
+        found: Subscription,
+        wanted: ua.MonitoredItemCreateRequest,
+        timestamps: ua.TimestampsToReturn,
+        role: Role,
     ) -> Item:
         target = wanted.ItemToMonitor
         node = self._space.get(target.NodeId)
         if node is None:
             raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
+        if not self._access.permits(role, Permission.SUBSCRIBE, target.NodeId):
+            raise FaultError(ua.StatusCodes.BadUserAccessDenied)
         if target.AttributeId not in node.attributes:
             raise FaultError(ua.StatusCodes.BadAttributeIdInvalid)
         if target.AttributeId == ua.AttributeIds.EventNotifier:

@@ -7,16 +7,8 @@ from typing import Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace, AttributeValue, struct_to_binary
-from impactcell.records import Quality
 
 GOOD: Final = ua.StatusCode(ua.StatusCodes.Good)
-UNCERTAIN: Final = ua.StatusCode(ua.StatusCodes.Uncertain)
-BAD: Final = ua.StatusCode(ua.StatusCodes.Bad)
-NO_COMMUNICATION: Final = ua.StatusCode(ua.StatusCodes.BadNoCommunication)
-LAST_USABLE: Final = ua.StatusCode(ua.StatusCodes.UncertainNoCommunicationLastUsableValue)
-WAITING: Final = ua.StatusCode(ua.StatusCodes.BadWaitingForInitialData)
-
-STATUS: Final = {Quality.GOOD: GOOD, Quality.UNCERTAIN: UNCERTAIN, Quality.BAD: BAD}
 
 
 def moment(time_ns: int) -> datetime:

@@ -20,9 +20,9 @@ from impactcell.opcua.binary_codec import (
     encode,
     service_fault,
 )
+from impactcell.opcua.host_interface import Actor
 from impactcell.opcua.sessions import Session, Sessions
 from impactcell.opcua.tcp_connection import Connection
-from impactcell.scada.interface import Actor
 
 _log = logging.getLogger(__name__)
 

@@ -4,22 +4,21 @@ import asyncio
 import contextlib
 import logging
 import os
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any, Final
 from urllib.parse import urlsplit
 
 from asyncua import ua
 
-from impactcell import __version__
 from impactcell.errors import AccessError
-from impactcell.opcua.asyncua_adapter import SecurityPolicyFactory, bound_null_arrays
+from impactcell.opcua.asyncua_adapter import AddressSpace, SecurityPolicyFactory, bound_null_arrays
 from impactcell.opcua.attribute_service import Attributes
 from impactcell.opcua.authentication import Logins
-from impactcell.opcua.endpoints import POLICIES, PRODUCT_NAME, PRODUCT_URI, Endpoints
+from impactcell.opcua.endpoints import POLICIES, Endpoints
 from impactcell.opcua.history_paging import PAGE
 from impactcell.opcua.history_processed import AGGREGATES
-from impactcell.opcua.history_service import MOST_NODES
+from impactcell.opcua.history_service import MOST_NODES, Histories
+from impactcell.opcua.host_interface import Actor, Host, ServerSettings
 from impactcell.opcua.method_service import Calls
 from impactcell.opcua.monitored_item_service import MonitoredItems
 from impactcell.opcua.node_values import Values
@@ -31,8 +30,6 @@ from impactcell.opcua.subscription_service import Monitoring
 from impactcell.opcua.tcp_connection import Connection
 from impactcell.opcua.trust_list import TrustList
 from impactcell.opcua.view_service import Views
-from impactcell.scada.interface import Actor, ServerSettings
-from impactcell.scada.users import Users
 
 _log = logging.getLogger(__name__)
 
@@ -40,7 +37,7 @@ BACKLOG: Final = 1_024
 CLOCK_S: Final = 1.0
 
 
-class Host:
+class ServiceHost:
     """Everything between the socket and the address space.
 
     Raises
@@ -49,21 +46,22 @@ class Host:
         Certificate, key or users file are absent or unusable.
     """
 
-    def __init__(self, settings: ServerSettings, space: Any, values: Values) -> None:
+    def __init__(self, settings: ServerSettings, host: Host, space: AddressSpace, values: Values) -> None:
         bound_null_arrays()
         self._settings = settings
+        self._host = host
         self._space = space
         self._values = values
         self._trust = TrustList(settings.pki, settings.application_uri)
-        self._logins = Logins(Users(settings.users), self._trust)
+        self._logins = Logins(host.users, self._trust)
         self._sessions = Sessions(settings.limits)
-        self._endpoints = Endpoints(settings, self._trust.own_certificate)
+        self._endpoints = Endpoints(settings, host.product, self._trust.own_certificate)
         self._connections: set[Connection] = set()
         self._listener: asyncio.Server | None = None
         self._clock: asyncio.Task[None] | None = None
         self._started = datetime.now(UTC)
         self.monitoring = Monitoring(settings.limits)
-        self.calls = Calls(space)
+        self.calls = Calls(space, host.access)
         self._dispatcher: Dispatcher | None = None
 
     @property
@@ -71,7 +69,7 @@ class Host:
         """Port the server listens on."""
         return self._endpoints.port
 
-    async def start(self, history: Mapping[str, Service]) -> None:
+    async def start(self) -> None:
         """Listen.
 
         Raises
@@ -79,12 +77,7 @@ class Host:
         AccessError
             The address cannot be listened on.
         """
-        settings = self._settings
-        if not self._logins.users():
-            _log.warning(
-                "OPC UA: nobody can log in: %s names no user; add one with `impactcell users add`",
-                settings.users,
-            )
+        settings, host = self._settings, self._host
         if settings.allow_none:
             _log.warning(
                 "OPC UA sessions without encryption are allowed (allow_sessions_without_encryption); "
@@ -101,12 +94,14 @@ class Host:
         )
         services: dict[str, Service] = {
             **access.services(),
-            **Attributes(self._space, self.calls.may_call).services(),
+            **Attributes(self._space, host.access).services(),
             **Views(self._space).services(),
             **self.calls.services(),
             **self.monitoring.services(),
-            **MonitoredItems(self._space, self._values, settings.limits, self.monitoring).services(),
-            **history,
+            **MonitoredItems(
+                self._space, self._values, host.access, settings.limits, self.monitoring
+            ).services(),
+            **Histories(self._space, host.access, host.history).services(),
         }
         dispatcher = Dispatcher(self._sessions, services, self._lost)
         factories = [
@@ -187,14 +182,12 @@ class Host:
 
     def _follow_users(self) -> None:
         """End the sessions of users who are no longer in the users file, and follow changes of role."""
-        sessions = [session for session in self._sessions.all() if session.actor is not None]
-        if not sessions:
-            return
-        users = self._logins.users()
-        for session in sessions:
+        for session in self._sessions.all():
             actor = session.actor
-            user = users.get(actor.user) if actor is not None else None
-            if actor is None or user is None:
+            if actor is None:
+                continue
+            user = self._host.users.find(actor.user)
+            if user is None:
                 _log.warning("user of session %r is gone; session ended", session.name)
                 self.monitoring.end_session(session, delete=True)
                 self._sessions.remove(session)
@@ -203,11 +196,11 @@ class Host:
 
     def _build_info(self) -> ua.BuildInfo:
         info = ua.BuildInfo()
-        info.ProductUri = PRODUCT_URI
-        info.ManufacturerName = PRODUCT_NAME
-        info.ProductName = PRODUCT_NAME
-        info.SoftwareVersion = __version__
-        info.BuildNumber = __version__
+        info.ProductUri = self._host.product.uri
+        info.ManufacturerName = self._host.product.name
+        info.ProductName = self._host.product.name
+        info.SoftwareVersion = self._host.product.version
+        info.BuildNumber = self._host.product.version
         info.BuildDate = self._started
         return info
 
@@ -221,11 +214,11 @@ class Host:
             (ids.Server_ServerStatus_StartTime, now, kinds.DateTime),
             (ids.Server_ServerStatus_State, int(ua.ServerState.Running), kinds.Int32),
             (ids.Server_ServerStatus_BuildInfo, self._build_info(), kinds.ExtensionObject),
-            (ids.Server_ServerStatus_BuildInfo_ProductUri, PRODUCT_URI, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_ProductName, PRODUCT_NAME, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_ManufacturerName, PRODUCT_NAME, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_SoftwareVersion, __version__, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_BuildNumber, __version__, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_ProductUri, self._host.product.uri, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_ProductName, self._host.product.name, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_ManufacturerName, self._host.product.name, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_SoftwareVersion, self._host.product.version, kinds.String),
+            (ids.Server_ServerStatus_BuildInfo_BuildNumber, self._host.product.version, kinds.String),
             (ids.Server_ServerStatus_BuildInfo_BuildDate, now, kinds.DateTime),
             (ids.Server_ServerCapabilities_MaxBrowseContinuationPoints, MAX_CONTINUATIONS, kinds.UInt16),
             (ids.Server_ServerCapabilities_MaxHistoryContinuationPoints, MAX_CONTINUATIONS, kinds.UInt16),

@@ -14,11 +14,11 @@ from impactcell.opcua.asyncua_adapter import InvalidSignature, StrictBuffer
 from impactcell.opcua.authentication import Logins
 from impactcell.opcua.binary_codec import FaultError
 from impactcell.opcua.endpoints import Endpoints
+from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.request_dispatch import Context, Service
 from impactcell.opcua.sessions import Session, Sessions
 from impactcell.opcua.subscription_service import Monitoring
 from impactcell.opcua.trust_list import TrustList, application_uris
-from impactcell.scada.interface import Limits
 
 _log = logging.getLogger(__name__)
 
@@ -35,7 +35,7 @@ class Access:
         monitoring: Monitoring,
         logins: Logins,
         trust: TrustList,
-        limits: Limits,
+        limits: ServerLimits,
         *,
         allow_none: bool,
     ) -> None:

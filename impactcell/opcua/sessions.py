@@ -16,8 +16,8 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.host_interface import Actor, ServerLimits
 from impactcell.opcua.tcp_connection import Connection
-from impactcell.scada.interface import Actor, Limits
 
 _log = logging.getLogger(__name__)
 
@@ -96,7 +96,7 @@ class Session:
 class Sessions:
     """All sessions of the server."""
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: ServerLimits) -> None:
         self._limits = limits
         self._sessions: dict[ua.NodeId, Session] = {}
 

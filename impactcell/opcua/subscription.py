@@ -16,10 +16,10 @@ from asyncua import ua
 
 from impactcell.opcua import notification_encoding
 from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.monitored_item import DataItem, EventItem
 from impactcell.opcua.sessions import PublishRequest, Session
 from impactcell.opcua.tcp_connection import Connection
-from impactcell.scada.interface import Limits
 
 Item = DataItem | EventItem
 
@@ -37,7 +37,7 @@ class Subscription:
         number: int,
         session: Session,
         wanted: ua.CreateSubscriptionParameters,
-        limits: Limits,
+        limits: ServerLimits,
         expired: Callable[[Any], None],
     ) -> None:
         self.id = number

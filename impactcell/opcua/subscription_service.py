@@ -13,12 +13,12 @@ from asyncua import ua
 
 from impactcell.opcua import notification_encoding
 from impactcell.opcua.binary_codec import FaultError, service_fault
-from impactcell.opcua.event_filter import Event
+from impactcell.opcua.event_notification import EventNotification
+from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.monitored_item import EventItem
 from impactcell.opcua.request_dispatch import Context, Service, bounded
 from impactcell.opcua.sessions import PublishRequest, Session
 from impactcell.opcua.subscription import Item, Subscription
-from impactcell.scada.interface import Limits
 
 WAITING_REQUESTS: Final = 100
 
@@ -26,7 +26,7 @@ WAITING_REQUESTS: Final = 100
 class Monitoring:
     """Holds all subscriptions and answers what clients ask of them."""
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: ServerLimits) -> None:
         self._limits = limits
         self._subscriptions: dict[int, Subscription] = {}
         self._last_id = 0
@@ -64,13 +64,15 @@ class Monitoring:
             raise FaultError(ua.StatusCodes.BadSubscriptionIdInvalid)
         return found
 
-    def event(self, event: Event) -> None:
+    def event(self, event: EventNotification) -> None:
         """Tell an event to all who listen to one of its notifiers."""
         for notifier in event.notifiers:
             for item in tuple(self._event_items.get(notifier, ())):
                 item.offer(event)
 
-    def refresh(self, session: Session, number: int, item_id: int | None, events: Sequence[Event]) -> None:
+    def refresh(
+        self, session: Session, number: int, item_id: int | None, events: Sequence[EventNotification]
+    ) -> None:
         """Tell events again to one subscription, or to one item of it.
 
         Raises

@@ -15,8 +15,8 @@ from typing import Final, Protocol, cast
 from asyncua import ua
 
 from impactcell.opcua.binary_codec import DecodingError, FaultError, encode, service_fault
+from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.secure_channel import CHUNK, Channel, ChannelError, Channels
-from impactcell.scada.interface import Limits
 
 _log = logging.getLogger(__name__)
 
@@ -43,7 +43,7 @@ class Connection(asyncio.Protocol):
     """The server's end of one TCP connection."""
 
     def __init__(
-        self, peer: Peer, channels: Channels, limits: Limits, open_connections: "set[Connection]"
+        self, peer: Peer, channels: Channels, limits: ServerLimits, open_connections: "set[Connection]"
     ) -> None:
         self._peer = peer
         self._limits = limits

@@ -4,13 +4,12 @@ asyncua instantiates a type with numbered NodeIds that depend on the order of cr
 descriptions. Here the NodeId of a node is its path from the cell: `press-1/Wear/Level`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace, AttributeValue, NodeData
-from impactcell.opcua.standard_descriptions import DESCRIPTIONS
 
 AGGREGATES = frozenset(
     ua.NodeId(i)
@@ -85,9 +84,13 @@ def instantiate(
     node: ua.NodeId,
     browse_name: ua.QualifiedName,
     description: str,
+    descriptions: Mapping[str, str],
     wanted: Wanted = lambda _path: False,
 ) -> None:
-    """Make an object of a type: all mandatory nodes, and the optional ones that are `wanted`."""
+    """Make an object of a type: all mandatory nodes, and the optional ones that are `wanted`.
+
+    `descriptions`, by browse name, are for nodes below it whose declarations have none.
+    """
     data = NodeData(node)
     space[node] = data
     attributes: tuple[tuple[ua.AttributeIds, object, ua.VariantType], ...] = (
@@ -103,7 +106,7 @@ def instantiate(
     for attribute, value, variant in attributes:
         set_attribute(space, node, attribute, value, variant)
     link(space, node, HAS_TYPE_DEFINITION, kind)
-    _fill(space, node, _declarations(space, [kind]), wanted, "")
+    _fill(space, node, _declarations(space, [kind]), descriptions, wanted, "")
 
 
 def _declarations(
@@ -126,6 +129,7 @@ def _fill(
     space: AddressSpace,
     parent: ua.NodeId,
     declarations: dict[tuple[int, str], tuple[ua.NodeId, ua.NodeId]],
+    descriptions: Mapping[str, str],
     wanted: Wanted,
     below: str,
 ) -> None:
@@ -141,16 +145,16 @@ def _fill(
             copy.attributes[attribute] = AttributeValue(held.value)
         space[node] = copy
         set_attribute(space, node, ua.AttributeIds.NodeId, node, ua.VariantType.NodeId)
-        _describe(space, node, name)
+        _describe(space, node, descriptions.get(name))
         types = targets(original, HAS_TYPE_DEFINITION)
         for kind in types:
             link(space, node, HAS_TYPE_DEFINITION, kind)
         link(space, parent, reference, node)
-        _fill(space, node, _declarations(space, [declaration, *types]), wanted, f"{path}/")
+        _fill(space, node, _declarations(space, [declaration, *types]), descriptions, wanted, f"{path}/")
 
 
-def _describe(space: AddressSpace, node: ua.NodeId, name: str) -> None:
+def _describe(space: AddressSpace, node: ua.NodeId, text: str | None) -> None:
     held = read(space, node, ua.AttributeIds.Description)
-    if (held is None or not held.Text) and name in DESCRIPTIONS:
-        text = ua.LocalizedText(DESCRIPTIONS[name])
-        set_attribute(space, node, ua.AttributeIds.Description, text, ua.VariantType.LocalizedText)
+    if (held is None or not held.Text) and text is not None:
+        value = ua.LocalizedText(text)
+        set_attribute(space, node, ua.AttributeIds.Description, value, ua.VariantType.LocalizedText)

@@ -5,21 +5,26 @@
 
 from typing import TYPE_CHECKING
 
+from impactcell.opcua.host_interface import (
+    Actor,
+    HistoryRequest,
+    Permission,
+    RefusedError,
+    Role,
+    SecurityPolicy,
+    ServerLimits,
+    ServerSettings,
+)
 from impactcell.scada.interface import (
     Actions,
-    Actor,
     AlarmPage,
     CellDescription,
     HistorySource,
     HistoryValue,
-    Limits,
     Machine,
     Ranges,
-    RefusedError,
-    Role,
-    SecurityPolicy,
-    ServerSettings,
     ValuePage,
+    default_application_uri,
 )
 
 if TYPE_CHECKING:
@@ -30,17 +35,20 @@ __all__ = [
     "Actor",
     "AlarmPage",
     "CellDescription",
+    "HistoryRequest",
     "HistorySource",
     "HistoryValue",
-    "Limits",
     "Machine",
+    "Permission",
     "Ranges",
     "RefusedError",
     "Role",
     "SecurityPolicy",
     "Server",
+    "ServerLimits",
     "ServerSettings",
     "ValuePage",
+    "default_application_uri",
 ]
 
 

@@ -20,6 +20,7 @@ from impactcell.opcua.type_instances import (
 from impactcell.records import AlarmName
 from impactcell.scada.interface import CellDescription, Machine
 from impactcell.scada.node_table import CYCLE, HISTORY
+from impactcell.scada.standard_descriptions import DESCRIPTIONS
 
 TYPES_URI: Final = "urn:impactcell:ua"
 CELLS_URI: Final = "urn:impactcell:cells"
@@ -96,6 +97,7 @@ class CellSpace:
             self.node,
             ua.QualifiedName(description.name, self._cells),
             f"Cell {description.name}.",
+            DESCRIPTIONS,
             self._wanted,
         )
         notifies = ua.EventNotifier.SubscribeToEvents.mask | ua.EventNotifier.HistoryRead.mask
@@ -173,6 +175,7 @@ class CellSpace:
                 settings,
                 ua.QualifiedName("HA Configuration", 0),
                 "How the history of this variable is kept and aggregated.",
+                DESCRIPTIONS,
             )
             link(self._space, node, ua.NodeId(ua.ObjectIds.HasHistoricalConfiguration), settings)
             defaults: tuple[tuple[str, object, ua.VariantType], ...] = (

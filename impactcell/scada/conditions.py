@@ -12,7 +12,7 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.alarms import is_retained
-from impactcell.opcua.event_filter import Event, Path
+from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.node_values import GOOD, Values, moment
 from impactcell.records import Alarm, AlarmName, Shelving
 from impactcell.scada.cell_nodes import CellSpace
@@ -99,7 +99,7 @@ class Condition:
         variant = ua.Variant(unshelve_ms(self.alarm), ua.VariantType.Double)
         return ua.DataValue(variant, GOOD if self.alarm.enabled else _DISABLED, now, now)
 
-    def update(self, alarm: Alarm) -> Event | None:
+    def update(self, alarm: Alarm) -> EventNotification | None:
         """Take a new state; the event that tells it, None where nothing has changed."""
         if alarm is self.alarm:  # as it is from cycle to cycle, nearly always
             return None
@@ -121,15 +121,15 @@ class Condition:
         """Whether an EventId was told since the alarm was raised."""
         return given in self._known
 
-    def event(self, alarm: Alarm) -> Event:
+    def event(self, alarm: Alarm) -> EventNotification:
         """Make the event that tells a state."""
         fields = dict(self._fields(alarm))
         if not alarm.enabled:
             bad = ua.Variant(_DISABLED, ua.VariantType.StatusCode)
             fields = {p: v if not p or p[0] in _TOLD_WHEN_DISABLED else bad for p, v in fields.items()}
-        return Event(self._kind, fields, self._notifiers)
+        return EventNotification(self._kind, fields, self._notifiers)
 
-    def present(self) -> Event | None:
+    def present(self) -> EventNotification | None:
         """Make the event of the present state for a refresh; None where it is not to be shown."""
         return self.event(self.alarm) if is_retained(self.alarm) else None
 
@@ -142,7 +142,7 @@ class Condition:
             node = self._space.path("/".join((self.name.value, *path)))
             self._values.write(node, ua.DataValue(variant, status, time_of, datetime.now(UTC)))
 
-    def _fields(self, alarm: Alarm) -> Iterator[tuple[Path, ua.Variant]]:
+    def _fields(self, alarm: Alarm) -> Iterator[tuple[BrowsePath, ua.Variant]]:
         time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
         yield from _plain(
             {
@@ -179,7 +179,7 @@ class Condition:
         yield from _evidence(alarm)
 
     @staticmethod
-    def _states(alarm: Alarm, time_of: datetime) -> Iterator[tuple[Path, ua.Variant]]:
+    def _states(alarm: Alarm, time_of: datetime) -> Iterator[tuple[BrowsePath, ua.Variant]]:
         enabled = "Enabled" if alarm.enabled else "Disabled"
         shown = enabled
         for name, (test, yes, no) in _STATES.items():
@@ -201,12 +201,12 @@ class Condition:
         yield ("ShelvingState", "UnshelveTime"), ua.Variant(unshelve_ms(alarm), ua.VariantType.Double)
 
 
-def _plain(fields: dict[str, tuple[Any, ua.VariantType]]) -> Iterator[tuple[Path, ua.Variant]]:
+def _plain(fields: dict[str, tuple[Any, ua.VariantType]]) -> Iterator[tuple[BrowsePath, ua.Variant]]:
     for name, (value, kind) in fields.items():
         yield (name,), ua.Variant(value, kind)
 
 
-def _evidence(alarm: Alarm) -> Iterator[tuple[Path, ua.Variant]]:
+def _evidence(alarm: Alarm) -> Iterator[tuple[BrowsePath, ua.Variant]]:
     found = alarm.evidence
     yield ("CycleNumber",), ua.Variant(alarm.cycle, ua.VariantType.UInt32)
     yield ("ChangeCycle",), ua.Variant(found.change_cycle, ua.VariantType.UInt32)
@@ -221,7 +221,7 @@ def _evidence(alarm: Alarm) -> Iterator[tuple[Path, ua.Variant]]:
         yield (name,), ua.Variant(float(value), ua.VariantType.Double)
 
 
-def refresh_event(kind: int) -> Event:
+def refresh_event(kind: int) -> EventNotification:
     """Make the event that opens or closes a refresh."""
     now = datetime.now(UTC)
     server = ua.NodeId(ua.ObjectIds.Server)
@@ -240,4 +240,4 @@ def refresh_event(kind: int) -> Event:
             }
         )
     )
-    return Event(ua.NodeId(kind), fields, frozenset({server}), unfiltered=True)
+    return EventNotification(ua.NodeId(kind), fields, frozenset({server}), unfiltered=True)

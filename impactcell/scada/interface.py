@@ -1,78 +1,18 @@
-"""What the OPC UA server is told: its settings, its cells, and what it asks of the rest of the service."""
+"""What the OPC UA server of this product is told: its cells, and what it asks of the rest of the service."""
 
-import enum
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Protocol
 
 from impactcell.alarms import EventKind
+from impactcell.opcua.host_interface import Actor, HistoryRequest
 from impactcell.records import Alarm, AlarmName, Quality
-
-
-class Role(enum.IntEnum):
-    """Who a user is; a higher role may all that a lower one may."""
-
-    OBSERVER = 1
-    OPERATOR = 2
-    ENGINEER = 3
-
-
-class SecurityPolicy(enum.Enum):
-    """Policies the server can offer, all of them sign and encrypt."""
-
-    BASIC256SHA256 = "Basic256Sha256"
-    AES128_SHA256_RSAOAEP = "Aes128_Sha256_RsaOaep"
-    AES256_SHA256_RSAPSS = "Aes256_Sha256_RsaPss"
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """How much one server takes on; what is beyond is refused with the status code of the standard."""
-
-    connections: int = 250
-    sessions: int = 100
-    subscriptions: int = 500
-    subscriptions_per_session: int = 20
-    items_per_subscription: int = 2_000
-    queue_per_item: int = 10_000
-    events_per_item: int = 1_000
-    message_bytes: int = 4 * 1024 * 1024
-    session_timeout_s: float = 600.0
-    publishing_interval_s: float = 0.01
-    hello_s: float = 5.0
-    activation_s: float = 15.0
 
 
 def default_application_uri() -> str:
     """Application URI of this machine's server; the certificate must carry the same."""
     return f"urn:{socket.gethostname()}:impactcell"
-
-
-@dataclass(frozen=True, slots=True)
-class ServerSettings:
-    """How the server is reached and who may come in.
-
-    Attributes
-    ----------
-    endpoint : str
-        `opc.tcp://host:port/path`; port 0 takes a free one.
-    pki : Path
-        Directory of the server's certificate and of the trust list (see `impactcell certs make`).
-    users : Path
-        Users file (see `impactcell users add`); read anew when it changes.
-    allow_none : bool
-        True allows sessions without encryption. Every start then logs a warning.
-    """
-
-    endpoint: str
-    pki: Path
-    users: Path
-    policies: tuple[SecurityPolicy, ...] = tuple(SecurityPolicy)
-    allow_none: bool = False
-    application_uri: str = field(default_factory=default_application_uri)
-    limits: Limits = field(default_factory=Limits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,29 +54,6 @@ class CellDescription:
     name: str
     machine: Machine
     ranges: Ranges = field(default_factory=Ranges)
-
-
-@dataclass(frozen=True, slots=True)
-class Actor:
-    """Who acts: the user as logged in, the role, and the client's address."""
-
-    user: str
-    role: Role
-    address: str
-
-
-class RefusedError(Exception):
-    """An action that was refused; nothing has changed.
-
-    Parameters
-    ----------
-    code : str
-        Name of the OPC UA status code, as `impactcell.alarms.Refusal` and `BadOutOfRange` give it.
-    """
-
-    def __init__(self, code: str, reason: str = "") -> None:
-        super().__init__(reason or code)
-        self.code = code
 
 
 class Actions(Protocol):
@@ -197,33 +114,10 @@ class AlarmPage:
 
 
 class HistorySource(Protocol):
-    """Where the past is kept. Times are nanoseconds since 1970, both ends inclusive, None is open.
+    """Where the past of the cells is kept. Every call may raise `RefusedError`."""
 
-    `newest_first` reverses the order. A page holds at most `limit` entries; `resume` continues an earlier
-    page of the same question and stays valid over restarts. Every call may raise `RefusedError`.
-    """
-
-    async def values(
-        self,
-        cell: str,
-        variable: str,
-        start_ns: int | None,
-        end_ns: int | None,
-        limit: int,
-        *,
-        newest_first: bool = False,
-        resume: bytes | None = None,
-    ) -> ValuePage:
+    async def values(self, cell: str, variable: str, request: HistoryRequest) -> ValuePage:
         """Read stored values of a variable, named by its path, as `Friction/StaticFriction`."""
 
-    async def alarms(
-        self,
-        cell: str,
-        start_ns: int | None,
-        end_ns: int | None,
-        limit: int,
-        *,
-        newest_first: bool = False,
-        resume: bytes | None = None,
-    ) -> AlarmPage:
+    async def alarms(self, cell: str, request: HistoryRequest) -> AlarmPage:
         """Read transitions of the conditions of a cell."""

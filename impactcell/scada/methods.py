@@ -9,13 +9,15 @@ from asyncua import ua
 
 from impactcell.alarms import EventKind
 from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.host_interface import RefusedError
 from impactcell.opcua.method_service import Argument, ArgumentError, Calls, Method
 from impactcell.opcua.request_dispatch import Context
 from impactcell.opcua.subscription_service import Monitoring
 from impactcell.records import Alarm, AlarmName
+from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition, refresh_event
-from impactcell.scada.interface import Actions, CellDescription, RefusedError
+from impactcell.scada.interface import Actions, CellDescription
 from impactcell.scada.node_table import MM_PER_M, target_range_mm
 from impactcell.scada.rights import CONDITION_AREAS, Area
 
@@ -60,6 +62,19 @@ _CONDITION_METHODS: Final[Mapping[EventKind, tuple[str, tuple[int, ...], tuple[A
 Tell = Callable[[str, Alarm], None]
 
 
+class MethodTable:
+    """Makes methods callable, and tells the access policy which area they lie in."""
+
+    def __init__(self, calls: Calls, access: CellAccess) -> None:
+        self._calls = calls
+        self._access = access
+
+    def bind(self, owner: ua.NodeId, method: ua.NodeId, area: Area, bound: Method) -> None:
+        """Make a method callable on an object."""
+        self._calls.bind(owner, method, bound)
+        self._access.add_method(method, area)
+
+
 def _text(value: object, index: int) -> str:
     """Take a comment: an absent one leaves the last one standing (Part 9, 5.5.6)."""
     text = (value.Text or "") if isinstance(value, ua.LocalizedText) else ""
@@ -80,7 +95,7 @@ async def _audited(context: Context, what: str, work: Awaitable[Any]) -> Any:
     return done
 
 
-def bind_cell(calls: Calls, space: CellSpace, types: Mapping[str, ua.NodeId], actions: Actions) -> None:
+def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeId], actions: Actions) -> None:
     """Make the methods of a cell callable."""
     description: CellDescription = space.description
     cell = description.name
@@ -121,22 +136,22 @@ def bind_cell(calls: Calls, space: CellSpace, types: Mapping[str, ua.NodeId], ac
         ("SetTarget", Area.SET_TARGET, (Argument("Target", ua.VariantType.Double),), set_target),
         ("AbortPositioning", Area.ABORT_POSITIONING, (), abort),
     ):
-        method = Method(area, arguments, run)
-        calls.bind(space.node, space.path(name), method)
-        calls.bind(space.node, types[name], method)
+        method = Method(arguments, run)
+        table.bind(space.node, space.path(name), area, method)
+        table.bind(space.node, types[name], area, method)
 
 
 def bind_condition(
-    calls: Calls, space: CellSpace, condition: Condition, actions: Actions, tell: Tell
+    table: MethodTable, space: CellSpace, condition: Condition, actions: Actions, tell: Tell
 ) -> None:
     """Make the methods of a condition callable, on itself and on its shelving state."""
     shelving = space.path(f"{condition.name.value}/ShelvingState")
     for event, (name, type_ids, arguments) in _CONDITION_METHODS.items():
-        method = Method(CONDITION_AREAS[event], arguments, _action(condition, event, actions, tell))
+        method = Method(arguments, _action(condition, event, actions, tell))
         own = space.path(f"{condition.name.value}/{name}")
         for owner in (condition.node, shelving) if "/" in name else (condition.node,):
             for each in (own, *(ua.NodeId(number) for number in type_ids)):
-                calls.bind(owner, each, method)
+                table.bind(owner, each, CONDITION_AREAS[event], method)
 
 
 def _action(
@@ -168,7 +183,7 @@ def _action(
 
 
 def bind_refresh(
-    calls: Calls, monitoring: Monitoring, conditions: Mapping[tuple[str, AlarmName], Condition]
+    table: MethodTable, monitoring: Monitoring, conditions: Mapping[tuple[str, AlarmName], Condition]
 ) -> None:
     """Make ConditionRefresh and ConditionRefresh2 callable."""
 
@@ -187,10 +202,8 @@ def bind_refresh(
         monitoring.refresh(context.session, given[0], given[1], events())
 
     number = ua.VariantType.UInt32
-    one = Method(Area.REFRESH, (Argument("SubscriptionId", number),), refresh)
-    two = Method(
-        Area.REFRESH, (Argument("SubscriptionId", number), Argument("MonitoredItemId", number)), refresh_item
-    )
+    one = Method((Argument("SubscriptionId", number),), refresh)
+    two = Method((Argument("SubscriptionId", number), Argument("MonitoredItemId", number)), refresh_item)
     owner = ua.NodeId(_ids.ConditionType)
-    calls.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh), one)
-    calls.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh2), two)
+    table.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh), Area.REFRESH, one)
+    table.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh2), Area.REFRESH, two)

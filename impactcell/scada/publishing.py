@@ -6,21 +6,23 @@ from typing import Final
 
 from asyncua import ua
 
-from impactcell.opcua.node_values import (
-    BAD,
-    LAST_USABLE,
-    NO_COMMUNICATION,
-    STATUS,
-    WAITING,
-    Values,
-    Variable,
-    moment,
-)
+from impactcell.opcua.node_values import GOOD, Values, Variable, moment
 from impactcell.opcua.type_instances import read
 from impactcell.records import ModuleStatus, Quality, Snapshot
 from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.node_table import CYCLE, MODULE
 from impactcell.scada.node_table import Value as NodeValue
+
+BAD: Final = ua.StatusCode(ua.StatusCodes.Bad)
+NO_COMMUNICATION: Final = ua.StatusCode(ua.StatusCodes.BadNoCommunication)
+LAST_USABLE: Final = ua.StatusCode(ua.StatusCodes.UncertainNoCommunicationLastUsableValue)
+WAITING: Final = ua.StatusCode(ua.StatusCodes.BadWaitingForInitialData)
+STATUS: Final = {
+    Quality.GOOD: GOOD,
+    Quality.UNCERTAIN: ua.StatusCode(ua.StatusCodes.Uncertain),
+    Quality.BAD: BAD,
+}
+"""Status code of each quality."""
 
 _EMPTY: Final[dict[ua.VariantType, object]] = {
     ua.VariantType.Double: math.nan,

@@ -5,18 +5,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from impactcell.alarms import EventKind
-from impactcell.scada.interface import Role
-
-
-class Right(enum.Enum):
-    """What can be done to a node."""
-
-    BROWSE = "browse"
-    READ = "read"
-    SUBSCRIBE = "subscribe"
-    WRITE = "write"
-    HISTORY = "read history"
-    CALL = "call"
+from impactcell.opcua.host_interface import Permission, Role
 
 
 class Area(enum.Enum):
@@ -37,24 +26,24 @@ class Area(enum.Enum):
     RESET_WEAR = "ResetWear"
 
 
-MATRIX: Final[Mapping[tuple[Area, Right], Role | None]] = {
-    (Area.NODES, Right.BROWSE): Role.OBSERVER,
-    (Area.NODES, Right.READ): Role.OBSERVER,
-    (Area.NODES, Right.WRITE): None,
-    (Area.VALUES, Right.SUBSCRIBE): Role.OBSERVER,
-    (Area.VALUES, Right.HISTORY): Role.OBSERVER,
-    (Area.EVENTS, Right.SUBSCRIBE): Role.OBSERVER,
-    (Area.EVENTS, Right.HISTORY): Role.OBSERVER,
-    (Area.REFRESH, Right.CALL): Role.OBSERVER,
-    (Area.ACKNOWLEDGE, Right.CALL): Role.OPERATOR,
-    (Area.CONFIRM, Right.CALL): Role.OPERATOR,
-    (Area.COMMENT, Right.CALL): Role.OPERATOR,
-    (Area.SHELVE, Right.CALL): Role.OPERATOR,
-    (Area.ENABLE, Right.CALL): Role.ENGINEER,
-    (Area.START_BATCH, Right.CALL): Role.OPERATOR,
-    (Area.ABORT_POSITIONING, Right.CALL): Role.OPERATOR,
-    (Area.SET_TARGET, Right.CALL): Role.ENGINEER,
-    (Area.RESET_WEAR, Right.CALL): Role.ENGINEER,
+MATRIX: Final[Mapping[tuple[Area, Permission], Role | None]] = {
+    (Area.NODES, Permission.BROWSE): Role.OBSERVER,
+    (Area.NODES, Permission.READ): Role.OBSERVER,
+    (Area.NODES, Permission.WRITE): None,
+    (Area.VALUES, Permission.SUBSCRIBE): Role.OBSERVER,
+    (Area.VALUES, Permission.READ_HISTORY): Role.OBSERVER,
+    (Area.EVENTS, Permission.SUBSCRIBE): Role.OBSERVER,
+    (Area.EVENTS, Permission.READ_HISTORY): Role.OBSERVER,
+    (Area.REFRESH, Permission.CALL): Role.OBSERVER,
+    (Area.ACKNOWLEDGE, Permission.CALL): Role.OPERATOR,
+    (Area.CONFIRM, Permission.CALL): Role.OPERATOR,
+    (Area.COMMENT, Permission.CALL): Role.OPERATOR,
+    (Area.SHELVE, Permission.CALL): Role.OPERATOR,
+    (Area.ENABLE, Permission.CALL): Role.ENGINEER,
+    (Area.START_BATCH, Permission.CALL): Role.OPERATOR,
+    (Area.ABORT_POSITIONING, Permission.CALL): Role.OPERATOR,
+    (Area.SET_TARGET, Permission.CALL): Role.ENGINEER,
+    (Area.RESET_WEAR, Permission.CALL): Role.ENGINEER,
 }
 """Lowest role that has a right; None where nobody has it."""
 
@@ -70,9 +59,9 @@ CONDITION_AREAS: Final[Mapping[EventKind, Area]] = {
 }
 
 
-def allowed(role: Role, area: Area, right: Right) -> bool:
+def allowed(role: Role, area: Area, permission: Permission) -> bool:
     """Whether a role has a right; what the table does not name is refused."""
-    lowest = MATRIX.get((area, right))
+    lowest = MATRIX.get((area, permission))
     return lowest is not None and role >= lowest
 
 
@@ -86,7 +75,7 @@ def matrix_table() -> str:
         "| node | right | " + " | ".join(role.name.capitalize() for role in Role) + " |",
         "|---|---|" + "---|" * len(Role),
     ]
-    for area, right in MATRIX:
-        cells = " | ".join("yes" if allowed(role, area, right) else "-" for role in Role)
-        lines.append(f"| {area.value} | {right.value} | {cells} |")
+    for area, permission in MATRIX:
+        cells = " | ".join("yes" if allowed(role, area, permission) else "-" for role in Role)
+        lines.append(f"| {area.value} | {permission.value} | {cells} |")
     return "\n".join(lines)

@@ -1,26 +1,36 @@
 """The OPC UA server of the service: cells in, nodes out."""
 
+import logging
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 from urllib.parse import urlsplit
 
 from asyncua import ua
 
-from impactcell.opcua.asyncua_adapter import address_space, new_standard_server
-from impactcell.opcua.event_filter import Event
-from impactcell.opcua.history_service import Histories
+from impactcell import __version__
+from impactcell.opcua.asyncua_adapter import AddressSpace, address_space, new_standard_server
+from impactcell.opcua.event_notification import EventNotification
+from impactcell.opcua.host_interface import Host, Product, ServerSettings
 from impactcell.opcua.node_values import Values
-from impactcell.opcua.service_host import Host, aggregate_functions
+from impactcell.opcua.service_host import ServiceHost, aggregate_functions
 from impactcell.opcua.type_instances import link
 from impactcell.records import Alarm, AlarmName, ModuleStatus, Snapshot
+from impactcell.scada.access_policy import CellAccess
+from impactcell.scada.cell_history import CellHistory
 from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
 from impactcell.scada.conditions import Condition
-from impactcell.scada.interface import Actions, CellDescription, HistorySource, ServerSettings
-from impactcell.scada.methods import bind_cell, bind_condition, bind_refresh
+from impactcell.scada.interface import Actions, CellDescription, HistorySource
+from impactcell.scada.methods import MethodTable, bind_cell, bind_condition, bind_refresh
 from impactcell.scada.node_table import HISTORY
 from impactcell.scada.publishing import CellValues
+from impactcell.scada.users import Users
+
+_log = logging.getLogger(__name__)
+
+PRODUCT: Final = Product("impactcell", "urn:impactcell", __version__)
 
 
 class Server:
@@ -33,6 +43,8 @@ class Server:
     ----------
     settings : ServerSettings
         Endpoint, security and limits.
+    users : Path
+        Users file (see `impactcell users add`); read anew when it changes.
     cells : sequence of CellDescription
         What is shown; a cell keeps its NodeIds over restarts, whatever other cells come and go.
     history : HistorySource
@@ -51,17 +63,19 @@ class Server:
     def __init__(
         self,
         settings: ServerSettings,
+        users: Path,
         cells: Sequence[CellDescription],
         history: HistorySource,
         actions: Actions,
     ) -> None:
         self._settings = settings
+        self._users_file = users
         self._descriptions = tuple(cells)
         self._history = history
         self._actions = actions
         self._cells: dict[str, CellValues] = {}
         self._conditions: dict[tuple[str, AlarmName], Condition] = {}
-        self._host: Host | None = None
+        self._host: ServiceHost | None = None
 
     @property
     def endpoint(self) -> str:
@@ -71,36 +85,40 @@ class Server:
         return url._replace(netloc=f"{url.netloc.rpartition(':')[0]}:{port}").geturl()
 
     async def __aenter__(self) -> Self:
+        users = Users(self._users_file)
+        if not users.current():
+            _log.warning(
+                "OPC UA: nobody can log in: %s names no user; add one with `impactcell users add`",
+                self._users_file,
+            )
         model = await new_standard_server(self._settings.application_uri)
         await load_types(model)
         space = address_space(model)
-        values = Values(space)
-        host = Host(self._settings, space, values)
-        for function in aggregate_functions():
-            for folder in (
-                ua.ObjectIds.HistoryServerCapabilities_AggregateFunctions,
-                ua.ObjectIds.Server_ServerCapabilities_AggregateFunctions,
-            ):
-                link(space, ua.NodeId(folder), ua.NodeId(ua.ObjectIds.Organizes), function)
+        _offer_aggregates(space)
         uris = await model.get_namespace_array()
-        variables: dict[ua.NodeId, tuple[str, str]] = {}
-        notifiers: dict[ua.NodeId, str] = {}
-        for description in self._descriptions:
-            cell = CellSpace(model, uris, description)
-            name = description.name
+        values, access = Values(space), CellAccess()
+        cells = [CellSpace(model, uris, description) for description in self._descriptions]
+        history = self._history_of(cells)
+        host = ServiceHost(self._settings, Host(PRODUCT, users, access, history), space, values)
+        table = MethodTable(host.calls, access)
+        for cell in cells:
+            name = cell.description.name
             self._cells[name] = CellValues(cell, values, space, datetime.now(UTC))
-            variables.update({cell.path(path): (name, path) for path in HISTORY})
-            notifiers[cell.node] = name
-            bind_cell(host.calls, cell, method_declarations(space, cell.kind), self._actions)
+            access.add_notifiers(cell_notifiers(cell))
+            bind_cell(table, cell, method_declarations(space, cell.kind), self._actions)
             for alarm in AlarmName:
                 condition = Condition(cell, alarm, values, cell_notifiers(cell))
                 self._conditions[name, alarm] = condition
-                bind_condition(host.calls, cell, condition, self._actions, self.alarm)
-        bind_refresh(host.calls, host.monitoring, self._conditions)
-        histories = Histories(space, self._history, variables, notifiers, self._event_of)
-        await host.start(histories.services())
+                bind_condition(table, cell, condition, self._actions, self.alarm)
+        bind_refresh(table, host.monitoring, self._conditions)
+        await host.start()
         self._host = host
         return self
+
+    def _history_of(self, cells: Sequence[CellSpace]) -> CellHistory:
+        variables = {cell.path(path): (cell.description.name, path) for cell in cells for path in HISTORY}
+        notifiers = {cell.node: cell.description.name for cell in cells}
+        return CellHistory(self._history, variables, notifiers, self._event_of)
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -135,5 +153,14 @@ class Server:
         """Nothing new for a while: all figures of a cycle become Uncertain and keep their last values."""
         self._cells[cell].stale(time_ns)
 
-    def _event_of(self, cell: str, alarm: Alarm) -> Event:
+    def _event_of(self, cell: str, alarm: Alarm) -> EventNotification:
         return self._conditions[cell, alarm.name].event(alarm)
+
+
+def _offer_aggregates(space: AddressSpace) -> None:
+    for function in aggregate_functions():
+        for folder in (
+            ua.ObjectIds.HistoryServerCapabilities_AggregateFunctions,
+            ua.ObjectIds.Server_ServerCapabilities_AggregateFunctions,
+        ):
+            link(space, ua.NodeId(folder), ua.NodeId(ua.ObjectIds.Organizes), function)

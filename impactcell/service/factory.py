@@ -10,7 +10,14 @@ from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink, TlsFiles
 from impactcell.journal.retention import Retention
 from impactcell.records import AlarmName
-from impactcell.scada import CellDescription, Limits, Machine, Ranges, ServerSettings
+from impactcell.scada import (
+    CellDescription,
+    Machine,
+    Ranges,
+    ServerLimits,
+    ServerSettings,
+    default_application_uri,
+)
 from impactcell.settings import Cell
 from impactcell.settings.sections import Journal
 from impactcell.tracking.signature.tracker import SignatureSettings
@@ -94,10 +101,10 @@ def server_settings(cell: Cell) -> ServerSettings:
     opcua = cell.settings.opcua
     return ServerSettings(
         endpoint=opcua.endpoint,
+        application_uri=default_application_uri(),
         pki=opcua.certificates_dir,
-        users=opcua.users_file,
         allow_none=opcua.allow_sessions_without_encryption,
-        limits=Limits(sessions=opcua.max_sessions),
+        limits=ServerLimits(sessions=opcua.max_sessions),
     )
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from impactcell.journal.history import Question
-from impactcell.scada import AlarmPage, HistoryValue, RefusedError, ValuePage
+from impactcell.scada import AlarmPage, HistoryRequest, HistoryValue, RefusedError, ValuePage
 from impactcell.service.cell_task import RunningCell
 from impactcell.service.worker import Worker
 
@@ -19,36 +19,19 @@ class JournalHistory:
             raise RefusedError("BadResourceUnavailable", f"{cell}: its journal cannot be opened")
         return self._cells[cell].worker
 
-    async def values(
-        self,
-        cell: str,
-        variable: str,
-        start_ns: int | None,
-        end_ns: int | None,
-        limit: int,
-        *,
-        newest_first: bool = False,
-        resume: bytes | None = None,
-    ) -> ValuePage:
+    async def values(self, cell: str, variable: str, request: HistoryRequest) -> ValuePage:
         """Read stored values of a variable, named by its path."""
-        question = Question(start_ns, end_ns, limit, newest_first, resume)
-        page = await self._worker(cell).read(lambda journal: journal.values(variable, question))
+        page = await self._worker(cell).read(lambda journal: journal.values(variable, _question(request)))
         if page is None:
             return ValuePage(())
         entries = tuple(HistoryValue(entry.time_ns, entry.value, entry.quality) for entry in page.entries)
         return ValuePage(entries, page.resume)
 
-    async def alarms(
-        self,
-        cell: str,
-        start_ns: int | None,
-        end_ns: int | None,
-        limit: int,
-        *,
-        newest_first: bool = False,
-        resume: bytes | None = None,
-    ) -> AlarmPage:
+    async def alarms(self, cell: str, request: HistoryRequest) -> AlarmPage:
         """Read the transitions of the conditions of a cell."""
-        question = Question(start_ns, end_ns, limit, newest_first, resume)
-        page = await self._worker(cell).read(lambda journal: journal.alarms(question))
+        page = await self._worker(cell).read(lambda journal: journal.alarms(_question(request)))
         return AlarmPage(()) if page is None else AlarmPage(page.entries, page.resume)
+
+
+def _question(request: HistoryRequest) -> Question:
+    return Question(request.start_ns, request.end_ns, request.limit, request.newest_first, request.resume)

@@ -115,6 +115,7 @@ class Service:
         cells = [cell for cell in self._cells if cell.settings.opcua.endpoint == endpoint]
         return Server(
             server_settings(cells[0]),
+            cells[0].settings.opcua.users_file,
             [cell_description(cell) for cell in cells],
             JournalHistory(self.running),
             CellActions(self.running),

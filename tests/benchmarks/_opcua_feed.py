@@ -11,7 +11,7 @@ import numpy as np
 import psutil
 
 from impactcell.records import ModuleStatus, Snapshot
-from impactcell.scada import Limits
+from impactcell.scada import ServerLimits
 from tests.opcua_server import CELL, PASSWORDS, Site, site
 from tests.snapshots import make_capture, make_snapshot
 
@@ -65,7 +65,7 @@ async def report(here: Site, lag: list[float]) -> None:
 async def main(rate_hz: float) -> None:
     loop = asyncio.get_running_loop()
     lag: list[float] = []
-    async with site(limits=Limits(sessions=1000, connections=1000)) as here:
+    async with site(limits=ServerLimits(sessions=1000, connections=1000)) as here:
         site_of = {
             "endpoint": here.server.endpoint,
             "certificate": str(here.certificate),

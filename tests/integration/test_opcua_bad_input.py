@@ -10,7 +10,7 @@ import pytest
 from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_to_binary
 
-from impactcell.scada import Limits
+from impactcell.scada import ServerLimits
 from tests.opcua_server import Site, site
 
 NONE_URI = b"http://opcfoundation.org/UA/SecurityPolicy#None"
@@ -205,7 +205,7 @@ async def test_noise(seed: int) -> None:
 
 
 async def test_half_open_connections_are_closed_in_time() -> None:
-    async with site(limits=Limits(hello_s=0.2, activation_s=0.3)) as here:
+    async with site(limits=ServerLimits(hello_s=0.2, activation_s=0.3)) as here:
         async with raw(here) as wire:
             assert await wire.error() == codes.BadTimeout, "says nothing"
         async with raw(here) as wire:
@@ -218,7 +218,7 @@ async def test_half_open_connections_are_closed_in_time() -> None:
 
 
 async def test_too_many_connections() -> None:
-    async with site(limits=Limits(connections=5)) as here, contextlib.AsyncExitStack() as stack:
+    async with site(limits=ServerLimits(connections=5)) as here, contextlib.AsyncExitStack() as stack:
         held = [await stack.enter_async_context(raw(here)) for _ in range(5)]
         for wire in held:
             await wire.send(hello())
@@ -235,7 +235,7 @@ async def test_too_many_connections() -> None:
 
 async def test_a_thousand_connections_at_once() -> None:
     """Those beyond the limit are told so before any cryptography; a client that is in goes on."""
-    async with site(limits=Limits(connections=50)) as here:
+    async with site(limits=ServerLimits(connections=50)) as here:
         here.publish()
         async with await here.client("observer") as inside:
 

@@ -8,8 +8,8 @@ import pytest
 from asyncua import Client, ua
 
 from impactcell.records import AlarmName
-from impactcell.scada import HistoryValue, Role
-from impactcell.scada.rights import MATRIX, Area, Right, allowed
+from impactcell.scada import HistoryValue, Permission, Role
+from impactcell.scada.rights import MATRIX, Area, allowed
 from tests.opcua_server import CELL, START_NS, Site, site
 
 REFUSED = {ua.StatusCodes.BadUserAccessDenied}
@@ -188,24 +188,24 @@ async def reset_wear(hand: Hand) -> int:
     return await hand.call("", "ResetWear", ua.Variant(ua.LocalizedText("new plate")))
 
 
-TRIES: dict[tuple[Area, Right], Callable[[Hand], Awaitable[int]]] = {
-    (Area.NODES, Right.BROWSE): browse,
-    (Area.NODES, Right.READ): read,
-    (Area.NODES, Right.WRITE): write,
-    (Area.VALUES, Right.SUBSCRIBE): subscribe,
-    (Area.VALUES, Right.HISTORY): history,
-    (Area.EVENTS, Right.SUBSCRIBE): events,
-    (Area.EVENTS, Right.HISTORY): event_history,
-    (Area.REFRESH, Right.CALL): refresh,
-    (Area.ACKNOWLEDGE, Right.CALL): acknowledge,
-    (Area.CONFIRM, Right.CALL): confirm,
-    (Area.COMMENT, Right.CALL): comment,
-    (Area.SHELVE, Right.CALL): shelve,
-    (Area.ENABLE, Right.CALL): enable,
-    (Area.START_BATCH, Right.CALL): start_batch,
-    (Area.ABORT_POSITIONING, Right.CALL): abort,
-    (Area.SET_TARGET, Right.CALL): set_target,
-    (Area.RESET_WEAR, Right.CALL): reset_wear,
+TRIES: dict[tuple[Area, Permission], Callable[[Hand], Awaitable[int]]] = {
+    (Area.NODES, Permission.BROWSE): browse,
+    (Area.NODES, Permission.READ): read,
+    (Area.NODES, Permission.WRITE): write,
+    (Area.VALUES, Permission.SUBSCRIBE): subscribe,
+    (Area.VALUES, Permission.READ_HISTORY): history,
+    (Area.EVENTS, Permission.SUBSCRIBE): events,
+    (Area.EVENTS, Permission.READ_HISTORY): event_history,
+    (Area.REFRESH, Permission.CALL): refresh,
+    (Area.ACKNOWLEDGE, Permission.CALL): acknowledge,
+    (Area.CONFIRM, Permission.CALL): confirm,
+    (Area.COMMENT, Permission.CALL): comment,
+    (Area.SHELVE, Permission.CALL): shelve,
+    (Area.ENABLE, Permission.CALL): enable,
+    (Area.START_BATCH, Permission.CALL): start_batch,
+    (Area.ABORT_POSITIONING, Permission.CALL): abort,
+    (Area.SET_TARGET, Permission.CALL): set_target,
+    (Area.RESET_WEAR, Permission.CALL): reset_wear,
 }
 
 
@@ -237,4 +237,4 @@ async def test_user_executable_tells_the_same(role: Role) -> None:
         for name, area in (("StartBatch", Area.START_BATCH), ("SetTarget", Area.SET_TARGET)):
             node = await here.node(client, name)
             value = await node.read_attribute(ua.AttributeIds.UserExecutable)
-            assert value.Value.Value is allowed(role, area, Right.CALL)
+            assert value.Value.Value is allowed(role, area, Permission.CALL)

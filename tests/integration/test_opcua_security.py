@@ -9,7 +9,7 @@ from asyncua import Client, ua
 from asyncua.crypto import uacrypto
 
 from impactcell.errors import AccessError
-from impactcell.scada import Limits, Role, SecurityPolicy
+from impactcell.scada import Role, SecurityPolicy, ServerLimits
 from impactcell.scada.users import User, read_users, with_password, write_users
 from tests.opcua_server import CLIENT_URI, PASSWORDS, site
 
@@ -170,7 +170,7 @@ async def test_certificate_must_be_made_for_the_application() -> None:
 
 async def test_more_sessions_at_once_than_allowed() -> None:
     """A thousand scaled to forty: ten are let in, the rest is refused with the standard's code."""
-    async with site(limits=Limits(sessions=10, connections=60)) as here:
+    async with site(limits=ServerLimits(sessions=10, connections=60)) as here:
         here.publish()
         async with await here.client("observer") as inside:
             held: list[Client] = []
@@ -236,5 +236,5 @@ async def test_user_certificate() -> None:
 def test_defaults_are_closed() -> None:
     from impactcell.scada import ServerSettings
 
-    assert replace(Limits()).sessions == 100
+    assert replace(ServerLimits()).sessions == 100
     assert ServerSettings.__dataclass_fields__["allow_none"].default is False

@@ -20,15 +20,14 @@ from impactcell.opcua.history_aggregates import (
     intervals,
     process,
 )
-from impactcell.records import Quality
-from impactcell.scada.interface import HistoryValue
+from impactcell.opcua.host_interface import HistoricalValue
 
-G, U, B = Quality.GOOD, Quality.UNCERTAIN, Quality.BAD
+G, U, B = 0x0000_0000, 0x4000_0000, 0x8000_0000  # Good, Uncertain, Bad (Part 4, 7.39)
 WHOLE = Interval(0, 100)
 
 
-def series(*entries: tuple[int, float, Quality]) -> list[HistoryValue]:
-    return [HistoryValue(*entry) for entry in entries]
+def series(*entries: tuple[int, float, int]) -> list[HistoricalValue]:
+    return [HistoricalValue(*entry) for entry in entries]
 
 
 @pytest.mark.parametrize(
@@ -50,7 +49,7 @@ def series(*entries: tuple[int, float, Quality]) -> list[HistoryValue]:
     ],
 )
 def test_by_definition(
-    aggregate: Aggregate, values: list[HistoryValue], expected: object, status: int
+    aggregate: Aggregate, values: list[HistoricalValue], expected: object, status: int
 ) -> None:
     found = process(aggregate, WHOLE, values, Treatment(), within=True)
     assert (found.time_ns, found.value, found.status) == (0, expected, status)
@@ -87,7 +86,7 @@ def test_every_value_lies_in_one_interval(
     cut = list(intervals(start, end, step))
     for time_ns, _ in entries:
         assert sum(time_ns in interval for interval in cut) == 1
-    values = [HistoryValue(*entry) for entry in entries]
+    values = [HistoricalValue(*entry) for entry in entries]
     counted = sum(
         process(Aggregate.COUNT, i, [v for v in values if v.time_ns in i], Treatment(), within=True).value  # type: ignore[misc]
         for i in cut

@@ -171,7 +171,7 @@ def test_users_file_round_trip_and_permissions(tmp_path: Path) -> None:
     assert not verify(None, "")
     assert not verify(User("x", Role.OBSERVER, "no hash"), "no hash")
     users = Users(file)
-    assert users.by_certificate("AB") is not None
+    assert users.find_by_certificate("AB") is not None
     write_users(file, {})
     assert users.current() == {}
 

@@ -4,16 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.scada import Role
-from impactcell.scada.rights import MATRIX, Area, Right, allowed, matrix_table
+from impactcell.scada import Permission, Role
+from impactcell.scada.rights import MATRIX, Area, allowed, matrix_table
 
 README = Path(__file__).resolve().parents[3] / "impactcell" / "scada" / "README.md"
 
-OBSERVER = {(a, r) for a, r in MATRIX if r is not Right.WRITE and r is not Right.CALL} | {
-    (Area.REFRESH, Right.CALL)
+OBSERVER = {(a, r) for a, r in MATRIX if r is not Permission.WRITE and r is not Permission.CALL} | {
+    (Area.REFRESH, Permission.CALL)
 }
 OPERATOR = OBSERVER | {
-    (area, Right.CALL)
+    (area, Permission.CALL)
     for area in (
         Area.ACKNOWLEDGE,
         Area.CONFIRM,
@@ -23,18 +23,18 @@ OPERATOR = OBSERVER | {
         Area.ABORT_POSITIONING,
     )
 }
-ENGINEER = OPERATOR | {(area, Right.CALL) for area in (Area.SET_TARGET, Area.RESET_WEAR, Area.ENABLE)}
+ENGINEER = OPERATOR | {(area, Permission.CALL) for area in (Area.SET_TARGET, Area.RESET_WEAR, Area.ENABLE)}
 
 
 @pytest.mark.parametrize(
     ("role", "may"), [(Role.OBSERVER, OBSERVER), (Role.OPERATOR, OPERATOR), (Role.ENGINEER, ENGINEER)]
 )
-def test_roles_may_what_the_interface_says(role: Role, may: set[tuple[Area, Right]]) -> None:
+def test_roles_may_what_the_interface_says(role: Role, may: set[tuple[Area, Permission]]) -> None:
     assert {cell for cell in MATRIX if allowed(role, *cell)} == may
 
 
 def test_what_the_table_does_not_name_is_refused() -> None:
-    assert not allowed(Role.ENGINEER, Area.RESET_WEAR, Right.WRITE)
+    assert not allowed(Role.ENGINEER, Area.RESET_WEAR, Permission.WRITE)
 
 
 def test_the_documentation_prints_this_table() -> None:

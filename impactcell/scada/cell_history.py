@@ -1,0 +1,68 @@
+"""The past of the cells as the OPC UA server asks for it: by NodeId, with status codes and events."""
+
+from collections.abc import Callable, Mapping
+
+from asyncua import ua
+
+from impactcell.opcua.event_notification import EventNotification
+from impactcell.opcua.host_interface import (
+    HistoricalEvents,
+    HistoricalValue,
+    HistoricalValues,
+    HistoryRequest,
+)
+from impactcell.records import Alarm, Quality
+from impactcell.scada.interface import HistorySource
+from impactcell.scada.publishing import STATUS
+
+EventOf = Callable[[str, Alarm], EventNotification]
+"""Makes the event again that an alarm's transition was told with, from the name of its cell."""
+
+
+class CellHistory:
+    """Implements `opcua.HistoryProvider` on a `HistorySource`.
+
+    Parameters
+    ----------
+    source : HistorySource
+    variables : mapping
+        NodeId of each variable with a history to its cell and its path.
+    notifiers : mapping
+        NodeId of each cell to its name.
+    event_of : callable
+    """
+
+    def __init__(
+        self,
+        source: HistorySource,
+        variables: Mapping[ua.NodeId, tuple[str, str]],
+        notifiers: Mapping[ua.NodeId, str],
+        event_of: EventOf,
+    ) -> None:
+        self._source = source
+        self._variables = variables
+        self._notifiers = notifiers
+        self._event_of = event_of
+
+    def has_values(self, node: ua.NodeId) -> bool:
+        """Whether a variable has a history."""
+        return node in self._variables
+
+    def has_events(self, node: ua.NodeId) -> bool:
+        """Whether a node is a cell."""
+        return node in self._notifiers
+
+    async def read_values(self, node: ua.NodeId, request: HistoryRequest) -> HistoricalValues:
+        """Read stored values."""
+        page = await self._source.values(*self._variables[node], request)
+        values = tuple(
+            HistoricalValue(entry.time_ns, entry.value, STATUS[Quality(entry.quality)].value)
+            for entry in page.values
+        )
+        return HistoricalValues(values, page.resume)
+
+    async def read_events(self, node: ua.NodeId, request: HistoryRequest) -> HistoricalEvents:
+        """Read the transitions of a cell's conditions, as the events that told of them."""
+        cell = self._notifiers[node]
+        page = await self._source.alarms(cell, request)
+        return HistoricalEvents(tuple(self._event_of(cell, alarm) for alarm in page.alarms), page.resume)
