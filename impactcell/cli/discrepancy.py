@@ -1,33 +1,24 @@
 """`impactcell discrepancy`: where model and measurement disagree, and what is missing."""
 
-import math
 import os
-import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from impactcell.campaign import Campaign, Excitation, read
+from impactcell.api.findings import write_findings
+from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
 from impactcell.cli.paths import recorded as opened
-from impactcell.discrepancy.report.page import write_report
-from impactcell.discrepancy.report.result import result, text_of
+from impactcell.discrepancy.report.page import verdict_sentence
 from impactcell.discrepancy.search.candidate_fits import Mapper
-from impactcell.discrepancy.workflow import Findings, investigate, plant_of
-from impactcell.errors import CampaignError, DiscrepancyError, PhysicsError, PredictionError
+from impactcell.discrepancy.workflow import investigate
+from impactcell.errors import CampaignError, DiscrepancyError
 from impactcell.physics import Plant
 from impactcell.prediction import Model
-from impactcell.prediction.model import Prior
 from impactcell.process.console import tell
-from impactcell.settings.model_file import write_model
-
-FILES = ("result.json", "model.extended.yaml", "report.html")
-SMALLEST_SHARE = 1e-4
 
 
 def discrepancy(
@@ -82,15 +73,8 @@ def discrepancy(
     with _steps() as say, _mapper(scheduler) as mapper:
         findings = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=say)
         say("writing the report")
-        _write(findings, data, output, source, name)
-    tell(f"{sentence(findings)}\n{output / 'report.html'}")
-
-
-def sentence(findings: Findings) -> str:
-    """Verdict in one sentence."""
-    from impactcell.discrepancy.report.page import verdict_sentence
-
-    return verdict_sentence(findings)
+        write_findings(findings, data, output, source, name)
+    tell(f"{verdict_sentence(findings)}\n{output / 'report.html'}")
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:
@@ -154,70 +138,3 @@ def _mapper(scheduler: str | None) -> Iterator[Mapper]:
             return list(client.gather(futures))
 
         yield on_cluster
-
-
-def _write(findings: Findings, data: Campaign, output: Path, source: str, nominal: str) -> None:
-    """Write all three files beside the directory and move them in together at the end."""
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=f".{output.name}.", dir=output.parent))
-    except OSError as error:
-        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
-    try:
-        (beside / "result.json").write_text(text_of(result(findings)), encoding="utf-8")
-        write_model(extended_model(findings, data, source, nominal), beside / "model.extended.yaml")
-        write_report(findings, source, beside / "report.html")
-        output.mkdir(exist_ok=True)
-        for name in FILES:
-            (beside / name).replace(output / name)
-    except OSError as error:
-        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-
-
-def extended_model(findings: Findings, data: Campaign, source: str, nominal: str) -> Model:
-    """Make the extended model as a model file holds it, calibrated so that a service can run with it."""
-    plant = plant_of(findings)
-    half = {one.parameter: (one.high - one.low) / 4.0 for one in findings.parameters if not one.effect}
-    ratio = plant.mu_k / plant.mu_s
-    intervals: dict[str, dict[str, tuple[float, float]]] = {}
-    for one in findings.parameters:
-        if one.effect and not one.batch and math.isfinite(one.low) and math.isfinite(one.high):
-            intervals.setdefault(one.effect, {})[one.parameter] = (one.low, one.high)
-    model = Model(
-        name=f"{nominal} + {' + '.join(findings.added)}" if findings.added else nominal,
-        plant=plant,
-        prior=Prior(
-            stiffness_std_n_per_m=_positive(half.get("stiffness_n_per_m", 0.0), plant.stiffness_n_per_m),
-            damping_std_n_s_per_m=_positive(
-                half.get("damping_n_s_per_m", 0.0), max(plant.damping_n_s_per_m, 1.0)
-            ),
-            ratio_std=_positive(half.get("ratio", 0.0) * ratio**2, ratio),
-        ),
-        stroke_m=data.stroke_m,
-        intervals=intervals,
-        provenance={
-            "made by": "impactcell discrepancy",
-            "from": source,
-            "seed": str(findings.seed),
-            "verdict": findings.verdict,
-            "held-out gap before": f"{findings.proof.before.whole:.4g}",
-            "held-out gap after": f"{findings.proof.after.whole:.4g}",
-        },
-    )
-    if data.excitation is not Excitation.TAP:
-        return model
-    from impactcell.cli.estimate import calibrated
-
-    try:
-        return calibrated(model, data.shots)
-    except (PredictionError, PhysicsError) as error:
-        note = {**model.provenance, "not calibrated": str(error)}
-        return replace(model, provenance=note)
-
-
-def _positive(value: float, magnitude: float) -> float:
-    return (
-        value if math.isfinite(value) and value > SMALLEST_SHARE * magnitude else SMALLEST_SHARE * magnitude
-    )

@@ -4,21 +4,17 @@ import csv
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
-import numpy as np
-
+from impactcell.api.friction import calibrated, weighed
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.cli.paths import check_target
-from impactcell.errors import CampaignError, PhysicsError, PredictionError
-from impactcell.physics import TapInput
-from impactcell.prediction import Model, calibrate
+from impactcell.errors import CampaignError, PredictionError
+from impactcell.prediction import Model
 from impactcell.prediction import estimate as estimate_tap
 from impactcell.prediction.free_slide import free_slide_friction
-from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
-from impactcell.prediction.slide_features import extract_slide
+from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import note, tell
 from impactcell.process.progress import progress
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
@@ -28,10 +24,6 @@ COLUMNS = (
     "mu_s_force_std", "mu_s_distance_std", "mu_s_combined_std", "estimator", "quality", "mu_k_quality",
     "peak_force_n", "sliding_distance_m", "gap", "reason",
 )  # fmt: skip
-FRICTIONS = 9
-VELOCITIES = 9
-WIDEST = 0.3
-"""Friction is swept at least this far to either side of the plant's."""
 
 
 def estimate(campaign: Path, cell: Path | None = None, output: Path | None = None) -> None:
@@ -78,44 +70,6 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
     except OSError as fault:
         raise CampaignError(f"{output}: cannot be written: {fault.strerror}") from fault
     tell(f"{len(rows)} shots in {output}")
-
-
-def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
-    """Give a mass to the shots that lack one, by their momentum balance."""
-    found = []
-    for shot in shots:
-        if math.isnan(shot.mass_kg):
-            try:
-                found.append(replace(shot, mass_kg=estimate_mass(shot, extract_slide(shot))))
-                continue
-            except (PredictionError, PhysicsError) as fault:
-                note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {fault}")
-        found.append(shot)
-    return tuple(found)
-
-
-def calibrated(model: Model, shots: Sequence[Capture]) -> Model:
-    """Calibrate a model that has no predictors to the masses, velocities and stroke of a campaign."""
-    if model.predictors:
-        return model
-    known = [shot for shot in shots if shot.mass_kg > 0.0 and shot.velocity_m_s > 0.0]
-    if not known:
-        return model
-    strokes = {shot.stroke_m for shot in known}
-    stroke = known[0].stroke_m if len(strokes) == 1 else math.inf
-    masses = sorted({round(shot.mass_kg, 2) for shot in known})
-    if len(masses) > VELOCITIES:
-        masses = np.geomspace(masses[0], masses[-1], VELOCITIES).tolist()
-    fastest = max(shot.velocity_m_s for shot in known)
-    slowest = min(0.8 * fastest, *(shot.velocity_m_s for shot in known))
-    frictions = np.linspace(1.0 - WIDEST, 1.0 + WIDEST, FRICTIONS) * model.plant.mu_s
-    tap = TapInput(fastest, masses[0], stroke, halts_at_separation=math.isinf(stroke))
-    velocities = np.linspace(slowest, fastest, VELOCITIES)
-    with progress("calibrating", len(masses)) as done:
-        predictors = calibrate(
-            model.plant, tap, masses, velocities, frictions, lambda at, _: done() if at else None
-        )
-    return replace(model, predictors=predictors, stroke_m=stroke)
 
 
 def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> tuple[Model, float]:

@@ -220,12 +220,13 @@ BARS: Mapping[str, int | str] = {
 """What the tree is held to; no bar is a promise about quality, each only keeps a known evil small."""
 
 NOTE = (
-    "Counted by `python -m tests.benchmarks.structure --list`, which prints what was counted; *before* is the "
-    "last tree before the rooms were set up, counted by the same script. A constant counts as explained if a "
-    "docstring or a comment stands with it: whether that says enough, no script can tell. Files to edit are the "
-    "item's own files and every file of product, simulator and tests that names more than half of the items "
-    "there are; documentation and generated files are not counted. Integrators, noise estimators and slide "
-    "extractors are those of a list kept by hand, under all names they have had."
+    "Counted by `python -m tests.benchmarks.structure --list`, which prints what was counted; *before* is "
+    "the last tree before the rooms were set up, counted by the same script. A constant counts as "
+    "explained if a docstring or a comment stands with it: whether that says enough, no script can tell. "
+    "Files to edit are the item's own files and every file of product, simulator and tests that names "
+    "more than half of the items there are; documentation and generated files are not counted. "
+    "Integrators, noise estimators and slide extractors are those of a list kept by hand, under all names "
+    "they have had."
 )
 
 

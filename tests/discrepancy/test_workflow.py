@@ -167,7 +167,7 @@ def test_an_interrupt_leaves_nothing_half_written(tmp_path: Path, monkeypatch: p
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("impactcell.cli.discrepancy.write_report", interrupt)
+    monkeypatch.setattr("impactcell.api.findings.write_report", interrupt)
     with pytest.raises(KeyboardInterrupt):
         discrepancy(tmp_path / "campaign", tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["campaign"]

@@ -1,0 +1,206 @@
+"""The discrepancy workflow on a campaign, its findings, and the files that it leaves."""
+
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from impactcell.api.friction import calibrated
+from impactcell.campaign import Campaign, Excitation, read
+from impactcell.discrepancy.report.page import verdict_sentence, write_report
+from impactcell.discrepancy.report.result import result, text_of
+from impactcell.discrepancy.workflow import Findings, investigate, plant_of
+from impactcell.errors import CampaignError, PhysicsError, PredictionError
+from impactcell.prediction import Model
+from impactcell.prediction.model import Prior
+from impactcell.settings.model_file import read_model, write_model
+
+FILES = ("result.json", "model.extended.yaml", "report.html")
+"""What a run leaves in its directory."""
+SMALLEST_SHARE = 1e-4
+"""Smallest standard deviation of a prior, relative to its value: a prior of none would stop any fit."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiscrepancyFindings:
+    """What the workflow found in a campaign.
+
+    Attributes
+    ----------
+    verdict : str
+        `no_gap`, `named`, `tied` or `unknown`, as in `result.json`.
+    headline : str
+        The verdict in a sentence.
+    effects : tuple of str
+        Effects that joined the nominal model, in the order in which they were added.
+    tied_with : mapping
+        For each of them the effects that this data cannot tell from it.
+    parameters : mapping
+        Of each effect, by name: value, and lower and upper end of the 95 % interval; a list a batch where
+        there is one value a batch.
+    gap_before, gap_after : float
+        Gap of nominal and extended model on the held-out shots, 1 = noise floor.
+    result : mapping
+        All of it as `result.json` has it.
+    """
+
+    verdict: str
+    headline: str
+    effects: tuple[str, ...]
+    tied_with: Mapping[str, tuple[str, ...]]
+    parameters: Mapping[str, Mapping[str, tuple[Any, Any]]]
+    gap_before: float
+    gap_after: float
+    result: Mapping[str, Any]
+    _campaign: Campaign = field(repr=False)
+    _findings: Findings = field(repr=False)
+    _nominal: str = field(repr=False)
+
+    def write(self, directory: str | PathLike[str], source: str = "campaign") -> Path:
+        """Write result.json, model.extended.yaml and report.html; return the path of the report.
+
+        Parameters
+        ----------
+        directory : path
+            What it holds of an earlier run is replaced only when all is done.
+        source : str
+            Where the data come from, as the report and the model's provenance name it.
+
+        Raises
+        ------
+        CampaignError
+            The directory cannot be written.
+        """
+        output = Path(directory)
+        write_findings(self._findings, self._campaign, output, source, self._nominal)
+        return output / "report.html"
+
+
+def discrepancy(
+    campaign: str | PathLike[str] | Campaign,
+    *,
+    model: str | PathLike[str] | None = None,
+    seed: int = 0,
+) -> DiscrepancyFindings:
+    """Find where model and measurement disagree, name what is missing, add it, and prove the gap shrinks.
+
+    Parameters
+    ----------
+    campaign : path or `impactcell.campaign.Campaign`
+        A campaign directory, or a campaign read or made elsewhere.
+    model : path, optional
+        Model file whose plant is the nominal one; without it equations (1)-(3) with Coulomb friction, all of
+        it fitted.
+    seed : int
+        Of the split and of every resampling: the same data and seed give the same findings.
+
+    Returns
+    -------
+    DiscrepancyFindings
+
+    Raises
+    ------
+    CampaignError, SettingsError
+        What was given cannot be read, or the data cannot be used; the message says why and what to do.
+    DiscrepancyError
+        The nominal model cannot be fitted at all.
+    """
+    data = campaign if isinstance(campaign, Campaign) else read(Path(campaign))
+    nominal = None if model is None else read_model(Path(model))
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        findings = investigate(
+            data,
+            seed=seed,
+            mapper=lambda function, items: list(pool.map(function, items)),
+            plant=None if nominal is None else nominal.plant,
+        )
+    outcome = result(findings)
+    return DiscrepancyFindings(
+        verdict=findings.verdict,
+        headline=verdict_sentence(findings),
+        effects=findings.added,
+        tied_with={entry["effect"]: tuple(entry["tied_with"]) for entry in outcome["effects"]},
+        parameters={
+            entry["effect"]: {
+                name: (value["value"], value["ci95"]) for name, value in entry["parameters"].items()
+            }
+            for entry in outcome["effects"]
+        },
+        gap_before=findings.proof.before.whole,
+        gap_after=findings.proof.after.whole,
+        result=outcome,
+        _campaign=data,
+        _findings=findings,
+        _nominal="fitted" if nominal is None else nominal.name,
+    )
+
+
+def write_findings(findings: Findings, data: Campaign, output: Path, source: str, nominal: str) -> None:
+    """Write all three files beside the directory and move them in together at the end."""
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        beside = Path(tempfile.mkdtemp(prefix=f".{output.name}.", dir=output.parent))
+    except OSError as error:
+        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
+    try:
+        (beside / "result.json").write_text(text_of(result(findings)), encoding="utf-8")
+        write_model(extended_model(findings, data, source, nominal), beside / "model.extended.yaml")
+        write_report(findings, source, beside / "report.html")
+        output.mkdir(exist_ok=True)
+        for name in FILES:
+            (beside / name).replace(output / name)
+    except OSError as error:
+        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def extended_model(findings: Findings, data: Campaign, source: str, nominal: str) -> Model:
+    """Make the extended model as a model file holds it, calibrated so that a service can run with it."""
+    plant = plant_of(findings)
+    half = {one.parameter: (one.high - one.low) / 4.0 for one in findings.parameters if not one.effect}
+    ratio = plant.mu_k / plant.mu_s
+    intervals: dict[str, dict[str, tuple[float, float]]] = {}
+    for one in findings.parameters:
+        if one.effect and not one.batch and math.isfinite(one.low) and math.isfinite(one.high):
+            intervals.setdefault(one.effect, {})[one.parameter] = (one.low, one.high)
+    model = Model(
+        name=f"{nominal} + {' + '.join(findings.added)}" if findings.added else nominal,
+        plant=plant,
+        prior=Prior(
+            stiffness_std_n_per_m=_positive(half.get("stiffness_n_per_m", 0.0), plant.stiffness_n_per_m),
+            damping_std_n_s_per_m=_positive(
+                half.get("damping_n_s_per_m", 0.0), max(plant.damping_n_s_per_m, 1.0)
+            ),
+            ratio_std=_positive(half.get("ratio", 0.0) * ratio**2, ratio),
+        ),
+        stroke_m=data.stroke_m,
+        intervals=intervals,
+        provenance={
+            "made by": "impactcell discrepancy",
+            "from": source,
+            "seed": str(findings.seed),
+            "verdict": findings.verdict,
+            "held-out gap before": f"{findings.proof.before.whole:.4g}",
+            "held-out gap after": f"{findings.proof.after.whole:.4g}",
+        },
+    )
+    if data.excitation is not Excitation.TAP:
+        return model
+    try:
+        return calibrated(model, data.shots)
+    except (PredictionError, PhysicsError) as error:
+        note = {**model.provenance, "not calibrated": str(error)}
+        return replace(model, provenance=note)
+
+
+def _positive(value: float, magnitude: float) -> float:
+    return (
+        value if math.isfinite(value) and value > SMALLEST_SHARE * magnitude else SMALLEST_SHARE * magnitude
+    )

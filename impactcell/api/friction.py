@@ -1,0 +1,153 @@
+"""Friction of a tap, from its arrays or from the shots of a campaign."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from impactcell.errors import CaptureError, PhysicsError, PredictionError
+from impactcell.physics import TapInput
+from impactcell.prediction import Model, calibrate
+from impactcell.prediction import estimate as estimate_capture
+from impactcell.prediction.feature_extraction import noise_std
+from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
+from impactcell.prediction.slide_features import extract_slide
+from impactcell.process.console import note
+from impactcell.process.progress import progress
+from impactcell.records import Capture, Channel, FrictionEstimate, Samples
+
+FRICTIONS = 9
+"""Values of mu_s that are swept for each mass of a campaign: three times the coefficients of (4) and (5)."""
+VELOCITIES = 9
+"""Velocities swept for each mass, and most masses swept; as `FRICTIONS`."""
+WIDEST = 0.3
+"""Friction is swept at least this far, relative, to either side of the plant's."""
+NARROWEST = 0.8
+"""Velocity is swept at least from this share of the fastest shot's."""
+LEAST_NOISE = 1e-4
+"""Noise of a channel is at least this share of its largest value: sensors of 16 bits whose range is used to
+a sixth. Without it a simulated trace without noise would be held to the last bit of a float."""
+GRAVITY_M_S2 = 9.81
+"""Of a tap given as arrays; m/s²."""
+
+
+def estimate(
+    time_s: ArrayLike,
+    force_n: ArrayLike,
+    position_m: ArrayLike,
+    velocity_m_s: float,
+    mass_kg: float,
+    stroke_m: float = math.inf,
+    *,
+    model: str | PathLike[str] | None = None,
+) -> FrictionEstimate:
+    """Estimate mu_s and mu_k of one tap from its traces.
+
+    By peak force (4), sliding distance (5), both (6), and by the whole waveform, each with its standard
+    deviation; the best of them is published as `mu_s` and `mu_k`.
+
+    Parameters
+    ----------
+    time_s, force_n, position_m : array_like, shape (n,)
+        Strictly ascending times, 0 at first contact; contact force, positive in compression; position along
+        the tap. Record until the part is at rest. The sensors' noise is taken from the traces, and is at
+        least 1e-4 of their largest values.
+    velocity_m_s, mass_kg : float
+        Constant velocity of the actuator, and mass of the part.
+    stroke_m : float
+        Travel from first contact after which the actuator halts; inf if it halts as it loses contact.
+    model : path, optional
+        Model file of the cell, as `impactcell calibrate` writes it. Without it k, b and mu_k/mu_s are fitted
+        to this one tap, with k_v = 0, which shows mu_k well and mu_s only as far as stiction shows in it.
+
+    Returns
+    -------
+    FrictionEstimate
+        Traces in which no tap can be seen give a bad quality and the reason.
+
+    Raises
+    ------
+    CaptureError
+        Arrays of different lengths, or of more than one dimension.
+    SettingsError
+        The model file cannot be read.
+    PredictionError
+        Without a model: the plant cannot be fitted.
+
+    Examples
+    --------
+    >>> from impactcell import simulate_tap
+    >>> tap = simulate_tap(0.04, 18.9, plant={"mu_s": 0.21, "mu_k": 0.16})
+    >>> friction = estimate(tap.time_s, tap.force_n, tap.position_m, 0.04, 18.9)
+    >>> f"{friction.mu_k.value:.4f}"
+    '0.1600'
+    """
+    time, force, position = (np.asarray(values, dtype=np.float64) for values in (time_s, force_n, position_m))
+    if time.ndim != 1 or force.shape != time.shape or position.shape != time.shape:
+        raise CaptureError(
+            f"time_s, force_n and position_m must be of one length and one dimension, "
+            f"not of shapes {time.shape}, {force.shape} and {position.shape}"
+        )
+    capture = Capture(
+        cycle=1,
+        velocity_m_s=velocity_m_s,
+        mass_kg=mass_kg,
+        force=_channel(time, force),
+        position=_channel(time, position),
+        stroke_m=stroke_m,
+    )
+    if model is not None:
+        from impactcell.settings.model_file import read_model
+
+        return estimate_capture(capture, read_model(Path(model)))
+    fit = fit_plant([capture], GRAVITY_M_S2)
+    return estimate_capture(capture, calibrated(fit.model, [capture]), fit.gap)
+
+
+def _channel(time_s: Samples, values: Samples) -> Channel:
+    """Give the channel its own noise, or the least that a sensor has."""
+    channel = Channel(time_s, values)
+    least = LEAST_NOISE * float(np.abs(values).max(initial=0.0))
+    return replace(channel, noise_std=max(noise_std(channel), least))
+
+
+def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
+    """Give a mass to the shots that lack one, by their momentum balance."""
+    complete = []
+    for shot in shots:
+        if math.isnan(shot.mass_kg):
+            try:
+                complete.append(replace(shot, mass_kg=estimate_mass(shot, extract_slide(shot))))
+                continue
+            except (PredictionError, PhysicsError) as error:
+                note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {error}")
+        complete.append(shot)
+    return tuple(complete)
+
+
+def calibrated(model: Model, shots: Sequence[Capture]) -> Model:
+    """Calibrate a model that has no predictors to the masses, velocities and stroke of a campaign."""
+    if model.predictors:
+        return model
+    usable = [shot for shot in shots if shot.mass_kg > 0.0 and shot.velocity_m_s > 0.0]
+    if not usable:
+        return model
+    strokes = {shot.stroke_m for shot in usable}
+    stroke = usable[0].stroke_m if len(strokes) == 1 else math.inf
+    masses = sorted({round(shot.mass_kg, 2) for shot in usable})
+    if len(masses) > VELOCITIES:
+        masses = np.geomspace(masses[0], masses[-1], VELOCITIES).tolist()
+    fastest = max(shot.velocity_m_s for shot in usable)
+    slowest = min(NARROWEST * fastest, *(shot.velocity_m_s for shot in usable))
+    frictions = np.linspace(1.0 - WIDEST, 1.0 + WIDEST, FRICTIONS) * model.plant.mu_s
+    tap = TapInput(fastest, masses[0], stroke, halts_at_separation=math.isinf(stroke))
+    velocities = np.linspace(slowest, fastest, VELOCITIES)
+    with progress("calibrating", len(masses)) as advance:
+        predictors = calibrate(
+            model.plant, tap, masses, velocities, frictions, lambda at, _: advance() if at else None
+        )
+    return replace(model, predictors=predictors, stroke_m=stroke)

@@ -1,0 +1,64 @@
+"""A series tracked through the public API."""
+
+import math
+
+import numpy as np
+import pytest
+
+import impactcell
+from impactcell.errors import SeriesError
+from impactcell.records import AlarmName
+
+
+def series(slope: float = 0.0, step: float = 0.0, at: int = 250, count: int = 400) -> np.ndarray:
+    cycles = np.arange(count)
+    noise = np.random.default_rng(3).normal(0.0, 0.002, count)
+    return 0.2 + slope * cycles + step * (cycles >= at) + noise
+
+
+def test_wear_is_followed() -> None:
+    tracked = impactcell.track(np.arange(1000), series(2e-5, count=1000), np.full(1000, 0.002), limit=0.24)
+    assert tracked.wear.rate_per_cycle == pytest.approx(2e-5, abs=4.0 * tracked.wear.rate_std)
+    assert tracked.level[-1] == tracked.wear.level
+    assert tracked.used == 1000
+    left = (0.24 - 0.2 - 2e-5 * 999) / 2e-5
+    assert tracked.wear.cycles_to_limit_low < left < tracked.wear.cycles_to_limit_high
+
+
+def test_a_batch_that_is_not_told_is_found() -> None:
+    tracked = impactcell.track(np.arange(400), series(step=0.02), np.full(400, 0.002))
+    (shift,) = tracked.alarms
+    assert shift.alarm is AlarmName.BATCH_SHIFT
+    assert shift.evidence.change_cycle == 250
+    assert shift.evidence.size == pytest.approx(0.02, abs=4.0 * shift.evidence.size_std)
+
+
+def test_a_batch_that_is_told_is_believed() -> None:
+    batch = ["A"] * 250 + ["B"] * 150
+    tracked = impactcell.track(np.arange(400), series(step=0.02), np.full(400, 0.002), batch=batch)
+    assert tracked.batch.batch_id == "B"
+    assert tracked.batch_offset[-1] == pytest.approx(0.02, abs=1e-3)
+    assert tracked.level[-1] == pytest.approx(0.2, abs=1e-3)
+
+
+def test_standard_deviations_may_be_left_out() -> None:
+    tracked = impactcell.track(np.arange(400), series())
+    assert tracked.wear.level == pytest.approx(0.2, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("cycle", "mu_s", "std", "message"),
+    [
+        ([], [], [], "no cycles"),
+        ([1, 2], [0.2], [0.1, 0.1], "of one length"),
+        ([1, 2], [0.2, 0.2], [0.1], "of one length"),
+        ([0.5, 2], [0.2, 0.2], [0.1, 0.1], r"cycle\[0\] = 0.5"),
+        ([1, math.nan], [0.2, 0.2], [0.1, 0.1], r"cycle\[1\] = nan"),
+        ([-1, 2], [0.2, 0.2], [0.1, 0.1], r"cycle\[0\] = -1"),
+    ],
+)
+def test_what_is_no_series_is_refused(
+    cycle: list[float], mu_s: list[float], std: list[float], message: str
+) -> None:
+    with pytest.raises(SeriesError, match=message):
+        impactcell.track(cycle, mu_s, std)

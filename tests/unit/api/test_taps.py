@@ -1,0 +1,105 @@
+"""A tap simulated and estimated through the public API."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import impactcell
+from impactcell.errors import CaptureError, PhysicsError, PredictionError, SettingsError
+from impactcell.physics import Plant
+from impactcell.records import Quality
+from simulator import plant as simulated
+
+PLANT = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.21, "mu_k": 0.16}
+
+
+@pytest.mark.parametrize("stroke_m", [1.5e-3, 4e-4])
+def test_it_agrees_with_the_simulators_own_integrator(stroke_m: float) -> None:
+    tap = impactcell.simulate_tap(0.05, 12.6, stroke_m, plant=PLANT)
+    truth = simulated.simulate_tap(
+        simulated.Plant(**PLANT, effects={}),
+        simulated.TapInput(velocity_m_s=0.05, mass_kg=12.6, stroke_m=stroke_m),
+    )
+    assert tap.peak_force_n == pytest.approx(truth.peak_force_n, rel=1e-6)
+    assert tap.sliding_distance_m == pytest.approx(truth.sliding_distance_m, rel=1e-6)
+
+
+def test_the_traces_are_those_of_the_figures() -> None:
+    tap = impactcell.simulate_tap(0.075, 18.9)
+    assert tap.force_n.max() == pytest.approx(tap.peak_force_n, rel=1e-3)
+    assert tap.position_m[-1] == pytest.approx(tap.displacement_m, rel=1e-9)
+    assert tap.time_s[-1] >= tap.stop_s > tap.separation_s > tap.breakaway_s >= 0.0
+    # momentum: what the contact gave is what friction took
+    friction = np.gradient(tap.velocity_m_s, tap.time_s)[tap.time_s > tap.separation_s + 1e-3][:-5]
+    assert np.median(friction) == pytest.approx(-0.76 * 0.2 * 9.81, rel=1e-6)
+
+
+def test_times_may_be_given_in_any_order() -> None:
+    tap = impactcell.simulate_tap(0.075, 18.9, time_s=[0.02, 0.0, 0.01])
+    ordered = impactcell.simulate_tap(0.075, 18.9, time_s=[0.0, 0.01, 0.02])
+    assert tap.position_m.tolist() == ordered.position_m[[2, 0, 1]].tolist()
+
+
+def test_a_plant_is_given_whole_or_in_part() -> None:
+    whole = impactcell.simulate_tap(0.05, 18.9, plant=Plant(6.5e5, 465.0, 0.25, 0.19))
+    part = impactcell.simulate_tap(0.05, 18.9, plant={"mu_s": 0.25})
+    assert whole.sliding_distance_m == pytest.approx(part.sliding_distance_m, rel=1e-12)
+    viscous = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}}
+    slowed = impactcell.simulate_tap(0.05, 18.9, plant={"mu_s": 0.25, "effects": viscous})
+    assert slowed.sliding_distance_m < part.sliding_distance_m
+
+
+def test_a_part_that_is_held_has_no_slide() -> None:
+    tap = impactcell.simulate_tap(0.01, 18.9, 1e-6)
+    assert math.isnan(tap.sliding_distance_m)
+    assert math.isnan(tap.breakaway_s)
+    assert tap.displacement_m == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"friction": 0.2}, "no field 'friction'"),
+        ({"mu_s": -0.2}, "mu_s must be 0 or more"),
+        ({"effects": {"gravity_waves": {}}}, "gravity_waves"),
+    ],
+)
+def test_a_plant_that_cannot_be_is_refused(given: dict[str, object], message: str) -> None:
+    with pytest.raises(PhysicsError, match=message):
+        impactcell.simulate_tap(0.05, 18.9, plant=given)
+
+
+def test_friction_is_found_from_noisy_arrays() -> None:
+    rng = np.random.default_rng(5)
+    tap = impactcell.simulate_tap(0.033, 18.9, plant=PLANT)
+    force = tap.force_n + rng.normal(0.0, 0.4, tap.force_n.shape)
+    position = tap.position_m + rng.normal(0.0, 1.5e-6, tap.position_m.shape)
+    friction = impactcell.estimate(tap.time_s, force, position, 0.033, 18.9)
+    assert friction.mu_k.value == pytest.approx(0.16, abs=3.0 * friction.mu_k.std)
+    assert friction.mu_s.value == pytest.approx(0.21, abs=3.0 * friction.mu_s.std)
+    assert friction.mu_k.std < 1e-3
+    assert friction.gap == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_models_predictors_are_used(pytestconfig: pytest.Config) -> None:
+    model = pytestconfig.rootpath / "config" / "models" / "prototype.yaml"
+    tap = impactcell.simulate_tap(0.075, 18.9, 1.5e-3)
+    friction = impactcell.estimate(tap.time_s, tap.force_n, tap.position_m, 0.075, 18.9, 1.5e-3, model=model)
+    assert friction.by_force.quality < Quality.BAD
+    assert friction.by_distance.quality < Quality.BAD
+
+
+def test_arrays_in_which_no_tap_is_seen_say_so() -> None:
+    nothing = np.zeros(500)
+    with pytest.raises(PredictionError, match="no tap"):
+        impactcell.estimate(np.arange(500) * 1e-4, nothing, nothing, 0.05, 18.9)
+
+
+def test_what_cannot_be_used_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CaptureError, match="of one length"):
+        impactcell.estimate([0.0, 1e-4], [0.0], [0.0, 0.0], 0.05, 18.9)
+    some = [0.0, 1e-4, 2e-4]
+    with pytest.raises(SettingsError):
+        impactcell.estimate(some, some, some, 0.05, 18.9, model=tmp_path / "none.yaml")
