@@ -14,8 +14,8 @@ from typing import Any
 from impactcell.api.friction import calibrated
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.discrepancy.report.page import verdict_sentence, write_report
-from impactcell.discrepancy.report.result import result, text_of
-from impactcell.discrepancy.workflow import Findings, investigate, plant_of
+from impactcell.discrepancy.report.result import result_document, json_text
+from impactcell.discrepancy.workflow import DiscrepancyResult, investigate, extended_plant
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.prediction import Model
 from impactcell.prediction.model import Prior
@@ -59,7 +59,7 @@ class DiscrepancyFindings:
     gap_after: float
     result: Mapping[str, Any]
     _campaign: Campaign = field(repr=False)
-    _findings: Findings = field(repr=False)
+    _findings: DiscrepancyResult = field(repr=False)
     _nominal: str = field(repr=False)
 
     def write(self, directory: str | PathLike[str], source: str = "campaign") -> Path:
@@ -120,7 +120,7 @@ def discrepancy(
             mapper=lambda function, items: list(pool.map(function, items)),
             plant=None if nominal is None else nominal.plant,
         )
-    outcome = result(findings)
+    outcome = result_document(findings)
     return DiscrepancyFindings(
         verdict=findings.verdict,
         headline=verdict_sentence(findings),
@@ -141,7 +141,7 @@ def discrepancy(
     )
 
 
-def write_findings(findings: Findings, data: Campaign, output: Path, source: str, nominal: str) -> None:
+def write_findings(findings: DiscrepancyResult, data: Campaign, output: Path, source: str, nominal: str) -> None:
     """Write all three files beside the directory and move them in together at the end."""
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
@@ -149,7 +149,7 @@ def write_findings(findings: Findings, data: Campaign, output: Path, source: str
     except OSError as error:
         raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
     try:
-        (beside / "result.json").write_text(text_of(result(findings)), encoding="utf-8")
+        (beside / "result.json").write_text(json_text(result_document(findings)), encoding="utf-8")
         write_model(extended_model(findings, data, source, nominal), beside / "model.extended.yaml")
         write_report(findings, source, beside / "report.html")
         output.mkdir(exist_ok=True)
@@ -161,9 +161,9 @@ def write_findings(findings: Findings, data: Campaign, output: Path, source: str
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def extended_model(findings: Findings, data: Campaign, source: str, nominal: str) -> Model:
+def extended_model(findings: DiscrepancyResult, data: Campaign, source: str, nominal: str) -> Model:
     """Make the extended model as a model file holds it, calibrated so that a service can run with it."""
-    plant = plant_of(findings)
+    plant = extended_plant(findings)
     half = {one.parameter: (one.high - one.low) / 4.0 for one in findings.parameters if not one.effect}
     ratio = plant.mu_k / plant.mu_s
     intervals: dict[str, dict[str, tuple[float, float]]] = {}

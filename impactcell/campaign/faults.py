@@ -4,7 +4,7 @@ from pathlib import Path
 
 from impactcell.errors import CampaignError
 
-SHOWN = 20
+MAX_FAULTS_SHOWN = 20
 
 
 class Faults:
@@ -29,7 +29,7 @@ class Faults:
         """
         if not self._messages:
             return
-        shown = self._messages[:SHOWN]
+        shown = self._messages[:MAX_FAULTS_SHOWN]
         rest = len(self._messages) - len(shown)
         if rest:
             shown.append(f"{self._directory}: and {rest} more faults")

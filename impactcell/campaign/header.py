@@ -69,13 +69,13 @@ def _check_format(reader: "_Reader", top: dict[str, yaml.Node]) -> None:
 
 def _excitation(reader: "_Reader", top: dict[str, yaml.Node]) -> Excitation | None:
     node = top.get("excitation")
-    known = ", ".join(Excitation)
+    choices = ", ".join(Excitation)
     if node is None:
-        reader.fault(None, f"excitation is missing; write one of {known}")
+        reader.fault(None, f"excitation is missing; write one of {choices}")
         return None
     value = node.value if isinstance(node, yaml.ScalarNode) else None
     if value not in set(Excitation):
-        reader.fault(node, f"excitation {value!r} is not known; write one of {known}")
+        reader.fault(node, f"excitation {value!r} is not known; write one of {choices}")
         return None
     return Excitation(value)
 
@@ -108,16 +108,16 @@ class _Reader:
         if not isinstance(node, yaml.MappingNode):
             self.fault(node, f"{name} has to be a block of `key: value`")
             return None
-        found: dict[str, yaml.Node] = {}
+        nodes: dict[str, yaml.Node] = {}
         for key, value in node.value:
             text = key.value if isinstance(key, yaml.ScalarNode) else "?"
             if text not in known:
                 self.fault(key, f"unknown key {text!r} in {name}; known: {', '.join(sorted(known))}")
-            elif text in found:
+            elif text in nodes:
                 self.fault(key, f"{text!r} appears twice in {name}; keep one")
             else:
-                found[text] = value
-        return found
+                nodes[text] = value
+        return nodes
 
     def number(
         self,

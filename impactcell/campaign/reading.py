@@ -7,11 +7,11 @@ from pathlib import Path
 from impactcell.campaign.contents import Campaign, Excitation, Sensor
 from impactcell.campaign.faults import Faults
 from impactcell.campaign.header import Header, read_header
-from impactcell.campaign.shots import Shot, read_shots
+from impactcell.campaign.shots import ShotRow, read_shots
 from impactcell.campaign.trace import read_trace
 from impactcell.records import Capture, Channel
 
-REQUIRED = {
+REQUIRED_CHANNELS = {
     Excitation.TAP: ({"force", "position"}, "force_n or position_m"),
     Excitation.FREE_SLIDE: ({"position"}, "position_m"),
     Excitation.DRIVEN: ({"force", "position"}, "force_n and position_m"),
@@ -101,12 +101,14 @@ def _check_orphans(traces: Path, numbers: set[int], faults: Faults) -> None:
             faults.add(file, None, f"has no shot {file.stem} in shots.csv; add the row or remove the trace")
 
 
-def _capture(file: Path, shot: Shot, header: Header | None, faults: Faults) -> Capture | None:
+def _capture(file: Path, shot: ShotRow, header: Header | None, faults: Faults) -> Capture | None:
     channels = read_trace(file, faults)
     if channels is None or header is None:
         return None
-    wanted, named = REQUIRED[header.excitation]
-    enough = wanted & channels.keys() if header.excitation is Excitation.TAP else wanted <= channels.keys()
+    required, named = REQUIRED_CHANNELS[header.excitation]
+    enough = (
+        required & channels.keys() if header.excitation is Excitation.TAP else required <= channels.keys()
+    )
     if not enough:
         faults.add(file, 1, f"a campaign of excitation {header.excitation} needs {named}")
         return None

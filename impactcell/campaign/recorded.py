@@ -12,7 +12,7 @@ _COLUMNS = ("shot", "velocity_mm_per_min", "mass_kg", "direction", "batch", "dwe
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recorded:
+class RecordedCampaign:
     """A campaign of recorded cycles, and how many cycles it had to leave out.
 
     Attributes
@@ -29,7 +29,7 @@ class Recorded:
     no_channels: int
 
 
-def from_captures(captures: Iterable[Capture], gravity_m_s2: float = 9.81) -> Recorded:
+def from_captures(captures: Iterable[Capture], gravity_m_s2: float = 9.81) -> RecordedCampaign:
     """Make a tap campaign of recorded captures, in their order.
 
     Shots keep their cycle numbers; where the module restarted and numbers repeat, they are counted
@@ -64,7 +64,7 @@ def from_captures(captures: Iterable[Capture], gravity_m_s2: float = 9.81) -> Re
         sensors=_sensors(shots),
         columns=(*_COLUMNS, *covariates),
     )
-    return Recorded(campaign, len(recorded) - len(kept), len(every) - len(recorded))
+    return RecordedCampaign(campaign, len(recorded) - len(kept), len(every) - len(recorded))
 
 
 def _sensors(shots: Sequence[Capture]) -> dict[str, Sensor]:

@@ -15,7 +15,7 @@ MM_PER_MIN = 1e-3 / 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class ShotRow:
     """One row of `shots.csv`, in SI units; nan where a cell is empty."""
 
     number: int
@@ -28,12 +28,12 @@ class Shot:
     covariates: dict[str, float | str]
 
 
-KNOWN = ("shot", "velocity_mm_per_min", "mass_kg", "direction", "batch", "dwell_s", "start_m")
+KNOWN_COLUMNS = ("shot", "velocity_mm_per_min", "mass_kg", "direction", "batch", "dwell_s", "start_m")
 
 
 def read_shots(
     file: Path, excitation: Excitation | None, faults: Faults
-) -> tuple[tuple[str, ...], list[Shot]] | None:
+) -> tuple[tuple[str, ...], list[ShotRow]] | None:
     """Columns and rows of `shots.csv`; None after noting every fault of it."""
     text = read_text(file, faults)
     if text is None:
@@ -98,7 +98,7 @@ class _Row:
         self._cells = cells
         self._faults = faults
 
-    def shot(self, excitation: Excitation | None) -> Shot | None:
+    def shot(self, excitation: Excitation | None) -> ShotRow | None:
         noted = len(self._faults)
         tap = excitation is Excitation.TAP
         number = self._number("shot", _is_count, "a whole number from 1", required=True)
@@ -107,17 +107,21 @@ class _Row:
         direction = self._number("direction", _is_sign, "+1 or -1", default=1.0)
         dwell = self._number("dwell_s", _is_not_negative, "a number from 0 or empty")
         start = self._number("start_m", math.isfinite, "a finite number or empty", default=0.0)
-        covariates = {name: self._covariate(text) for name, text in self._cells.items() if name not in KNOWN}
+        covariates = {
+            name: self._covariate(text) for name, text in self._cells.items() if name not in KNOWN_COLUMNS
+        }
         if len(self._faults) > noted:
             return None
         batch = self._cells.get("batch") or None
-        return Shot(int(number), velocity * MM_PER_MIN, mass, int(direction), batch, dwell, start, covariates)
+        return ShotRow(
+            int(number), velocity * MM_PER_MIN, mass, int(direction), batch, dwell, start, covariates
+        )
 
     def _number(
         self,
         name: str,
         accepts: Callable[[float], bool],
-        wanted: str,
+        requirement: str,
         *,
         default: float = math.nan,
         required: bool = False,
@@ -128,7 +132,7 @@ class _Row:
         value = _to_float(text)
         if value is None or not accepts(value):
             shown = repr(text) if text else "empty"
-            self._faults.add(self._file, self._line, f"{name} is {shown}; it has to be {wanted}")
+            self._faults.add(self._file, self._line, f"{name} is {shown}; it has to be {requirement}")
             return default
         return value
 

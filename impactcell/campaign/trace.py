@@ -8,7 +8,7 @@ from impactcell.campaign.contents import CHANNELS
 from impactcell.campaign.faults import Faults, read_text
 from impactcell.records import Samples
 
-SHOWN_PER_TRACE = 3
+MAX_FAULTS_PER_TRACE = 3
 
 
 def read_trace(file: Path, faults: Faults) -> dict[str, tuple[Samples, Samples]] | None:
@@ -42,13 +42,15 @@ def read_trace(file: Path, faults: Faults) -> dict[str, tuple[Samples, Samples]]
 
 
 def _check_names(file: Path, names: list[str], faults: Faults) -> bool:
-    known = ["time_s", *CHANNELS.values()]
+    known_columns = ["time_s", *CHANNELS.values()]
     noted = len(faults)
     if "time_s" not in names:
-        faults.add(file, 1, f"no column time_s in `{','.join(names)}`; known columns: {', '.join(known)}")
+        faults.add(
+            file, 1, f"no column time_s in `{','.join(names)}`; known columns: {', '.join(known_columns)}"
+        )
     for column, name in enumerate(names):
-        if name not in known:
-            faults.add(file, 1, f"unknown column {name!r}; known columns: {', '.join(known)}")
+        if name not in known_columns:
+            faults.add(file, 1, f"unknown column {name!r}; known columns: {', '.join(known_columns)}")
         elif name in names[:column]:
             faults.add(file, 1, f"column {name!r} appears twice; keep one")
     if len(faults) == noted and len(names) == 1:
@@ -62,7 +64,7 @@ def _numbers(file: Path, lines: list[str], width: int, faults: Faults) -> Sample
     commas = width - 1
     ragged = [row for row, line in enumerate(body, 2) if line.count(",") != commas]
     if ragged:
-        for row in ragged[:SHOWN_PER_TRACE]:
+        for row in ragged[:MAX_FAULTS_PER_TRACE]:
             line = lines[row - 1]
             what = (
                 f"{line.count(',') + 1} cells where the header has {width}"
@@ -70,7 +72,7 @@ def _numbers(file: Path, lines: list[str], width: int, faults: Faults) -> Sample
                 else "a blank line"
             )
             faults.add(file, row, f"{what}; leave a cell empty where a channel was not sampled")
-        _more(file, len(ragged), faults)
+        _report_further(file, len(ragged), faults)
         return None
     joined = ",".join(body)
     cells = joined.split(",")
@@ -81,10 +83,10 @@ def _numbers(file: Path, lines: list[str], width: int, faults: Faults) -> Sample
     # An underscore would be read as a thousands sign of Python source, which a trace does not have.
     if table is not None and np.isfinite(table).all() and "_" not in joined:
         return table.reshape(-1, width)
-    return _careful(file, cells, width, faults)
+    return _parse_cells(file, cells, width, faults)
 
 
-def _careful(file: Path, cells: list[str], width: int, faults: Faults) -> Samples | None:
+def _parse_cells(file: Path, cells: list[str], width: int, faults: Faults) -> Samples | None:
     table = np.full(len(cells), np.nan)
     bad = []
     for place, cell in enumerate(cells):
@@ -98,13 +100,13 @@ def _careful(file: Path, cells: list[str], width: int, faults: Faults) -> Sample
             continue
         if not np.isfinite(table[place]) or "_" in text:
             bad.append(place)
-    for place in bad[:SHOWN_PER_TRACE]:
+    for place in bad[:MAX_FAULTS_PER_TRACE]:
         faults.add(
             file,
             place // width + 2,
             f"{cells[place].strip()!r} is not a finite number; leave the cell empty where there is no sample",
         )
-    _more(file, len(bad), faults)
+    _report_further(file, len(bad), faults)
     return None if bad else table.reshape(-1, width)
 
 
@@ -116,12 +118,12 @@ def _channels(
     untimed = np.flatnonzero(np.isnan(time))
     # A comparison with nan is false, so a missing time is not reported a second time as a step back.
     backward = np.flatnonzero(time[1:] <= time[:-1]) + 1
-    for row in untimed[:SHOWN_PER_TRACE]:
+    for row in untimed[:MAX_FAULTS_PER_TRACE]:
         faults.add(file, int(row) + 2, "time_s is empty; every row needs its time")
-    for row in backward[:SHOWN_PER_TRACE]:
+    for row in backward[:MAX_FAULTS_PER_TRACE]:
         text = f"time_s does not increase: {time[row]:.9g} after {time[row - 1]:.9g}; sort or remove the row"
         faults.add(file, int(row) + 2, text)
-    _more(file, max(len(untimed), len(backward)), faults)
+    _report_further(file, max(len(untimed), len(backward)), faults)
     if len(faults) > noted:
         return None
     channels = {}
@@ -137,6 +139,6 @@ def _channels(
     return channels
 
 
-def _more(file: Path, found: int, faults: Faults) -> None:
-    if found > SHOWN_PER_TRACE:
-        faults.add(file, None, f"the same in {found - SHOWN_PER_TRACE} more rows")
+def _report_further(file: Path, found: int, faults: Faults) -> None:
+    if found > MAX_FAULTS_PER_TRACE:
+        faults.add(file, None, f"the same in {found - MAX_FAULTS_PER_TRACE} more rows")

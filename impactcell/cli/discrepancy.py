@@ -70,11 +70,11 @@ def discrepancy(
         if recording is not None:
             plant, name = recording.plant, recording.name
     source, data = _read(campaign, journal, plant)
-    with _steps() as say, _mapper(scheduler) as mapper:
-        findings = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=say)
-        say("writing the report")
-        write_findings(findings, data, output, source, name)
-    tell(f"{verdict_sentence(findings)}\n{output / 'report.html'}")
+    with _steps() as report_step, _mapper(scheduler) as mapper:
+        result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
+        report_step("writing the report")
+        write_findings(result, data, output, source, name)
+    tell(f"{verdict_sentence(result)}\n{output / 'report.html'}")
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:

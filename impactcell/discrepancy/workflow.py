@@ -7,29 +7,29 @@ import numpy as np
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.data import noise_floor
-from impactcell.discrepancy.data.prepared_campaign import Material, laid_out, prepare, split
-from impactcell.discrepancy.data.shots import Index, thinned
-from impactcell.discrepancy.model.block_selection import decided, followed
-from impactcell.discrepancy.model.fit import Fit, refit_own
+from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign, prepare, shot_set, split_held_out
+from impactcell.discrepancy.data.shots import IndexArray, decimate
+from impactcell.discrepancy.model.block_selection import decided_blocks, usable_blocks
+from impactcell.discrepancy.model.fit import Fit, refit_shot_parameters
 from impactcell.discrepancy.model.initial_guess import fit_nominal
-from impactcell.discrepancy.model.intervals import Estimate, estimates
+from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
 from impactcell.discrepancy.model.linearisation import linearise
 from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.search.candidate_fits import Mapper, Setup
-from impactcell.discrepancy.search.experiment_design import Proposal, propose
-from impactcell.discrepancy.search.model_selection import Search, search
-from impactcell.discrepancy.search.unexplained_gap import Unexplained, describe
-from impactcell.discrepancy.search.validation import Proof, prove
+from impactcell.discrepancy.search.candidate_fits import Mapper, SearchContext
+from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
+from impactcell.discrepancy.search.model_selection import SelectionResult, select_model
+from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
+from impactcell.discrepancy.search.validation import Validation, validate
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
 
 NO_GAP, NAMED, TIED, UNKNOWN = "no_gap", "named", "tied", "unknown"
-COARSE = 400
+COARSE_SAMPLES = 400
 """Samples of a channel and shot that a search among many models reads."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Findings:
+class DiscrepancyResult:
     """Outcome of the workflow.
 
     Attributes
@@ -48,28 +48,28 @@ class Findings:
     """
 
     verdict: str
-    material: Material
-    floor: noise_floor.Floor
-    replicates: noise_floor.Replicates
-    training: Index
-    held_out: Index
+    prepared: PreparedCampaign
+    floor: noise_floor.NoiseFloor
+    replicates: noise_floor.ReplicateSpread
+    training: IndexArray
+    held_out: IndexArray
     problem: Problem
     held_problem: Problem
     nominal: Fit
     final: Fit
     held_nominal: Fit
     held_final: Fit
-    search: Search
-    parameters: tuple[Estimate, ...]
-    proof: Proof
-    unexplained: Unexplained | None
-    proposals: tuple[Proposal, ...]
+    selection: SelectionResult
+    parameters: tuple[ParameterEstimate, ...]
+    validation: Validation
+    unexplained: UnexplainedGap | None
+    experiments: tuple[Proposal, ...]
     seed: int
 
     @property
     def added(self) -> tuple[str, ...]:
         """Effects that joined the nominal model."""
-        return self.search.added
+        return self.selection.added
 
 
 def investigate(
@@ -80,7 +80,7 @@ def investigate(
     plant: Plant | None = None,
     library: Sequence[str] | None = None,
     progress: Callable[[str], None] | None = None,
-) -> Findings:
+) -> DiscrepancyResult:
     """Find where model and measurement disagree, name what is missing, add it and prove the gap shrinks.
 
     Parameters
@@ -104,49 +104,54 @@ def investigate(
     DiscrepancyError
         The nominal model cannot be fitted at all.
     """
-    say = progress or (lambda _step: None)
-    each: Mapper = mapper or (lambda function, items: [function(item) for item in items])
+    report_step = progress or (lambda _step: None)
+    mapper_or_serial: Mapper = mapper or (lambda function, items: [function(item) for item in items])
     names = tuple(LIBRARY) if library is None else tuple(library)
     if campaign.excitation is Excitation.DRIVEN:
         # Blocks of one record share what acts between records; there are too few of those for any test.
         names = tuple(name for name in names if LIBRARY[name].kind is not Kind.BETWEEN_SHOTS)
-    material = prepare(campaign)
-    floor = noise_floor.sensors(material)
-    training, held_out = split(material, seed)
-    problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
-    say("fitting the nominal model")
+    prepared = prepare(campaign)
+    floor = noise_floor.sensor_noise(prepared)
+    training, held_out = split_held_out(prepared, seed)
+    problem = Problem(shot_set(prepared, training, floor.noise_std), len(prepared.batches))
+    report_step("fitting the nominal model")
     nominal = fit_nominal(problem, plant)
     if campaign.excitation is Excitation.DRIVEN:
-        kept = followed(problem, nominal)
+        kept = usable_blocks(problem, nominal)
         if len(kept) < len(training):
             note = (
                 f"{len(training) - len(kept)} of {len(training)} training blocks were left out: in them "
                 "stick ends, or does not, by so little that noise decides, or the nominal model does not "
                 "follow them."
             )
-            material = replace(material, notes=(*material.notes, note))
+            prepared = replace(prepared, notes=(*prepared.notes, note))
             training = training[kept]
-            problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
+            problem = Problem(shot_set(prepared, training, floor.noise_std), len(prepared.batches))
             nominal = fit_nominal(problem, plant)
-    say("locating the gap and naming effects")
-    fewer = thinned(problem.shots, COARSE)
-    coarse = problem if fewer is problem.shots else Problem(fewer, len(material.batches))
-    found = search(Setup(problem, coarse, material, names, seed, each, _certain(material, floor)), nominal)
-    final = found.accepted or nominal
-    say("proving on held-out shots")
-    held_problem = Problem(laid_out(material, held_out, floor.noise_std), len(material.batches))
-    if campaign.excitation is Excitation.DRIVEN:
-        held_out = held_out[decided(held_problem, refit_own(held_problem, final))]
-        held_problem = Problem(laid_out(material, held_out, floor.noise_std), len(material.batches))
-    proof, replicates, held_nominal, held_final = _prove(
-        material, floor, (problem, held_problem), nominal, final, (training, held_out), seed
+    report_step("locating the gap and naming effects")
+    fewer = decimate(problem.shots, COARSE_SAMPLES)
+    coarse = problem if fewer is problem.shots else Problem(fewer, len(prepared.batches))
+    selection = select_model(
+        SearchContext(
+            problem, coarse, prepared, names, seed, mapper_or_serial, _is_floor_certain(prepared, floor)
+        ),
+        nominal,
     )
-    tangent = linearise(problem, final)
-    verdict = _verdict(found)
-    say("planning the next experiment")
-    return Findings(
+    final = selection.accepted or nominal
+    report_step("proving on held-out shots")
+    held_problem = Problem(shot_set(prepared, held_out, floor.noise_std), len(prepared.batches))
+    if campaign.excitation is Excitation.DRIVEN:
+        held_out = held_out[decided_blocks(held_problem, refit_shot_parameters(held_problem, final))]
+        held_problem = Problem(shot_set(prepared, held_out, floor.noise_std), len(prepared.batches))
+    proof, replicates, held_nominal, held_final = _validate(
+        prepared, floor, (problem, held_problem), nominal, final, (training, held_out), seed
+    )
+    linearisation = linearise(problem, final)
+    verdict = _verdict(selection)
+    report_step("planning the next experiment")
+    return DiscrepancyResult(
         verdict=verdict,
-        material=material,
+        prepared=prepared,
         floor=floor,
         replicates=replicates,
         training=training,
@@ -157,73 +162,78 @@ def investigate(
         final=final,
         held_nominal=held_nominal,
         held_final=held_final,
-        search=found,
-        parameters=estimates(final, tangent),
-        proof=proof,
-        unexplained=describe(problem, found.nominal) if verdict == UNKNOWN else None,
-        proposals=propose(problem, final, _rivals(found)),
+        selection=selection,
+        parameters=estimate_parameters(final, linearisation),
+        validation=proof,
+        unexplained=describe_gap(problem, selection.nominal) if verdict == UNKNOWN else None,
+        experiments=propose_experiments(problem, final, _tied_models(selection)),
         seed=seed,
     )
 
 
-def _certain(material: Material, floor: noise_floor.Floor) -> bool:
+def _is_floor_certain(prepared: PreparedCampaign, floor: noise_floor.NoiseFloor) -> bool:
     """Whether what is above the floor is a gap: noise is stated, or sampled fast enough to be seen."""
-    return "stated" in floor.source or material.excitation is Excitation.TAP
+    return "stated" in floor.source or prepared.excitation is Excitation.TAP
 
 
-def _verdict(found: Search) -> str:
-    if found.accepted is None:
+def _verdict(selection: SelectionResult) -> str:
+    if selection.accepted is None:
         return UNKNOWN
-    if not found.added:
+    if not selection.added:
         return NO_GAP
-    return TIED if any(found.ties.values()) else NAMED
+    return TIED if any(selection.ties.values()) else NAMED
 
 
-def _prove(
-    material: Material,
-    floor: noise_floor.Floor,
+def _validate(
+    prepared: PreparedCampaign,
+    floor: noise_floor.NoiseFloor,
     problems: tuple[Problem, Problem],
     nominal: Fit,
     final: Fit,
-    places: tuple[Index, Index],
+    places: tuple[IndexArray, IndexArray],
     seed: int,
-) -> tuple[Proof, noise_floor.Replicates, Fit, Fit]:
+) -> tuple[Validation, noise_floor.ReplicateSpread, Fit, Fit]:
     problem, held_problem = problems
-    held = refit_own(held_problem, final)
-    log_factor = np.empty(len(material.shots))
-    log_factor[places[0]] = final.local.log_factor
-    log_factor[places[1]] = held.local.log_factor
-    replicates = noise_floor.replicate_spread(material.shots, log_factor, len(material.batches))
-    proof, old, new = prove(problem, nominal, final, held_problem, floor, replicates, seed)
-    return proof, replicates, old, new
+    held = refit_shot_parameters(held_problem, final)
+    log_factor = np.empty(len(prepared.shots))
+    log_factor[places[0]] = final.shot_parameters.log_factor
+    log_factor[places[1]] = held.shot_parameters.log_factor
+    replicates = noise_floor.replicate_spread(prepared.shots, log_factor, len(prepared.batches))
+    proof, held_nominal, held_final = validate(problem, nominal, final, held_problem, floor, replicates, seed)
+    return proof, replicates, held_nominal, held_final
 
 
-def _rivals(found: Search) -> list[tuple[str, str, Fit]]:
-    made = []
-    for effect, rivals in found.ties.items():
+def _tied_models(selection: SelectionResult) -> list[tuple[str, str, Fit]]:
+    models = []
+    for effect, rivals in selection.ties.items():
         for rival in rivals:
-            wanted = {rival if one == effect else one for one in found.added}
-            for alternative in found.alternatives:
-                if set(alternative.effects) >= wanted and len(alternative.effects) == len(
-                    found.accepted.effects if found.accepted else ()
+            tied_set = {rival if name == effect else name for name in selection.added}
+            for alternative in selection.alternatives:
+                if set(alternative.effects) >= tied_set and len(alternative.effects) == len(
+                    selection.accepted.effects if selection.accepted else ()
                 ):
-                    made.append((effect, rival, alternative.fit))
+                    models.append((effect, rival, alternative.fit))
                     break
-    return made
+    return models
 
 
-def plant_of(findings: Findings) -> Plant:
+def extended_plant(result: DiscrepancyResult) -> Plant:
     """Plant of the final model."""
-    values = {("", one.parameter): one.value for one in findings.parameters if not one.effect}
+    values = {
+        ("", estimate.parameter): estimate.value for estimate in result.parameters if not estimate.effect
+    }
     effects: dict[str, dict[str, float | Sequence[float]]] = {}
-    for one in findings.parameters:
-        if not one.effect:
+    for estimate in result.parameters:
+        if not estimate.effect:
             continue
-        mine = effects.setdefault(one.effect, {})
-        if one.batch:
-            mine[one.parameter] = (*_several(mine.get(one.parameter)), one.value)
+        values_of_effect = effects.setdefault(estimate.effect, {})
+        if estimate.batch:
+            values_of_effect[estimate.parameter] = (
+                *_batch_values(values_of_effect.get(estimate.parameter)),
+                estimate.value,
+            )
         else:
-            mine[one.parameter] = one.value
+            values_of_effect[estimate.parameter] = estimate.value
     mu_k = values["", "mu_k"]
     ratio = values.get(("", "ratio"), 1.0)
     return Plant(
@@ -231,10 +241,10 @@ def plant_of(findings: Findings) -> Plant:
         damping_n_s_per_m=values.get(("", "damping_n_s_per_m"), 0.0),
         mu_s=mu_k * ratio,
         mu_k=mu_k,
-        gravity_m_s2=findings.material.gravity_m_s2,
+        gravity_m_s2=result.prepared.gravity_m_s2,
         effects=effects,
     )
 
 
-def _several(value: float | Sequence[float] | None) -> Sequence[float]:
+def _batch_values(value: float | Sequence[float] | None) -> Sequence[float]:
     return value if isinstance(value, Sequence) else ()

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from impactcell.campaign import Campaign, Excitation, Sensor
-from impactcell.discrepancy.report.result import result
+from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import ImpactCellError
 from impactcell.records import Capture, Channel
@@ -127,7 +127,7 @@ def run(job: Job) -> dict[str, Any]:
         found = investigate(given, seed=job.seed)
     except (ImpactCellError, ValueError, np.linalg.LinAlgError) as error:
         return row | {"verdict": "error", "error": f"{type(error).__name__}: {error}"}
-    outcome = result(found)
+    outcome = result_document(found)
     return row | {
         "verdict": outcome["verdict"],
         "named": [one["effect"] for one in outcome["effects"]],
@@ -135,10 +135,10 @@ def run(job: Job) -> dict[str, Any]:
         "parameters": {one["effect"]: one["parameters"] for one in outcome["effects"]},
         "unexplained": outcome["unexplained"],
         "gap": outcome["gap"],
-        "p_nominal": found.search.nominal.p_value,
-        "p_final": found.search.final.p_value,
-        "blocks": [len(found.material.shots), len(found.training), len(found.held_out)],
-        "tried": [[*one.effects, round(one.behind, 1)] for one in found.search.alternatives[:6]],
+        "p_nominal": found.selection.nominal.p_value,
+        "p_final": found.selection.final.p_value,
+        "blocks": [len(found.prepared.shots), len(found.training), len(found.held_out)],
+        "tried": [[*one.effects, round(one.deficit, 1)] for one in found.selection.alternatives[:6]],
         "seconds": round(time.process_time() - started, 1),
     }
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from impactcell.discrepancy.data import noise_floor
-from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare
+from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import ImpactCellError
@@ -167,18 +167,18 @@ def nominal_gap(job: Job, strength: float, shots: int = FIRST_SHOTS) -> float:
     try:
         plan = scenario(few, [strength])
         made = make(plan)[1]
-        material = prepare(recorded(plan, made))
-        floor = noise_floor.sensors(material)
-        every = np.arange(len(material.shots))
-        problem = Problem(laid_out(material, every, floor.noise_std), len(material.batches))
+        prepared = prepare(recorded(plan, made))
+        floor = noise_floor.sensor_noise(prepared)
+        every = np.arange(len(prepared.shots))
+        problem = Problem(shot_set(prepared, every, floor.noise_std), len(prepared.batches))
         nominal = fit_nominal(problem)
     except ImpactCellError:
         return math.inf
     finally:
         study.RATE_HZ = rate
     size = problem.shots.values.size
-    free = size - len(problem.own) * problem.count - len(nominal.coordinates)
+    free = size - len(problem.shot_parameter_names) * problem.count - len(nominal.coordinates)
     trace = math.sqrt(float(nominal.misfit(problem.shots).sum()) / free)
     scatter = np.log([shot.plan.factor for shot in made])
-    more = float(np.var(nominal.local.log_factor) - np.var(scatter)) / plan.friction_scatter**2
+    more = float(np.var(nominal.shot_parameters.log_factor) - np.var(scatter)) / plan.friction_scatter**2
     return max(trace, math.sqrt(max(1.0 + more, 0.0)))

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from impactcell.discrepancy.data import noise_floor
-from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare, split
+from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set, split_held_out
 from impactcell.discrepancy.model.fit import Fit, fit
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.linearisation import linearise, scores
@@ -70,13 +70,13 @@ def subset(plan: list[Job], found: list[Row]) -> list[Task]:
 def run(task: Task) -> Row:
     """Answers of the rivals on one campaign."""
     job = task.job
-    material = prepare(campaign(job, task.multiples))
-    floor = noise_floor.sensors(material)
-    training, _ = split(material, job.seed)
+    prepared = prepare(campaign(job, task.multiples))
+    floor = noise_floor.sensor_noise(prepared)
+    training, _ = split_held_out(prepared, job.seed)
     library = tuple(effect for effect in LIBRARY if effect != job.removed)
     row: Row = {"key": job.key}
     started = time.process_time()
-    problem = Problem(laid_out(material, training, floor.noise_std), len(material.batches))
+    problem = Problem(shot_set(prepared, training, floor.noise_std), len(prepared.batches))
     nominal = fit_nominal(problem)
     steps = Steps(problem, library)
     for which, criterion in (("bic", bic), ("ratio", likelihood_ratio)):
@@ -102,12 +102,12 @@ class Steps:
         return self.made[model.effects]
 
     def _fits(self, model: Fit) -> list[Fit]:
-        tangent = linearise(self.problem, model)
-        found = candidate_scores.candidates(self.problem, model, tangent, self.library)
-        scored = scores(tangent, found.products)
+        linearisation = linearise(self.problem, model)
+        found = candidate_scores.candidate_directions(self.problem, model, linearisation, self.library)
+        scored = scores(linearisation, found.products)
         ranked = []
         for number, effect in enumerate(found.names):
-            best = candidate_scores.best_probes(found, scored, number, 1)
+            best = candidate_scores.best_points(found, scored, number, 1)
             if best:
                 ranked.append((best[0][0], effect, best[0][1]))
         ranked.sort(key=lambda one: -one[0])
@@ -117,15 +117,24 @@ class Steps:
         return [*filter(None, done), *order[FINISHED:]]
 
     def _fit(self, model: Fit, effect: str, start: np.ndarray) -> Fit | None:
-        at = np.concatenate([model.at, start])
+        theta = np.concatenate([model.theta, start])
         effects = (*model.effects, effect)
         try:
-            return fit(self.problem, effects, at, model.local, spread=model.spread, most_steps=FEW_STEPS)
+            return fit(
+                self.problem, effects, theta, model.shot_parameters, spread=model.spread, most_steps=FEW_STEPS
+            )
         except DiscrepancyError:
             return None
 
     def _finished(self, one: Fit) -> Fit | None:
-        return fit(self.problem, one.effects, one.at, one.local, spread=one.spread, most_steps=MANY_STEPS)
+        return fit(
+            self.problem,
+            one.effects,
+            one.theta,
+            one.shot_parameters,
+            spread=one.spread,
+            most_steps=MANY_STEPS,
+        )
 
 
 def total(problem: Problem, model: Fit) -> float:

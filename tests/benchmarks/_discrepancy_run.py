@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from impactcell.discrepancy.report.result import result
+from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks._discrepancy_plan import calibrated
@@ -32,7 +32,7 @@ def run(job: Job) -> dict[str, Any]:
     library = [effect for effect in LIBRARY if effect != job.removed]
     started = time.process_time()
     found = investigate(given, seed=job.seed, library=library)
-    outcome = result(found)
+    outcome = result_document(found)
     return row | {
         "verdict": outcome["verdict"],
         "named": [one["effect"] for one in outcome["effects"]],
@@ -42,12 +42,12 @@ def run(job: Job) -> dict[str, Any]:
         "unexplained": outcome["unexplained"],
         "proposals": [one["separates"] for one in outcome["next_experiment"]],
         "gap": outcome["gap"],
-        "p_nominal": found.search.nominal.p_value,
-        "p_final": found.search.final.p_value,
+        "p_nominal": found.selection.nominal.p_value,
+        "p_final": found.selection.final.p_value,
         "covered": covered(job, multiples, outcome),
         "tried": [
-            [*one.effects, round(one.behind, 1), round(one.behind_std, 1)]
-            for one in found.search.alternatives[:6]
+            [*one.effects, round(one.deficit, 1), round(one.deficit_std, 1)]
+            for one in found.selection.alternatives[:6]
         ],
         "seconds": round(time.process_time() - started, 2),
     }

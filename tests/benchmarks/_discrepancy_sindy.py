@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 from pysindy import STLSQ, SmoothedFiniteDifference
 
-from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, Shot
+from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, PreparedShot
 from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.phases import FREE_SLIDE, LOADING, UNLOADING, course_of, phases
+from impactcell.discrepancy.model.phases import FREE_SLIDE, LOADING, UNLOADING, sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 
 SMOOTH_SLIDE_S, SMOOTH_CONTACT_S = 0.010, 0.004
@@ -67,14 +67,14 @@ class Smoothed:
 
 def sindy(problem: Problem, nominal: Fit, library: tuple[str, ...]) -> list[list[str]]:
     """Effects that PySINDy names, those with the same term together."""
-    k, b, _, mu = (float(one) for one in problem.parameters(nominal.effects, nominal.at)[:4])
-    phase = phases(problem, course_of(problem, nominal))
+    k, b, _, mu = (float(one) for one in problem.parameters(nominal.effects, nominal.theta)[:4])
+    phase = sample_phases(problem, trajectory_of(problem, nominal))
     force = problem.shots.values[problem.shots.channel == FORCE]
     peak = float(force.max(initial=0.0))
     span = max(float(np.max(np.abs(shot.values[POSITION]))) for shot in problem.shots.items)
     slides, contacts, momenta, speeds = [], [], [], []
     for number, shot in enumerate(problem.shots.items):
-        part = problem.shots.of(number)
+        part = problem.shots.samples_of(number)
         mine = phase[part][problem.shots.channel[part] == POSITION]
         slow = smoothed(problem, shot, mine == FREE_SLIDE, SMOOTH_SLIDE_S)
         if slow is not None:
@@ -96,7 +96,7 @@ def sindy(problem: Problem, nominal: Fit, library: tuple[str, ...]) -> list[list
     return found
 
 
-def smoothed(problem: Problem, shot: Shot, on: np.ndarray, over_s: float) -> Smoothed | None:
+def smoothed(problem: Problem, shot: PreparedShot, on: np.ndarray, over_s: float) -> Smoothed | None:
     """Smooth and differentiate one stretch of a shot; None if it is too short."""
     t = shot.times[POSITION]
     window = max(2 * round(0.5 * over_s / float(np.median(np.diff(t)))) + 1, 7)
@@ -117,7 +117,9 @@ def smoothed(problem: Problem, shot: Shot, on: np.ndarray, over_s: float) -> Smo
     return Smoothed(*(one[:: max(window // SHARE, 1)] for one in made))
 
 
-def slide(problem: Problem, shot: Shot, one: Smoothed, mu: float, span: float) -> tuple[np.ndarray, Columns]:
+def slide(
+    problem: Problem, shot: PreparedShot, one: Smoothed, mu: float, span: float
+) -> tuple[np.ndarray, Columns]:
     """Friction coefficient beyond the nominal one in the free slide, and its terms."""
     g = problem.shots.gravity_m_s2
     on = one.v > 0.1 * one.v.max()
@@ -166,7 +168,7 @@ def contact(one: Smoothed, k: float, b: float, peak: float) -> tuple[np.ndarray,
     return one.force[on] - known, terms
 
 
-def momentum(problem: Problem, shot: Shot, one: Smoothed, mu: float) -> tuple[np.ndarray, Columns]:
+def momentum(problem: Problem, shot: PreparedShot, one: Smoothed, mu: float) -> tuple[np.ndarray, Columns]:
     """Force that neither accelerates the part nor overcomes nominal friction, and its terms."""
     weight = problem.shots.gravity_m_s2 * shot.mass_kg
     terms: Columns = {

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.report.result import result
+from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from tests.benchmarks._discrepancy_judge import RIGHT, TIED, judged
 from tests.benchmarks._discrepancy_plan import calibrated, jobs
@@ -35,7 +35,7 @@ def timed(job: study.Job) -> tuple[float, float, float, bool]:
             given, seed=job.seed, mapper=lambda function, items: list(pool.map(function, items))
         )
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    outcome = result(found)
+    outcome = result_document(found)
     row = {
         "job": {"hidden": job.hidden, "removed": job.removed},
         "verdict": outcome["verdict"],

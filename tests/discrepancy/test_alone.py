@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.data import noise_floor
-from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare
+from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.model.split_fits import Alone, alone
+from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 from tests.discrepancy.study import Job, campaign
 
 ON_THE_FLOOR = 1.05
 
 
-def apart(hidden: str, multiple: float, *, blind: bool = False) -> Alone:
+def apart(hidden: str, multiple: float, *, blind: bool = False) -> SplitFits:
     given = campaign(Job("outside", (hidden,), 5, target=3.0, shots=24), [multiple])
     if blind:
         given = replace(given, shots=tuple(replace(shot, position=None) for shot in given.shots))
-    material = prepare(given)
-    shots = laid_out(material, np.arange(len(material.shots)), noise_floor.sensors(material).noise_std)
-    problem = Problem(shots, len(material.batches))
-    return alone(problem, fit_nominal(problem))
+    prepared = prepare(given)
+    shots = shot_set(prepared, np.arange(len(prepared.shots)), noise_floor.sensor_noise(prepared).noise_std)
+    problem = Problem(shots, len(prepared.batches))
+    return fit_split(problem, fit_nominal(problem))
 
 
 @pytest.mark.parametrize("law", ["bilinear_contact", "relaxing_contact", "actuator_vibration"])

@@ -12,22 +12,22 @@ from tests.discrepancy.test_workflow import make
 
 
 def test_findings_are_looked_at_and_written(tmp_path: Path) -> None:
-    findings = impactcell.discrepancy(make("viscous_friction", shots=24), seed=4)
-    assert findings.verdict == "named"
-    assert findings.effects == ("viscous_friction",)
-    assert "viscous friction" in findings.headline
-    assert findings.gap_after < 1.2 < findings.gap_before
-    value, (low, high) = findings.parameters["viscous_friction"]["viscous_coefficient_n_s_per_m"]
+    result = impactcell.discrepancy(make("viscous_friction", shots=24), seed=4)
+    assert result.verdict == "named"
+    assert result.effects == ("viscous_friction",)
+    assert "viscous friction" in result.headline
+    assert result.gap_after < 1.2 < result.gap_before
+    value, (low, high) = result.parameters["viscous_friction"]["viscous_coefficient_n_s_per_m"]
     assert low < value < high
-    report = findings.write(tmp_path / "out", source="twenty-four shots")
+    report = result.write(tmp_path / "out", source="twenty-four shots")
     assert report.is_file()
     assert json.loads((tmp_path / "out" / "result.json").read_text()) == json.loads(
-        json.dumps(findings.result)
+        json.dumps(result.result)
     )
     extended = read_model(tmp_path / "out" / "model.extended.yaml")
     assert list(extended.plant.effects) == ["viscous_friction"]
     with pytest.raises(CampaignError, match="cannot be written"):
-        findings.write(report)
+        result.write(report)
 
 
 def test_a_directory_that_is_no_campaign_is_refused(tmp_path: Path) -> None:

@@ -5,10 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from impactcell.discrepancy.data.driven_blocks import blocks, velocity
-from impactcell.discrepancy.data.measured_drive import Drive, carried, smooth, weighed
-from impactcell.discrepancy.data.prepared_campaign import laid_out, prepare
-from impactcell.discrepancy.report.result import result
+from impactcell.discrepancy.data.driven_blocks import cut_blocks, smoothed_velocity
+from impactcell.discrepancy.data.measured_drive import (
+    SmoothedDrive,
+    mass_from_momentum,
+    position_response,
+    smooth_drive,
+)
+from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set
+from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
 from tests.benchmarks._discrepancy_driven import LISTED, Job, record
@@ -19,9 +24,9 @@ FEW = ("viscous_friction", "quadratic_drag", "surface_tilt", "force_sensor_offse
 def test_noise_integrated_twice() -> None:
     # A free mass under white noise of density S: the variance of its position is S t^3 / 3 m^2.
     mass, density = 3.0, 2e-4
-    drive = Drive(np.linspace(0.0, 0.5, 101), np.full(101, 50.0), density)
+    drive = SmoothedDrive(np.linspace(0.0, 0.5, 101), np.full(101, 50.0), density)
     h = 0.005
-    G = carried(drive, np.full(101, 0.2), mass, 5.0)
+    G = position_response(drive, np.full(101, 0.2), mass, 5.0)
     # The knots are averages of white noise over h but for what neighbours share.
     variance = density / h * (G**2).sum(axis=1)
     np.testing.assert_allclose(variance[20:], density * drive.time_s[20:] ** 3 / 3.0 / mass**2, rtol=0.1)
@@ -29,9 +34,9 @@ def test_noise_integrated_twice() -> None:
 
 def test_a_stop_forgets_the_speed_and_keeps_the_place() -> None:
     time = np.linspace(0.0, 0.5, 101)
-    drive = Drive(time, np.full(101, 1.0), 1e-4)
+    drive = SmoothedDrive(time, np.full(101, 1.0), 1e-4)
     speed = np.where(time < 0.2, 0.2, 0.0)
-    G = carried(drive, speed, 3.0, 5.0)
+    G = position_response(drive, speed, 3.0, 5.0)
     early = np.flatnonzero(time < 0.1)
     assert (np.abs(G[-1, early]) > 0.0).all()
     np.testing.assert_allclose(G[-1], G[50], atol=1e-18)
@@ -50,7 +55,7 @@ def test_density_of_white_and_coloured_noise(tau: float) -> None:
             noise[i] = keep * noise[i - 1] + np.sqrt(1.0 - keep**2) * noise[i]
         expected *= (1.0 + keep) / (1.0 - keep)
     force = 40.0 * np.sin(2.0 * np.pi * 3.0 * time)
-    drive = smooth(time, force + noise, float(time[-1]))
+    drive = smooth_drive(time, force + noise, float(time[-1]))
     # Where the drive begins to show it is counted as noise: a bound from above, but no loose one.
     assert 0.7 < drive.density / expected < 2.0
     impulse = np.trapezoid(drive.force_n, drive.time_s) - np.trapezoid(force, time)
@@ -60,8 +65,8 @@ def test_density_of_white_and_coloured_noise(tau: float) -> None:
 def test_blocks_begin_where_the_part_is_fast() -> None:
     (capture,) = record(Job("", 7301, coloured=False)).shots
     assert capture.position is not None
-    speed = velocity(capture.position.time_s, capture.position.values)
-    made = blocks((capture,))
+    speed = smoothed_velocity(capture.position.time_s, capture.position.values)
+    made = cut_blocks((capture,))
     assert len(made) >= 20
     for block, place in made:
         assert place == 1
@@ -74,14 +79,14 @@ def test_blocks_begin_where_the_part_is_fast() -> None:
 
 def test_nothing_is_found_where_nothing_is_hidden() -> None:
     found = investigate(record(Job("", 7302, coloured=True)), library=FEW)
-    outcome = result(found)
+    outcome = result_document(found)
     assert outcome["verdict"] == "no_gap"
     assert outcome["gap"]["held_out"]["before"] == pytest.approx(1.0, abs=0.15)
 
 
 def test_a_hidden_effect_is_named_with_its_parameter() -> None:
     found = investigate(record(Job("viscous_friction", 7303, coloured=False)), library=FEW)
-    outcome = result(found)
+    outcome = result_document(found)
     assert outcome["verdict"] == "named"
     (effect,) = outcome["effects"]
     assert effect["effect"] == "viscous_friction"
@@ -110,7 +115,7 @@ def test_the_motion_weighs_the_part() -> None:
     (capture,) = given.shots
     assert capture.position is not None
     assert capture.force is not None
-    assert weighed(capture.position, capture.force) == pytest.approx(capture.mass_kg, rel=0.05)
+    assert mass_from_momentum(capture.position, capture.force) == pytest.approx(capture.mass_kg, rel=0.05)
     heavy = replace(capture, mass_kg=1000.0 * capture.mass_kg)
     with pytest.raises(CampaignError, match="check the units of mass_kg"):
         prepare(replace(given, shots=(heavy,)))
@@ -119,10 +124,10 @@ def test_the_motion_weighs_the_part() -> None:
 
 
 def test_whitened_and_back() -> None:
-    material = prepare(record(Job("", 7302, coloured=True)))
-    shots = laid_out(material, np.arange(4), (float("nan"), 2e-6, float("nan")))
+    prepared = prepare(record(Job("", 7302, coloured=True)))
+    shots = shot_set(prepared, np.arange(4), (float("nan"), 2e-6, float("nan")))
     change = 1e-5 * np.random.default_rng(6).standard_normal(shots.values.size)
-    np.testing.assert_allclose(shots.unwhitened(shots.whitened(change)), change, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(shots.unwhiten(shots.whiten(change)), change, rtol=0.0, atol=1e-12)
     # One position alone is as uncertain as its sensor at the start of a block, and more so later on.
     spread = np.linalg.inv(shots.items[0].whitener)
     deviation = np.sqrt((spread**2).sum(axis=1))

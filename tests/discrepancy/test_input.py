@@ -14,7 +14,7 @@ from impactcell.campaign import Campaign
 from impactcell.cli import discrepancy as command
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.prepared_campaign import prepare
-from impactcell.discrepancy.report.result import result
+from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
 from impactcell.journal.store import Journal
@@ -104,8 +104,8 @@ def test_unequal_rates_and_gaps_in_time_cost_nothing_but_are_said() -> None:
 
     found = investigate(changed(given, spoilt))
     assert found.added == ("viscous_friction",)
-    assert found.proof.after.trace == pytest.approx(1.0, abs=0.06)
-    assert any("has a gap in time" in note for note in result(found)["notes"])
+    assert found.validation.after.trace == pytest.approx(1.0, abs=0.06)
+    assert any("has a gap in time" in note for note in result_document(found)["notes"])
 
 
 def test_a_shot_without_force_among_others_is_used_all_the_same() -> None:
@@ -113,7 +113,7 @@ def test_a_shot_without_force_among_others_is_used_all_the_same() -> None:
     part = changed(given, lambda shot: replace(shot, force=None) if shot.cycle % 3 == 0 else shot)
     found = investigate(part)
     assert found.verdict == "no_gap"
-    assert found.proof.before.trace == pytest.approx(1.0, abs=0.04)
+    assert found.validation.before.trace == pytest.approx(1.0, abs=0.04)
 
 
 def test_without_positions_the_loss_of_power_is_said() -> None:

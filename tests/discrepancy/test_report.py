@@ -7,8 +7,14 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from impactcell.discrepancy.report.page import content, number, verdict_sentence, words, write_report
-from impactcell.discrepancy.workflow import Findings, investigate
+from impactcell.discrepancy.report.page import (
+    format_number,
+    page_context,
+    phrase,
+    verdict_sentence,
+    write_report,
+)
+from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import make
 
@@ -52,7 +58,7 @@ class Page(HTMLParser):
             self.headings.append(data)
 
 
-def page_of(found: Findings, directory: Path) -> Page:
+def page_of(found: DiscrepancyResult, directory: Path) -> Page:
     write_report(found, "a campaign", directory / "report.html")
     page = Page()
     page.feed((directory / "report.html").read_text(encoding="utf-8"))
@@ -61,56 +67,56 @@ def page_of(found: Findings, directory: Path) -> Page:
 
 
 @pytest.fixture(scope="module")
-def tied() -> Findings:
+def tied() -> DiscrepancyResult:
     return investigate(make("mass_error", shots=18))
 
 
 @pytest.fixture(scope="module")
-def unknown() -> Findings:
+def unknown() -> DiscrepancyResult:
     return investigate(make("actuator_vibration", shots=18))
 
 
-def test_the_page_is_whole_and_fetches_nothing(tied: Findings, tmp_path: Path) -> None:
+def test_the_page_is_whole_and_fetches_nothing(tied: DiscrepancyResult, tmp_path: Path) -> None:
     page = page_of(tied, tmp_path)
     assert page.headings == [*SECTIONS, "What to measure next", "How it was computed"]
     assert page.outside() == []
     assert page.pictures == 4  # two maps, the traces, the friction factors
-    assert all(words(effect) in page.text for effect in LIBRARY)
+    assert all(phrase(effect) in page.text for effect in LIBRARY)
     assert "weigh the part" in page.text
 
 
-def test_a_tie_is_told_in_the_sentence(tied: Findings) -> None:
-    first, second = (words(one) for one in (tied.added[0], *tied.search.ties[tied.added[0]]))
+def test_a_tie_is_told_in_the_sentence(tied: DiscrepancyResult) -> None:
+    first, second = (phrase(one) for one in (tied.added[0], *tied.selection.ties[tied.added[0]]))
     assert {first, second} == {"mass error", "force sensor gain"}
     sentence = verdict_sentence(tied)
     assert sentence.startswith(f"Missing: {first} or {second}, which these shots cannot tell apart; the held")
 
 
-def test_an_unknown_gap_leads_to_the_guide(unknown: Findings, tmp_path: Path) -> None:
+def test_an_unknown_gap_leads_to_the_guide(unknown: DiscrepancyResult, tmp_path: Path) -> None:
     page = page_of(unknown, tmp_path)
     (link,) = page.outside()
     guide = urlparse(link)
     assert guide.scheme == "file"
     assert "## A new effect" in Path(unquote(guide.path)).read_text(encoding="utf-8")
     assert unknown.unexplained is not None
-    assert f"largest in phase {words(unknown.unexplained.phase)}" in page.text
+    assert f"largest in phase {phrase(unknown.unexplained.phase)}" in page.text
     assert "→" not in page.text
     assert verdict_sentence(unknown).startswith("No known effect explains a held-out gap of")
 
 
 def test_what_was_named_before_an_unknown_gap_stays_in_the_sentence(
-    tied: Findings, unknown: Findings
+    tied: DiscrepancyResult, unknown: DiscrepancyResult
 ) -> None:
     both = replace(tied, verdict="unknown", unexplained=unknown.unexplained)
     sentence = verdict_sentence(both)
     assert sentence.startswith(
-        f"Missing: {words(tied.added[0])}, and something that no known effect explains"
+        f"Missing: {phrase(tied.added[0])}, and something that no known effect explains"
     )
-    assert f"falls from {tied.proof.before.whole:.2f} to {tied.proof.after.whole:.2f}" in sentence
+    assert f"falls from {tied.validation.before.whole:.2f} to {tied.validation.after.whole:.2f}" in sentence
 
 
-def test_parameters_have_their_units_and_regions_their_place(tied: Findings) -> None:
-    shown = content(tied, "a campaign")
+def test_parameters_have_their_units_and_regions_their_place(tied: DiscrepancyResult) -> None:
+    shown = page_context(tied, "a campaign")
     units = {row["name"]: row["unit"] for row in shown["parameters"]}
     assert units["stiffness_n_per_m"] == "N/m"
     assert units["damping_n_s_per_m"] == "N s/m"
@@ -122,11 +128,11 @@ def test_parameters_have_their_units_and_regions_their_place(tied: Findings) -> 
         for channel, cell in zip(channels, row, strict=True)
         if cell is not None
     }
-    assert cells == set(tied.proof.regions)
+    assert cells == set(tied.validation.regions)
 
 
-def test_numbers_are_told_as_one_reads_them(tied: Findings) -> None:
-    assert [number(value) for value in (670681.4, 440.834, 0.155968, 249.9, 3.2e-6, 4e9)] == [
+def test_numbers_are_told_as_one_reads_them(tied: DiscrepancyResult) -> None:
+    assert [format_number(value) for value in (670681.4, 440.834, 0.155968, 249.9, 3.2e-6, 4e9)] == [
         "670 680",
         "440.83",
         "0.15597",
@@ -134,11 +140,11 @@ def test_numbers_are_told_as_one_reads_them(tied: Findings) -> None:
         "3.2e-06",
         "4e+09",
     ]
-    shown = {row["name"]: row for row in content(tied, "a campaign")["parameters"]}
+    shown = {row["name"]: row for row in page_context(tied, "a campaign")["parameters"]}
     assert shown["mu_s/mu_k"]["value"] > 1.0
 
 
-def test_a_phone_scrolls_tables_and_not_the_page(tied: Findings, tmp_path: Path) -> None:
+def test_a_phone_scrolls_tables_and_not_the_page(tied: DiscrepancyResult, tmp_path: Path) -> None:
     write_report(tied, "a campaign", tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count("<table>") == page.count('<div class="wide"><table>') > 3

@@ -12,11 +12,15 @@ from impactcell.campaign import Campaign
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.noise_floor import replicate_spread
 from impactcell.discrepancy.model.fit import fit
-from impactcell.discrepancy.model.problem import Problem, without_jumps
-from impactcell.discrepancy.model.shot_parameters import point_at, settle
-from impactcell.discrepancy.report.result import result, text_of
-from impactcell.discrepancy.search.indistinguishability import folds, is_tied, out_of_shot
-from impactcell.discrepancy.workflow import Findings, investigate
+from impactcell.discrepancy.model.problem import Problem, remove_jumps
+from impactcell.discrepancy.model.shot_parameters import evaluate, fit_shot_parameters
+from impactcell.discrepancy.report.result import json_text, result_document
+from impactcell.discrepancy.search.indistinguishability import (
+    are_indistinguishable,
+    evaluate_out_of_shot,
+    folds,
+)
+from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Channel
@@ -34,15 +38,15 @@ def make(*hidden: str, seed: int = 3, shots: int = 36) -> Campaign:
         study.RATE_HZ = study_rate
 
 
-def answer(found: Findings) -> tuple[str, set[str]]:
-    tied = {one for rivals in found.search.ties.values() for one in rivals}
+def answer(found: DiscrepancyResult) -> tuple[str, set[str]]:
+    tied = {one for rivals in found.selection.ties.values() for one in rivals}
     return found.verdict, {*found.added, *tied}
 
 
 def test_nothing_is_named_where_nothing_is_hidden() -> None:
     found = investigate(make())
     assert found.verdict == "no_gap"
-    assert found.proof.before.trace == pytest.approx(1.0, abs=0.03)
+    assert found.validation.before.trace == pytest.approx(1.0, abs=0.03)
     assert np.log(found.parameters[0].value) == pytest.approx(
         np.log(study.scenario(study.Job("single", (), 3)).plant.stiffness_n_per_m), rel=1e-4
     )
@@ -57,7 +61,7 @@ def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
     (estimate,) = [one for one in found.parameters if one.effect == effect]
     half = 0.5 * (estimate.high - estimate.low)
     assert abs(estimate.value - truth) < 3.0 * half
-    assert found.proof.after.trace < 1.05
+    assert found.validation.after.trace < 1.05
 
 
 def test_a_jump_at_one_sample_is_no_slope() -> None:
@@ -66,25 +70,34 @@ def test_a_jump_at_one_sample_is_no_slope() -> None:
     jumped[[50, 120]] = 40.0, -900.0
     expected = slope.copy()
     expected[[50, 120]] = 0.0
-    assert np.array_equal(without_jumps(jumped), expected)
-    assert np.array_equal(without_jumps(30.0 * slope), 30.0 * slope)
+    assert np.array_equal(remove_jumps(jumped), expected)
+    assert np.array_equal(remove_jumps(30.0 * slope), 30.0 * slope)
 
 
 def test_likelihood_out_of_shot_is_that_of_a_fit_without_the_shot() -> None:
     found = investigate(make(shots=20))
     problem, model = found.problem, found.nominal
     inside = model.log_likelihood(problem.shots)
-    outside = out_of_shot(problem, model).each
+    outside = evaluate_out_of_shot(problem, model).each
     expected, got = [], []
     for fold in folds(problem)[[0, 5, 9]]:
         mine = np.flatnonzero(folds(problem) == fold)
         others = np.setdiff1d(np.arange(problem.count), mine)
-        rest = Problem(problem.shots.chosen(others), problem.forward.batches)
-        refitted = fit(rest, (), model.at, model.local.of(others), spread=model.spread, tolerance=1e-6)
-        alone = Problem(problem.shots.chosen(mine), problem.forward.batches)
-        start = point_at(alone, (), refitted.at, model.local.of(mine), model.spread)
-        settled = settle(alone, (), start, model.spread, 8)
-        there = replace(model, at=refitted.at, local=settled.local, residual=settled.residual)
+        rest = Problem(problem.shots.select(others), problem.forward.batches)
+        refitted = fit(
+            rest,
+            (),
+            model.theta,
+            model.shot_parameters.samples_of(others),
+            spread=model.spread,
+            tolerance=1e-6,
+        )
+        alone = Problem(problem.shots.select(mine), problem.forward.batches)
+        start = evaluate(alone, (), refitted.theta, model.shot_parameters.samples_of(mine), model.spread)
+        settled = fit_shot_parameters(alone, (), start, model.spread, 8)
+        there = replace(
+            model, theta=refitted.theta, shot_parameters=settled.shot_parameters, residual=settled.residual
+        )
         expected.append((inside[mine] - there.log_likelihood(alone.shots)).sum())
         got.append((inside[mine] - outside[mine]).sum())
     assert np.sum(got) == pytest.approx(np.sum(expected), rel=0.25)
@@ -93,19 +106,19 @@ def test_likelihood_out_of_shot_is_that_of_a_fit_without_the_shot() -> None:
 
 def test_few_shots_that_decide_are_no_tie() -> None:
     found = investigate(make(shots=20))
-    best = out_of_shot(found.problem, found.nominal)
+    best = evaluate_out_of_shot(found.problem, found.nominal)
     each = best.each.copy()
     each[:2] -= 400.0
-    assert not is_tied(found.problem, best, replace(best, each=each))
+    assert not are_indistinguishable(found.problem, best, replace(best, each=each))
     each[:2] += 390.0
-    assert is_tied(found.problem, best, replace(best, each=each))
+    assert are_indistinguishable(found.problem, best, replace(best, each=each))
 
 
 def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
     found = investigate(make("mass_error"))
     assert found.verdict == "tied"
     assert answer(found)[1] == {"mass_error", "force_sensor_gain"}
-    assert "weigh the part" in found.proposals[0].setting
+    assert "weigh the part" in found.experiments[0].setting
 
 
 def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
@@ -113,20 +126,20 @@ def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
     job = study.Job("two", hidden, 50_028, target=4.108, actuator=False)
     found = investigate(study.campaign(job, [1.0751, 0.7086]), seed=job.seed)
     gain = next(one for one in found.added if one != "batch_shift")
-    assert {gain, *found.search.ties[gain]} == {"mass_error", "force_sensor_gain"}
+    assert {gain, *found.selection.ties[gain]} == {"mass_error", "force_sensor_gain"}
     assert "batch_shift" in found.added
 
 
 def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
     hidden = "position_dependent_friction"
     found = investigate(make(hidden, seed=920030), library=[one for one in LIBRARY if one != hidden])
-    assert found.search.alternatives[0].effects == ("friction_patch",)
+    assert found.selection.alternatives[0].effects == ("friction_patch",)
     assert answer(found) == ("unknown", set())
 
 
 def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
     found = investigate(make("actuator_vibration"))
-    outcome = result(found)
+    outcome = result_document(found)
     assert outcome["verdict"] == "unknown"
     assert outcome["effects"] == []
     assert outcome["unexplained"]["phase"] in {"preload", "loading", "unloading"}
@@ -198,10 +211,10 @@ def test_missing_channels_and_replicates_are_said() -> None:
         for i, shot in enumerate(given.shots)
     ]
     found = investigate(replace(given, shots=tuple(jittered)))
-    text = text_of(result(found))
+    text = json_text(result_document(found))
     assert "No force channel" in text
     assert "No replicates" in text
-    assert result(found)["gap"]["parts"]["train"]["before"]["friction_factors"] is None
+    assert result_document(found)["gap"]["parts"]["train"]["before"]["friction_factors"] is None
 
 
 def test_replicate_spread_is_that_of_the_scatter() -> None:
@@ -209,7 +222,7 @@ def test_replicate_spread_is_that_of_the_scatter() -> None:
     rng = np.random.default_rng(2)
     drift = np.linspace(-0.05, 0.05, 60)
     spreads = [
-        replicate_spread(found.material.shots, drift + 0.01 * rng.standard_normal(60), 2).spread
+        replicate_spread(found.prepared.shots, drift + 0.01 * rng.standard_normal(60), 2).spread
         for _ in range(200)
     ]
     assert np.sqrt(np.mean(np.square(spreads))) == pytest.approx(0.01, rel=0.05)

@@ -13,46 +13,46 @@ import numpy as np
 
 from impactcell.records import Capture, Channel, Samples
 
-MOST = 60
+MAX_BLOCKS = 60
 """Blocks in all: each has a few numbers of its own, and more of them make a run longer, not better."""
-SHORTEST = 40
+MIN_BLOCK_SAMPLES = 40
 """Samples of a block."""
-CORRELATION_TIMES = 2.0
-FAST = 0.25
+BLOCK_CORRELATION_TIMES = 2.0
+CUT_SPEED_SHARE = 0.25
 """A cut needs this share of the record's RMS speed."""
-STEADY = 0.02
+VELOCITY_NOISE_SHARE = 0.02
 """Noise of a speed, over the RMS speed."""
 NORMAL_MAD = 1.482602218505602
-THIRD_DIFFERENCE = math.sqrt(20.0)
+THIRD_DIFFERENCE_GAIN = math.sqrt(20.0)
 
 
-def blocks(captures: tuple[Capture, ...]) -> tuple[tuple[Capture, int], ...]:
+def cut_blocks(captures: tuple[Capture, ...]) -> tuple[tuple[Capture, int], ...]:
     """Blocks of all records, each with the place of its record, from 1; at most `MOST`, evenly chosen.
 
     A block's times count from its start, its positions from where the record began; `start_m` says where on
     the table it begins.
     """
-    made = [
+    cut = [
         (block, place)
         for place, capture in enumerate(captures, 1)
         if capture.position is not None and capture.force is not None
-        for block in _of_record(capture, capture.position, capture.force)
+        for block in _blocks_of_record(capture, capture.position, capture.force)
     ]
-    if len(made) > MOST:
-        made = [made[i] for i in np.unique(np.linspace(0, len(made) - 1, MOST).astype(int))]
-    return tuple((replace(block, cycle=number), place) for number, (block, place) in enumerate(made, 1))
+    if len(cut) > MAX_BLOCKS:
+        cut = [cut[i] for i in np.unique(np.linspace(0, len(cut) - 1, MAX_BLOCKS).astype(int))]
+    return tuple((replace(block, cycle=number), place) for number, (block, place) in enumerate(cut, 1))
 
 
-def _of_record(capture: Capture, position: Channel, force: Channel) -> list[Capture]:
-    speed = velocity(position.time_s, position.values)
+def _blocks_of_record(capture: Capture, position: Channel, force: Channel) -> list[Capture]:
+    speed = smoothed_velocity(position.time_s, position.values)
     out = []
-    for first, last in pairwise(_cuts(position.time_s, speed)):
+    for first, last in pairwise(_cut_samples(position.time_s, speed)):
         inside = slice(first, last + 1)
         times = position.time_s[inside]
         # One sample of force either side, so that the drive covers the block.
         low = max(int(np.searchsorted(force.time_s, times[0], "right")) - 1, 0)
         high = min(int(np.searchsorted(force.time_s, times[-1], "left")) + 1, len(force.time_s))
-        if high - low < SHORTEST // 2:
+        if high - low < MIN_BLOCK_SAMPLES // 2:
             continue
         covariates = {**capture.covariates, "time": float(times[0]), "initial_speed": float(speed[first])}
         out.append(
@@ -67,31 +67,34 @@ def _of_record(capture: Capture, position: Channel, force: Channel) -> list[Capt
     return out
 
 
-def _cuts(time: Samples, speed: Samples) -> list[int]:
+def _cut_samples(time: Samples, speed: Samples) -> list[int]:
     """Find the samples at which the part is fastest, more than the correlation time of its velocity apart."""
-    fast = FAST * float(np.sqrt(np.mean(speed**2)))
-    least = max(CORRELATION_TIMES * _correlation(time, speed), SHORTEST * float(np.median(np.diff(time))))
-    made: list[int] = []
-    begin = 0.0
-    reach = least
+    fast = CUT_SPEED_SHARE * float(np.sqrt(np.mean(speed**2)))
+    shortest_s = max(
+        BLOCK_CORRELATION_TIMES * _correlation_time(time, speed),
+        MIN_BLOCK_SAMPLES * float(np.median(np.diff(time))),
+    )
+    cuts: list[int] = []
+    begin_s = 0.0
+    reach_s = shortest_s
     while True:
-        low, high = np.searchsorted(time, [time[0] + begin, time[0] + begin + reach])
-        if high > len(time) - 1 and made:
-            return made
-        found = int(low) + int(np.argmax(np.abs(speed[low:high]))) if high > low else 0
-        if high > low and abs(speed[found]) >= fast:
-            made.append(found)
-            begin, reach = float(time[found] - time[0]) + least, least
+        low, high = np.searchsorted(time, [time[0] + begin_s, time[0] + begin_s + reach_s])
+        if high > len(time) - 1 and cuts:
+            return cuts
+        fastest = int(low) + int(np.argmax(np.abs(speed[low:high]))) if high > low else 0
+        if high > low and abs(speed[fastest]) >= fast:
+            cuts.append(fastest)
+            begin_s, reach_s = float(time[fastest] - time[0]) + shortest_s, shortest_s
         elif high > len(time) - 1:
-            return made
+            return cuts
         else:
-            reach *= 1.5
+            reach_s *= 1.5
 
 
-def velocity(time: Samples, position: Samples) -> Samples:
+def smoothed_velocity(time: Samples, position: Samples) -> Samples:
     """Velocity along +1 by a straight line through as many samples as make it steady, shape (n,)."""
     step = float(np.median(np.diff(time)))
-    noise = float(np.median(np.abs(np.diff(position, 3)))) * NORMAL_MAD / THIRD_DIFFERENCE
+    noise = float(np.median(np.abs(np.diff(position, 3)))) * NORMAL_MAD / THIRD_DIFFERENCE_GAIN
     half = 1
     while True:
         lever = np.arange(-half, half + 1.0)
@@ -105,12 +108,12 @@ def velocity(time: Samples, position: Samples) -> Samples:
         )
         speed: Samples = np.convolve(padded, weight[::-1], "valid") / step
         scatter = noise / (step * math.sqrt(float(lever @ lever)))
-        if scatter <= STEADY * float(np.sqrt(np.mean(speed**2))) or 16 * half > len(position):
+        if scatter <= VELOCITY_NOISE_SHARE * float(np.sqrt(np.mean(speed**2))) or 16 * half > len(position):
             return speed
         half *= 2
 
 
-def _correlation(time: Samples, speed: Samples) -> float:
+def _correlation_time(time: Samples, speed: Samples) -> float:
     """Time after which the velocity's correlation has fallen to 1/e."""
     centred = speed - speed.mean()
     power = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2

@@ -16,25 +16,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular, solveh_banded
 
-from impactcell.discrepancy.data.driven_blocks import NORMAL_MAD, velocity
-from impactcell.discrepancy.data.shots import POSITION, Index, Shot
+from impactcell.discrepancy.data.driven_blocks import NORMAL_MAD, smoothed_velocity
+from impactcell.discrepancy.data.shots import POSITION, IndexArray, PreparedShot
 from impactcell.records import Channel, Samples
 
-MOST_SAMPLES = 80
-FEWEST_KNOTS, MOST_KNOTS = 60, 160
-SIGNAL = 4.0
+MAX_BLOCK_SAMPLES = 80
+MIN_KNOTS, MAX_KNOTS = 60, 160
+SIGNAL_GROWTH = 4.0
 """Growth of the apparent noise density, when the window doubles, that only a signal makes."""
-RESTING = 0.02
+RESTING_SPEED_SHARE = 0.02
 """Share of a block's largest speed below which the part rests."""
-SLIPPING = 0.15
+SLIPPING_SPEED_SHARE = 0.15
 """Share above which it slips without doubt."""
-FEWEST_SLIPPING = 10
-LARGEST_KICK = 0.5
+MIN_SLIP_SAMPLES = 10
+MAX_SPEED_ERROR_SHARE = 0.5
 """Error of the speed after a breakaway, over the block's largest speed, at one standard deviation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class SmoothedDrive:
     """A drive, linear between evenly spaced knots, and the density of its noise [N²/Hz, two-sided]."""
 
     time_s: Samples
@@ -42,7 +42,7 @@ class Drive:
     density: float
 
 
-def reduced(shot: Shot, noise_std_m: float, gravity_m_s2: float, mu_k: float) -> Shot:
+def whiten_block(shot: PreparedShot, noise_std_m: float, gravity_m_s2: float, mu_k: float) -> PreparedShot:
     """Return a block with a smooth drive, fewer samples and the whitener of its residuals.
 
     Parameters
@@ -53,14 +53,14 @@ def reduced(shot: Shot, noise_std_m: float, gravity_m_s2: float, mu_k: float) ->
         About what friction is; only the whitener depends on it.
     """
     time, position = shot.times[POSITION], shot.values[POSITION]
-    speed = velocity(time, position)
-    drive = smooth(shot.drive[0], shot.drive[1], float(time[-1]))
-    step = max(math.ceil(len(time) / MOST_SAMPLES), 1)
+    speed = smoothed_velocity(time, position)
+    drive = smooth_drive(shot.drive[0], shot.drive[1], float(time[-1]))
+    step = max(math.ceil(len(time) / MAX_BLOCK_SAMPLES), 1)
     chosen = time[::step]
     mass = shot.covariates["mass"]
-    G = carried(drive, np.interp(drive.time_s, time, speed), mass, mu_k * mass * gravity_m_s2)
+    G = position_response(drive, np.interp(drive.time_s, time, speed), mass, mu_k * mass * gravity_m_s2)
     seen = np.array([np.interp(chosen, drive.time_s, column) for column in G.T]).T
-    R = noise_std_m**2 * np.eye(len(chosen)) + seen @ _covariance(drive) @ seen.T
+    R = noise_std_m**2 * np.eye(len(chosen)) + seen @ _knot_covariance(drive) @ seen.T
     whitener = solve_triangular(np.linalg.cholesky(R), np.eye(len(chosen)), lower=True)
     empty = np.empty(0)
     return replace(
@@ -72,31 +72,31 @@ def reduced(shot: Shot, noise_std_m: float, gravity_m_s2: float, mu_k: float) ->
     )
 
 
-def smooth(time: Samples, force: Samples, end: float) -> Drive:
+def smooth_drive(time: Samples, force: Samples, end: float) -> SmoothedDrive:
     """Least squares by a function that is linear between knots over 0 to `end`.
 
     Unlike interpolation it has no bias of the mean: what it misses is orthogonal to every such function.
     """
     apart = float(np.median(np.diff(time)))
-    density, window = _noise(force, apart)
-    count = int(np.clip(round(end / (2.0 * window)), FEWEST_KNOTS, MOST_KNOTS))
+    density, window = _noise_density(force, apart)
+    count = int(np.clip(round(end / (2.0 * window)), MIN_KNOTS, MAX_KNOTS))
     count = max(min(count, int(end / apart)), 2)
     knots = np.linspace(min(time[0], 0.0), max(end, time[-1]), count + 1)
-    place = np.clip((time - knots[0]) / (knots[1] - knots[0]), 0.0, count - 1e-9)
-    left = place.astype(int)
-    share = place - left
-    diagonal = np.bincount(left, (1.0 - share) ** 2, count + 1) + np.bincount(left + 1, share**2, count + 1)
-    beside = np.bincount(left, share * (1.0 - share), count + 1)
-    right = np.bincount(left, (1.0 - share) * force, count + 1) + np.bincount(
-        left + 1, share * force, count + 1
+    knot_position = np.clip((time - knots[0]) / (knots[1] - knots[0]), 0.0, count - 1e-9)
+    knot = knot_position.astype(int)
+    share = knot_position - knot
+    diagonal = np.bincount(knot, (1.0 - share) ** 2, count + 1) + np.bincount(knot + 1, share**2, count + 1)
+    beside = np.bincount(knot, share * (1.0 - share), count + 1)
+    moment = np.bincount(knot, (1.0 - share) * force, count + 1) + np.bincount(
+        knot + 1, share * force, count + 1
     )
     # A knot without samples, as in a gap, is joined to its neighbours.
     small = 1e-9 * float(diagonal.max())
     banded = np.vstack([np.concatenate([[0.0], beside[:-1] - small]), diagonal + 2.0 * small])
-    return Drive(knots, solveh_banded(banded, right), density)
+    return SmoothedDrive(knots, solveh_banded(banded, moment), density)
 
 
-def _noise(force: Samples, apart: float) -> tuple[float, float]:
+def _noise_density(force: Samples, apart: float) -> tuple[float, float]:
     """Density of the force's noise, and the window of averages in which the drive begins to show.
 
     Third differences of averages over windows see no slow drive; doubled windows see coloured noise in full.
@@ -107,13 +107,13 @@ def _noise(force: Samples, apart: float) -> tuple[float, float]:
         means = force[: len(force) // window * window].reshape(-1, window).mean(axis=1)
         std = float(np.median(np.abs(np.diff(means, 3)))) * NORMAL_MAD / math.sqrt(20.0)
         now = std**2 * window * apart
-        if window > 1 and now > SIGNAL * density:
+        if window > 1 and now > SIGNAL_GROWTH * density:
             break
         density, window = now, 2 * window
     return density, 0.5 * window * apart
 
 
-def _covariance(drive: Drive) -> Samples:
+def _knot_covariance(drive: SmoothedDrive) -> Samples:
     """Covariance of the knots of a drive with white noise."""
     count = len(drive.time_s)
     h = float(drive.time_s[1] - drive.time_s[0])
@@ -123,7 +123,7 @@ def _covariance(drive: Drive) -> Samples:
     return np.asarray(drive.density * np.linalg.inv(overlap))
 
 
-def carried(drive: Drive, speed: Samples, mass: float, friction: float) -> Samples:
+def position_response(drive: SmoothedDrive, speed: Samples, mass: float, friction: float) -> Samples:
     """Change of the position at every knot with the force at every knot, shape (k, k) [m/N].
 
     Parameters
@@ -136,66 +136,68 @@ def carried(drive: Drive, speed: Samples, mass: float, friction: float) -> Sampl
     count = len(speed)
     h = float(drive.time_s[1] - drive.time_s[0])
     largest = float(np.abs(speed).max())
-    moving = np.where(np.abs(speed) > RESTING * largest, np.sign(speed), 0.0)
+    moving = np.where(np.abs(speed) > RESTING_SPEED_SHARE * largest, np.sign(speed), 0.0)
     force = np.abs(drive.force_n)
     slope = np.abs(np.gradient(drive.force_n, h))
     knot_std = math.sqrt(drive.density / h)
-    V, X = np.zeros(count), np.zeros(count)
-    made = np.zeros((count, count))
+    velocity_response, position_now = np.zeros(count), np.zeros(count)
+    response = np.zeros((count, count))
     for k in range(count - 1):
         if moving[k] == 0.0 and moving[k + 1] != 0.0:
             kick = max(force[k] - friction, 0.0) / mass / max(float(slope[k]), 1e-9)
-            V[k] += min(kick, LARGEST_KICK * largest / max(knot_std, 1e-12))
-        X = X + h * V
+            velocity_response[k] += min(kick, MAX_SPEED_ERROR_SHARE * largest / max(knot_std, 1e-12))
+        position_now = position_now + h * velocity_response
         if moving[k] != 0.0 or moving[k + 1] != 0.0:
-            V = V.copy()
-            X[k] += h * h / 3.0 / mass
-            X[k + 1] += h * h / 6.0 / mass
-            V[k] += 0.5 * h / mass
-            V[k + 1] += 0.5 * h / mass
+            velocity_response = velocity_response.copy()
+            position_now[k] += h * h / 3.0 / mass
+            position_now[k + 1] += h * h / 6.0 / mass
+            velocity_response[k] += 0.5 * h / mass
+            velocity_response[k + 1] += 0.5 * h / mass
         if moving[k + 1] == 0.0:
-            V = np.zeros(count)
+            velocity_response = np.zeros(count)
         elif moving[k] * moving[k + 1] < 0.0:
-            V = V * max(force[k] - friction, 0.0) / max(force[k] + friction, 1e-12)
-        made[k + 1] = X
-    return made
+            velocity_response = (
+                velocity_response * max(force[k] - friction, 0.0) / max(force[k] + friction, 1e-12)
+            )
+        response[k + 1] = position_now
+    return response
 
 
-def friction(shots: tuple[Shot, ...], gravity_m_s2: float) -> tuple[float, float]:
+def friction_of_slip(shots: tuple[PreparedShot, ...], gravity_m_s2: float) -> tuple[float, float]:
     """About what mu_k and mu_s / mu_k are, without any model of stick and slip.
 
     In slip of one direction the impulse of the drive less the momentum grows by mu_k m g a second; mu_s is
     what the drive is worth where the part breaks away.
     """
-    found, weights, edges = [], [], []
+    coefficients, weights, breakaway_ratios = [], [], []
     for shot in shots:
         time = shot.times[POSITION]
-        speed = velocity(time, shot.values[POSITION])
+        speed = smoothed_velocity(time, shot.values[POSITION])
         force = np.interp(time, *shot.drive)
         mass = shot.covariates["mass"]
-        lost = _impulse(time, force) / mass - speed
-        for part, sense in _slips(speed):
-            found.append(np.polyfit(time[part], lost[part], 1)[0] * sense / gravity_m_s2)
+        impulse_lost = _impulse(time, force) / mass - speed
+        for part, sense in _slip_intervals(speed):
+            coefficients.append(np.polyfit(time[part], impulse_lost[part], 1)[0] * sense / gravity_m_s2)
             weights.append((time[part[-1]] - time[part[0]]) ** 3)
-        resting = np.abs(speed) <= RESTING * np.abs(speed).max()
+        resting = np.abs(speed) <= RESTING_SPEED_SHARE * np.abs(speed).max()
         leaves = np.flatnonzero(resting[:-1] & ~resting[1:])
-        edges += (np.abs(force[leaves]) / (mass * gravity_m_s2)).tolist()
-    if not found:
+        breakaway_ratios += (np.abs(force[leaves]) / (mass * gravity_m_s2)).tolist()
+    if not coefficients:
         return 0.15, 1.2
-    order = np.argsort(found)
+    order = np.argsort(coefficients)
     share = np.cumsum(np.array(weights)[order])
-    mu_k = float(np.clip(found[order[np.searchsorted(share, 0.5 * share[-1])]], 0.005, 2.0))
-    ratio = float(np.median(edges)) / mu_k if edges else 1.2
+    mu_k = float(np.clip(coefficients[order[np.searchsorted(share, 0.5 * share[-1])]], 0.005, 2.0))
+    ratio = float(np.median(breakaway_ratios)) / mu_k if breakaway_ratios else 1.2
     return mu_k, min(max(ratio, 1.02), 2.0)
 
 
-def weighed(position: Channel, force: Channel) -> float:
+def mass_from_momentum(position: Channel, force: Channel) -> float:
     """About what a driven part weighs [kg]: what its momentum in slip gains from the impulse of the drive."""
     time = position.time_s
-    speed = velocity(time, position.values)
+    speed = smoothed_velocity(time, position.values)
     impulse = _impulse(time, np.interp(time, force.time_s, force.values))
     rows, right = [], []
-    for part, sense in _slips(speed):
+    for part, sense in _slip_intervals(speed):
         columns = np.column_stack([speed[part], sense * time[part]])
         rows.append(columns - columns.mean(axis=0))
         right.append(impulse[part] - impulse[part].mean())
@@ -209,8 +211,8 @@ def _impulse(time: Samples, force: Samples) -> Samples:
     return np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(time))])
 
 
-def _slips(speed: Samples) -> list[tuple[Index, float]]:
+def _slip_intervals(speed: Samples) -> list[tuple[IndexArray, float]]:
     """Find the samples of every slip in one direction, and that direction."""
-    fast = np.where(np.abs(speed) > SLIPPING * np.abs(speed).max(), np.sign(speed), 0.0)
+    fast = np.where(np.abs(speed) > SLIPPING_SPEED_SHARE * np.abs(speed).max(), np.sign(speed), 0.0)
     parts = np.split(np.arange(len(speed)), np.flatnonzero(np.diff(fast)) + 1)
-    return [(part, float(fast[part[0]])) for part in parts if fast[part[0]] and len(part) >= FEWEST_SLIPPING]
+    return [(part, float(fast[part[0]])) for part in parts if fast[part[0]] and len(part) >= MIN_SLIP_SAMPLES]

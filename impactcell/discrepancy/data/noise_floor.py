@@ -5,21 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.prepared_campaign import Material
-from impactcell.discrepancy.data.shots import CHANNELS, Index, Shot
+from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
+from impactcell.discrepancy.data.shots import CHANNELS, IndexArray, PreparedShot
 from impactcell.errors import CampaignError
 from impactcell.records import Samples
 
 # Var of the third difference of white noise of unit variance: 1 + 9 + 9 + 1.
-THIRD_DIFFERENCE = math.sqrt(20.0)
+THIRD_DIFFERENCE_GAIN = math.sqrt(20.0)
 NORMAL_MAD = 1.482602218505602
-DISAGREES = 30.0
-FEWEST_FREE = 3
-SMALLEST_SPREAD = 1e-9
+NOISE_UNIT_FACTOR = 30.0
+MIN_DEGREES_OF_FREEDOM = 3
+MIN_REPLICATE_SPREAD = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Floor:
+class NoiseFloor:
     """Noise floor of a campaign.
 
     Attributes
@@ -36,7 +36,7 @@ class Floor:
     notes: tuple[str, ...]
 
 
-def sensors(material: Material) -> Floor:
+def sensor_noise(prepared: PreparedCampaign) -> NoiseFloor:
     """Noise of each channel: as stated, else from third differences of neighbouring samples.
 
     Raises
@@ -49,12 +49,12 @@ def sensors(material: Material) -> Floor:
     stds: list[float] = []
     sources: list[str] = []
     for channel, name in enumerate(CHANNELS):
-        if not any(len(shot.values[channel]) for shot in material.shots):
+        if not any(len(shot.values[channel]) for shot in prepared.shots):
             stds.append(math.nan)
             sources.append("none")
             continue
-        estimate = white_noise(material.shots, channel)
-        stated = material.stated_noise[channel]
+        estimate = white_noise(prepared.shots, channel)
+        stated = prepared.stated_noise[channel]
         if math.isnan(stated):
             if not estimate > 0.0:
                 message = (
@@ -69,7 +69,7 @@ def sensors(material: Material) -> Floor:
             stds.append(estimate)
             sources.append("estimated")
             continue
-        if estimate > DISAGREES * stated or 0.0 < estimate < stated / DISAGREES**1.5:
+        if estimate > NOISE_UNIT_FACTOR * stated or 0.0 < estimate < stated / NOISE_UNIT_FACTOR**1.5:
             message = (
                 f"{name}: its noise is stated as {stated:.3g}, but neighbouring samples scatter by "
                 f"{estimate:.3g}: "
@@ -78,12 +78,12 @@ def sensors(material: Material) -> Floor:
             raise CampaignError(message)
         stds.append(stated)
         sources.append("stated")
-    return Floor((stds[0], stds[1], stds[2]), (sources[0], sources[1], sources[2]), tuple(notes))
+    return NoiseFloor((stds[0], stds[1], stds[2]), (sources[0], sources[1], sources[2]), tuple(notes))
 
 
-def white_noise(shots: tuple[Shot, ...], channel: int) -> float:
+def white_noise(shots: tuple[PreparedShot, ...], channel: int) -> float:
     """Estimate the noise that differs from sample to sample by a robust third difference."""
-    found: list[float] = []
+    estimates: list[float] = []
     for shot in shots:
         values = shot.values[channel]
         if len(values) < 8:
@@ -92,12 +92,12 @@ def white_noise(shots: tuple[Shot, ...], channel: int) -> float:
         spread = float(np.median(np.abs(third))) * NORMAL_MAD
         if spread == 0.0:
             spread = float(third.std())
-        found.append(spread / THIRD_DIFFERENCE)
-    return float(np.median(found)) if found else math.nan
+        estimates.append(spread / THIRD_DIFFERENCE_GAIN)
+    return float(np.median(estimates)) if estimates else math.nan
 
 
 @dataclass(frozen=True, slots=True)
-class Replicates:
+class ReplicateSpread:
     """Pure error of the friction factors.
 
     Attributes
@@ -105,15 +105,15 @@ class Replicates:
     spread : float
         Standard deviation of the logarithm of a factor about that of its replicates, slow drift, batches
         and dwell taken out; nan without replicates.
-    free : int
+    degrees_of_freedom : int
         Degrees of freedom.
     """
 
     spread: float
-    free: int
+    degrees_of_freedom: int
 
 
-def replicate_spread(shots: tuple[Shot, ...], log_factor: Samples, batches: int) -> Replicates:
+def replicate_spread(shots: tuple[PreparedShot, ...], log_factor: Samples, batches: int) -> ReplicateSpread:
     """Spread of friction factors between shots of the same settings.
 
     Replicates still differ in when they were taken, in batch and in dwell; these act between shots and
@@ -129,8 +129,8 @@ def replicate_spread(shots: tuple[Shot, ...], log_factor: Samples, batches: int)
     _, member = np.unique(group, return_inverse=True)
     size = np.bincount(member)
     inside = size[member] > 1
-    if int(inside.sum() - np.unique(member[inside]).size) < FEWEST_FREE:
-        return Replicates(math.nan, 0)
+    if int(inside.sum() - np.unique(member[inside]).size) < MIN_DEGREES_OF_FREEDOM:
+        return ReplicateSpread(math.nan, 0)
     columns = [np.array([shot.place / shot.shots for shot in shots])]
     columns += [np.array([float(shot.batch == batch) for shot in shots]) for batch in range(1, batches)]
     dwell = np.array([shot.covariates["dwell"] for shot in shots])
@@ -139,17 +139,20 @@ def replicate_spread(shots: tuple[Shot, ...], log_factor: Samples, batches: int)
     X = np.column_stack(columns)[inside]
     y = log_factor[inside]
     member = member[inside]
-    X = X - _means(X, member)
-    y = y - _means(y[:, None], member)[:, 0]
+    X = X - _group_means(X, member)
+    y = y - _group_means(y[:, None], member)[:, 0]
     coefficients, _, rank, _ = np.linalg.lstsq(X, y, rcond=1e-9)
-    free = len(y) - np.unique(member).size - int(rank)
-    if free < FEWEST_FREE:
-        return Replicates(math.nan, 0)
-    left = y - X @ coefficients
-    return Replicates(max(math.sqrt(float(left @ left) / free), SMALLEST_SPREAD), free)
+    degrees_of_freedom = len(y) - np.unique(member).size - int(rank)
+    if degrees_of_freedom < MIN_DEGREES_OF_FREEDOM:
+        return ReplicateSpread(math.nan, 0)
+    residual = y - X @ coefficients
+    return ReplicateSpread(
+        max(math.sqrt(float(residual @ residual) / degrees_of_freedom), MIN_REPLICATE_SPREAD),
+        degrees_of_freedom,
+    )
 
 
-def _means(columns: Samples, member: Index) -> Samples:
+def _group_means(columns: Samples, member: IndexArray) -> Samples:
     count = np.bincount(member)
     sums = np.zeros((len(count), columns.shape[1]))
     np.add.at(sums, member, columns)

@@ -10,22 +10,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.campaign import Campaign, Excitation
-from impactcell.discrepancy.data.driven_blocks import blocks
-from impactcell.discrepancy.data.measured_drive import friction, reduced, weighed
-from impactcell.discrepancy.data.shots import POSITION, Index, Shot, Shots, lay_out
+from impactcell.discrepancy.data.driven_blocks import cut_blocks
+from impactcell.discrepancy.data.measured_drive import friction_of_slip, mass_from_momentum, whiten_block
+from impactcell.discrepancy.data.shots import POSITION, IndexArray, PreparedShot, ShotSet, concatenate_shots
 from impactcell.discrepancy.data.unit_checks import check_units
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel, Samples
 
-FEWEST_SHOTS = 6
-HELD_OUT = 0.25
-GAP_FACTOR = 5.0
-WRONG_UNIT = 30.0
-EMPTY = np.empty(0)
+MIN_SHOTS = 6
+HELD_OUT_SHARE = 0.25
+TIME_GAP_FACTOR = 5.0
+MASS_UNIT_FACTOR = 30.0
+NO_SAMPLES = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Material:
+class PreparedCampaign:
     """A campaign made ready.
 
     Attributes
@@ -44,14 +44,14 @@ class Material:
     excitation: Excitation
     gravity_m_s2: float
     stroke_m: float
-    shots: tuple[Shot, ...]
+    shots: tuple[PreparedShot, ...]
     batches: tuple[str, ...]
     covariates: tuple[str, ...]
     stated_noise: tuple[float, float, float]
     notes: tuple[str, ...]
 
 
-def prepare(campaign: Campaign) -> Material:
+def prepare(campaign: Campaign) -> PreparedCampaign:
     """Make a campaign ready for the workflow.
 
     Raises
@@ -64,14 +64,14 @@ def prepare(campaign: Campaign) -> Material:
     records = list(range(1, len(captures) + 1))
     weights: list[float] = []
     if campaign.excitation is Excitation.DRIVEN:
-        weights = [_weight(capture, notes) for capture in captures]
-        cut = blocks(captures)
+        weights = [_record_mass(capture, notes) for capture in captures]
+        cut = cut_blocks(captures)
         captures, records = tuple(block for block, _ in cut), [record for _, record in cut]
-    if len(captures) < FEWEST_SHOTS:
+    if len(captures) < MIN_SHOTS:
         unit = "blocks" if campaign.excitation is Excitation.DRIVEN else "shots"
         message = (
             f"{len(captures)} {unit} are too few: the shot is the unit of every test, and with fewer than "
-            f"{FEWEST_SHOTS} none can be made. Record at least {FEWEST_SHOTS}, better 30"
+            f"{MIN_SHOTS} none can be made. Record at least {MIN_SHOTS}, better 30"
         )
         raise CampaignError(message)
     batches: list[str] = []
@@ -91,66 +91,73 @@ def prepare(campaign: Campaign) -> Material:
         )
         key = settings if campaign.excitation is Excitation.TAP else (float(place),)
         group = groups.setdefault(key, len(groups))
-        shots.append(_shot(capture, record, len(campaign.shots), batch, group, campaign.excitation))
+        shots.append(_prepared_shot(capture, record, len(campaign.shots), batch, group, campaign.excitation))
     if weights:
         for shot in shots:
             shot.covariates["mass"] = weights[shot.place - 1]
-    _say_what_lacks(campaign, shots, notes)
+    _note_missing_information(campaign, shots, notes)
     check_units(campaign.excitation, campaign.gravity_m_s2, shots)
-    stated = (_stated(captures, "force"), _stated(captures, "position"), _stated(captures, "actuator"))
+    stated = (
+        _stated_noise(captures, "force"),
+        _stated_noise(captures, "position"),
+        _stated_noise(captures, "actuator"),
+    )
     if campaign.excitation is Excitation.DRIVEN:
         stated = (math.nan, stated[1], math.nan)
-    return Material(
+    return PreparedCampaign(
         campaign.excitation,
         campaign.gravity_m_s2,
         campaign.stroke_m,
         tuple(shots),
         tuple(batches),
-        _varying(shots, campaign.excitation),
+        _varying_covariates(shots, campaign.excitation),
         stated,
         tuple(notes),
     )
 
 
-def split(material: Material, seed: int) -> tuple[Index, Index]:
+def split_held_out(prepared: PreparedCampaign, seed: int) -> tuple[IndexArray, IndexArray]:
     """Places of the training and of the held-out shots, each in file order.
 
     A quarter is held out, spread over the settings; of a driven record it is the last third of each. Held-out
     shots come first from settings that have replicates, so that no setting is lost to training.
     """
-    n = len(material.shots)
-    places = np.arange(n)
-    if material.excitation is Excitation.DRIVEN:
-        record = np.array([shot.place for shot in material.shots])
+    n = len(prepared.shots)
+    indices = np.arange(n)
+    if prepared.excitation is Excitation.DRIVEN:
+        record = np.array([shot.place for shot in prepared.shots])
         last = [
-            mine[len(mine) - len(mine) // 3 :] for mine in (places[record == r] for r in np.unique(record))
+            members[len(members) - len(members) // 3 :]
+            for members in (indices[record == r] for r in np.unique(record))
         ]
-        held = np.concatenate(last) if sum(map(len, last)) > n // 4 else places[n - max(n // 3, 1) :]
-        return np.setdiff1d(places, held), held
+        held = np.concatenate(last) if sum(map(len, last)) > n // 4 else indices[n - max(n // 3, 1) :]
+        return np.setdiff1d(indices, held), held
     rng = np.random.default_rng([seed, 1])
     order = rng.permutation(n)
-    keys = np.array([_stratum(shot) for shot in material.shots])
+    keys = np.array([_stratum(shot) for shot in prepared.shots])
     # Round after round one shot of every stratum: the later rounds go to training last, so that
     # the held-out shots are those of the first rounds of the fullest strata.
     rank = np.empty(n, dtype=np.int64)
-    seen: dict[tuple[float, ...], int] = {}
-    for place in order:
-        key = tuple(keys[place])
-        rank[place] = seen.get(key, 0)
-        seen[key] = rank[place] + 1
-    count = np.array([seen[tuple(key)] for key in keys])
+    count_of_stratum: dict[tuple[float, ...], int] = {}
+    for index in order:
+        key = tuple(keys[index])
+        rank[index] = count_of_stratum.get(key, 0)
+        count_of_stratum[key] = rank[index] + 1
+    count = np.array([count_of_stratum[tuple(key)] for key in keys])
     share = (rank + rng.random(n)) / count
-    wanted = max(round(HELD_OUT * n), 1)
-    held = np.sort(np.lexsort((order, share))[:wanted])
-    return np.setdiff1d(places, held), held
+    held_out_count = max(round(HELD_OUT_SHARE * n), 1)
+    held = np.sort(np.lexsort((order, share))[:held_out_count])
+    return np.setdiff1d(indices, held), held
 
 
-def _stratum(shot: Shot) -> tuple[float, float]:
+def _stratum(shot: PreparedShot) -> tuple[float, float]:
     velocity = shot.velocity_m_s if math.isfinite(shot.velocity_m_s) else 0.0
     return (velocity, float(shot.direction))
 
 
-def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, excitation: Excitation) -> Shot:
+def _prepared_shot(
+    capture: Capture, place: int, shots: int, batch: int, group: int, excitation: Excitation
+) -> PreparedShot:
     channels = [capture.force, capture.position, capture.actuator]
     drive = np.empty((2, 0))
     if excitation is Excitation.DRIVEN and capture.force is not None:
@@ -171,7 +178,7 @@ def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, exci
     covariates |= {name: value for name, value in capture.covariates.items() if isinstance(value, float)}
     if excitation is Excitation.DRIVEN:
         covariates["direction"] = math.copysign(1.0, covariates["initial_speed"])
-    return Shot(
+    return PreparedShot(
         number=capture.cycle,
         place=place,
         shots=shots,
@@ -182,14 +189,14 @@ def _shot(capture: Capture, place: int, shots: int, batch: int, group: int, exci
         dwell_s=capture.dwell_s,
         start_m=capture.start_m,
         group=group,
-        times=_of_each(channels, "time_s"),
-        values=_of_each(channels, "values"),
+        times=_channel_arrays(channels, "time_s"),
+        values=_channel_arrays(channels, "values"),
         drive=drive,
         covariates=covariates,
     )
 
 
-def _weight(record: Capture, notes: list[str]) -> float:
+def _record_mass(record: Capture, notes: list[str]) -> float:
     """Mass of a driven record's part as stated; else about what the motion says, and it is fitted.
 
     Raises
@@ -199,40 +206,44 @@ def _weight(record: Capture, notes: list[str]) -> float:
     """
     if record.position is None or record.force is None:
         return record.mass_kg
-    found = weighed(record.position, record.force)
+    estimated = mass_from_momentum(record.position, record.force)
     if math.isnan(record.mass_kg):
-        if math.isnan(found):
+        if math.isnan(estimated):
             message = f"shot {record.cycle}: its mass_kg is not stated, and its motion does not tell it"
             raise CampaignError(message)
         notes.append(f"The mass of shot {record.cycle} is not stated and is fitted, block by block.")
-        return found
-    if found > WRONG_UNIT * record.mass_kg or found < record.mass_kg / WRONG_UNIT:
+        return estimated
+    if estimated > MASS_UNIT_FACTOR * record.mass_kg or estimated < record.mass_kg / MASS_UNIT_FACTOR:
         message = (
             f"shot {record.cycle}: its part is stated as {record.mass_kg:.3g} kg, but moves as one of "
-            f"{found:.3g} kg would; check the units of mass_kg, force_n, position_m and time_s"
+            f"{estimated:.3g} kg would; check the units of mass_kg, force_n, position_m and time_s"
         )
         raise CampaignError(message)
     return record.mass_kg
 
 
-def _of_each(channels: list[Channel | None], what: str) -> tuple[Samples, Samples, Samples]:
-    force, position, actuator = (EMPTY if one is None else getattr(one, what) for one in channels)
+def _channel_arrays(channels: list[Channel | None], attribute: str) -> tuple[Samples, Samples, Samples]:
+    force, position, actuator = (
+        NO_SAMPLES if channel is None else getattr(channel, attribute) for channel in channels
+    )
     return force, position, actuator
 
 
-def _varying(shots: list[Shot], excitation: Excitation) -> tuple[str, ...]:
+def _varying_covariates(shots: list[PreparedShot], excitation: Excitation) -> tuple[str, ...]:
     """Covariates that vary; from block to block of a driven record, as its friction is one draw for all."""
     record = np.array([shot.place if excitation is Excitation.DRIVEN else 0 for shot in shots])
     names: list[str] = []
     for name in shots[0].covariates:
         values = np.array([shot.covariates.get(name, math.nan) for shot in shots])
-        least = 1e-12 * np.abs(values).max()
-        if np.isfinite(values).all() and any(np.ptp(values[record == one]) > least for one in set(record)):
+        threshold = 1e-12 * np.abs(values).max()
+        if np.isfinite(values).all() and any(
+            np.ptp(values[record == number]) > threshold for number in set(record)
+        ):
             names.append(name)
     return tuple(names)
 
 
-def _stated(captures: tuple[Capture, ...], name: str) -> float:
+def _stated_noise(captures: tuple[Capture, ...], name: str) -> float:
     for capture in captures:
         channel: Channel | None = getattr(capture, name)
         if channel is not None and channel.noise_std is not None:
@@ -240,7 +251,7 @@ def _stated(captures: tuple[Capture, ...], name: str) -> float:
     return math.nan
 
 
-def _say_what_lacks(campaign: Campaign, shots: list[Shot], notes: list[str]) -> None:
+def _note_missing_information(campaign: Campaign, shots: list[PreparedShot], notes: list[str]) -> None:
     tap = campaign.excitation is Excitation.TAP
     if tap and not any(len(shot.times[0]) for shot in shots):
         notes.append("No force channel: effects of contact and force sensor are seen in the motion only.")
@@ -264,15 +275,17 @@ def _say_what_lacks(campaign: Campaign, shots: list[Shot], notes: list[str]) -> 
         )
     for shot in shots:
         steps = [np.diff(times) for times in shot.times if len(times) > 1]
-        if any(one.max() > GAP_FACTOR * np.median(one) for one in steps):
+        if any(step.max() > TIME_GAP_FACTOR * np.median(step) for step in steps):
             notes.append(f"Shot {shot.number} has a gap in time; what happened in it is lost.")
             break
 
 
-def laid_out(material: Material, places: Index, noise_std: tuple[float, float, float]) -> Shots:
+def shot_set(
+    prepared: PreparedCampaign, places: IndexArray, noise_std: tuple[float, float, float]
+) -> ShotSet:
     """Lay out some of the shots for fits; driven blocks with a smooth drive and their whiteners."""
-    items = tuple(material.shots[int(place)] for place in places)
-    if material.excitation is Excitation.DRIVEN:
-        mu_k, _ = friction(material.shots, material.gravity_m_s2)
-        items = tuple(reduced(shot, noise_std[POSITION], material.gravity_m_s2, mu_k) for shot in items)
-    return lay_out(material.excitation, material.gravity_m_s2, material.stroke_m, items, noise_std)
+    items = tuple(prepared.shots[int(place)] for place in places)
+    if prepared.excitation is Excitation.DRIVEN:
+        mu_k, _ = friction_of_slip(prepared.shots, prepared.gravity_m_s2)
+        items = tuple(whiten_block(shot, noise_std[POSITION], prepared.gravity_m_s2, mu_k) for shot in items)
+    return concatenate_shots(prepared.excitation, prepared.gravity_m_s2, prepared.stroke_m, items, noise_std)

@@ -11,11 +11,11 @@ from impactcell.records import Samples
 CHANNELS = ("force", "position", "actuator")
 FORCE, POSITION, ACTUATOR = range(3)
 
-Index = NDArray[np.int64]
+IndexArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class PreparedShot:
     """One shot, or one block of a driven record.
 
     Attributes
@@ -63,7 +63,7 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shots:
+class ShotSet:
     """A set of shots laid out for fits: samples shot after shot, channel after channel.
 
     Attributes
@@ -81,34 +81,39 @@ class Shots:
     excitation: Excitation
     gravity_m_s2: float
     stroke_m: float
-    items: tuple[Shot, ...]
+    items: tuple[PreparedShot, ...]
     noise_std: tuple[float, float, float]
     values: Samples
     weights: Samples
-    channel: Index
-    bounds: Index
+    channel: IndexArray
+    bounds: IndexArray
 
     def __len__(self) -> int:
         return len(self.items)
 
-    def of(self, shot: int) -> slice:
+    def samples_of(self, shot: int) -> slice:
         """Select the samples of one shot."""
         return slice(int(self.bounds[shot]), int(self.bounds[shot + 1]))
 
-    def whitened(self, change: Samples) -> Samples:
+    def whiten(self, change: Samples) -> Samples:
         """Scale residuals, shape (N,), so that they are independent and of unit variance."""
         if self.excitation is not Excitation.DRIVEN:
-            made: Samples = change * self.weights
-            return made
-        return np.concatenate([shot.whitener @ change[self.of(i)] for i, shot in enumerate(self.items)])
+            scaled: Samples = change * self.weights
+            return scaled
+        return np.concatenate(
+            [shot.whitener @ change[self.samples_of(i)] for i, shot in enumerate(self.items)]
+        )
 
-    def unwhitened(self, residual: Samples) -> Samples:
+    def unwhiten(self, residual: Samples) -> Samples:
         """Scale residuals back: measured minus predicted [N, m, m]."""
         if self.excitation is not Excitation.DRIVEN:
-            made: Samples = residual / self.weights
-            return made
+            scaled: Samples = residual / self.weights
+            return scaled
         return np.concatenate(
-            [np.linalg.solve(shot.whitener, residual[self.of(i)]) for i, shot in enumerate(self.items)]
+            [
+                np.linalg.solve(shot.whitener, residual[self.samples_of(i)])
+                for i, shot in enumerate(self.items)
+            ]
         )
 
     @property
@@ -116,9 +121,9 @@ class Shots:
         """Time of every sample, shape (N,)."""
         return np.concatenate([np.concatenate(shot.times) for shot in self.items])
 
-    def chosen(self, places: Index) -> "Shots":
+    def select(self, places: IndexArray) -> "ShotSet":
         """Return the same set with only some of its shots, in the order given."""
-        return lay_out(
+        return concatenate_shots(
             self.excitation,
             self.gravity_m_s2,
             self.stroke_m,
@@ -127,13 +132,13 @@ class Shots:
         )
 
 
-def lay_out(
+def concatenate_shots(
     excitation: Excitation,
     gravity_m_s2: float,
     stroke_m: float,
-    items: tuple[Shot, ...],
+    items: tuple[PreparedShot, ...],
     noise_std: tuple[float, float, float],
-) -> Shots:
+) -> ShotSet:
     """Put the samples of many shots in one row."""
     values = np.concatenate([np.concatenate(shot.values) for shot in items])
     channel = np.concatenate(
@@ -141,17 +146,17 @@ def lay_out(
     )
     weights = 1.0 / np.asarray(noise_std)[channel]
     bounds = np.concatenate([[0], np.cumsum([shot.size for shot in items])]).astype(np.int64)
-    return Shots(excitation, gravity_m_s2, stroke_m, items, noise_std, values, weights, channel, bounds)
+    return ShotSet(excitation, gravity_m_s2, stroke_m, items, noise_std, values, weights, channel, bounds)
 
 
-def thinned(shots: Shots, most: int) -> Shots:
-    """Keep every k-th sample, so that no channel of a shot has more than about `most`.
+def decimate(shots: ShotSet, max_samples: int) -> ShotSet:
+    """Keep every k-th sample, so that no channel of a shot has more than about `max_samples`.
 
     Fits and scores cost what they read; a search among many models can do with fewer samples than the
     comparison of the last few.
     """
     longest = max(len(channel) for shot in shots.items for channel in shot.values)
-    step = max(longest // most, 1)
+    step = max(longest // max_samples, 1)
     if step == 1:
         return shots
     items = tuple(
@@ -162,4 +167,4 @@ def thinned(shots: Shots, most: int) -> Shots:
         )
         for shot in shots.items
     )
-    return lay_out(shots.excitation, shots.gravity_m_s2, shots.stroke_m, items, shots.noise_std)
+    return concatenate_shots(shots.excitation, shots.gravity_m_s2, shots.stroke_m, items, shots.noise_std)

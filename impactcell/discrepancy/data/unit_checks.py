@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.data.shots import Shot
+from impactcell.discrepancy.data.shots import PreparedShot
 from impactcell.errors import CampaignError
 
 
-def check_units(excitation: Excitation, gravity: float, shots: list[Shot]) -> None:
+def check_units(excitation: Excitation, gravity: float, shots: list[PreparedShot]) -> None:
     """Notice a column that is wrong by a large factor.
 
     The part leaves the actuator at one to two times its velocity, the impulse of the contact makes m v, and

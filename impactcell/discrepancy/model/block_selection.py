@@ -4,42 +4,46 @@ from dataclasses import replace
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import Index
+from impactcell.discrepancy.data.shots import IndexArray
 from impactcell.discrepancy.model.fit import Fit
 from impactcell.discrepancy.model.problem import Problem
 
-NUDGE = 0.02
+FRICTION_CHANGE = 0.02
 """Relative change of friction that may not change what happens in a block."""
-LOPSIDED = 25.0
-LOST = 30.0
-FOLLOWED = 4.0
+MAX_ASYMMETRY = 25.0
+MAX_MISFIT_OVER_MEDIAN = 30.0
+ACCEPTED_MISFIT = 4.0
 
 
-def decided(problem: Problem, model: Fit) -> Index:
+def decided_blocks(problem: Problem, model: Fit) -> IndexArray:
     """Blocks in which slightly more and slightly less friction change the motion alike.
 
     Where the drive comes within a hair of breaking the part away, or the part turns within a hair of
     sticking, noise decides what happens: one of the two makes another course of events.
     """
     kept = np.ones(problem.count, dtype=bool)
-    ratio = next(i for i, one in enumerate(model.coordinates) if one.parameter == "ratio" and not one.effect)
+    ratio = next(
+        i
+        for i, coordinate in enumerate(model.coordinates)
+        if coordinate.parameter == "ratio" and not coordinate.effect
+    )
     for column in (ratio, None):
         size = []
-        for nudge in (NUDGE, -NUDGE):
-            at, local = model.at.copy(), model.local
+        for nudge in (FRICTION_CHANGE, -FRICTION_CHANGE):
+            theta, shot_parameters = model.theta.copy(), model.shot_parameters
             if column is None:
-                local = replace(local, log_factor=local.log_factor + nudge)
+                shot_parameters = replace(shot_parameters, log_factor=shot_parameters.log_factor + nudge)
             else:
-                at[column] += nudge
-            change = problem.residual(model.effects, at, local) - model.residual
+                theta[column] += nudge
+            change = problem.residual(model.effects, theta, shot_parameters) - model.residual
             size.append(np.add.reduceat(change**2, problem.shots.bounds[:-1]))
         more, less = np.maximum(*size), np.minimum(*size)
-        kept &= ~(more > LOPSIDED * np.maximum(less, problem.sizes))
+        kept &= ~(more > MAX_ASYMMETRY * np.maximum(less, problem.sizes))
     return np.flatnonzero(kept)
 
 
-def followed(problem: Problem, model: Fit) -> Index:
+def usable_blocks(problem: Problem, model: Fit) -> IndexArray:
     """Blocks that are decided and that the model follows at all."""
     misfit = model.misfit(problem.shots) / problem.sizes
-    limit = max(LOST * float(np.median(misfit)), FOLLOWED)
-    return np.intersect1d(decided(problem, model), np.flatnonzero(misfit <= limit))
+    limit = max(MAX_MISFIT_OVER_MEDIAN * float(np.median(misfit)), ACCEPTED_MISFIT)
+    return np.intersect1d(decided_blocks(problem, model), np.flatnonzero(misfit <= limit))

@@ -11,21 +11,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import Index, Shots
-from impactcell.discrepancy.model.forward import Local
+from impactcell.discrepancy.data.shots import IndexArray, ShotSet
+from impactcell.discrepancy.model.forward import ShotParameters
 from impactcell.discrepancy.model.parameters import Coordinate
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.model.shot_parameters import (
-    THOROUGH,
-    Point,
-    begin_at,
-    better_of,
-    correct,
-    cost_of,
-    normal,
-    own_steps,
-    point_at,
-    settle,
+    THOROUGH_STEPS,
+    FitState,
+    better_per_shot,
+    correct_shot_parameters,
+    evaluate,
+    fit_shot_parameters,
+    initialise,
+    normal_equations,
+    shot_steps,
+    total_cost,
 )
 from impactcell.errors import DiscrepancyError
 from impactcell.records import Samples
@@ -50,9 +50,9 @@ class Fit:
     ----------
     effects : tuple of str
     coordinates : tuple of Coordinate
-    at : ndarray, shape (p,)
+    theta : ndarray, shape (p,)
         Coordinates at the optimum.
-    local : Local
+    shot_parameters : Local
     spread : float
         Standard deviation of the logarithm of the friction factors.
     residual : ndarray, shape (N,)
@@ -61,26 +61,26 @@ class Fit:
 
     effects: tuple[str, ...]
     coordinates: tuple[Coordinate, ...]
-    at: Samples
-    local: Local
+    theta: Samples
+    shot_parameters: ShotParameters
     spread: float
     residual: Samples
 
-    def misfit(self, shots: Shots) -> Samples:
+    def misfit(self, shots: ShotSet) -> Samples:
         """Squared residual of every shot, shape (n,)."""
         return np.add.reduceat(self.residual**2, shots.bounds[:-1])
 
-    def log_likelihood(self, shots: Shots) -> Samples:
+    def log_likelihood(self, shots: ShotSet) -> Samples:
         """Log-likelihood of every shot but for constants, shape (n,): its traces, and its factor."""
-        factor = (self.local.log_factor / self.spread) ** 2 + 2.0 * math.log(self.spread)
+        factor = (self.shot_parameters.log_factor / self.spread) ** 2 + 2.0 * math.log(self.spread)
         return -0.5 * (self.misfit(shots) + factor)
 
 
 def fit(
     problem: Problem,
     effects: tuple[str, ...],
-    at: Samples,
-    local: Local,
+    theta: Samples,
+    shot_parameters: ShotParameters,
     *,
     spread: float = FIRST_SPREAD,
     most_steps: int = 30,
@@ -92,9 +92,9 @@ def fit(
     ----------
     problem : Problem
     effects : tuple of str
-    at : ndarray, shape (p,)
+    theta : ndarray, shape (p,)
         Start, in coordinates.
-    local : Local
+    shot_parameters : Local
         Start of each shot's own numbers.
     spread : float
         First value of the factors' spread; it is fitted too.
@@ -107,157 +107,181 @@ def fit(
         The plant has no answer at the start.
     """
     coordinates = problem.coordinates(effects)
-    lower = np.array([one.lower for one in coordinates])
-    upper = np.array([one.upper for one in coordinates])
-    at = np.clip(at, lower, upper)
-    point = settle(problem, effects, point_at(problem, effects, at, local, spread), spread)
+    lower = np.array([coordinate.lower for coordinate in coordinates])
+    upper = np.array([coordinate.upper for coordinate in coordinates])
+    theta = np.clip(theta, lower, upper)
+    point = fit_shot_parameters(
+        problem, effects, evaluate(problem, effects, theta, shot_parameters, spread), spread
+    )
     if not point.cost < math.inf:
         raise DiscrepancyError(
             f"the plant with {', '.join(effects) or 'no effect'} has no answer at the start"
         )
     limits = (lower, upper)
-    point = _recentred(coordinates, point, spread)
-    point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
+    point = _centre_factors(coordinates, point, spread)
+    point, spread = _gauss_newton(problem, effects, point, spread, limits, (most_steps, tolerance))
     if most_steps >= WHOLE:
         for _ in range(RESCUES):
-            stuck = _stuck(problem, effects, point, spread)
+            stuck = _stuck_shots(problem, effects, point, spread)
             if not len(stuck):
                 break
             before = point.cost
-            point = _recentred(coordinates, _rescued(problem, effects, point, spread, limits, stuck), spread)
-            point, spread = _descend(problem, effects, point, spread, limits, (most_steps, tolerance))
+            point = _centre_factors(
+                coordinates, _refit_without_stuck(problem, effects, point, spread, limits, stuck), spread
+            )
+            point, spread = _gauss_newton(problem, effects, point, spread, limits, (most_steps, tolerance))
             if point.cost > before - 1.0:
                 break
-    return Fit(effects, coordinates, point.at, point.local, spread, point.residual)
+    return Fit(effects, coordinates, point.theta, point.shot_parameters, spread, point.residual)
 
 
-def _recentred(coordinates: tuple[Coordinate, ...], point: Point, spread: float) -> Point:
+def _centre_factors(coordinates: tuple[Coordinate, ...], point: FitState, spread: float) -> FitState:
     """Move what all friction factors have in common into mu_k, which leaves every trace as it is."""
-    place = next(i for i, one in enumerate(coordinates) if one.parameter == "mu_k" and not one.effect)
-    common = float(np.median(point.local.log_factor))
-    moved = min(max(float(point.at[place]) + common, coordinates[place].lower), coordinates[place].upper)
-    common = moved - float(point.at[place])
-    at = point.at.copy()
-    at[place] = moved
-    local = replace(point.local, log_factor=point.local.log_factor - common)
-    return Point(at, local, point.residual, cost_of(point.residual, local, spread))
+    column = next(
+        i
+        for i, coordinate in enumerate(coordinates)
+        if coordinate.parameter == "mu_k" and not coordinate.effect
+    )
+    common = float(np.median(point.shot_parameters.log_factor))
+    moved = min(
+        max(float(point.theta[column]) + common, coordinates[column].lower), coordinates[column].upper
+    )
+    common = moved - float(point.theta[column])
+    theta = point.theta.copy()
+    theta[column] = moved
+    shot_parameters = replace(point.shot_parameters, log_factor=point.shot_parameters.log_factor - common)
+    return FitState(
+        theta, shot_parameters, point.residual, total_cost(point.residual, shot_parameters, spread)
+    )
 
 
-def _rescued(
+def _refit_without_stuck(
     problem: Problem,
     effects: tuple[str, ...],
-    point: Point,
+    point: FitState,
     spread: float,
     limits: tuple[Samples, Samples],
-    stuck: Index,
-) -> Point:
+    stuck: IndexArray,
+) -> FitState:
     """Start the stuck shots again, at shared parameters to which only the other shots are fitted.
 
     A few shots whose events come in another order hold up the fit of all: every step that helps the others
     makes them worse. Shots that are far off are left out with them.
     """
-    point = _begun_again(problem, effects, point, spread, stuck)
+    point = _reinitialise(problem, effects, point, spread, stuck)
     misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
     good = np.setdiff1d(np.flatnonzero(misfit <= FAR * float(np.median(misfit))), stuck)
     if len(good) == problem.count or len(good) < 0.6 * problem.count:
         return point
-    part = Problem(problem.shots.chosen(good), problem.forward.batches)
-    start = point_at(part, effects, point.at, point.local.of(good), spread)
-    found, _ = _descend(part, effects, start, spread, limits, (WHOLE, 1.0))
-    moved = point_at(problem, effects, found.at, point.local.put(good, found.local), spread)
-    others = np.setdiff1d(np.arange(problem.count), good)
-    other = _begun_again(problem, effects, moved, spread, others)
-    return other if other.cost < point.cost else point
+    part = Problem(problem.shots.select(good), problem.forward.batches)
+    start = evaluate(part, effects, point.theta, point.shot_parameters.samples_of(good), spread)
+    refitted, _ = _gauss_newton(part, effects, start, spread, limits, (WHOLE, 1.0))
+    moved = evaluate(
+        problem, effects, refitted.theta, point.shot_parameters.put(good, refitted.shot_parameters), spread
+    )
+    left_out = np.setdiff1d(np.arange(problem.count), good)
+    restarted = _reinitialise(problem, effects, moved, spread, left_out)
+    return restarted if restarted.cost < point.cost else point
 
 
-def _begun_again(
-    problem: Problem, effects: tuple[str, ...], point: Point, spread: float, which: Index
-) -> Point:
+def _reinitialise(
+    problem: Problem, effects: tuple[str, ...], point: FitState, spread: float, which: IndexArray
+) -> FitState:
     """Start some shots again; each keeps what suits it better."""
-    part = Problem(problem.shots.chosen(which), problem.forward.batches)
-    again = begin_at(part, effects, point.at, spread, (0.0, -spread, spread))
-    new = point_at(problem, effects, point.at, point.local.put(which, again.local), spread)
-    return better_of(problem, point, new, spread)
+    part = Problem(problem.shots.select(which), problem.forward.batches)
+    reinitialised = initialise(part, effects, point.theta, spread, (0.0, -spread, spread))
+    restarted = evaluate(
+        problem, effects, point.theta, point.shot_parameters.put(which, reinitialised.shot_parameters), spread
+    )
+    return better_per_shot(problem, point, restarted, spread)
 
 
-def _stuck(problem: Problem, effects: tuple[str, ...], point: Point, spread: float) -> Index:
+def _stuck_shots(problem: Problem, effects: tuple[str, ...], point: FitState, spread: float) -> IndexArray:
     """Shots whose own numbers are not at their optimum: the cost would still fall to first order."""
     misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
     if float(np.median(misfit)) > NOT_IT:
         return np.empty(0, dtype=np.int64)
-    Jl = problem.own_derivatives(effects, point.at, point.local, point.residual)
-    _, _, blocks = normal(problem, np.empty((0, point.residual.size)), Jl, point, spread)
+    Jl = problem.shot_jacobian(effects, point.theta, point.shot_parameters, point.residual)
+    _, _, blocks = normal_equations(problem, np.empty((0, point.residual.size)), Jl, point, spread)
     promise = np.einsum("iq,iqr,ir->i", blocks.gradient, blocks.inverse, blocks.gradient)
     return np.flatnonzero(promise > PROMISE)
 
 
-def _descend(
+def _gauss_newton(
     problem: Problem,
     effects: tuple[str, ...],
-    point: Point,
+    point: FitState,
     spread: float,
     limits: tuple[Samples, Samples],
     budget: tuple[int, float],
-) -> tuple[Point, float]:
+) -> tuple[FitState, float]:
     """Damped Gauss-Newton steps until the cost no longer falls."""
     lower, upper = limits
     most_steps, tolerance = budget
     damping = 1e-3
-    calm = 0
-    near = False
+    small_gains = 0
+    keep_jacobian = False
     J = Jl = np.empty(0)
     for _ in range(most_steps):
-        if not near:
-            J = problem.shared_derivatives(effects, point.at, point.local, point.residual)
-            Jl = problem.own_derivatives(effects, point.at, point.local, point.residual)
-        H, g, blocks = normal(problem, J, Jl, point, spread)
-        taken = False
-        for _attempt in range(1 if near else 8):
-            free = ~(((point.at <= lower) & (g < 0.0)) | ((point.at >= upper) & (g > 0.0)))
-            step = np.zeros_like(point.at)
+        if not keep_jacobian:
+            J = problem.shared_jacobian(effects, point.theta, point.shot_parameters, point.residual)
+            Jl = problem.shot_jacobian(effects, point.theta, point.shot_parameters, point.residual)
+        H, g, blocks = normal_equations(problem, J, Jl, point, spread)
+        improved = False
+        for _attempt in range(1 if keep_jacobian else 8):
+            free = ~(((point.theta <= lower) & (g < 0.0)) | ((point.theta >= upper) & (g > 0.0)))
+            step = np.zeros_like(point.theta)
             scaled = H[np.ix_(free, free)].copy()
             scale = np.maximum(np.diag(scaled), 1e-12 * max(float(np.diag(H).max()), 1e-300))
             scaled[np.diag_indices_from(scaled)] += damping * scale
             step[free] = np.linalg.lstsq(scaled, g[free], rcond=None)[0]
-            there = np.clip(point.at + step, lower, upper)
-            own = own_steps(blocks, there - point.at)
-            trial = point_at(problem, effects, there, problem.moved(point.local, own), spread)
-            trial = correct(problem, effects, trial, Jl, blocks, spread)
+            trial_theta = np.clip(point.theta + step, lower, upper)
+            own_steps = shot_steps(blocks, trial_theta - point.theta)
+            trial = evaluate(
+                problem,
+                effects,
+                trial_theta,
+                problem.step_shot_parameters(point.shot_parameters, own_steps),
+                spread,
+            )
+            trial = correct_shot_parameters(problem, effects, trial, Jl, blocks, spread)
             if trial.cost < point.cost:
-                taken = True
+                improved = True
                 break
             damping *= 10.0
             if damping > GIVES_UP:
                 break
-        if not taken and near:
+        if not improved and keep_jacobian:
             damping /= 10.0
-            near = False
+            keep_jacobian = False
             continue
-        if not taken:
+        if not improved:
             break
         # Derivatives are worth having anew only when the parameters have moved since.
-        near = float(np.abs(trial.at - point.at).max(initial=0.0)) < NEAR
+        keep_jacobian = float(np.abs(trial.theta - point.theta).max(initial=0.0)) < NEAR
         gain = point.cost - trial.cost
         point = trial
         damping = max(damping / 8.0, 1e-9)
-        newest = max(float(np.sqrt(np.mean(point.local.log_factor**2))), SMALLEST_SPREAD)
-        moved = abs(math.log(newest / spread))
-        spread = newest
-        point = replace(point, cost=cost_of(point.residual, point.local, spread))
+        new_spread = max(float(np.sqrt(np.mean(point.shot_parameters.log_factor**2))), SMALLEST_SPREAD)
+        moved = abs(math.log(new_spread / spread))
+        spread = new_spread
+        point = replace(point, cost=total_cost(point.residual, point.shot_parameters, spread))
         # A model that is far from the floor need not be found to the last digit.
         excess = max(point.cost - point.residual.size, 0.0)
-        calm = calm + 1 if gain < max(tolerance, HOPELESS * excess) and moved < 0.01 else 0
-        if calm > (gain >= tolerance):
+        small_gains = small_gains + 1 if gain < max(tolerance, HOPELESS * excess) and moved < 0.01 else 0
+        if small_gains > (gain >= tolerance):
             break
     return point, spread
 
 
-def refit_own(problem: Problem, model: Fit) -> Fit:
+def refit_shot_parameters(problem: Problem, model: Fit) -> Fit:
     """Keep the shared parameters of `model` and fit only what every shot of `problem` has of its own."""
-    point = begin_at(problem, model.effects, model.at, 1e3, (0.0, -model.spread, model.spread))
-    return replace(model, local=point.local, residual=point.residual)
+    point = initialise(problem, model.effects, model.theta, 1e3, (0.0, -model.spread, model.spread))
+    return replace(model, shot_parameters=point.shot_parameters, residual=point.residual)
 
 
-def begin(problem: Problem, effects: tuple[str, ...], at: Samples, steps: int = THOROUGH) -> Local:
+def initial_shot_parameters(
+    problem: Problem, effects: tuple[str, ...], theta: Samples, steps: int = THOROUGH_STEPS
+) -> ShotParameters:
     """Fit what every shot has of its own from several starts; the best of them shot by shot."""
-    return begin_at(problem, effects, at, FIRST_SPREAD, steps=steps).local
+    return initialise(problem, effects, theta, FIRST_SPREAD, steps=steps).shot_parameters

@@ -1,4 +1,4 @@
-"""Predictions of the plant for a whole set of shots, in the layout of `Shots`."""
+"""Predictions of the plant for a whole set of shots, in the layout of `ShotSet`."""
 
 import math
 from dataclasses import dataclass, fields
@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.data.shots import Index, Shots
+from impactcell.discrepancy.data.shots import IndexArray, ShotSet
 from impactcell.numerics.jit import IntArray
 from impactcell.physics import TapInput
 from impactcell.physics import memory_layout as at
@@ -46,7 +46,7 @@ def _integrate_shots(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Local:
+class ShotParameters:
     """What every shot has of its own, each of shape (n,).
 
     Attributes
@@ -65,28 +65,28 @@ class Local:
     speed_m_s: Samples
     shift_m: Samples
 
-    def of(self, places: Index) -> "Local":
+    def samples_of(self, places: IndexArray) -> "ShotParameters":
         """Return the numbers of some of the shots."""
-        return Local(*(getattr(self, one.name)[places] for one in fields(self)))
+        return ShotParameters(*(getattr(self, item.name)[places] for item in fields(self)))
 
-    def put(self, places: Index, other: "Local") -> "Local":
-        """Return the same numbers but for those of some shots, which are taken from `other`."""
-        made = {one.name: getattr(self, one.name).copy() for one in fields(self)}
-        for name, values in made.items():
-            values[places] = getattr(other, name)
-        return Local(**made)
+    def put(self, places: IndexArray, replacement: "ShotParameters") -> "ShotParameters":
+        """Return the same numbers but for those of some shots, which are taken from `replacement`."""
+        values_by_name = {item.name: getattr(self, item.name).copy() for item in fields(self)}
+        for name, values in values_by_name.items():
+            values[places] = getattr(replacement, name)
+        return ShotParameters(**values_by_name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class Trajectory:
     """State of the part and of the actuator at every sample, shape (N,) each, along the shot."""
 
-    advance_m: Samples
+    part_displacement_m: Samples
     speed_m_s: Samples
-    travel_m: Samples
+    actuator_displacement_m: Samples
 
 
-class Forward:
+class ForwardModel:
     """The plant's answers for one set of shots.
 
     Parameters
@@ -96,7 +96,7 @@ class Forward:
         How many batches the whole campaign has; a part of it may show fewer.
     """
 
-    def __init__(self, shots: Shots, batches: int) -> None:
+    def __init__(self, shots: ShotSet, batches: int) -> None:
         self.shots = shots
         free = shots.excitation is not Excitation.TAP
         taps = [
@@ -131,51 +131,58 @@ class Forward:
         """Parameters of a row: nominal four, then those of the effects."""
         return build_law_table(effects, self.batches).names
 
-    def rows(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Samples:
+    def rows(self, effects: tuple[str, ...], parameters: Samples, shot_parameters: ShotParameters) -> Samples:
         """Rows for the integrator; `parameters` has shape (P,) or (n, P)."""
-        taps = self._columns | {"mass_kg": local.mass_kg, "initial_speed_m_s": local.speed_m_s}
+        taps = self._columns | {
+            "mass_kg": shot_parameters.mass_kg,
+            "initial_speed_m_s": shot_parameters.speed_m_s,
+        }
         table = np.broadcast_to(parameters, (len(self.shots), parameters.shape[-1]))
         rows = build_law_table(effects, self.batches).rows(table, self.shots.gravity_m_s2, taps)
-        factor = np.exp(local.log_factor)
+        factor = np.exp(shot_parameters.log_factor)
         rows[:, at.MU_S] *= factor
         rows[:, at.MU_K] *= factor
         return rows
 
-    def samples(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Samples:
+    def samples(
+        self, effects: tuple[str, ...], parameters: Samples, shot_parameters: ShotParameters
+    ) -> Samples:
         """Predicted samples, shape (N,); not finite where the plant has no answer."""
         out = np.empty(self._times.size)
         figures = np.empty((len(self.shots), at.FIGURES))
-        rows = self.rows(effects, parameters, local)
+        rows = self.rows(effects, parameters, shot_parameters)
         laws = build_law_table(effects, self.batches).laws
         _integrate_shots(
             rows, laws, self._drive, self._drive_bounds, LONGEST_S, self._cursors, self._times, out, figures
         )
-        if local.shift_m.any():
-            out += np.repeat(local.shift_m, np.diff(self.shots.bounds))
+        if shot_parameters.shift_m.any():
+            out += np.repeat(shot_parameters.shift_m, np.diff(self.shots.bounds))
         return out
 
-    def course(self, effects: tuple[str, ...], parameters: Samples, local: Local) -> Course:
+    def trajectory(
+        self, effects: tuple[str, ...], parameters: Samples, shot_parameters: ShotParameters
+    ) -> Trajectory:
         """Follow what the part does at every sample's time, whatever channel the sample belongs to."""
-        order = _sorted_within(self.shots, self._times)
+        order = _time_order(self.shots, self._times)
         times = self._times[order]
-        found = np.empty((3, times.size))
+        states = np.empty((3, times.size))
         figures = np.empty((len(self.shots), at.FIGURES))
-        rows = self.rows(effects, parameters, local)
+        rows = self.rows(effects, parameters, shot_parameters)
         laws = build_law_table(effects, self.batches).laws
         for k, channel in enumerate((at.POSITION, at.PART_VELOCITY, at.ACTUATOR)):
             cursors = np.zeros_like(self._cursors)
             cursors[:, channel] = self.shots.bounds[:-1]
             cursors[:, at.CHANNELS + channel] = self.shots.bounds[1:]
             _integrate_shots(
-                rows, laws, self._drive, self._drive_bounds, LONGEST_S, cursors, times, found[k], figures
+                rows, laws, self._drive, self._drive_bounds, LONGEST_S, cursors, times, states[k], figures
             )
         back = np.empty_like(order)
         back[order] = np.arange(order.size)
         sign = np.repeat(self._columns["direction"], np.diff(self.shots.bounds))
-        return Course(*(sign * found[k][back] for k in range(3)))
+        return Trajectory(*(sign * states[k][back] for k in range(3)))
 
 
-def _sorted_within(shots: Shots, times: Samples) -> IntArray:
+def _time_order(shots: ShotSet, times: Samples) -> IntArray:
     """Order that sorts the samples of every shot by time."""
     owner = np.repeat(np.arange(len(shots)), np.diff(shots.bounds))
     order: IntArray = np.lexsort((times, owner)).astype(np.int64)

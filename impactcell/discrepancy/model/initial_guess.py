@@ -6,17 +6,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.data.measured_drive import friction
-from impactcell.discrepancy.data.shots import FORCE, POSITION, Shot
-from impactcell.discrepancy.model.fit import Fit, begin, fit
+from impactcell.discrepancy.data.measured_drive import friction_of_slip
+from impactcell.discrepancy.data.shots import FORCE, POSITION, PreparedShot
+from impactcell.discrepancy.model.fit import Fit, fit, initial_shot_parameters
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import DiscrepancyError
 from impactcell.physics import Plant
 from impactcell.records import Samples
 
-RATIOS = (1.15, 1.5)
+TAP_RATIOS = (1.15, 1.5)
 DRIVEN_RATIOS = (1.05, 1.3)
-STIFFNESSES = (5e4, 2e5, 6e5, 2e6, 8e6)
+FALLBACK_STIFFNESSES = (5e4, 2e5, 6e5, 2e6, 8e6)
 
 
 def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
@@ -28,62 +28,65 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
         No start leads to a fit.
     """
     shots = problem.shots
-    mu = _friction(shots.items, shots.gravity_m_s2)
+    mu = _friction_of_slide(shots.items, shots.gravity_m_s2)
     starts: list[Samples] = []
     if shots.excitation is Excitation.FREE_SLIDE:
         starts.append(np.array([math.log(mu)]))
     elif shots.excitation is Excitation.DRIVEN:
-        mu, ratio = friction(shots.items, shots.gravity_m_s2)
-        starts += [np.array([math.log(mu), math.log(one)]) for one in (ratio, *DRIVEN_RATIOS)]
+        mu, ratio = friction_of_slip(shots.items, shots.gravity_m_s2)
+        starts += [np.array([math.log(mu), math.log(initial)]) for initial in (ratio, *DRIVEN_RATIOS)]
     else:
-        found = _contact(shots.items)
-        pairs = [found] if found is not None else [(k, 0.7e-3 * k) for k in STIFFNESSES]
+        contact = _contact_regression(shots.items)
+        pairs = [contact] if contact is not None else [(k, 0.7e-3 * k) for k in FALLBACK_STIFFNESSES]
         starts += [
             np.array([math.log(k), b / 100.0, math.log(mu), math.log(ratio)])
             for k, b in pairs
-            for ratio in RATIOS
+            for ratio in TAP_RATIOS
         ]
     effects: tuple[str, ...] = ()
     if plant is not None:
         effects = tuple(plant.effects)
         starts = [
-            _given(problem, plant),
-            *(np.concatenate([one, _given(problem, plant)[len(one) :]]) for one in starts),
+            _coordinates_of(problem, plant),
+            *(
+                np.concatenate([initial, _coordinates_of(problem, plant)[len(initial) :]])
+                for initial in starts
+            ),
         ]
     best: Fit | None = None
     failures: list[str] = []
     for start in starts:
         try:
-            made = fit(problem, effects, start, begin(problem, effects, start))
+            fitted = fit(problem, effects, start, initial_shot_parameters(problem, effects, start))
         except DiscrepancyError as error:
             failures.append(str(error))
             continue
-        if best is None or made.misfit(shots).sum() < best.misfit(shots).sum():
-            best = made
+        if best is None or fitted.misfit(shots).sum() < best.misfit(shots).sum():
+            best = fitted
     if best is None:
         raise DiscrepancyError(f"the nominal model cannot be fitted: {failures[0]}")
     return best
 
 
-def _given(problem: Problem, plant: Plant) -> Samples:
+def _coordinates_of(problem: Problem, plant: Plant) -> Samples:
     """Coordinates of a plant."""
-    made = []
-    for one in problem.coordinates(tuple(plant.effects)):
-        if one.effect:
-            value = plant.effects[one.effect].get(one.parameter, math.nan)
+    theta = []
+    for coordinate in problem.coordinates(tuple(plant.effects)):
+        if coordinate.effect:
+            value = plant.effects[coordinate.effect].get(coordinate.parameter, math.nan)
             if isinstance(value, Sequence):
-                value = value[one.batch - 1] if one.batch - 1 < len(value) else math.nan
-            made.append(one.start if math.isnan(value) else one.coordinate(value))
-        elif one.parameter == "ratio":
-            made.append(one.coordinate(max(plant.mu_s / plant.mu_k, 1.0)))
+                value = value[coordinate.batch - 1] if coordinate.batch - 1 < len(value) else math.nan
+            theta.append(coordinate.initial if math.isnan(value) else coordinate.coordinate(value))
+        elif coordinate.parameter == "ratio":
+            theta.append(coordinate.coordinate(max(plant.mu_s / plant.mu_k, 1.0)))
         else:
-            made.append(one.coordinate(getattr(plant, one.parameter)))
-    return np.array(made)
+            theta.append(coordinate.coordinate(getattr(plant, coordinate.parameter)))
+    return np.array(theta)
 
 
-def _friction(items: tuple[Shot, ...], gravity: float) -> float:
+def _friction_of_slide(items: tuple[PreparedShot, ...], gravity: float) -> float:
     """Coefficient from the curvature of the slide after the fastest moment."""
-    found = []
+    coefficients = []
     for shot in items:
         time, position = shot.times[POSITION], shot.values[POSITION] * shot.direction
         if len(time) < 12:
@@ -99,13 +102,13 @@ def _friction(items: tuple[Shot, ...], gravity: float) -> float:
             continue
         bend = np.polyfit(time[inside] - t[first], position[inside], 2)[0]
         if bend < 0.0:
-            found.append(-2.0 * bend / gravity)
-    return float(np.clip(np.median(found), 0.005, 2.0)) if found else 0.15
+            coefficients.append(-2.0 * bend / gravity)
+    return float(np.clip(np.median(coefficients), 0.005, 2.0)) if coefficients else 0.15
 
 
-def _contact(items: tuple[Shot, ...]) -> tuple[float, float] | None:
+def _contact_regression(items: tuple[PreparedShot, ...]) -> tuple[float, float] | None:
     """Stiffness and damping by regressing force on indentation and its rate up to the peak."""
-    found = []
+    estimates = []
     for shot in items:
         time, force = shot.times[FORCE], shot.values[FORCE]
         if len(time) < 12 or len(shot.times[POSITION]) < 12:
@@ -121,8 +124,8 @@ def _contact(items: tuple[Shot, ...]) -> tuple[float, float] | None:
         columns = np.column_stack([shot.velocity_m_s * t - x, rate])
         solution = np.linalg.lstsq(columns, force[:peak], rcond=None)[0]
         if solution[0] > 0.0:
-            found.append((float(solution[0]), max(float(solution[1]), 0.0)))
-    if not found:
+            estimates.append((float(solution[0]), max(float(solution[1]), 0.0)))
+    if not estimates:
         return None
-    k, b = np.median(np.array(found), axis=0)
+    k, b = np.median(np.array(estimates), axis=0)
     return float(k), float(b)

@@ -13,12 +13,12 @@ from impactcell.discrepancy.model.fit import Fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
-UNSEEN = 1e-8
+UNSEEN_SHARE = 1e-8
 """A direction of which less than this share is left after projection cannot be seen in these data."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tangent:
+class Linearisation:
     """Projected residuals and shared derivatives.
 
     Attributes
@@ -76,43 +76,45 @@ class Scores:
         return np.where(seen, self.each.sum(0) / np.where(seen, self.information, 1.0), 0.0)
 
 
-def linearise(problem: Problem, fit: Fit) -> Tangent:
+def linearise(problem: Problem, fit: Fit) -> Linearisation:
     """Linearise about a fit."""
     bounds = problem.shots.bounds
-    own = problem.own_derivatives(fit.effects, fit.at, fit.local, fit.residual, central=True)
-    prior = np.zeros((len(own), problem.count))
+    shot_jacobian = problem.shot_jacobian(
+        fit.effects, fit.theta, fit.shot_parameters, fit.residual, central=True
+    )
+    prior = np.zeros((len(shot_jacobian), problem.count))
     prior[0] = 1.0 / fit.spread
     basis: list[Samples] = []
     prior_basis: list[Samples] = []
-    for row, below in zip(own, prior, strict=True):
+    for row, below in zip(shot_jacobian, prior, strict=True):
         v, pv = row.copy(), below.copy()
-        size = np.sqrt(_dot(v, v, bounds) + pv * pv)
+        size = np.sqrt(_shot_products(v, v, bounds) + pv * pv)
         for _ in range(2):
             for b, pb in zip(basis, prior_basis, strict=True):
-                along = _dot(v, b, bounds) + pv * pb
+                along = _shot_products(v, b, bounds) + pv * pb
                 v -= np.repeat(along, np.diff(bounds)) * b
                 pv -= along * pb
-        length = np.sqrt(_dot(v, v, bounds) + pv * pv)
+        length = np.sqrt(_shot_products(v, v, bounds) + pv * pv)
         scale = np.where(length > 1e-8 * np.maximum(size, 1e-300), 1.0 / np.maximum(length, 1e-300), 0.0)
         basis.append(v * np.repeat(scale, np.diff(bounds)))
         prior_basis.append(pv * scale)
     B, PB = np.array(basis), np.array(prior_basis)
-    shared = problem.shared_derivatives(fit.effects, fit.at, fit.local, fit.residual)
+    shared = problem.shared_jacobian(fit.effects, fit.theta, fit.shot_parameters, fit.residual)
     J, PJ = _project(shared, np.zeros((len(shared), problem.count)), B, PB, bounds)
-    r, pr = _project(fit.residual[None], (-fit.local.log_factor / fit.spread)[None], B, PB, bounds)
+    r, pr = _project(fit.residual[None], (-fit.shot_parameters.log_factor / fit.spread)[None], B, PB, bounds)
     p = len(J)
     H = np.empty((problem.count, p, p))
     u = np.empty((problem.count, p))
     for i in range(problem.count):
-        part = problem.shots.of(i)
+        part = problem.shots.samples_of(i)
         H[i] = J[:, part] @ J[:, part].T + np.outer(PJ[:, i], PJ[:, i])
         u[i] = J[:, part] @ r[0, part] + PJ[:, i] * pr[0, i]
-    return Tangent(bounds, r[0], pr[0], B, PB, J, PJ, H.sum(0), H, u)
+    return Linearisation(bounds, r[0], pr[0], B, PB, J, PJ, H.sum(0), H, u)
 
 
-def _dot(a: Samples, b: Samples, bounds: np.ndarray) -> Samples:
-    made: Samples = np.add.reduceat(a * b, bounds[:-1])
-    return made
+def _shot_products(a: Samples, b: Samples, bounds: np.ndarray) -> Samples:
+    sums: Samples = np.add.reduceat(a * b, bounds[:-1])
+    return sums
 
 
 def _project(
@@ -122,14 +124,14 @@ def _project(
     sizes = np.diff(bounds)
     for i in range(len(rows)):
         for b, pb in zip(basis, prior_basis, strict=True):
-            along = _dot(rows[i], b, bounds) + prior[i] * pb
+            along = _shot_products(rows[i], b, bounds) + prior[i] * pb
             rows[i] -= np.repeat(along, sizes) * b
             prior[i] -= along * pb
     return rows, prior
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Products:
+class DirectionProducts:
     """What a set of Q directions has in common with residuals and shared derivatives, shot by shot.
 
     Attributes
@@ -145,19 +147,19 @@ class Products:
     square: Samples
     whole: Samples
 
-    def modulated(self, factor: Samples) -> "Products":
+    def modulate(self, factor: Samples) -> "DirectionProducts":
         """Return the directions scaled by a factor of each shot, shape (n,)."""
         column = factor[:, None]
-        return Products(
+        return DirectionProducts(
             self.residual * column,
             self.shared * column[:, None],
             self.square * column**2,
             self.whole * column**2,
         )
 
-    def chosen(self, columns: np.ndarray) -> "Products":
+    def select(self, columns: np.ndarray) -> "DirectionProducts":
         """Return some of the directions."""
-        return Products(
+        return DirectionProducts(
             self.residual[:, columns],
             self.shared[:, columns],
             self.square[:, columns],
@@ -165,31 +167,40 @@ class Products:
         )
 
 
-def products(tangent: Tangent, direction: Samples, prior: Samples | None = None) -> Products:
+def direction_products(
+    linearisation: Linearisation, direction: Samples, prior: Samples | None = None
+) -> DirectionProducts:
     """Products of one direction.
 
     Parameters
     ----------
-    tangent : Tangent
+    linearisation : Tangent
     direction : ndarray, shape (N,)
         Change of the whitened prediction.
     prior : ndarray, shape (n,), optional
         Change of the factors' rows.
     """
-    n = len(tangent.bounds) - 1
+    n = len(linearisation.bounds) - 1
     below = np.zeros(n) if prior is None else prior
-    whole = _dot(direction, direction, tangent.bounds) + below**2
-    rows, priors = _project(direction[None], below[None], tangent.basis, tangent.prior_basis, tangent.bounds)
+    whole = _shot_products(direction, direction, linearisation.bounds) + below**2
+    rows, priors = _project(
+        direction[None], below[None], linearisation.basis, linearisation.prior_basis, linearisation.bounds
+    )
     d, below = rows[0], priors[0]
-    residual = _dot(d, tangent.residual, tangent.bounds) + below * tangent.prior_residual
-    shared = np.add.reduceat(d * tangent.shared, tangent.bounds[:-1], axis=1) + below * tangent.prior_shared
-    square = _dot(d, d, tangent.bounds) + below**2
-    return Products(residual[:, None], shared.T[:, None, :], square[:, None], whole[:, None])
+    residual = (
+        _shot_products(d, linearisation.residual, linearisation.bounds) + below * linearisation.prior_residual
+    )
+    shared = (
+        np.add.reduceat(d * linearisation.shared, linearisation.bounds[:-1], axis=1)
+        + below * linearisation.prior_shared
+    )
+    square = _shot_products(d, d, linearisation.bounds) + below**2
+    return DirectionProducts(residual[:, None], shared.T[:, None, :], square[:, None], whole[:, None])
 
 
-def together(parts: list[Products]) -> Products:
+def concatenate_products(parts: list[DirectionProducts]) -> DirectionProducts:
     """Put directions side by side."""
-    return Products(
+    return DirectionProducts(
         np.concatenate([part.residual for part in parts], axis=1),
         np.concatenate([part.shared for part in parts], axis=1),
         np.concatenate([part.square for part in parts], axis=1),
@@ -197,13 +208,13 @@ def together(parts: list[Products]) -> Products:
     )
 
 
-def scores(tangent: Tangent, made: Products) -> Scores:
+def scores(linearisation: Linearisation, products: DirectionProducts) -> Scores:
     """Effective scores: the shared parameters projected out of the directions."""
-    inverse = np.linalg.pinv(tangent.information, rcond=1e-13, hermitian=True)
-    summed = made.shared.sum(0)
+    inverse = np.linalg.pinv(linearisation.information, rcond=1e-13, hermitian=True)
+    summed = products.shared.sum(0)
     weights = summed @ inverse
-    information = made.square.sum(0) - np.einsum("qa,qa->q", summed, weights)
-    seen = information > UNSEEN * made.whole.sum(0)
-    each = made.residual - tangent.shot_gradient @ weights.T
-    lever = made.shared - np.einsum("iab,qb->iqa", tangent.shot_information, weights)
-    return Scores(each * seen, lever * seen[None, :, None], np.where(seen, information, 0.0))
+    information = products.square.sum(0) - np.einsum("qa,qa->q", summed, weights)
+    seen = information > UNSEEN_SHARE * products.whole.sum(0)
+    per_shot = products.residual - linearisation.shot_gradient @ weights.T
+    lever = products.shared - np.einsum("iab,qb->iqa", linearisation.shot_information, weights)
+    return Scores(per_shot * seen, lever * seen[None, :, None], np.where(seen, information, 0.0))

@@ -15,10 +15,10 @@ from impactcell.physics import Parameter
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 
-NOMINAL = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
-SMALLEST_RATIO, LARGEST_RATIO = 1.0, 5.0
+NOMINAL_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
+MIN_RATIO, MAX_RATIO = 1.0, 5.0
 DAMPING_SCALE = 100.0
-SHORTEST = 0.02
+MIN_TIME_CONSTANT_SHARE = 0.02
 """Time constants shorter than this share of the typical one act at once and only make the plant stiff."""
 
 
@@ -39,7 +39,7 @@ class Coordinate:
         value).
     lower, upper : float
         Range of the coordinate itself.
-    start : float
+    initial : float
         Value of the coordinate where nothing better is known.
     """
 
@@ -50,7 +50,7 @@ class Coordinate:
     scale: float
     lower: float
     upper: float
-    start: float
+    initial: float
 
     def value(self, coordinate: float) -> float:
         """Parameter at a coordinate."""
@@ -80,25 +80,25 @@ class Coordinate:
 
 
 @lru_cache
-def nominal(excitation: Excitation) -> tuple[Coordinate, ...]:
+def nominal_coordinates(excitation: Excitation) -> tuple[Coordinate, ...]:
     """Free numbers of the nominal plant: those that this excitation can tell anything of."""
     k = Coordinate("", "stiffness_n_per_m", 0, "log", 1.0, math.log(1e2), math.log(1e11), math.log(6e5))
     b = Coordinate("", "damping_n_s_per_m", 0, "linear", DAMPING_SCALE, 0.0, 1e6, 4.0)
     mu_k = Coordinate("", "mu_k", 0, "log", 1.0, math.log(1e-3), math.log(3.0), math.log(0.15))
-    ratio = Coordinate("", "ratio", 0, "log", 1.0, math.log(SMALLEST_RATIO), math.log(LARGEST_RATIO), 0.25)
+    ratio = Coordinate("", "ratio", 0, "log", 1.0, math.log(MIN_RATIO), math.log(MAX_RATIO), 0.25)
     if excitation is Excitation.TAP:
         return (k, b, mu_k, ratio)
     return (mu_k,) if excitation is Excitation.FREE_SLIDE else (mu_k, ratio)
 
 
 @lru_cache(maxsize=256)
-def of_effect(identifier: str, batches: int) -> tuple[Coordinate, ...]:
+def effect_coordinates(identifier: str, batches: int) -> tuple[Coordinate, ...]:
     """Free numbers of an effect."""
-    made: list[Coordinate] = []
+    coordinates: list[Coordinate] = []
     for parameter in LIBRARY[identifier].parameters:
         numbers = range(1, batches) if parameter.per_batch else (0,)
-        made += [_coordinate(identifier, parameter, batch) for batch in numbers]
-    return tuple(made)
+        coordinates += [_coordinate(identifier, parameter, batch) for batch in numbers]
+    return tuple(coordinates)
 
 
 def _coordinate(identifier: str, parameter: Parameter, batch: int) -> Coordinate:
@@ -122,7 +122,11 @@ def _coordinate(identifier: str, parameter: Parameter, batch: int) -> Coordinate
             batch,
             "log",
             1.0,
-            math.log(max(parameter.lower, SHORTEST * typical) if parameter.unit == "s" else parameter.lower),
+            math.log(
+                max(parameter.lower, MIN_TIME_CONSTANT_SHARE * typical)
+                if parameter.unit == "s"
+                else parameter.lower
+            ),
             math.log(parameter.upper),
             math.log(typical),
         )
@@ -142,29 +146,29 @@ def _coordinate(identifier: str, parameter: Parameter, batch: int) -> Coordinate
     )
 
 
-def vector(
-    coordinates: tuple[Coordinate, ...], at: Samples, names: tuple[str, ...], typical: Samples
+def plant_parameters(
+    coordinates: tuple[Coordinate, ...], theta: Samples, names: tuple[str, ...], typical: Samples
 ) -> Samples:
     """Parameter vector in the order of the plant's `names` from coordinates.
 
     `typical` holds what is taken for parameters that are not free.
     """
-    made = typical.copy()
+    parameters = typical.copy()
     ratio = math.nan
-    for coordinate, where in zip(coordinates, at, strict=True):
-        value = coordinate.value(float(where))
+    for coordinate, theta_value in zip(coordinates, theta, strict=True):
+        value = coordinate.value(float(theta_value))
         if coordinate.parameter == "ratio" and not coordinate.effect:
             ratio = value
             continue
-        made[names.index(plant_name(coordinate))] = value
+        parameters[names.index(parameter_name(coordinate))] = value
     if not math.isnan(ratio):
-        made[2] = ratio * made[3]
+        parameters[2] = ratio * parameters[3]
     else:
-        made[2] = max(made[2], made[3])
-    return made
+        parameters[2] = max(parameters[2], parameters[3])
+    return parameters
 
 
-def plant_name(coordinate: Coordinate) -> str:
+def parameter_name(coordinate: Coordinate) -> str:
     """Name of a coordinate's parameter among those of `physics`."""
     if not coordinate.effect:
         return coordinate.parameter
@@ -172,6 +176,6 @@ def plant_name(coordinate: Coordinate) -> str:
     return f"{name}[{coordinate.batch}]" if coordinate.batch else name
 
 
-def defaults(names: tuple[str, ...]) -> Samples:
+def default_parameters(names: tuple[str, ...]) -> Samples:
     """Parameter vector for whatever is not free: a stiff contact, friction in the middle of its range."""
     return np.array([6e5, 0.0, 0.2, 0.15, *([0.0] * (len(names) - 4))])

@@ -3,9 +3,9 @@
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.data.shots import Index
+from impactcell.discrepancy.data.shots import IndexArray
 from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.forward import Course
+from impactcell.discrepancy.model.forward import Trajectory
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
@@ -14,12 +14,14 @@ PRELOAD, LOADING, UNLOADING, FREE_SLIDE, STOP, DRIVEN = range(6)
 BETWEEN_SHOTS = "between_shots"
 
 
-def course_of(problem: Problem, fit: Fit) -> Course:
+def trajectory_of(problem: Problem, fit: Fit) -> Trajectory:
     """Course of the fitted model at every sample."""
-    return problem.forward.course(fit.effects, problem.parameters(fit.effects, fit.at), fit.local)
+    return problem.forward.trajectory(
+        fit.effects, problem.parameters(fit.effects, fit.theta), fit.shot_parameters
+    )
 
 
-def phases(problem: Problem, course: Course) -> Index:
+def sample_phases(problem: Problem, trajectory: Trajectory) -> IndexArray:
     """Phase of every sample, shape (N,), an index into `PHASES`.
 
     Preload lasts from contact to breakaway; loading while the contact is being compressed, unloading while it
@@ -28,23 +30,23 @@ def phases(problem: Problem, course: Course) -> Index:
     shots = problem.shots
     if shots.excitation is Excitation.DRIVEN:
         return np.full(shots.values.size, DRIVEN, dtype=np.int64)
-    made = np.full(shots.values.size, STOP, dtype=np.int64)
-    moving = np.abs(course.speed_m_s) > 0.0
+    phase = np.full(shots.values.size, STOP, dtype=np.int64)
+    moving = np.abs(trajectory.speed_m_s) > 0.0
     if shots.excitation is Excitation.FREE_SLIDE:
-        made[moving] = FREE_SLIDE
-        return made
-    touching = course.travel_m - course.advance_m > 0.0
+        phase[moving] = FREE_SLIDE
+        return phase
+    touching = trajectory.actuator_displacement_m - trajectory.part_displacement_m > 0.0
     velocity = np.repeat([shot.velocity_m_s for shot in shots.items], np.diff(shots.bounds))
-    closing = velocity > course.speed_m_s
-    still = ~moving & (course.advance_m <= 1e-12)
-    made[moving & ~touching] = FREE_SLIDE
-    made[moving & touching & ~closing] = UNLOADING
-    made[moving & touching & closing] = LOADING
-    made[still] = PRELOAD
-    return made
+    closing = velocity > trajectory.speed_m_s
+    still = ~moving & (trajectory.part_displacement_m <= 1e-12)
+    phase[moving & ~touching] = FREE_SLIDE
+    phase[moving & touching & ~closing] = UNLOADING
+    phase[moving & touching & closing] = LOADING
+    phase[still] = PRELOAD
+    return phase
 
 
-def place_within(problem: Problem, phase: Index, times: Samples) -> Samples:
+def phase_positions(problem: Problem, phase: IndexArray, times: Samples) -> Samples:
     """Place of every sample within its phase, 0 to 1 in time, shape (N,)."""
     shots = problem.shots
     owner = np.repeat(np.arange(len(shots)), np.diff(shots.bounds))

@@ -11,28 +11,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.data.shots import POSITION, Shot, lay_out
-from impactcell.discrepancy.model.fit import Fit, begin, fit
-from impactcell.discrepancy.model.phases import course_of
+from impactcell.discrepancy.data.shots import POSITION, PreparedShot, concatenate_shots
+from impactcell.discrepancy.model.fit import Fit, fit, initial_shot_parameters
+from impactcell.discrepancy.model.phases import trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import DiscrepancyError
 
-CLEAR = 0.1
+SEPARATION_MARGIN = 0.1
 """Share of the contact's duration left out after it: the model need not know the separation to the sample."""
 
-FEWEST_SAMPLES = 12
-FEWEST_SHOTS = 3
+MIN_SAMPLES = 12
+MIN_SHOTS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Alone:
+class SplitFits:
     """RMS over the sensors' noise of contact and slide fitted alone; nan where it could not be fitted."""
 
     contact: float
     slide: float
 
 
-def alone(problem: Problem, nominal: Fit) -> Alone:
+def fit_split(problem: Problem, nominal: Fit) -> SplitFits:
     """Fit the contacts and the slides of taps apart from each other.
 
     Parameters
@@ -42,21 +42,21 @@ def alone(problem: Problem, nominal: Fit) -> Alone:
     nominal : Fit
         Fitted to whole shots: says when part and actuator separate, and where the fits start.
     """
-    course = course_of(problem, nominal)
-    touching = course.travel_m > course.advance_m
+    trajectory = trajectory_of(problem, nominal)
+    touching = trajectory.actuator_displacement_m > trajectory.part_displacement_m
     times = problem.shots.times
-    parts = [problem.shots.of(shot) for shot in range(problem.count)]
+    parts = [problem.shots.samples_of(shot) for shot in range(problem.count)]
     ends = [float(times[part][touching[part]].max(initial=0.0)) for part in parts]
     shots = list(zip(problem.shots.items, ends, strict=True))
-    contacts = [_until(shot, end) for shot, end in shots if end > 0.0]
-    slides = [_after(shot, (1.0 + CLEAR) * end) for shot, end in shots]
-    return Alone(
-        _floors(problem, nominal, Excitation.TAP, contacts),
-        _floors(problem, nominal, Excitation.FREE_SLIDE, slides),
+    contacts = [_contact_of(shot, end) for shot, end in shots if end > 0.0]
+    slides = [_slide_of(shot, (1.0 + SEPARATION_MARGIN) * end) for shot, end in shots]
+    return SplitFits(
+        _rms_of_fit(problem, nominal, Excitation.TAP, contacts),
+        _rms_of_fit(problem, nominal, Excitation.FREE_SLIDE, slides),
     )
 
 
-def _until(shot: Shot, end: float) -> Shot:
+def _contact_of(shot: PreparedShot, end: float) -> PreparedShot:
     force, position, actuator = (times <= end for times in shot.times)
     return replace(
         shot,
@@ -65,7 +65,7 @@ def _until(shot: Shot, end: float) -> Shot:
     )
 
 
-def _after(shot: Shot, begin_s: float) -> Shot:
+def _slide_of(shot: PreparedShot, begin_s: float) -> PreparedShot:
     kept = shot.times[POSITION] > begin_s
     none = np.empty(0)
     times = shot.times[POSITION][kept]
@@ -76,18 +76,18 @@ def _after(shot: Shot, begin_s: float) -> Shot:
     )
 
 
-def _floors(problem: Problem, nominal: Fit, excitation: Excitation, items: list[Shot]) -> float:
-    items = [shot for shot in items if shot.size >= FEWEST_SAMPLES]
-    if len(items) < FEWEST_SHOTS:
+def _rms_of_fit(problem: Problem, nominal: Fit, excitation: Excitation, items: list[PreparedShot]) -> float:
+    items = [shot for shot in items if shot.size >= MIN_SAMPLES]
+    if len(items) < MIN_SHOTS:
         return math.nan
     whole = problem.shots
-    shots = lay_out(excitation, whole.gravity_m_s2, whole.stroke_m, tuple(items), whole.noise_std)
+    shots = concatenate_shots(excitation, whole.gravity_m_s2, whole.stroke_m, tuple(items), whole.noise_std)
     part = Problem(shots, problem.forward.batches)
-    known = dict(zip(nominal.coordinates, nominal.at, strict=True))
-    start = np.array([known[one] for one in part.coordinates(nominal.effects)])
+    nominal_theta = dict(zip(nominal.coordinates, nominal.theta, strict=True))
+    start = np.array([nominal_theta[coordinate] for coordinate in part.coordinates(nominal.effects)])
     try:
-        found = fit(part, nominal.effects, start, begin(part, nominal.effects, start))
+        fitted = fit(part, nominal.effects, start, initial_shot_parameters(part, nominal.effects, start))
     except DiscrepancyError:
         return math.nan
-    free = shots.values.size - len(part.own) * part.count - len(start)
-    return math.sqrt(float(found.misfit(shots).sum()) / max(free, 1))
+    free = shots.values.size - len(part.shot_parameter_names) * part.count - len(start)
+    return math.sqrt(float(fitted.misfit(shots).sum()) / max(free, 1))

@@ -6,22 +6,22 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
-from impactcell.discrepancy.model.intervals import Estimate
+from impactcell.discrepancy.model.intervals import ParameterEstimate
 from impactcell.discrepancy.report import figures
-from impactcell.discrepancy.report.result import where
+from impactcell.discrepancy.report.result import locate_effect
 from impactcell.discrepancy.search.evidence import ALPHA
-from impactcell.discrepancy.search.validation import Proof
-from impactcell.discrepancy.workflow import NAMED, NO_GAP, TIED, Findings
+from impactcell.discrepancy.search.validation import Validation
+from impactcell.discrepancy.workflow import NAMED, NO_GAP, TIED, DiscrepancyResult
 from impactcell.physics.effects import LIBRARY
 
-GUIDE = (Path(__file__).parents[1] / "README.md").as_uri() + "#a-new-effect"
-LARGE = 1.25
+EFFECT_GUIDE = (Path(__file__).parents[1] / "README.md").as_uri() + "#a-new-effect"
+LARGE_REGION_RMS = 1.25
 """RMS of a region's residuals, in noise floors, from which on it is shown as large."""
-NAMES = {"ratio": "mu_s/mu_k"}
-UNITS = {"stiffness_n_per_m": "N/m", "damping_n_s_per_m": "N s/m"}
+PARAMETER_LABELS = {"ratio": "mu_s/mu_k"}
+PLANT_UNITS = {"stiffness_n_per_m": "N/m", "damping_n_s_per_m": "N s/m"}
 
 
-def write_report(findings: Findings, source: str, file: Path) -> None:
+def write_report(result: DiscrepancyResult, source: str, file: Path) -> None:
     """Write the report; pictures and style are inside the page."""
     environment = Environment(
         loader=PackageLoader("impactcell.discrepancy.report", "templates"),
@@ -29,46 +29,46 @@ def write_report(findings: Findings, source: str, file: Path) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(zip=zip, number=number, grouped=grouped)
-    page = environment.get_template("report.html.j2").render(**content(findings, source))
+    environment.filters.update(zip=zip, number=format_number, grouped=format_thousands)
+    page = environment.get_template("report.html.j2").render(**page_context(result, source))
     file.write_text(page, encoding="utf-8")
 
 
-def words(identifier: str) -> str:
+def phrase(identifier: str) -> str:
     """Name of an effect as one would say it."""
     return identifier.replace("_", " ")
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Five digits, and an exponent only where the number could not be read without."""
     text = f"{value:.5g}"
-    return grouped(float(text), 0) if "e+" in text and abs(value) < 1e7 else text
+    return format_thousands(float(text), 0) if "e+" in text and abs(value) < 1e7 else text
 
 
-def grouped(value: float, decimals: int) -> str:
+def format_thousands(value: float, decimals: int) -> str:
     """Thousands apart."""
     return f"{value:,.{decimals}f}".replace(",", " ")
 
 
-def verdict_sentence(findings: Findings) -> str:
+def verdict_sentence(result: DiscrepancyResult) -> str:
     """Verdict in one sentence."""
-    proof = findings.proof
+    proof = result.validation
     before, after = f"{proof.before.whole:.2f}", f"{proof.after.whole:.2f}"
-    if findings.verdict == NO_GAP:
+    if result.verdict == NO_GAP:
         return f"The nominal model explains these shots: the held-out gap is {before} noise floors."
-    names = " and ".join(words(effect) for effect in findings.added)
-    if findings.verdict == NAMED:
+    names = " and ".join(phrase(effect) for effect in result.added)
+    if result.verdict == NAMED:
         return f"Missing: {names}; with it the held-out gap falls from {before} to {after} noise floors."
-    if findings.verdict == TIED:
-        ties = findings.search.ties
-        groups = [" or ".join(map(words, (effect, *ties.get(effect, ())))) for effect in findings.added]
+    if result.verdict == TIED:
+        ties = result.selection.ties
+        groups = [" or ".join(map(phrase, (effect, *ties.get(effect, ())))) for effect in result.added]
         return (
             f"Missing: {', and '.join(groups)}, which these shots cannot tell apart; "
             f"the held-out gap falls from {before} to {after} noise floors."
         )
-    left = findings.unexplained
-    phase = words(left.phase) if left else "some phase"
-    if findings.added:
+    gap = result.unexplained
+    phase = phrase(gap.phase) if gap else "some phase"
+    if result.added:
         return (
             f"Missing: {names}, and something that no known effect explains: with {names} the held-out gap "
             f"falls from {before} to {after} noise floors only; what is left is largest in phase {phase}."
@@ -76,9 +76,9 @@ def verdict_sentence(findings: Findings) -> str:
     return f"No known effect explains a held-out gap of {before} noise floors, largest in phase {phase}."
 
 
-def apart(findings: Findings) -> str:
+def split_sentence(result: DiscrepancyResult) -> str:
     """How far contact and slide of taps stay from the floor when each is fitted alone; empty if unknown."""
-    alone = findings.unexplained.alone if findings.unexplained else None
+    alone = result.unexplained.split_fits if result.unexplained else None
     if alone is None or math.isnan(alone.contact + alone.slide):
         return ""
     return (
@@ -87,86 +87,90 @@ def apart(findings: Findings) -> str:
     )
 
 
-def content(findings: Findings, source: str) -> dict[str, Any]:
+def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
     """Everything the template shows."""
-    search = findings.search
-    extended = findings.final is not findings.nominal
+    search = result.selection
+    extended = result.final is not result.nominal
     return {
         "source": source,
-        "verdict": findings.verdict,
-        "sentence": verdict_sentence(findings),
-        "shots": len(findings.material.shots),
-        "training": len(findings.training),
-        "held_out": len(findings.held_out),
-        "excitation": str(findings.material.excitation),
-        "notes": [*findings.material.notes, *findings.floor.notes],
-        "map_before": figures.chart(search.nominal),
-        "map_after": figures.chart(search.final) if search.final is not search.nominal else None,
-        "traces": figures.traces(findings),
-        "factors": figures.factors(findings),
-        "shape": figures.shape(findings),
-        "unexplained": findings.unexplained,
-        "apart": apart(findings),
-        "candidates": _candidates(findings),
+        "verdict": result.verdict,
+        "sentence": verdict_sentence(result),
+        "shots": len(result.prepared.shots),
+        "training": len(result.training),
+        "held_out": len(result.held_out),
+        "excitation": str(result.prepared.excitation),
+        "notes": [*result.prepared.notes, *result.floor.notes],
+        "map_before": figures.map_figure(search.nominal),
+        "map_after": figures.map_figure(search.final) if search.final is not search.nominal else None,
+        "traces": figures.trace_figure(result),
+        "factors": figures.factor_figure(result),
+        "shape": figures.shape_figure(result),
+        "unexplained": result.unexplained,
+        "apart": split_sentence(result),
+        "candidates": _candidates(result),
         "alternatives": [
             {
-                "effects": " + ".join(words(one) for one in alternative.effects),
-                "behind": alternative.behind,
-                "std": alternative.behind_std,
-                "chosen": alternative.effects == findings.final.effects,
+                "effects": " + ".join(phrase(item) for item in alternative.effects),
+                "behind": alternative.deficit,
+                "std": alternative.deficit_std,
+                "chosen": alternative.effects == result.final.effects,
             }
             for alternative in search.alternatives[:15]
         ],
         "effects": [
             {
-                "name": words(effect),
+                "name": phrase(effect),
                 "equation": LIBRARY[effect].equation,
                 "reference": LIBRARY[effect].reference,
-                "tied": [words(one) for one in search.ties.get(effect, ())],
+                "tied": [phrase(item) for item in search.ties.get(effect, ())],
                 "p": search.p_values.get(effect, 1.0),
-                "where": where(findings, effect),
+                "where": locate_effect(result, effect),
             }
-            for effect in findings.added
+            for effect in result.added
         ],
         "parameters": [
             {
-                "effect": words(one.effect) if one.effect else "nominal plant",
-                "name": NAMES.get(one.parameter, one.parameter)
-                + (f" [batch {one.batch + 1}]" if one.batch else ""),
-                "value": one.value,
-                "low": one.low,
-                "high": one.high,
-                "unit": _unit(one),
+                "effect": phrase(item.effect) if item.effect else "nominal plant",
+                "name": PARAMETER_LABELS.get(item.parameter, item.parameter)
+                + (f" [batch {item.batch + 1}]" if item.batch else ""),
+                "value": item.value,
+                "low": item.low,
+                "high": item.high,
+                "unit": _unit(item),
             }
-            for one in findings.parameters
+            for item in result.parameters
         ],
-        "proof": findings.proof,
-        "regions": _regions(findings.proof),
-        "large": LARGE,
-        "uncertain": 1.0 / math.sqrt(2.0 * max(len(findings.held_out), 1)),
+        "proof": result.validation,
+        "regions": _regions(result.validation),
+        "large": LARGE_REGION_RMS,
+        "uncertain": 1.0 / math.sqrt(2.0 * max(len(result.held_out), 1)),
         "extended": extended,
         "change": lambda form, before, after: form % before + (f" → {form % after}" if extended else ""),
-        "nominal_effects": [words(one) for one in findings.nominal.effects],
-        "floor": findings.floor,
-        "replicates": findings.replicates,
-        "spread": findings.final.spread,
-        "proposals": findings.proposals,
+        "nominal_effects": [phrase(item) for item in result.nominal.effects],
+        "floor": result.floor,
+        "replicates": result.replicates,
+        "spread": result.final.spread,
+        "proposals": result.experiments,
         "alpha": ALPHA,
-        "seed": findings.seed,
-        "guide": GUIDE,
-        "words": words,
+        "seed": result.seed,
+        "guide": EFFECT_GUIDE,
+        "words": phrase,
     }
 
 
-def _unit(one: Estimate) -> str:
+def _unit(estimate: ParameterEstimate) -> str:
     """Return the unit of a parameter; empty for a pure number."""
-    if not one.effect:
-        return UNITS.get(one.parameter, "")
-    unit = next(known.unit for known in LIBRARY[one.effect].parameters if known.name == one.parameter)
+    if not estimate.effect:
+        return PLANT_UNITS.get(estimate.parameter, "")
+    unit = next(
+        parameter.unit
+        for parameter in LIBRARY[estimate.effect].parameters
+        if parameter.name == estimate.parameter
+    )
     return "" if unit == "1" else unit
 
 
-def _regions(proof: Proof) -> dict[str, Any]:
+def _regions(proof: Validation) -> dict[str, Any]:
     """Held-out RMS before and after, phases down and channels across; None where nothing was recorded."""
     values = {(phase, channel): (before, after) for phase, channel, before, after in proof.regions}
     channels = list(dict.fromkeys(channel for _, channel in values))
@@ -179,27 +183,27 @@ def _regions(proof: Proof) -> dict[str, Any]:
     }
 
 
-def _candidates(findings: Findings) -> list[dict[str, Any]]:
+def _candidates(result: DiscrepancyResult) -> list[dict[str, Any]]:
     """Evidence for every candidate against the nominal model."""
-    evidence = findings.search.nominal
-    gains = evidence.scan.gains()
+    evidence = result.selection.nominal
+    gains = evidence.candidate_scan.gains()
     rows: list[dict[str, Any]] = []
-    for number, effect in enumerate(evidence.scan.candidates.names):
+    for number, effect in enumerate(evidence.candidate_scan.candidates.names):
         rows.append(
             {
-                "name": words(effect),
-                "statistic": float(evidence.scan.tests.statistic[number]),
-                "single": float(evidence.scan.tests.single[number]),
-                "adjusted": float(evidence.scan.tests.adjusted[number]),
+                "name": phrase(effect),
+                "statistic": float(evidence.candidate_scan.tests.statistic[number]),
+                "single": float(evidence.candidate_scan.tests.p_single[number]),
+                "adjusted": float(evidence.candidate_scan.tests.p_adjusted[number]),
                 "gain": gains[effect],
-                "added": effect in findings.added,
+                "added": effect in result.added,
             }
         )
     unseen = [
         effect
         for effect in LIBRARY
-        if effect not in evidence.scan.candidates.names and effect not in evidence.fit.effects
+        if effect not in evidence.candidate_scan.candidates.names and effect not in evidence.fit.effects
     ]
     rows.sort(key=lambda row: (row["adjusted"], -row["gain"]))
-    rows += [{"name": words(effect), "unseen": True} for effect in unseen]
+    rows += [{"name": phrase(effect), "unseen": True} for effect in unseen]
     return rows

@@ -6,28 +6,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import Index
+from impactcell.discrepancy.data.shots import IndexArray
 from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.linearisation import Products, Scores, Tangent, products, together
-from impactcell.discrepancy.model.parameters import NOMINAL, of_effect, plant_name
-from impactcell.discrepancy.model.phases import course_of
-from impactcell.discrepancy.model.problem import Problem, without_jumps
-from impactcell.discrepancy.search.effect_grid import SMALL, Probe, Range, probes
+from impactcell.discrepancy.model.linearisation import (
+    DirectionProducts,
+    Linearisation,
+    Scores,
+    concatenate_products,
+    direction_products,
+)
+from impactcell.discrepancy.model.parameters import NOMINAL_PARAMETERS, effect_coordinates, parameter_name
+from impactcell.discrepancy.model.phases import trajectory_of
+from impactcell.discrepancy.model.problem import Problem, remove_jumps
+from impactcell.discrepancy.search.effect_grid import SMALL_STRENGTH, GridPoint, VisitedRange, effect_grid
 from impactcell.errors import PhysicsError
 from impactcell.physics.effect import Covariates
 from impactcell.physics.effects import LIBRARY
 from impactcell.physics.law_table import build_law_table
 from impactcell.records import Samples
 
-FORWARD = 0.1
+FORWARD_STEP = 0.1
 """Step forward, in units of `SMALL`."""
-LARGEST = 5.0
-WEAK = 0.3
+MAX_STRENGTH = 5.0
+WEAK_STRENGTH = 0.3
 """Strengths in units of an effect's typical one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidates:
+class CandidateDirections:
     """Directions of all candidate effects about one fit.
 
     Attributes
@@ -36,109 +42,120 @@ class Candidates:
     products : Products
     group : ndarray, shape (Q,)
         Candidate of each direction.
-    side : ndarray, shape (Q,)
+    sign : ndarray, shape (Q,)
         +1 where only a positive amplitude makes sense, else 0.
-    probes : tuple of Probe
+    points : tuple of Probe
     """
 
     names: tuple[str, ...]
-    products: Products
-    group: Index
-    side: Samples
-    probes: tuple[Probe, ...]
+    products: DirectionProducts
+    group: IndexArray
+    sign: Samples
+    points: tuple[GridPoint, ...]
 
 
-def gone_through(problem: Problem, fit: Fit) -> Range:
+def visited_range(problem: Problem, fit: Fit) -> VisitedRange:
     """Positions and speeds that the fitted model goes through."""
-    course = course_of(problem, fit)
+    trajectory = trajectory_of(problem, fit)
     sizes = np.diff(problem.shots.bounds)
     sign = np.repeat([float(shot.direction) for shot in problem.shots.items], sizes)
     start = np.repeat([shot.start_m for shot in problem.shots.items], sizes)
-    position = start + sign * course.advance_m
-    return Range(float(position.min()), float(position.max()), float(np.abs(course.speed_m_s).max()))
+    position = start + sign * trajectory.part_displacement_m
+    return VisitedRange(
+        float(position.min()), float(position.max()), float(np.abs(trajectory.speed_m_s).max())
+    )
 
 
-def candidates(problem: Problem, fit: Fit, tangent: Tangent, library: Sequence[str]) -> Candidates:
+def candidate_directions(
+    problem: Problem, fit: Fit, linearisation: Linearisation, library: Sequence[str]
+) -> CandidateDirections:
     """Directions of the effects of `library` that the fit does not have yet."""
-    gone = gone_through(problem, fit)
+    visited = visited_range(problem, fit)
     names: list[str] = []
-    parts: list[Products] = []
+    parts: list[DirectionProducts] = []
     groups: list[int] = []
-    kept: list[Probe] = []
-    unit = products(tangent, np.zeros(problem.shots.values.size), np.ones(problem.count))
+    points: list[GridPoint] = []
+    unit = direction_products(linearisation, np.zeros(problem.shots.values.size), np.ones(problem.count))
     for identifier in library:
         if identifier in fit.effects:
             continue
-        grid = probes(identifier, problem.forward.batches, gone)
-        found = 0
-        for probe in grid:
-            between = log_factors(problem, identifier, probe)
+        grid = effect_grid(identifier, problem.forward.batches, visited)
+        count = 0
+        for point in grid:
+            between = between_shot_factors(problem, identifier, point)
             if between is not None:
-                parts.append(unit.modulated(-between / fit.spread))
+                parts.append(unit.modulate(-between / fit.spread))
             else:
-                change = direction(problem, fit, identifier, probe, alone=len(grid) == 1)
+                change = effect_direction(problem, fit, identifier, point, is_single=len(grid) == 1)
                 if change is None or not change.any():
                     continue
-                parts.append(products(tangent, change))
+                parts.append(direction_products(linearisation, change))
             groups.append(len(names))
-            kept.append(probe)
-            found += 1
-        if found:
+            points.append(point)
+            count += 1
+        if count:
             names.append(identifier)
-    side = np.array([float(probe.side) for probe in kept])
-    return Candidates(tuple(names), together(parts), np.array(groups, dtype=np.int64), side, tuple(kept))
+    side = np.array([float(point.sign) for point in points])
+    return CandidateDirections(
+        tuple(names), concatenate_products(parts), np.array(groups, dtype=np.int64), side, tuple(points)
+    )
 
 
-def direction(
-    problem: Problem, fit: Fit, identifier: str, probe: Probe, *, alone: bool = True
+def effect_direction(
+    problem: Problem, fit: Fit, identifier: str, point: GridPoint, *, is_single: bool = True
 ) -> Samples | None:
     """Change of the whitened prediction when an effect joins at a probe; None where the plant cannot.
 
-    A direction that is `alone` is a central difference: what the friction factors can do as well must cancel
+    A direction that `is_single` is a central difference: what the friction factors can do as well must cancel
     to the last digits. Of a whole grid each is a small step forward.
     """
     effects = (*fit.effects, identifier)
-    ahead, back = probe.at.copy(), probe.at.copy()
-    both = probe.scaled and probe.side == 0
-    if both and alone:
-        back[probe.amplitude] -= 2.0 * SMALL
+    forward_theta, backward_theta = point.theta.copy(), point.theta.copy()
+    both = point.scaled and point.sign == 0
+    if both and is_single:
+        backward_theta[point.amplitude] -= 2.0 * SMALL_STRENGTH
     elif both:
-        ahead[probe.amplitude] -= (1.0 - FORWARD) * SMALL
+        forward_theta[point.amplitude] -= (1.0 - FORWARD_STEP) * SMALL_STRENGTH
     try:
-        there = problem.residual(effects, np.concatenate([fit.at, ahead]), fit.local)
-        if both and alone:
-            here = problem.residual(effects, np.concatenate([fit.at, back]), fit.local)
-            change = 0.5 * (here - there)
-            change[np.abs(here + there - 2.0 * fit.residual) > 1.0 + np.abs(change)] = 0.0
+        forward = problem.residual(effects, np.concatenate([fit.theta, forward_theta]), fit.shot_parameters)
+        if both and is_single:
+            backward = problem.residual(
+                effects, np.concatenate([fit.theta, backward_theta]), fit.shot_parameters
+            )
+            change = 0.5 * (backward - forward)
+            change[np.abs(backward + forward - 2.0 * fit.residual) > 1.0 + np.abs(change)] = 0.0
         elif both:
-            change = without_jumps(fit.residual - there) / FORWARD
+            change = remove_jumps(fit.residual - forward) / FORWARD_STEP
         else:
-            change = fit.residual - there
-            if probe.scaled:
-                change = without_jumps(change)
+            change = fit.residual - forward
+            if point.scaled:
+                change = remove_jumps(change)
     except PhysicsError:
         return None
     return change if np.isfinite(change).all() else None
 
 
-def log_factors(problem: Problem, identifier: str, probe: Probe) -> Samples | None:
+def between_shot_factors(problem: Problem, identifier: str, point: GridPoint) -> Samples | None:
     """Logarithms of the friction factors by which an effect acts, if that is all it does; shape (n,)."""
     effect = LIBRARY[identifier]
     if effect.between is None or effect.laws:
         return None
     items = problem.shots.items
     names = build_law_table((identifier,), problem.forward.batches).names
-    coordinates = of_effect(identifier, problem.forward.batches)
-    values = {plant_name(one): one.value(float(at)) for one, at in zip(coordinates, probe.at, strict=True)}
-    row = np.array([values[one] for one in names[len(NOMINAL) :]])
+    coordinates = effect_coordinates(identifier, problem.forward.batches)
+    values = {
+        parameter_name(coordinate): coordinate.value(float(theta))
+        for coordinate, theta in zip(coordinates, point.theta, strict=True)
+    }
+    row = np.array([values[coordinate] for coordinate in names[len(NOMINAL_PARAMETERS) :]])
     columns = []
     place = 0
     for parameter in effect.parameters:
         width = problem.forward.batches - 1 if parameter.per_batch else 1
-        own = np.tile(row[place : place + width], (len(items), 1))
-        columns.append(own if parameter.per_batch else own[:, 0])
+        values_of_shots = np.tile(row[place : place + width], (len(items), 1))
+        columns.append(values_of_shots if parameter.per_batch else values_of_shots[:, 0])
         place += width
-    found = effect.between(
+    factors = effect.between(
         columns,
         Covariates(
             dwell_s=np.array([shot.dwell_s for shot in items]),
@@ -148,37 +165,39 @@ def log_factors(problem: Problem, identifier: str, probe: Probe) -> Samples | No
             direction=np.array([float(shot.direction) for shot in items]),
         ),
     )
-    mu_s, mu_k, mass = (np.broadcast_to(one, len(items)) for one in found)
+    mu_s, mu_k, mass = (np.broadcast_to(coordinate, len(items)) for coordinate in factors)
     if not (np.allclose(mu_s, mu_k, rtol=1e-12) and np.all(mass == 1.0)):
         return None
-    made: Samples = np.log(np.maximum(mu_k, 1e-6))
-    return made
+    log_factor: Samples = np.log(np.maximum(mu_k, 1e-6))
+    return log_factor
 
 
-def best_probes(found: Candidates, scored: Scores, candidate: int, most: int) -> list[tuple[float, Samples]]:
+def best_points(
+    directions: CandidateDirections, scored: Scores, candidate: int, max_points: int
+) -> list[tuple[float, Samples]]:
     """Gains and starting coordinates of an effect: its best probes, amplitudes scaled by their scores."""
-    columns = np.flatnonzero(found.group == candidate)
+    columns = np.flatnonzero(directions.group == candidate)
     gain, amplitude = scored.gain[columns], scored.amplitude[columns]
-    allowed = (found.side[columns] == 0.0) | (amplitude * found.side[columns] > 0.0)
+    allowed = (directions.sign[columns] == 0.0) | (amplitude * directions.sign[columns] > 0.0)
     gain = np.where(allowed, gain, 0.0)
-    phase = phase_of(found.names[candidate])
+    phase = phase_angle_index(directions.names[candidate])
     if phase is not None:
-        scale = LIBRARY[found.names[candidate]].parameters[phase].typical
-        return _best_waves(found, columns, gain, amplitude, (phase, scale), most)
-    made: list[tuple[float, Samples]] = []
-    taken: list[Samples] = []
+        scale = LIBRARY[directions.names[candidate]].parameters[phase].typical
+        return _best_waves(directions, columns, gain, amplitude, (phase, scale), max_points)
+    best: list[tuple[float, Samples]] = []
+    chosen: list[Samples] = []
     for place in np.argsort(-gain, kind="stable"):
-        if gain[place] <= 0.0 or len(made) == most:
+        if gain[place] <= 0.0 or len(best) == max_points:
             break
-        probe = found.probes[int(columns[place])]
-        if any(_near(probe, other) for other in taken):
+        point = directions.points[int(columns[place])]
+        if any(_are_neighbours(point, other) for other in chosen):
             continue
-        taken.append(probe.at)
-        made.append((float(gain[place]), started(probe, float(amplitude[place]))))
-    return made
+        chosen.append(point.theta)
+        best.append((float(gain[place]), start_coordinates(point, float(amplitude[place]))))
+    return best
 
 
-def phase_of(identifier: str) -> int | None:
+def phase_angle_index(identifier: str) -> int | None:
     """Place of an effect's phase angle among its parameters, if it has one."""
     for place, parameter in enumerate(LIBRARY[identifier].parameters):
         if parameter.name.endswith("phase_rad"):
@@ -187,70 +206,72 @@ def phase_of(identifier: str) -> int | None:
 
 
 def _best_waves(
-    found: Candidates,
-    columns: Index,
+    directions: CandidateDirections,
+    columns: IndexArray,
     gain: Samples,
     amplitude: Samples,
     angle: tuple[int, float],
-    most: int,
+    max_points: int,
 ) -> list[tuple[float, Samples]]:
     """Sine and cosine of the same wave make one start with an amplitude and a phase."""
     phase, scale = angle
     waves: dict[tuple[float, ...], list[int]] = {}
     for place, column in enumerate(columns):
-        key = tuple(np.delete(found.probes[int(column)].at, phase))
+        key = tuple(np.delete(directions.points[int(column)].theta, phase))
         waves.setdefault(key, []).append(place)
     ranked = sorted(waves.values(), key=lambda pair: -float(gain[pair].sum()))
-    made: list[tuple[float, Samples]] = []
-    taken: list[Samples] = []
+    best: list[tuple[float, Samples]] = []
+    chosen: list[Samples] = []
     for pair in ranked:
-        probe = found.probes[int(columns[pair[0]])]
-        if len(made) == most or not gain[pair].sum() > 0.0:
+        point = directions.points[int(columns[pair[0]])]
+        if len(best) == max_points or not gain[pair].sum() > 0.0:
             break
-        if any(_near(probe, other) for other in taken):
+        if any(_are_neighbours(point, other) for other in chosen):
             continue
-        taken.append(probe.at)
-        angles = [float(found.probes[int(columns[i])].at[phase]) * scale for i in pair]
+        chosen.append(point.theta)
+        angles = [float(directions.points[int(columns[i])].theta[phase]) * scale for i in pair]
         sine = sum(float(amplitude[i]) * math.cos(a) for i, a in zip(pair, angles, strict=True))
         cosine = sum(float(amplitude[i]) * math.sin(a) for i, a in zip(pair, angles, strict=True))
-        at = started(probe, math.hypot(sine, cosine))
-        at[phase] = math.atan2(cosine, sine) / scale
-        made.append((float(gain[pair].sum()), at))
-    return made
+        theta = start_coordinates(point, math.hypot(sine, cosine))
+        theta[phase] = math.atan2(cosine, sine) / scale
+        best.append((float(gain[pair].sum()), theta))
+    return best
 
 
-def _near(probe: Probe, other: Samples) -> bool:
+def _are_neighbours(point: GridPoint, other: Samples) -> bool:
     """Neighbours on the grid lead to the same optimum."""
-    apart = np.abs(probe.at - other)
+    apart = np.abs(point.theta - other)
     return bool(np.all(apart <= 0.12 * np.maximum(np.abs(other), 0.3)))
 
 
-def started(probe: Probe, amplitude: float) -> Samples:
+def start_coordinates(point: GridPoint, amplitude: float) -> Samples:
     """Coordinates at which a fit starts, the strength scaled by the score's own estimate."""
-    at = probe.at.copy()
-    if not probe.scaled:
-        return at
-    base = at[probe.amplitude] - SMALL
-    at[probe.amplitude] = base + float(np.clip(SMALL * amplitude, -LARGEST, LARGEST))
-    return at
+    theta = point.theta.copy()
+    if not point.scaled:
+        return theta
+    base = theta[point.amplitude] - SMALL_STRENGTH
+    theta[point.amplitude] = base + float(np.clip(SMALL_STRENGTH * amplitude, -MAX_STRENGTH, MAX_STRENGTH))
+    return theta
 
 
-def starts(found: Candidates, scored: Scores, effect: str, most: int) -> list[Samples]:
+def starting_points(
+    directions: CandidateDirections, scored: Scores, effect: str, max_points: int
+) -> list[Samples]:
     """Where fits of an effect start: its best probes, as strong as the score says and much weaker.
 
     A score is a slope; where the gap is wide the effect it promises may lie far beyond what the plant can do.
     """
-    number = found.names.index(effect)
-    best = [start for _, start in best_probes(found, scored, number, most)]
-    probe = found.probes[int(np.argmax(found.group == number))]
-    made: list[Samples] = []
+    number = directions.names.index(effect)
+    best = [start for _, start in best_points(directions, scored, number, max_points)]
+    point = directions.points[int(np.argmax(directions.group == number))]
+    initial_thetas: list[Samples] = []
     for start in best:
-        made.append(start)
-        if probe.scaled:
-            base = probe.at[probe.amplitude] - SMALL
-            away = start[probe.amplitude] - base
-            if abs(away) > WEAK:
+        initial_thetas.append(start)
+        if point.scaled:
+            base = point.theta[point.amplitude] - SMALL_STRENGTH
+            away = start[point.amplitude] - base
+            if abs(away) > WEAK_STRENGTH:
                 weaker = start.copy()
-                weaker[probe.amplitude] = base + math.copysign(WEAK, away)
-                made.append(weaker)
-    return made
+                weaker[point.amplitude] = base + math.copysign(WEAK_STRENGTH, away)
+                initial_thetas.append(weaker)
+    return initial_thetas

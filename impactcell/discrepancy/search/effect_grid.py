@@ -11,18 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.model.parameters import Coordinate, of_effect
+from impactcell.discrepancy.model.parameters import Coordinate, effect_coordinates
 from impactcell.records import Samples
 
-SMALL = 2e-3
-DECADE = (0.1, 0.316, 1.0, 3.16, 10.0)
-RECIPROCALS = tuple(float(0.08 * 1.42**i) for i in range(16))
-CYCLES = 40
+SMALL_STRENGTH = 2e-3
+DECADE_FACTORS = (0.1, 0.316, 1.0, 3.16, 10.0)
+RECIPROCAL_POINTS = tuple(float(0.08 * 1.42**i) for i in range(16))
+MAX_CYCLES = 40
 CYCLE_STEP = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class VisitedRange:
     """What the shots went through.
 
     Attributes
@@ -44,79 +44,83 @@ class Range:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Probe:
+class GridPoint:
     """One point of the grid.
 
     Attributes
     ----------
-    at : ndarray
+    theta : ndarray
         Coordinates of the effect.
     amplitude : int
         Which of them is the strength.
-    side : int
+    sign : int
         +1 where only a positive strength makes sense, else 0.
     scaled : bool
         The strength is small here, so that a score tells how large it should be.
     """
 
-    at: Samples
+    theta: Samples
     amplitude: int
-    side: int
+    sign: int
     scaled: bool
 
 
-def probes(identifier: str, batches: int, gone: Range) -> tuple[Probe, ...]:
+def effect_grid(identifier: str, batches: int, visited: VisitedRange) -> tuple[GridPoint, ...]:
     """Grid of an effect; empty if it has no parameters here, as a batch shift with one batch."""
-    coordinates = of_effect(identifier, batches)
-    strengths = [i for i, one in enumerate(coordinates) if _is_strength(one)]
-    shapes = [i for i, one in enumerate(coordinates) if not _is_strength(one)]
-    made: list[Probe] = []
+    coordinates = effect_coordinates(identifier, batches)
+    strengths = [i for i, coordinate in enumerate(coordinates) if _is_strength(coordinate)]
+    shapes = [i for i, coordinate in enumerate(coordinates) if not _is_strength(coordinate)]
+    points: list[GridPoint] = []
     for strength in strengths:
-        one = coordinates[strength]
-        if one.form == "reciprocal":
-            made += [
-                Probe(np.array([value]), 0, 0, scaled=False)
-                for value in RECIPROCALS
-                if one.lower < value <= one.upper
+        coordinate = coordinates[strength]
+        if coordinate.form == "reciprocal":
+            points += [
+                GridPoint(np.array([value]), 0, 0, scaled=False)
+                for value in RECIPROCAL_POINTS
+                if coordinate.lower < value <= coordinate.upper
             ]
             continue
         turns = any(coordinates[i].parameter.endswith("phase_rad") for i in shapes)
-        side = 1 if one.lower >= one.start and not turns else 0
-        for point in itertools.product(*(_grid(coordinates[i], gone) for i in shapes)):
-            at = np.array([c.start for c in coordinates])
-            at[strength] = one.start + SMALL
+        side = 1 if coordinate.lower >= coordinate.initial and not turns else 0
+        for point in itertools.product(*(_grid(coordinates[i], visited) for i in shapes)):
+            theta = np.array([c.initial for c in coordinates])
+            theta[strength] = coordinate.initial + SMALL_STRENGTH
             for i, value in zip(shapes, point, strict=True):
-                at[i] = min(max(value, coordinates[i].lower), coordinates[i].upper)
-            made.append(Probe(at, strength, side, scaled=True))
-    return tuple(made)
+                theta[i] = min(max(value, coordinates[i].lower), coordinates[i].upper)
+            points.append(GridPoint(theta, strength, side, scaled=True))
+    return tuple(points)
 
 
-def _is_strength(one: Coordinate) -> bool:
+def _is_strength(coordinate: Coordinate) -> bool:
     from impactcell.physics.effects import LIBRARY
 
-    for parameter in LIBRARY[one.effect].parameters:
-        if parameter.name == one.parameter:
+    for parameter in LIBRARY[coordinate.effect].parameters:
+        if parameter.name == coordinate.parameter:
             return not math.isnan(parameter.null)
     return False
 
 
-def _grid(one: Coordinate, gone: Range) -> tuple[float, ...]:
-    if one.parameter.startswith("period"):
+def _grid(coordinate: Coordinate, visited: VisitedRange) -> tuple[float, ...]:
+    if coordinate.parameter.startswith("period"):
         # Even in frequency: a relative error of the period counts once a cycle.
-        count = np.arange(0.5, CYCLES, CYCLE_STEP)
-        return tuple(one.coordinate(gone.span_m / value) for value in count)
-    if one.parameter.endswith("_rad"):
+        count = np.arange(0.5, MAX_CYCLES, CYCLE_STEP)
+        return tuple(coordinate.coordinate(visited.span_m / value) for value in count)
+    if coordinate.parameter.endswith("_rad"):
         # Sine and cosine; a negative amplitude is a phase turned by half.
-        return (one.coordinate(0.0), one.coordinate(math.pi / 2))
-    if one.form == "linear" and one.parameter.endswith("_m"):
-        inside = np.linspace(gone.low_m, gone.high_m, 20)[1:-1]
-        return tuple(one.coordinate(float(value)) for value in inside)
-    if one.parameter.startswith("width"):
-        return tuple(one.coordinate(gone.span_m * share) for share in (0.025, 0.08))
-    if one.parameter.endswith("_m"):
-        return tuple(one.coordinate(gone.span_m * share) for share in (0.005, 0.015, 0.05, 0.15, 0.5))
-    if one.parameter.endswith("_m_s"):
-        return tuple(one.coordinate(gone.speed_m_s * share) for share in (0.03, 0.08, 0.2, 0.4, 0.8))
-    if one.form == "log":
-        return tuple(one.start + math.log(factor) for factor in DECADE)
-    return tuple(one.start * factor for factor in DECADE)
+        return (coordinate.coordinate(0.0), coordinate.coordinate(math.pi / 2))
+    if coordinate.form == "linear" and coordinate.parameter.endswith("_m"):
+        inside = np.linspace(visited.low_m, visited.high_m, 20)[1:-1]
+        return tuple(coordinate.coordinate(float(value)) for value in inside)
+    if coordinate.parameter.startswith("width"):
+        return tuple(coordinate.coordinate(visited.span_m * share) for share in (0.025, 0.08))
+    if coordinate.parameter.endswith("_m"):
+        return tuple(
+            coordinate.coordinate(visited.span_m * share) for share in (0.005, 0.015, 0.05, 0.15, 0.5)
+        )
+    if coordinate.parameter.endswith("_m_s"):
+        return tuple(
+            coordinate.coordinate(visited.speed_m_s * share) for share in (0.03, 0.08, 0.2, 0.4, 0.8)
+        )
+    if coordinate.form == "log":
+        return tuple(coordinate.initial + math.log(factor) for factor in DECADE_FACTORS)
+    return tuple(coordinate.initial * factor for factor in DECADE_FACTORS)

@@ -5,17 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.data.prepared_campaign import Material
+from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
 from impactcell.discrepancy.model.fit import Fit
 from impactcell.discrepancy.model.linearisation import Scores, linearise, scores
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.search import candidate_scores, residual_map
-from impactcell.discrepancy.search.wild_bootstrap import Tests, resampled
+from impactcell.discrepancy.search.wild_bootstrap import BootstrapTests, wild_bootstrap
 
 ALPHA = 0.01
 """Family-wise error of one step: map and candidates each get half of it."""
 
-OVERWHELMING = 150.0
+OVERWHELMING_GAIN = 150.0
 """A first-order gain, over what shots scatter, beyond which a few shots alone convict a model.
 
 Mirroring whole shots can never make fewer than about eight shots significant, but a force channel that
@@ -24,31 +24,31 @@ saturates may do so in three.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scan:
+class CandidateScan:
     """Scores of all candidates against one fit."""
 
     fit: Fit
-    candidates: candidate_scores.Candidates
+    candidates: candidate_scores.CandidateDirections
     scores: Scores
-    tests: Tests
+    tests: BootstrapTests
 
     def gains(self) -> dict[str, float]:
         """Largest first-order gain of each candidate."""
-        made = {}
+        gains = {}
         for number, effect in enumerate(self.candidates.names):
-            best = candidate_scores.best_probes(self.candidates, self.scores, number, 1)
-            made[effect] = best[0][0] if best else 0.0
-        return made
+            best = candidate_scores.best_points(self.candidates, self.scores, number, 1)
+            gains[effect] = best[0][0] if best else 0.0
+        return gains
 
-    def p_of(self, effect: str) -> float:
+    def p_value_of(self, effect: str) -> float:
         """Return the adjusted p-value of a candidate; 1 where it could not be tested."""
         if effect not in self.candidates.names:
             return 1.0
-        return float(self.tests.adjusted[self.candidates.names.index(effect)])
+        return float(self.tests.p_adjusted[self.candidates.names.index(effect)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
+class ModelEvidence:
     """Evidence against one fit.
 
     Attributes
@@ -56,61 +56,68 @@ class Evidence:
     fit : Fit
     map, map_scores, map_tests
         Residuals of every phase against every covariate.
-    scan : Scan
+    candidate_scan : Scan
         Candidates.
     p_value : float
         That the model lacks nothing, over map and candidates together.
     """
 
     fit: Fit
-    map: residual_map.Directions
+    map: residual_map.MapDirections
     map_scores: Scores
-    map_tests: Tests
-    scan: Scan
+    map_tests: BootstrapTests
+    candidate_scan: CandidateScan
     p_value: float
 
 
-def at_problem(problem: Problem, fit: Fit) -> Fit:
+def evaluate_on(problem: Problem, fit: Fit) -> Fit:
     """Return the same model with the residuals of another selection of the same shots' samples."""
-    return replace(fit, residual=problem.residual(fit.effects, fit.at, fit.local))
+    return replace(fit, residual=problem.residual(fit.effects, fit.theta, fit.shot_parameters))
 
 
-def scan(coarse: Problem, fit: Fit, library: Sequence[str], seed: tuple[int, ...]) -> Scan:
+def scan_candidates(
+    coarse: Problem, fit: Fit, library: Sequence[str], seed: tuple[int, ...]
+) -> CandidateScan:
     """Score every candidate against a fitted model."""
-    here = at_problem(coarse, fit)
-    tangent = linearise(coarse, here)
-    found = candidate_scores.candidates(coarse, here, tangent, library)
-    made = scores(tangent, found.products)
-    return Scan(fit, found, made, resampled(tangent, made, found.group, (*seed, 2), found.side))
+    coarse_fit = evaluate_on(coarse, fit)
+    linearisation = linearise(coarse, coarse_fit)
+    directions = candidate_scores.candidate_directions(coarse, coarse_fit, linearisation, library)
+    candidate_scores_ = scores(linearisation, directions.products)
+    return CandidateScan(
+        fit,
+        directions,
+        candidate_scores_,
+        wild_bootstrap(linearisation, candidate_scores_, directions.group, (*seed, 2), directions.sign),
+    )
 
 
-def examine(
+def test_model(
     problem: Problem,
     coarse: Problem,
     fit: Fit,
-    material: Material,
+    prepared: PreparedCampaign,
     library: Sequence[str],
     seed: tuple[int, ...],
-) -> Evidence:
+) -> ModelEvidence:
     """Test a fitted model against the map, and against every candidate on fewer samples."""
-    tangent = linearise(problem, fit)
-    chart = residual_map.directions(problem, fit, tangent, material)
-    chart_scores = scores(tangent, chart.products)
-    chart_tests = resampled(tangent, chart_scores, chart.cell, (*seed, 1))
-    scanned = scan(coarse, fit, library, seed)
+    linearisation = linearise(problem, fit)
+    chart = residual_map.map_directions(problem, fit, linearisation, prepared)
+    chart_scores = scores(linearisation, chart.products)
+    chart_tests = wild_bootstrap(linearisation, chart_scores, chart.cell, (*seed, 1))
+    scanned = scan_candidates(coarse, fit, library, seed)
     smallest = min(
-        float(chart_tests.adjusted.min(initial=1.0)), float(scanned.tests.adjusted.min(initial=1.0))
+        float(chart_tests.p_adjusted.min(initial=1.0)), float(scanned.tests.p_adjusted.min(initial=1.0))
     )
     p_value = min(2.0 * smallest, 1.0)
-    if _overwhelming(chart_scores) > OVERWHELMING:
+    if _relative_gain(chart_scores) > OVERWHELMING_GAIN:
         p_value = min(p_value, 1e-4)
-    return Evidence(fit, chart, chart_scores, chart_tests, scanned, p_value)
+    return ModelEvidence(fit, chart, chart_scores, chart_tests, scanned, p_value)
 
 
-def _overwhelming(made: Scores) -> float:
+def _relative_gain(map_scores: Scores) -> float:
     """Largest gain over the dispersion that most directions show."""
-    seen = made.information > 0.0
+    seen = map_scores.information > 0.0
     if not seen.any():
         return 0.0
-    dispersion = (made.each**2).sum(0)[seen] / made.information[seen]
-    return float(made.gain.max() / max(float(np.median(dispersion)), 1.0))
+    dispersion = (map_scores.each**2).sum(0)[seen] / map_scores.information[seen]
+    return float(map_scores.gain.max() / max(float(np.median(dispersion)), 1.0))

@@ -11,34 +11,34 @@ from dataclasses import dataclass, field
 from impactcell.discrepancy.model.fit import Fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.search.candidate_fits import (
-    REFITS,
-    Setup,
-    at_an_end,
-    backward,
+    MAX_SCREENED,
+    SearchContext,
     finalists,
-    finish,
-    inside_first,
-    race,
+    is_at_bound,
+    prefer_interior,
+    refine,
+    screen,
+    without_each_effect,
 )
-from impactcell.discrepancy.search.evidence import Evidence, Scan, scan
+from impactcell.discrepancy.search.evidence import CandidateScan, ModelEvidence, scan_candidates
 from impactcell.discrepancy.search.indistinguishability import (
     Alternative,
-    Contender,
-    alternatives,
-    by_likelihood,
-    is_tied,
-    total,
+    CandidateFit,
+    are_indistinguishable,
+    compare_fits,
+    sort_by_likelihood,
+    total_log_likelihood,
 )
 
-SEEDS_OF_PAIRS = 4
-SECONDS = 5
-MOST = 0.5
-BETTER = 2.0
-RIVAL = 0.5
+MAX_FIRST_EFFECTS = 4
+MAX_SECOND_EFFECTS = 5
+MIN_SHARE_EXPLAINED = 0.5
+MIN_REFIT_GAIN = 2.0
+MAX_RIVAL_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Search:
+class SelectionResult:
     """Outcome of the search.
 
     Attributes
@@ -55,8 +55,8 @@ class Search:
         Everything that was fitted, the likeliest first.
     """
 
-    nominal: Evidence
-    final: Evidence
+    nominal: ModelEvidence
+    final: ModelEvidence
     accepted: Fit | None
     added: tuple[str, ...]
     ties: dict[str, tuple[str, ...]]
@@ -64,135 +64,156 @@ class Search:
     alternatives: tuple[Alternative, ...] = field(default=())
 
 
-def _scan(task: tuple[Problem, Fit, tuple[str, ...], tuple[int, ...]]) -> Scan:
-    return scan(*task)
+def _scan_task(task: tuple[Problem, Fit, tuple[str, ...], tuple[int, ...]]) -> CandidateScan:
+    return scan_candidates(*task)
 
 
-def search(setup: Setup, nominal: Fit) -> Search:
+def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
     """Look for the smallest set of effects that leaves nothing significant."""
-    first = setup.look(nominal)
-    if setup.suffices(first):
-        return Search(first, first, nominal, (), {}, {})
-    rough = finish(setup, race(setup, first.scan, REFITS))
+    first = context.test_model(nominal)
+    if context.is_sufficient(first):
+        return SelectionResult(first, first, nominal, (), {}, {})
+    rough = refine(context, screen(context, first.candidate_scan, MAX_SCREENED))
     if not rough:
-        return Search(first, first, None, (), {}, {})
-    singles = inside_first(setup.problem, setup.polished(finalists(setup, rough)))
-    against = setup.look(singles[0].fit)
-    if setup.closes(against):
-        return _accept_single(setup.problem, first, against, singles)
-    plausible = _plausible(setup, first, against, singles[0].fit, rough, alternatives(singles))
+        return SelectionResult(first, first, None, (), {}, {})
+    singles = prefer_interior(context.problem, context.refit_on_all_samples(finalists(context, rough)))
+    against = context.test_model(singles[0].fit)
+    if context.is_closed(against):
+        return _accept_single(context.problem, first, against, singles)
+    plausible = _accept_plausible(context, first, against, singles[0].fit, rough, compare_fits(singles))
     if plausible is not None:
         return plausible
     # The likeliest on all samples need not have been so on few.
-    others = [one for one in rough if one.effects != singles[0].fit.effects]
-    tasks = [(setup.coarse, one, setup.library, (setup.seed, 1)) for one in others[: SEEDS_OF_PAIRS - 1]]
-    sources = [against.scan, *setup.mapper(_scan, tasks)]
-    rough_pairs = _pairs(setup, sources)
+    other_singles = [candidate for candidate in rough if candidate.effects != singles[0].fit.effects]
+    tasks = [
+        (context.coarse, candidate, context.library, (context.seed, 1))
+        for candidate in other_singles[: MAX_FIRST_EFFECTS - 1]
+    ]
+    sources = [against.candidate_scan, *context.mapper(_scan_task, tasks)]
+    rough_pairs = _fit_pairs(context, sources)
     if not rough_pairs:
-        return Search(first, against, None, (), {}, {}, alternatives(singles))
-    pairs = inside_first(setup.problem, setup.polished(finalists(setup, rough_pairs)))
-    if not setup.follows(pairs[0].fit):
-        return Search(first, against, None, (), {}, {}, alternatives([*pairs, *singles]))
-    again = setup.polished(backward(nominal, pairs[0].fit))
-    if again and total(setup.problem, again[0].fit) > total(setup.problem, singles[0].fit) + BETTER:
-        effects = {one.fit.effects for one in again}
-        singles = [*again, *(one for one in singles if one.fit.effects not in effects)]
-        singles.sort(key=lambda one: -float(one.each.sum()))
-        against = setup.look(singles[0].fit)
-        if setup.closes(against):
-            return _accept_single(setup.problem, first, against, singles)
-    everything = alternatives([*pairs, *singles])
-    if not setup.material_gain(singles[0].fit, pairs[0].fit) and setup.follows(singles[0].fit):
-        return _accept_single(setup.problem, first, against, singles)
-    last = setup.look(pairs[0].fit)
-    if not setup.suffices(last) or at_an_end(pairs[0].fit):
-        return Search(first, last, None, (), {}, {}, everything)
-    return _accept_pair(setup.problem, first, last, pairs, rough, sources, everything)
+        return SelectionResult(first, against, None, (), {}, {}, compare_fits(singles))
+    pairs = prefer_interior(context.problem, context.refit_on_all_samples(finalists(context, rough_pairs)))
+    if not context.reaches_floor(pairs[0].fit):
+        return SelectionResult(first, against, None, (), {}, {}, compare_fits([*pairs, *singles]))
+    again = context.refit_on_all_samples(without_each_effect(nominal, pairs[0].fit))
+    if (
+        again
+        and total_log_likelihood(context.problem, again[0].fit)
+        > total_log_likelihood(context.problem, singles[0].fit) + MIN_REFIT_GAIN
+    ):
+        effects = {candidate.fit.effects for candidate in again}
+        singles = [*again, *(candidate for candidate in singles if candidate.fit.effects not in effects)]
+        singles.sort(key=lambda candidate: -float(candidate.each.sum()))
+        against = context.test_model(singles[0].fit)
+        if context.is_closed(against):
+            return _accept_single(context.problem, first, against, singles)
+    everything = compare_fits([*pairs, *singles])
+    if not context.gains_enough(singles[0].fit, pairs[0].fit) and context.reaches_floor(singles[0].fit):
+        return _accept_single(context.problem, first, against, singles)
+    last = context.test_model(pairs[0].fit)
+    if not context.is_sufficient(last) or is_at_bound(pairs[0].fit):
+        return SelectionResult(first, last, None, (), {}, {}, everything)
+    return _accept_pair(context.problem, first, last, pairs, rough, sources, everything)
 
 
-def _pairs(setup: Setup, sources: list[Scan]) -> list[Fit]:
+def _fit_pairs(context: SearchContext, sources: list[CandidateScan]) -> list[Fit]:
     """Fit the most promising second effects beside several first ones, the likeliest first."""
     best: dict[frozenset[str], Fit] = {}
     for source in sources:
-        for made in race(setup, source, SECONDS):
-            key = frozenset(made.effects)
-            if key not in best or total(setup.coarse, made) > total(setup.coarse, best[key]):
-                best[key] = made
-    return finish(setup, by_likelihood(setup.coarse, best.values()))
+        for fitted in screen(context, source, MAX_SECOND_EFFECTS):
+            key = frozenset(fitted.effects)
+            if key not in best or total_log_likelihood(context.coarse, fitted) > total_log_likelihood(
+                context.coarse, best[key]
+            ):
+                best[key] = fitted
+    return refine(context, sort_by_likelihood(context.coarse, best.values()))
 
 
-def _plausible(
-    setup: Setup,
-    first: Evidence,
-    against: Evidence,
+def _accept_plausible(
+    context: SearchContext,
+    first: ModelEvidence,
+    against: ModelEvidence,
     best: Fit,
     rough: list[Fit],
     everything: tuple[Alternative, ...],
-) -> Search | None:
+) -> SelectionResult | None:
     """Accept the effect that explains most of a gap, if the floor itself is only a lower bound.
 
     What is left then may be noise that nobody stated. It also may be what separates the best effect from its
     rivals: whoever is behind by less than that is tied.
     """
-    if setup.certain or at_an_end(best):
+    if context.floor_is_certain or is_at_bound(best):
         return None
-    size = setup.problem.shots.values.size
-    before = float(first.fit.misfit(setup.problem.shots).sum()) - size
-    after = float(best.misfit(setup.problem.shots).sum()) - size
-    if after > (1.0 - MOST) * before:
+    size = context.problem.shots.values.size
+    before = float(first.fit.misfit(context.problem.shots).sum()) - size
+    after = float(best.misfit(context.problem.shots).sum()) - size
+    if after > (1.0 - MIN_SHARE_EXPLAINED) * before:
         return None
-    scale = setup.coarse.shots.values.size / size
-    least = float(best.misfit(setup.problem.shots).sum()) * scale
+    scale = context.coarse.shots.values.size / size
+    smallest = float(best.misfit(context.problem.shots).sum()) * scale
     effect = best.effects[-1]
     tied = tuple(
-        one.effects[-1]
-        for one in rough
-        if one.effects != best.effects
-        and float(one.misfit(setup.coarse.shots).sum()) - least <= RIVAL * after * scale
+        model.effects[-1]
+        for model in rough
+        if model.effects != best.effects
+        and float(model.misfit(context.coarse.shots).sum()) - smallest <= MAX_RIVAL_SHARE * after * scale
     )
-    return Search(
-        first, against, best, (effect,), {effect: tied}, {effect: first.scan.p_of(effect)}, everything
-    )
-
-
-def _accept_single(problem: Problem, first: Evidence, against: Evidence, singles: list[Contender]) -> Search:
-    best = singles[0].fit
-    if at_an_end(best):
-        return Search(first, against, None, (), {}, {}, alternatives(singles))
-    effect = best.effects[-1]
-    tied = tuple(other.fit.effects[-1] for other in singles[1:] if is_tied(problem, singles[0], other))
-    return Search(
+    return SelectionResult(
         first,
         against,
         best,
         (effect,),
         {effect: tied},
-        {effect: first.scan.p_of(effect)},
-        alternatives(singles),
+        {effect: first.candidate_scan.p_value_of(effect)},
+        everything,
+    )
+
+
+def _accept_single(
+    problem: Problem, first: ModelEvidence, against: ModelEvidence, singles: list[CandidateFit]
+) -> SelectionResult:
+    best = singles[0].fit
+    if is_at_bound(best):
+        return SelectionResult(first, against, None, (), {}, {}, compare_fits(singles))
+    effect = best.effects[-1]
+    tied = tuple(
+        other.fit.effects[-1] for other in singles[1:] if are_indistinguishable(problem, singles[0], other)
+    )
+    return SelectionResult(
+        first,
+        against,
+        best,
+        (effect,),
+        {effect: tied},
+        {effect: first.candidate_scan.p_value_of(effect)},
+        compare_fits(singles),
     )
 
 
 def _accept_pair(
     problem: Problem,
-    first: Evidence,
-    last: Evidence,
-    pairs: list[Contender],
+    first: ModelEvidence,
+    last: ModelEvidence,
+    pairs: list[CandidateFit],
     rough: list[Fit],
-    sources: list[Scan],
+    sources: list[CandidateScan],
     everything: tuple[Alternative, ...],
-) -> Search:
+) -> SelectionResult:
     best = pairs[0].fit
-    order = {one.effects[-1]: place for place, one in enumerate(rough)}
-    new = [effect for effect in best.effects if effect not in first.fit.effects]
-    added = tuple(sorted(new, key=lambda effect: order.get(effect, len(order))))
+    order = {model.effects[-1]: place for place, model in enumerate(rough)}
+    new_effects = [effect for effect in best.effects if effect not in first.fit.effects]
+    added = tuple(sorted(new_effects, key=lambda effect: order.get(effect, len(order))))
     ties: dict[str, tuple[str, ...]] = dict.fromkeys(added, ())
     for rival in pairs[1:]:
         other = rival.fit.effects
-        if len(set(other) & set(added)) == 1 and is_tied(problem, pairs[0], rival):
+        if len(set(other) & set(added)) == 1 and are_indistinguishable(problem, pairs[0], rival):
             replaced = next(effect for effect in added if effect not in other)
             instead = next(effect for effect in other if effect not in best.effects)
             ties[replaced] = (*ties[replaced], instead)
-    p_values = {added[0]: first.scan.p_of(added[0])}
+    p_values = {added[0]: first.candidate_scan.p_value_of(added[0])}
     beside = [source for source in sources if source.fit.effects[-1:] == added[:1]]
-    p_values[added[1]] = beside[0].p_of(added[1]) if beside else first.scan.p_of(added[1])
-    return Search(first, last, best, added, ties, p_values, everything)
+    p_values[added[1]] = (
+        beside[0].p_value_of(added[1]) if beside else first.candidate_scan.p_value_of(added[1])
+    )
+    return SelectionResult(first, last, best, added, ties, p_values, everything)

@@ -9,22 +9,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.prepared_campaign import Material
-from impactcell.discrepancy.data.shots import CHANNELS, Index
+from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
+from impactcell.discrepancy.data.shots import CHANNELS, IndexArray
 from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.linearisation import Products, Tangent, products, together
-from impactcell.discrepancy.model.phases import BETWEEN_SHOTS, PHASES, course_of, phases, place_within
+from impactcell.discrepancy.model.linearisation import (
+    DirectionProducts,
+    Linearisation,
+    concatenate_products,
+    direction_products,
+)
+from impactcell.discrepancy.model.phases import (
+    BETWEEN_SHOTS,
+    PHASES,
+    phase_positions,
+    sample_phases,
+    trajectory_of,
+)
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
 ALL = "all"
-FINE = 10
-COARSE = 3
-FEWEST_SAMPLES = 4
+MEAN_KNOTS = 10
+COVARIATE_KNOTS = 3
+MIN_SAMPLES_PER_SHOT = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Directions:
+class MapDirections:
     """Directions of the map.
 
     Attributes
@@ -40,34 +51,36 @@ class Directions:
         Where within the phase the direction has its middle.
     """
 
-    products: Products
-    cell: Index
+    products: DirectionProducts
+    cell: IndexArray
     rows: tuple[str, ...]
     columns: tuple[str, ...]
-    channel: Index
+    channel: IndexArray
     place: Samples
 
 
-def modulators(problem: Problem, material: Material) -> dict[str, Samples]:
+def standardised_covariates(problem: Problem, prepared: PreparedCampaign) -> dict[str, Samples]:
     """Covariates of the problem's shots, centred and scaled; those that are constant are left out."""
-    made: dict[str, Samples] = {}
-    for name in material.covariates:
+    standardised: dict[str, Samples] = {}
+    for name in prepared.covariates:
         values = np.array([shot.covariates[name] for shot in problem.shots.items])
         spread = float(values.std())
         if spread > 1e-12 * float(np.abs(values).max()):
-            made[name] = (values - values.mean()) / spread
-    return made
+            standardised[name] = (values - values.mean()) / spread
+    return standardised
 
 
-def directions(problem: Problem, fit: Fit, tangent: Tangent, material: Material) -> Directions:
+def map_directions(
+    problem: Problem, fit: Fit, linearisation: Linearisation, prepared: PreparedCampaign
+) -> MapDirections:
     """Directions of every cell of the map."""
-    course = course_of(problem, fit)
+    trajectory = trajectory_of(problem, fit)
     times = problem.shots.times
-    phase = phases(problem, course)
-    place = place_within(problem, phase, times)
-    factors = modulators(problem, material)
+    phase = sample_phases(problem, trajectory)
+    place = phase_positions(problem, phase, times)
+    factors = standardised_covariates(problem, prepared)
     columns = (ALL, *factors)
-    parts: list[Products] = []
+    parts: list[DirectionProducts] = []
     cells: list[int] = []
     channels: list[int] = []
     places: list[float] = []
@@ -79,37 +92,44 @@ def directions(problem: Problem, fit: Fit, tangent: Tangent, material: Material)
         row = len(rows)
         rows.append(name)
         for channel in range(len(CHANNELS)):
-            mine = inside & (problem.shots.channel == channel)
-            if int(mine.sum()) < FEWEST_SAMPLES * problem.count:
+            in_channel = inside & (problem.shots.channel == channel)
+            if int(in_channel.sum()) < MIN_SAMPLES_PER_SHOT * problem.count:
                 continue
-            for count, modulated in ((FINE, False), (COARSE, True)):
-                for middle, hat in _hats(place, mine, count):
-                    made = products(tangent, hat)
+            for count, modulated in ((MEAN_KNOTS, False), (COVARIATE_KNOTS, True)):
+                for middle, hat in _hat_functions(place, in_channel, count):
+                    hat_products = direction_products(linearisation, hat)
                     for column, covariate in enumerate(columns):
                         if (column == 0) == modulated:
                             continue
-                        parts.append(made if column == 0 else made.modulated(factors[covariate]))
+                        parts.append(
+                            hat_products if column == 0 else hat_products.modulate(factors[covariate])
+                        )
                         cells.append(row * len(columns) + column)
                         channels.append(channel)
                         places.append(middle)
     row = len(rows)
     rows.append(BETWEEN_SHOTS)
-    unit = products(tangent, np.zeros(problem.shots.values.size), np.ones(problem.count))
+    unit = direction_products(linearisation, np.zeros(problem.shots.values.size), np.ones(problem.count))
     for column, covariate in enumerate(columns):
         if column:
-            parts.append(unit.modulated(factors[covariate]))
+            parts.append(unit.modulate(factors[covariate]))
             cells.append(row * len(columns) + column)
             channels.append(-1)
             places.append(0.5)
-    return Directions(
-        together(parts), np.array(cells), tuple(rows), columns, np.array(channels), np.array(places)
+    return MapDirections(
+        concatenate_products(parts),
+        np.array(cells),
+        tuple(rows),
+        columns,
+        np.array(channels),
+        np.array(places),
     )
 
 
-def _hats(place: Samples, mine: Index, count: int) -> list[tuple[float, Samples]]:
+def _hat_functions(place: Samples, inside: IndexArray, count: int) -> list[tuple[float, Samples]]:
     """Piecewise linear functions of the place within the phase that add up to one."""
-    made = []
+    hats = []
     for knot in np.linspace(0.0, 1.0, count):
         hat = np.maximum(1.0 - np.abs(place - knot) * (count - 1), 0.0)
-        made.append((float(knot), np.where(mine, hat, 0.0)))
-    return made
+        hats.append((float(knot), np.where(inside, hat, 0.0)))
+    return hats

@@ -6,20 +6,20 @@ import numpy as np
 
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.data.shots import CHANNELS
-from impactcell.discrepancy.model.phases import BETWEEN_SHOTS, PHASES, course_of, phases
+from impactcell.discrepancy.model.phases import BETWEEN_SHOTS, PHASES, sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.model.split_fits import Alone, alone
-from impactcell.discrepancy.search.evidence import ALPHA, Evidence
+from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
+from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.records import Samples
 
 STRONG_SHARE = 0.25
-SMALL = 1.1
-AFTER = frozenset({"free_slide", "stop", "driven"})
+NO_GAP_RMS = 1.1
+AFTER_SEPARATION = frozenset({"free_slide", "stop", "driven"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shape:
+class ResidualShape:
     """Free-form residual along one phase of one channel, in units of the noise.
 
     Attributes
@@ -39,7 +39,7 @@ class Shape:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Unexplained:
+class UnexplainedGap:
     """What is left.
 
     Attributes
@@ -52,18 +52,18 @@ class Unexplained:
         In words.
     shapes : tuple of Shape
         To be drawn.
-    alone : Alone, optional
+    split_fits : Alone, optional
         Contact and slide fitted alone, of taps.
     """
 
     phase: str
     depends_on: tuple[str, ...]
     shape: str
-    shapes: tuple[Shape, ...]
-    alone: Alone | None
+    shapes: tuple[ResidualShape, ...]
+    split_fits: SplitFits | None
 
 
-def phase_of_gap(problem: Problem, evidence: Evidence, parts: Alone | None) -> str:
+def phase_of_gap(problem: Problem, evidence: ModelEvidence, parts: SplitFits | None) -> str:
     """Phase in which a gap arises.
 
     A gap that shows in the friction factors only is where the map is strongest. Of a tap, contact and slide
@@ -71,77 +71,79 @@ def phase_of_gap(problem: Problem, evidence: Evidence, parts: Alone | None) -> s
     with the largest share of the squared residuals is named. Where neither does, the whole shots' residuals
     decide.
     """
-    if evidence.fit.misfit(problem.shots).sum() <= SMALL * problem.shots.values.size:
-        return _strongest(evidence)
-    phase = phases(problem, course_of(problem, evidence.fit))
+    if evidence.fit.misfit(problem.shots).sum() <= NO_GAP_RMS * problem.shots.values.size:
+        return _strongest_row(evidence)
+    phase = sample_phases(problem, trajectory_of(problem, evidence.fit))
     excess = {
         name: float((evidence.fit.residual[phase == number] ** 2 - 1.0).sum())
         for number, name in enumerate(PHASES)
         if (phase == number).any()
     }
-    after = {name: value for name, value in excess.items() if name in AFTER}
-    contact = {name: value for name, value in excess.items() if name not in AFTER}
+    after = {name: value for name, value in excess.items() if name in AFTER_SEPARATION}
+    contact = {name: value for name, value in excess.items() if name not in AFTER_SEPARATION}
     in_contact = sum(contact.values()) > sum(after.values())
     if parts is not None:
-        found = np.nan_to_num([parts.contact, parts.slide], nan=1.0)
-        if found.max() > SMALL:
-            in_contact = bool(found[0] > found[1])
+        rms = np.nan_to_num([parts.contact, parts.slide], nan=1.0)
+        if rms.max() > NO_GAP_RMS:
+            in_contact = bool(rms[0] > rms[1])
     side = contact if (in_contact and contact) or not after else after
     return max(side, key=lambda name: side[name])
 
 
-def _strongest(evidence: Evidence) -> str:
+def _strongest_row(evidence: ModelEvidence) -> str:
     """Row of the map with the most significant cell; of equals the one that promises most."""
     chart, gain = evidence.map, evidence.map_scores.gain
-    cells = range(len(evidence.map_tests.adjusted))
+    cells = range(len(evidence.map_tests.p_adjusted))
     best = min(
         cells,
-        key=lambda cell: (evidence.map_tests.adjusted[cell], -gain[chart.cell == cell].max(initial=0.0)),
+        key=lambda cell: (evidence.map_tests.p_adjusted[cell], -gain[chart.cell == cell].max(initial=0.0)),
     )
     return chart.rows[best // len(chart.columns)]
 
 
-def describe(problem: Problem, evidence: Evidence) -> Unexplained:
+def describe_gap(problem: Problem, evidence: ModelEvidence) -> UnexplainedGap:
     """Describe what a fitted model leaves."""
     chart, tests = evidence.map, evidence.map_tests
     taps = problem.shots.excitation is Excitation.TAP
-    parts = alone(problem, evidence.fit) if taps else None
+    parts = fit_split(problem, evidence.fit) if taps else None
     phase = phase_of_gap(problem, evidence, parts)
     if phase not in chart.rows:
-        phase = _strongest(evidence)
+        phase = _strongest_row(evidence)
     row = chart.rows.index(phase)
     p = np.ones(len(chart.columns))
     for column in range(len(chart.columns)):
         cell = row * len(chart.columns) + column
-        if cell < len(tests.adjusted):
-            p[column] = tests.adjusted[cell]
+        if cell < len(tests.p_adjusted):
+            p[column] = tests.p_adjusted[cell]
     depends = tuple(
         name for column, name in enumerate(chart.columns) if name != ALL and p[column] <= ALPHA * 5.0
     )
     shapes = _shapes(evidence, row, depends) if phase != BETWEEN_SHOTS else ()
-    return Unexplained(phase, depends, _in_words(phase, shapes), shapes, parts)
+    return UnexplainedGap(phase, depends, _in_words(phase, shapes), shapes, parts)
 
 
-def _shapes(evidence: Evidence, row: int, depends: tuple[str, ...]) -> tuple[Shape, ...]:
+def _shapes(evidence: ModelEvidence, row: int, depends: tuple[str, ...]) -> tuple[ResidualShape, ...]:
     """Free-form shape in each channel: its mean, or what changes with the covariate that shows more of it."""
-    chart, made = evidence.map, evidence.map_scores
+    chart, map_scores = evidence.map, evidence.map_scores
     shapes = []
     for channel, sensor in enumerate(CHANNELS):
-        best, most = None, 0.0
+        best, largest_gain = None, 0.0
         for covariate in (ALL, *depends):
             cell = row * len(chart.columns) + chart.columns.index(covariate)
-            mine = (chart.cell == cell) & (chart.channel == channel)
-            gain = float(made.gain[mine].max(initial=0.0))
-            if gain > most:
+            in_cell = (chart.cell == cell) & (chart.channel == channel)
+            gain = float(map_scores.gain[in_cell].max(initial=0.0))
+            if gain > largest_gain:
                 times = "" if covariate == ALL else covariate
-                best = Shape(chart.rows[row], sensor, times, chart.place[mine], made.amplitude[mine])
-                most = gain
+                best = ResidualShape(
+                    chart.rows[row], sensor, times, chart.place[in_cell], map_scores.amplitude[in_cell]
+                )
+                largest_gain = gain
         if best is not None:
             shapes.append(best)
     return tuple(shapes)
 
 
-def _in_words(phase: str, shapes: tuple[Shape, ...]) -> str:
+def _in_words(phase: str, shapes: tuple[ResidualShape, ...]) -> str:
     if phase == BETWEEN_SHOTS:
         return "the friction factors change from shot to shot with the covariates named"
     if not shapes:

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.noise_floor import Floor, Replicates
+from impactcell.discrepancy.data.noise_floor import NoiseFloor, ReplicateSpread
 from impactcell.discrepancy.data.shots import CHANNELS
-from impactcell.discrepancy.model.fit import Fit, refit_own
-from impactcell.discrepancy.model.phases import PHASES, course_of, phases
+from impactcell.discrepancy.model.fit import Fit, refit_shot_parameters
+from impactcell.discrepancy.model.phases import PHASES, sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
-OPEN = 1.05
+MIN_OPEN_GAP = 1.05
 """A gap of at most this before is none that could be closed."""
 
 RESAMPLES = 1999
@@ -40,7 +40,7 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Proof:
+class Validation:
     """Gaps before and after, in training and held out.
 
     Attributes
@@ -61,23 +61,23 @@ class Proof:
     regions: tuple[tuple[str, str, float, float], ...]
 
 
-def gap(problem: Problem, model: Fit, floor: Floor, replicates: Replicates) -> Gap:
+def gap(problem: Problem, model: Fit, floor: NoiseFloor, replicates: ReplicateSpread) -> Gap:
     """Gap of a model whose own numbers of each shot have been fitted.
 
     Only channels whose noise is stated are counted, if there are any: elsewhere the floor is a lower bound.
     """
-    misfit, free = _counted(problem, model, floor)
-    return _gap(misfit, free, model.local.log_factor, replicates.spread)
+    misfit, free = _counted_misfit(problem, model, floor)
+    return _gap(misfit, free, model.shot_parameters.log_factor, replicates.spread)
 
 
-def _counted(problem: Problem, model: Fit, floor: Floor) -> tuple[Samples, Samples]:
+def _counted_misfit(problem: Problem, model: Fit, floor: NoiseFloor) -> tuple[Samples, Samples]:
     """Squared residual and degrees of freedom of every shot, over the channels that count."""
     stated = np.array([source == "stated" for source in floor.source])
     counts = stated if stated.any() else ~stated
-    mine = counts[problem.shots.channel]
+    counted = counts[problem.shots.channel]
     first = problem.shots.bounds[:-1]
-    misfit = np.add.reduceat(np.where(mine, model.residual**2, 0.0), first)
-    free = np.add.reduceat(mine.astype(np.float64), first) - len(problem.own)
+    misfit = np.add.reduceat(np.where(counted, model.residual**2, 0.0), first)
+    free = np.add.reduceat(counted.astype(np.float64), first) - len(problem.shot_parameter_names)
     return misfit, np.maximum(free, 0.0)
 
 
@@ -87,35 +87,44 @@ def _gap(misfit: Samples, free: Samples, log_factor: Samples, spread: float) -> 
     return Gap(trace, factor)
 
 
-def prove(
+def validate(
     training: Problem,
     before: Fit,
     after: Fit,
     held_out: Problem,
-    floor: Floor,
-    replicates: Replicates,
+    floor: NoiseFloor,
+    replicates: ReplicateSpread,
     seed: int,
-) -> tuple[Proof, Fit, Fit]:
+) -> tuple[Validation, Fit, Fit]:
     """Open the held-out shots; returns the proof and both models fitted to their factors."""
-    old, new = refit_own(held_out, before), refit_own(held_out, after)
-    gap_before, gap_after = (gap(held_out, one, floor, replicates) for one in (old, new))
+    held_before, held_after = refit_shot_parameters(held_out, before), refit_shot_parameters(held_out, after)
+    gap_before, gap_after = (gap(held_out, model, floor, replicates) for model in (held_before, held_after))
     closed = low = high = math.nan
-    if gap_before.whole > OPEN:
-        closed = _closed(gap_before, gap_after)
+    if gap_before.whole > MIN_OPEN_GAP:
+        closed = _closed_share(gap_before, gap_after)
         rng = np.random.default_rng([seed, 7])
-        (misfit_before, free), (misfit_after, _) = (_counted(held_out, one, floor) for one in (old, new))
+        (misfit_before, free), (misfit_after, _) = (
+            _counted_misfit(held_out, model, floor) for model in (held_before, held_after)
+        )
         draws = []
         for _ in range(RESAMPLES):
             pick = rng.integers(0, held_out.count, held_out.count)
-            a = _gap(misfit_before[pick], free[pick], old.local.log_factor[pick], replicates.spread)
-            b = _gap(misfit_after[pick], free[pick], new.local.log_factor[pick], replicates.spread)
-            if a.whole > OPEN:
-                draws.append(_closed(a, b))
+            a = _gap(
+                misfit_before[pick],
+                free[pick],
+                held_before.shot_parameters.log_factor[pick],
+                replicates.spread,
+            )
+            b = _gap(
+                misfit_after[pick], free[pick], held_after.shot_parameters.log_factor[pick], replicates.spread
+            )
+            if a.whole > MIN_OPEN_GAP:
+                draws.append(_closed_share(a, b))
         if draws:
             low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
             low, high = min(low, closed), max(high, closed)
     return (
-        Proof(
+        Validation(
             gap(training, before, floor, replicates),
             gap(training, after, floor, replicates),
             gap_before,
@@ -123,24 +132,29 @@ def prove(
             closed,
             low,
             high,
-            _regions(held_out, old, new),
+            _regions(held_out, held_before, held_after),
         ),
-        old,
-        new,
+        held_before,
+        held_after,
     )
 
 
-def _closed(before: Gap, after: Gap) -> float:
+def _closed_share(before: Gap, after: Gap) -> float:
     return (before.whole - after.whole) / (before.whole - 1.0)
 
 
-def _regions(problem: Problem, old: Fit, new: Fit) -> tuple[tuple[str, str, float, float], ...]:
-    phase = phases(problem, course_of(problem, new))
-    made = []
+def _regions(
+    problem: Problem, held_before: Fit, held_after: Fit
+) -> tuple[tuple[str, str, float, float], ...]:
+    phase = sample_phases(problem, trajectory_of(problem, held_after))
+    regions = []
     for number, name in enumerate(PHASES):
         for channel, sensor in enumerate(CHANNELS):
-            mine = (phase == number) & (problem.shots.channel == channel)
-            if mine.any():
-                rms = [float(np.sqrt(np.mean(one.residual[mine] ** 2))) for one in (old, new)]
-                made.append((name, sensor, rms[0], rms[1]))
-    return tuple(made)
+            in_region = (phase == number) & (problem.shots.channel == channel)
+            if in_region.any():
+                rms = [
+                    float(np.sqrt(np.mean(model.residual[in_region] ** 2)))
+                    for model in (held_before, held_after)
+                ]
+                regions.append((name, sensor, rms[0], rms[1]))
+    return tuple(regions)

@@ -11,40 +11,40 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from impactcell.discrepancy.data.shots import Index
-from impactcell.discrepancy.model.linearisation import Scores, Tangent
+from impactcell.discrepancy.data.shots import IndexArray
+from impactcell.discrepancy.model.linearisation import Linearisation, Scores
 from impactcell.records import Samples
 
 DRAWS = 1999
-AT_A_TIME = 64
+DIRECTIONS_PER_BATCH = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tests:
+class BootstrapTests:
     """Outcome of a family of groups of directions; a group's statistic is the largest of its directions.
 
     Attributes
     ----------
     statistic : ndarray, shape (groups,)
-    single : ndarray, shape (groups,)
+    p_single : ndarray, shape (groups,)
         p-value of each group by itself.
-    adjusted : ndarray, shape (groups,)
+    p_adjusted : ndarray, shape (groups,)
         p-value that holds over all groups together.
     """
 
     statistic: Samples
-    single: Samples
-    adjusted: Samples
+    p_single: Samples
+    p_adjusted: Samples
 
 
-def resampled(
-    tangent: Tangent,
+def wild_bootstrap(
+    linearisation: Linearisation,
     scores: Scores,
-    groups: Index,
+    groups: IndexArray,
     seed: tuple[int, ...],
     one_sided: Samples | None = None,
     draws: int = DRAWS,
-) -> Tests:
+) -> BootstrapTests:
     """Test groups of directions.
 
     Parameters
@@ -58,12 +58,12 @@ def resampled(
     count = int(groups.max()) + 1 if Q else 0
     rng = np.random.default_rng(list(seed))
     W = rng.integers(0, 2, size=(draws, n)) * 2.0 - 1.0
-    inverse = np.linalg.pinv(tangent.information, rcond=1e-13, hermitian=True)
-    shifts = W @ tangent.shot_gradient @ inverse
+    inverse = np.linalg.pinv(linearisation.information, rcond=1e-13, hermitian=True)
+    shifts = W @ linearisation.shot_gradient @ inverse
     sides = np.zeros(Q) if one_sided is None else one_sided
-    found = np.zeros((draws + 1, count))
-    for first in range(0, Q, AT_A_TIME):
-        part = slice(first, min(first + AT_A_TIME, Q))
+    statistics = np.zeros((draws + 1, count))
+    for first in range(0, Q, DIRECTIONS_PER_BATCH):
+        part = slice(first, min(first + DIRECTIONS_PER_BATCH, Q))
         e, K = scores.each[:, part], scores.leverage[:, part]
         U = np.vstack([e.sum(0), W @ e])
         V = np.broadcast_to((e**2).sum(0), U.shape).copy()
@@ -76,25 +76,27 @@ def resampled(
         side = sides[part]
         T = np.where((side != 0.0) & (U * side < 0.0), 0.0, T)
         for column, group in enumerate(groups[part]):
-            found[:, group] = np.maximum(found[:, group], T[:, column])
-    return _min_p(found, np.bincount(groups, minlength=count), n)
+            statistics[:, group] = np.maximum(statistics[:, group], T[:, column])
+    return _min_p(statistics, np.bincount(groups, minlength=count), n)
 
 
-def _min_p(found: Samples, size: Index, shots: int) -> Tests:
+def _min_p(statistics: Samples, size: IndexArray, shots: int) -> BootstrapTests:
     """p-values from statistics of shape (draws + 1, groups), the observed ones first.
 
     Groups are made comparable by what a statistic would mean for as many independent directions as the group
     has and normal scores: that is only a scale, on which the draws say how small the smallest may be. Unlike
     ranks within each group it does not run out of digits.
     """
-    total = len(found)
-    if not found.shape[1]:
-        return Tests(np.empty(0), np.empty(0), np.empty(0))
-    ordered = np.sort(found, axis=0)
-    below = [np.searchsorted(ordered[:, g], found[0, g], side="left") for g in range(found.shape[1])]
+    total = len(statistics)
+    if not statistics.shape[1]:
+        return BootstrapTests(np.empty(0), np.empty(0), np.empty(0))
+    ordered = np.sort(statistics, axis=0)
+    below = [
+        np.searchsorted(ordered[:, g], statistics[0, g], side="left") for g in range(statistics.shape[1])
+    ]
     single = (total - np.array(below)) / total
-    ratio = found * (shots - 1) / np.maximum(shots - found, 1e-9)
+    ratio = statistics * (shots - 1) / np.maximum(shots - statistics, 1e-9)
     scale = fisher.logsf(ratio, 1, shots - 1) + np.log(np.maximum(size, 1))
     smallest = np.sort(scale.min(axis=1))
     adjusted = np.searchsorted(smallest, scale[0] + 1e-9, side="right") / total
-    return Tests(found[0], single, np.maximum(adjusted, single))
+    return BootstrapTests(statistics[0], single, np.maximum(adjusted, single))
