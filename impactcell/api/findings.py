@@ -14,8 +14,8 @@ from typing import Any
 from impactcell.api.friction import calibrated
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.discrepancy.report.page import verdict_sentence, write_report
-from impactcell.discrepancy.report.result import result_document, json_text
-from impactcell.discrepancy.workflow import DiscrepancyResult, investigate, extended_plant
+from impactcell.discrepancy.report.result import json_text, result_document
+from impactcell.discrepancy.workflow import DiscrepancyResult, extended_plant, investigate
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.prediction import Model
 from impactcell.prediction.model import Prior
@@ -114,17 +114,17 @@ def discrepancy(
     data = campaign if isinstance(campaign, Campaign) else read(Path(campaign))
     nominal = None if model is None else read_model(Path(model))
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        findings = investigate(
+        result = investigate(
             data,
             seed=seed,
             mapper=lambda function, items: list(pool.map(function, items)),
             plant=None if nominal is None else nominal.plant,
         )
-    outcome = result_document(findings)
+    outcome = result_document(result)
     return DiscrepancyFindings(
-        verdict=findings.verdict,
-        headline=verdict_sentence(findings),
-        effects=findings.added,
+        verdict=result.verdict,
+        headline=verdict_sentence(result),
+        effects=result.added,
         tied_with={entry["effect"]: tuple(entry["tied_with"]) for entry in outcome["effects"]},
         parameters={
             entry["effect"]: {
@@ -132,16 +132,18 @@ def discrepancy(
             }
             for entry in outcome["effects"]
         },
-        gap_before=findings.proof.before.whole,
-        gap_after=findings.proof.after.whole,
+        gap_before=result.validation.before.whole,
+        gap_after=result.validation.after.whole,
         result=outcome,
         _campaign=data,
-        _findings=findings,
+        _findings=result,
         _nominal="fitted" if nominal is None else nominal.name,
     )
 
 
-def write_findings(findings: DiscrepancyResult, data: Campaign, output: Path, source: str, nominal: str) -> None:
+def write_findings(
+    result: DiscrepancyResult, data: Campaign, output: Path, source: str, nominal: str
+) -> None:
     """Write all three files beside the directory and move them in together at the end."""
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
@@ -149,9 +151,9 @@ def write_findings(findings: DiscrepancyResult, data: Campaign, output: Path, so
     except OSError as error:
         raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
     try:
-        (beside / "result.json").write_text(json_text(result_document(findings)), encoding="utf-8")
-        write_model(extended_model(findings, data, source, nominal), beside / "model.extended.yaml")
-        write_report(findings, source, beside / "report.html")
+        (beside / "result.json").write_text(json_text(result_document(result)), encoding="utf-8")
+        write_model(extended_model(result, data, source, nominal), beside / "model.extended.yaml")
+        write_report(result, source, beside / "report.html")
         output.mkdir(exist_ok=True)
         for name in FILES:
             (beside / name).replace(output / name)
@@ -161,17 +163,17 @@ def write_findings(findings: DiscrepancyResult, data: Campaign, output: Path, so
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def extended_model(findings: DiscrepancyResult, data: Campaign, source: str, nominal: str) -> Model:
+def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nominal: str) -> Model:
     """Make the extended model as a model file holds it, calibrated so that a service can run with it."""
-    plant = extended_plant(findings)
-    half = {one.parameter: (one.high - one.low) / 4.0 for one in findings.parameters if not one.effect}
+    plant = extended_plant(result)
+    half = {one.parameter: (one.high - one.low) / 4.0 for one in result.parameters if not one.effect}
     ratio = plant.mu_k / plant.mu_s
     intervals: dict[str, dict[str, tuple[float, float]]] = {}
-    for one in findings.parameters:
+    for one in result.parameters:
         if one.effect and not one.batch and math.isfinite(one.low) and math.isfinite(one.high):
             intervals.setdefault(one.effect, {})[one.parameter] = (one.low, one.high)
     model = Model(
-        name=f"{nominal} + {' + '.join(findings.added)}" if findings.added else nominal,
+        name=f"{nominal} + {' + '.join(result.added)}" if result.added else nominal,
         plant=plant,
         prior=Prior(
             stiffness_std_n_per_m=_positive(half.get("stiffness_n_per_m", 0.0), plant.stiffness_n_per_m),
@@ -185,10 +187,10 @@ def extended_model(findings: DiscrepancyResult, data: Campaign, source: str, nom
         provenance={
             "made by": "impactcell discrepancy",
             "from": source,
-            "seed": str(findings.seed),
-            "verdict": findings.verdict,
-            "held-out gap before": f"{findings.proof.before.whole:.4g}",
-            "held-out gap after": f"{findings.proof.after.whole:.4g}",
+            "seed": str(result.seed),
+            "verdict": result.verdict,
+            "held-out gap before": f"{result.validation.before.whole:.4g}",
+            "held-out gap after": f"{result.validation.after.whole:.4g}",
         },
     )
     if data.excitation is not Excitation.TAP:

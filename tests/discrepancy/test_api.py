@@ -21,9 +21,7 @@ def test_findings_are_looked_at_and_written(tmp_path: Path) -> None:
     assert low < value < high
     report = result.write(tmp_path / "out", source="twenty-four shots")
     assert report.is_file()
-    assert json.loads((tmp_path / "out" / "result.json").read_text()) == json.loads(
-        json.dumps(result.result)
-    )
+    assert json.loads((tmp_path / "out" / "result.json").read_text()) == json.loads(json.dumps(result.result))
     extended = read_model(tmp_path / "out" / "model.extended.yaml")
     assert list(extended.plant.effects) == ["viscous_friction"]
     with pytest.raises(CampaignError, match="cannot be written"):
