@@ -1,13 +1,13 @@
 """What the PLC says of batches through the registers: the scenario's PLC, or one that writes them. Pure."""
 
-from simulator.image import Image
+from simulator.image import RegisterImage
 from simulator.scenario import Batch, Scenario
 
-AHEAD = 2
+ANNOUNCED_CYCLES_AHEAD = 2
 """Cycles before its first one at which the scenario's PLC announces a batch."""
 
 
-class Announcements:
+class BatchAnnouncer:
     """Which batch the PLC believes to be on the table.
 
     Attributes
@@ -16,7 +16,7 @@ class Announcements:
         Empty until something has been announced.
     """
 
-    def __init__(self, scenario: Scenario, image: Image) -> None:
+    def __init__(self, scenario: Scenario, image: RegisterImage) -> None:
         self.batch_id = ""
         self._batches = [batch for batch in scenario.batches if batch.announced]
         self._image = image
@@ -31,7 +31,7 @@ class Announcements:
 
     def announce(self, made: int, cycle: int) -> None:
         """Announce what begins soon, after `made` strikes of the scenario and `cycle` on the counter."""
-        known = [batch for batch in self._batches if batch.from_cycle <= made + AHEAD]
+        known = [batch for batch in self._batches if batch.from_cycle <= made + ANNOUNCED_CYCLES_AHEAD]
         if known and known[-1] is not self._last:
             self._last = known[-1]
             self._image.put("batch_from_cycle", max(known[-1].from_cycle - made, 1) + cycle)

@@ -3,7 +3,7 @@
 import enum
 from typing import Final
 
-from simulator.image import Image
+from simulator.image import RegisterImage
 from simulator.plant import TapInput
 from simulator.scenario import Positioning
 from simulator.tasks import PartSequence
@@ -44,7 +44,7 @@ class CommandResult(enum.IntEnum):
     FAULT = 6
 
 
-def commanded(image: Image, positioning: Positioning, parts: PartSequence) -> TapInput | None:
+def commanded(image: RegisterImage, positioning: Positioning, parts: PartSequence) -> TapInput | None:
     """Return the tap that the registers ask for; None where the actuator cannot do it."""
     velocity, stroke = float(image.get("command_velocity")), float(image.get("command_stroke"))
     direction = int(image.get("command_direction"))
@@ -56,13 +56,13 @@ def commanded(image: Image, positioning: Positioning, parts: PartSequence) -> Ta
     return TapInput(velocity, parts.part.mass_kg, stroke, direction, start_m=parts.position_m)
 
 
-def show_result(image: Image, sequence: int, result: CommandResult) -> None:
+def show_result(image: RegisterImage, sequence: int, result: CommandResult) -> None:
     """Show what became, or is becoming, of a command."""
     image.put("command_accepted", sequence)
     image.put("command_result", result)
 
 
-def show_part(image: Image, parts: PartSequence, *, mass_stated: bool) -> None:
+def show_part(image: RegisterImage, parts: PartSequence, *, mass_stated: bool) -> None:
     """Show where the part lies, and the PLC's target for it where it is a new one."""
     image.put("part_position", parts.position_m)
     image.put("part_mass", parts.part.mass_kg if mass_stated else float("nan"))

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from simulator.plant import Motion, TapInput
-from simulator.process import Encounter
+from simulator.process import StrikeConditions
 
 
 @dataclass(frozen=True, slots=True)
-class Tap:
+class RunningTap:
     """A tap under way; `began_s` is the module's own time, `sequence` the command's number or 0."""
 
     strike: TapInput
-    met: Encounter
+    met: StrikeConditions
     motion: Motion
     began_s: float
     sequence: int

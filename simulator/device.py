@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from impactcell.fieldbus.registers import RegisterMap, Words
-from simulator.announcements import Announcements
+from simulator.announcements import BatchAnnouncer
 from simulator.commands import (
     MM_PER_MIN,
     CommandResult,
@@ -22,10 +22,10 @@ from simulator.commands import (
     show_part,
     show_result,
 )
-from simulator.cycle import Tap
-from simulator.image import Image
+from simulator.cycle import RunningTap
+from simulator.image import RegisterImage
 from simulator.plant import NeverAtRestError, TapInput, simulate_tap
-from simulator.process import encounter
+from simulator.process import strike_conditions
 from simulator.recorder import record
 from simulator.scenario import Scenario
 from simulator.tasks import PartSequence
@@ -68,7 +68,7 @@ class Device:
         on_truth: Callable[[Truth], None] | None = None,
     ) -> None:
         self.scenario = scenario
-        self._image = Image(registers, session)
+        self._image = RegisterImage(registers, session)
         self._room = {
             name: registers[name].count for name in ("force", "position", "actuator") if name in registers
         }
@@ -76,12 +76,12 @@ class Device:
         self._began_s = now_s
         self._now_s = 0.0
         self._on_truth = on_truth
-        self._tap: Tap | None = None
+        self._tap: RunningTap | None = None
         self._made = 0
         self._next_s = math.inf if scenario.strikes is None else scenario.strikes.period_s
         self._rested_s = 0.0
         self._busy_until_s = -math.inf
-        self._announcements = Announcements(scenario, self._image)
+        self._announcements = BatchAnnouncer(scenario, self._image)
         self._parts = PartSequence(scenario, 0.0)
         self._image.put("serial_number", scenario.serial_number)
         self._image.put("firmware_version", 0x0100)
@@ -160,7 +160,7 @@ class Device:
 
     def _strike(self, commanded: TapInput, sequence: int) -> None:
         self._made += 1
-        met = encounter(self.scenario, self._made, commanded.start_m, commanded.direction)
+        met = strike_conditions(self.scenario, self._made, commanded.start_m, commanded.direction)
         strike = replace(
             commanded,
             dwell_s=self._now_s - self._rested_s,
@@ -175,10 +175,10 @@ class Device:
             self._image.put("positioning_state", PositioningState.FAULT)
             show_result(self._image, sequence, CommandResult.FAULT)
             return
-        self._tap = Tap(strike, met, motion, self._now_s, sequence)
+        self._tap = RunningTap(strike, met, motion, self._now_s, sequence)
         self._image.put("state", ModuleState.CYCLE_RUNNING)
 
-    def _finish(self, done: Tap) -> None:
+    def _finish(self, done: RunningTap) -> None:
         """Put the cycle into the ring, now that the part is at rest."""
         scenario = self.scenario
         self._tap = None

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from simulator.faults import Fault, FaultInjector, FaultKind
 from simulator.scenario_file import ScenarioModel
 
-_ONCE: Final[Mapping[str, str | None]] = {
+_MOMENTARY: Final[Mapping[str, str | None]] = {
     "restart": None,
     "drop_clients": None,
     "set_counter": "value",
@@ -40,12 +40,12 @@ class ScheduledFault(ScenarioModel):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        needed = _ONCE.get(self.kind)
+        needed = _MOMENTARY.get(self.kind)
         for key in ("value", "cycles"):
             if (getattr(self, key) is not None) != (key == needed):
                 message = f"{self.kind} {'needs' if key == needed else 'takes no'} {key}"
                 raise ValueError(message)
-        if self.kind in _ONCE and self.lasts_s is not None:
+        if self.kind in _MOMENTARY and self.lasts_s is not None:
             message = f"{self.kind} happens at a moment and takes no lasts_s"
             raise ValueError(message)
         return self
@@ -64,8 +64,8 @@ def arm(
     loop = asyncio.get_running_loop()
     handles = []
     for entry in entries:
-        if entry.kind in _ONCE:
-            needed = _ONCE[entry.kind]
+        if entry.kind in _MOMENTARY:
+            needed = _MOMENTARY[entry.kind]
             arguments = () if needed is None else (getattr(entry, needed),)
             handles.append(loop.call_later(entry.at_s, actions[entry.kind], *arguments))
             continue

@@ -12,7 +12,7 @@ from simulator.scripted import ScriptedDevice
 LAST_CYCLE: Final = 2**32 - 1
 
 
-class Image:
+class RegisterImage:
     """Registers by name; what the map does not have is written nowhere and reads as 0."""
 
     def __init__(self, registers: RegisterMap, session: int) -> None:

@@ -78,14 +78,16 @@ class ModbusServer:
         self.faults = faults if faults is not None else FaultInjector()
         self.before = before
         self.requests = 0
-        self.links: list[_Link] = []
+        self.links: list[_ClientConnection] = []
         self._tls = tls
         self._server: asyncio.Server | None = None
 
     async def start(self) -> None:
         """Listen; `port` then is the port that was given by the system if it was 0."""
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(lambda: _Link(self), self.host, self.port, ssl=self._tls)
+        self._server = await loop.create_server(
+            lambda: _ClientConnection(self), self.host, self.port, ssl=self._tls
+        )
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
@@ -155,7 +157,7 @@ class ModbusServer:
         return bytes((function | 0x80, ILLEGAL_FUNCTION))
 
 
-class _Link(asyncio.Protocol):
+class _ClientConnection(asyncio.Protocol):
     """One client's connection."""
 
     def __init__(self, server: ModbusServer) -> None:

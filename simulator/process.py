@@ -11,7 +11,7 @@ from simulator.scenario import DEVIATION_EFFECT, Batch, Deviation, Scenario
 
 
 @dataclass(frozen=True, slots=True)
-class Encounter:
+class StrikeConditions:
     """What one strike meets, and why.
 
     Attributes
@@ -30,7 +30,7 @@ class Encounter:
     random: np.random.Generator
 
 
-def encounter(scenario: Scenario, number: int, start_m: float, direction: int) -> Encounter:
+def strike_conditions(scenario: Scenario, number: int, start_m: float, direction: int) -> StrikeConditions:
     """Plant met by the strike of this number, counted from 1, on a part that lies at `start_m`.
 
     The number is that of the scenario's cycles; a restart of the module changes its counter, not this.
@@ -52,7 +52,7 @@ def encounter(scenario: Scenario, number: int, start_m: float, direction: int) -
         else:
             effects[DEVIATION_EFFECT[deviation.kind]] = _along_stroke(deviation, start_m, direction)
     mu_s = (plant.mu_s + worn + batch.shift) * factor
-    return Encounter(
+    return StrikeConditions(
         plant=Plant(
             stiffness_n_per_m=plant.stiffness_n_per_m,
             damping_n_s_per_m=plant.damping_n_s_per_m,

@@ -12,7 +12,7 @@ from typing import TextIO
 
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.process.signals import signalled
+from impactcell.process.signals import stop_on_signals
 from simulator.control import Control
 from simulator.device import Device, Truth
 from simulator.fault_schedule import arm
@@ -68,7 +68,7 @@ async def serve(
     """
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
-    with signalled(stop) as came, _truths(truth_file, verbose=verbose) as tell:
+    with stop_on_signals(stop) as came, _truths(truth_file, verbose=verbose) as tell:
         epoch_ns = time.time_ns()
         device = Device(
             scenario,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from impactcell.fieldbus.decoding import capture, used_counts
+from impactcell.fieldbus.decoding import capture_from_words, sample_counts
 from impactcell.fieldbus.registers import RegisterMap, capture_crc32
 from impactcell.records import Capture
 from simulator.device import Device, Truth
@@ -54,7 +54,7 @@ class Client:
     def read_slot(self, slot: int) -> Capture:
         self.put("slot_select", slot)
         header = {register.name: self.get(register.name) for register in self.registers.header()}
-        counts = used_counts(self.registers, header)
+        counts = sample_counts(self.registers, header)
         samples = {}
         for name, count in counts.items():
             register = self.registers[name]
@@ -66,5 +66,5 @@ class Client:
         assert header["capture_crc32"] == capture_crc32(words, *samples.values())
         assert header["window_sequence"] == self.get("window_sequence_after")
         assert header["window_sequence"] % 2 == 0
-        got, self.faults = capture(self.registers, header, samples)
+        got, self.faults = capture_from_words(self.registers, header, samples)
         return got

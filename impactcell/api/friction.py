@@ -16,7 +16,7 @@ from impactcell.prediction import estimate as estimate_capture
 from impactcell.prediction.feature_extraction import noise_std
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
 from impactcell.prediction.slide_features import extract_slide
-from impactcell.process.console import note
+from impactcell.process.console import print_note
 from impactcell.process.progress import progress
 from impactcell.records import Capture, Channel, FrictionEstimate, Samples
 
@@ -124,7 +124,7 @@ def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
                 complete.append(replace(shot, mass_kg=estimate_mass(shot, extract_slide(shot))))
                 continue
             except (PredictionError, PhysicsError) as error:
-                note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {error}")
+                print_note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {error}")
         complete.append(shot)
     return tuple(complete)
 

@@ -3,13 +3,13 @@
 from dataclasses import replace
 from pathlib import Path
 
-from impactcell.cli.calibrate import calibrated
-from impactcell.process.console import tell
+from impactcell.cli.calibrate import calibrated_model
+from impactcell.process.console import print_result
 from impactcell.settings import read_cell
 from impactcell.settings.model_file import read_model, write_model
 
 
-def accept(cell: Path, extended: Path) -> None:
+def accept_model(cell: Path, extended: Path) -> None:
     """Calibrate an extended model for the cell and put it in the place of the cell's model file.
 
     The model that it replaces is kept beside it as `<name>.previous.yaml`. A running service sees the new
@@ -23,9 +23,9 @@ def accept(cell: Path, extended: Path) -> None:
         The part would not slide free over the calibrated range.
     """
     given = read_cell(cell)
-    model = calibrated(replace(given, model=read_model(extended)))
+    model = calibrated_model(replace(given, model=read_model(extended)))
     target = given.settings.model
     previous = target.with_name(f"{target.stem}.previous{target.suffix}")
     previous.write_bytes(target.read_bytes())
     write_model(model, target)
-    tell(f"{given.name} runs with model {model.name} from the next cycle on; before: {previous}")
+    print_result(f"{given.name} runs with model {model.name} from the next cycle on; before: {previous}")

@@ -8,7 +8,7 @@ from impactcell.errors import AccessError
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.host_interface import Role
 from impactcell.opcua.trust_list import FOLDERS, der, fingerprint, read_certificate, thumbprint
-from impactcell.process.console import tell
+from impactcell.process.console import print_result
 from impactcell.scada.interface import default_application_uri
 from impactcell.scada.rights import matrix_table
 from impactcell.scada.users import User, read_users, with_password, write_users
@@ -27,7 +27,7 @@ def add_user(file: Path, name: str, role: str = "observer", certificate: Path | 
     AccessError
         Unknown role, a password that is too short or typed differently, or a file that cannot be used.
     """
-    roles = {known.name.lower(): known for known in Role}
+    roles = {role_name.name.lower(): role_name for role_name in Role}
     if role.lower() not in roles:
         raise AccessError(f"{role!r} is not a role; choose one of {', '.join(roles)}")
     if not name.strip() or not name.isprintable():
@@ -43,7 +43,7 @@ def add_user(file: Path, name: str, role: str = "observer", certificate: Path | 
     users[name] = user
     write_users(file, users)
     verb = "changed" if before is not None else "added"
-    tell(f"{name} {verb} as {user.role.name.lower()} in {file}")
+    print_result(f"{name} {verb} as {user.role.name.lower()} in {file}")
 
 
 def _ask_password(name: str) -> str:
@@ -71,7 +71,7 @@ def remove_user(file: Path, name: str) -> None:
         raise AccessError(f"{file}: there is no user {name!r}; see `impactcell users list {file}`")
     del users[name]
     write_users(file, users)
-    tell(f"{name} removed from {file}")
+    print_result(f"{name} removed from {file}")
 
 
 def list_users(file: Path, *, rights: bool = False) -> None:
@@ -108,8 +108,8 @@ def make_certs(pki: Path, application_uri: str | None = None, hosts: list[str] |
         except OSError as error:
             raise AccessError(f"{pki / folder}: {error.strerror}") from error
     path, _ = write_pair(pki / "own", certificate, key)
-    tell(f"{path}: certificate of {uri}, valid until {certificate.not_valid_after_utc:%Y-%m-%d}")
-    tell(f"SHA-1 {thumbprint(der(certificate))}")
+    print_result(f"{path}: certificate of {uri}, valid until {certificate.not_valid_after_utc:%Y-%m-%d}")
+    print_result(f"SHA-1 {thumbprint(der(certificate))}")
 
 
 def trust_cert(file: Path, pki: Path | None = None) -> None:
@@ -141,7 +141,7 @@ def trust_cert(file: Path, pki: Path | None = None) -> None:
             file.unlink()
     except OSError as error:
         raise AccessError(f"{target}: {error.strerror}") from error
-    tell(f"{certificate.subject.rfc4514_string()} is trusted: {target}")
+    print_result(f"{certificate.subject.rfc4514_string()} is trusted: {target}")
 
 
 def list_certs(pki: Path) -> None:

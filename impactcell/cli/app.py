@@ -69,11 +69,11 @@ def run(cells: Cells, *, quiet: Quiet = False, verbose: Verbose = False) -> None
 def check(cells: Cells, *, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Report every fault of the cell files at once as file:line:column: message."""
     del quiet, verbose
-    from impactcell.process.console import tell
+    from impactcell.process.console import print_result
     from impactcell.settings import read_cells
 
     read_cells(cells)
-    tell(f"{len(cells)} cell file{'s' * (len(cells) > 1)} in order")
+    print_result(f"{len(cells)} cell file{'s' * (len(cells) > 1)} in order")
 
 
 @app.command()
@@ -180,10 +180,10 @@ def figures(output: Directory, *, quiet: Quiet = False, verbose: Verbose = False
     """Redraw the source paper's figures from this code."""
     del quiet, verbose
     from impactcell.figures import draw
-    from impactcell.process.console import tell
+    from impactcell.process.console import print_result
 
     for path in draw(output):
-        tell(str(path))
+        print_result(str(path))
 
 
 @model.command("accept")
@@ -198,9 +198,9 @@ def model_accept(
 ) -> None:
     """Put an extended model into service; a running cell takes it over without losing its state."""
     del quiet, verbose
-    from impactcell.cli.accept_model import accept
+    from impactcell.cli.accept_model import accept_model
 
-    accept(cell, extended)
+    accept_model(cell, extended)
 
 
 def run_verb(arguments: list[str] | None = None) -> None:

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from impactcell.cli.paths import check_target
+from impactcell.cli.paths import check_output
 from impactcell.errors import SettingsError
 from impactcell.physics import TapInput
 from impactcell.prediction import Model
 from impactcell.prediction import calibrate as fit_predictors
-from impactcell.process.console import tell
+from impactcell.process.console import print_result
 from impactcell.process.progress import progress
 from impactcell.records import Samples
-from impactcell.settings import Cell, read_cell
+from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.model_file import write_model
 
 VELOCITIES = 17
@@ -50,13 +50,13 @@ def calibrate(cell: Path, output: Path) -> None:
     PredictionError
         The part does not slide free over the range.
     """
-    check_target(output, SettingsError)
+    check_output(output, SettingsError)
     given = read_cell(cell)
-    write_model(calibrated(given), output)
-    tell(f"{output}: model of {given.name}; it is used where a cell file's `model` names it")
+    write_model(calibrated_model(given), output)
+    print_result(f"{output}: model of {given.name}; it is used where a cell file's `model` names it")
 
 
-def calibrated(cell: Cell) -> Model:
+def calibrated_model(cell: CellConfig) -> Model:
     """Give the model of a cell, with predictors for its actuator and a range of masses."""
     settings, model = cell.settings, cell.model
     stroke = math.inf if settings.actuator.stroke_mm is None else settings.actuator.stroke_mm * 1e-3

@@ -11,14 +11,14 @@ from typing import Any
 from impactcell.api.findings import write_findings
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
-from impactcell.cli.paths import recorded as opened
+from impactcell.cli.paths import open_journal
 from impactcell.discrepancy.report.page import verdict_sentence
 from impactcell.discrepancy.search.candidate_fits import Mapper
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError, DiscrepancyError
 from impactcell.physics import Plant
 from impactcell.prediction import Model
-from impactcell.process.console import tell
+from impactcell.process.console import print_result
 
 
 def discrepancy(
@@ -70,18 +70,18 @@ def discrepancy(
         if recording is not None:
             plant, name = recording.plant, recording.name
     source, data = _read(campaign, journal, plant)
-    with _steps() as report_step, _mapper(scheduler) as mapper:
+    with _progress() as report_step, _mapper(scheduler) as mapper:
         result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
         report_step("writing the report")
         write_findings(result, data, output, source, name)
-    tell(f"{verdict_sentence(result)}\n{output / 'report.html'}")
+    print_result(f"{verdict_sentence(result)}\n{output / 'report.html'}")
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:
     if journal is None:
         assert campaign is not None  # noqa: S101 - one of them is given
         return str(campaign.name), read(campaign)
-    with opened(journal) as store:
+    with open_journal(journal) as store:
         try:
             recorded = from_captures(store.captures(), plant.gravity_m_s2 if plant else 9.81)
         except CampaignError as error:
@@ -93,7 +93,7 @@ def _recording_model(journal: Path) -> Model | None:
     """Model that the recording cell ran with; None in a journal that has none yet."""
     from impactcell.serialization import json_text
 
-    with opened(journal) as store:
+    with open_journal(journal) as store:
         try:
             return json_text.loads(Model, store.model.encode()) if store.model else None
         except ValueError as error:
@@ -103,7 +103,7 @@ def _recording_model(journal: Path) -> Model | None:
 
 
 @contextmanager
-def _steps() -> Iterator[Callable[[str], None]]:
+def _progress() -> Iterator[Callable[[str], None]]:
     if not sys.stderr.isatty():
         yield lambda _step: None
         return

@@ -9,13 +9,13 @@ from typing import TextIO
 
 from impactcell.api.friction import calibrated, weighed
 from impactcell.campaign import Campaign, Excitation, read
-from impactcell.cli.paths import check_target
+from impactcell.cli.paths import check_output
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.prediction import Model
 from impactcell.prediction import estimate as estimate_tap
 from impactcell.prediction.free_slide import free_slide_friction
 from impactcell.prediction.joint_plant_fit import fit_plant
-from impactcell.process.console import note, tell
+from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
 
@@ -46,15 +46,17 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
         No plant could be fitted.
     """
     if output is not None:
-        check_target(output, CampaignError)
-    given = read(campaign)
-    if given.excitation is Excitation.DRIVEN:
+        check_output(output, CampaignError)
+    campaign_data = read(campaign)
+    if campaign_data.excitation is Excitation.DRIVEN:
         raise CampaignError(f"{campaign}: estimate needs taps or free slides, this campaign is driven")
-    if given.excitation is Excitation.FREE_SLIDE:
-        rows = [(shot.cycle, _of_free_slide(shot, given.gravity_m_s2)) for shot in given.shots]
+    if campaign_data.excitation is Excitation.FREE_SLIDE:
+        rows = [
+            (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots
+        ]
     else:
-        shots = weighed(given.shots)
-        plant, misfit = _model(given, shots, cell)
+        shots = weighed(campaign_data.shots)
+        plant, misfit = _model(campaign_data, shots, cell)
         model = calibrated(plant, shots)
         with progress("estimating", len(shots)) as done:
             rows = []
@@ -69,7 +71,7 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
             _write(rows, file)
     except OSError as fault:
         raise CampaignError(f"{output}: cannot be written: {fault.strerror}") from fault
-    tell(f"{len(rows)} shots in {output}")
+    print_result(f"{len(rows)} shots in {output}")
 
 
 def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> tuple[Model, float]:
@@ -81,7 +83,7 @@ def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> t
     with progress("fitting the plant", 1):
         fitted = fit_plant(shots, campaign.gravity_m_s2)
     plant, prior = fitted.model.plant, fitted.model.prior
-    note(
+    print_note(
         f"plant fitted to {len(fitted.used)} of {len(shots)} shots: k {plant.stiffness_n_per_m:.6g} ± "
         f"{prior.stiffness_std_n_per_m:.2g} N/m, b {plant.damping_n_s_per_m:.5g} ± "
         f"{prior.damping_std_n_s_per_m:.2g} N s/m, "
@@ -106,22 +108,23 @@ def _of_free_slide(shot: Capture, gravity_m_s2: float) -> FrictionEstimate:
 def _write(rows: Iterable[tuple[int, FrictionEstimate]], file: TextIO) -> None:
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for shot, found in rows:
+    for shot, friction in rows:
+        by_equation = (friction.by_force, friction.by_distance, friction.combined)
         numbers = (
-            found.by_force.value, found.by_distance.value, found.combined.value, found.mu_s.value,
-            found.mu_s.std, found.mu_k.value, found.mu_k.std, found.by_force.std, found.by_distance.std,
-            found.combined.std,
-        )  # fmt: skip
-        figures = (found.peak_force_n, found.sliding_distance_m, found.gap)
+            *(coefficient.value for coefficient in by_equation),
+            *(number for c in (friction.mu_s, friction.mu_k) for number in (c.value, c.std)),
+            *(coefficient.std for coefficient in by_equation),
+        )
+        measured = (friction.peak_force_n, friction.sliding_distance_m, friction.gap)
         writer.writerow(
             [
                 shot,
                 *map(_number, numbers),
-                found.estimator.value,
-                found.mu_s.quality.name.lower(),
-                found.mu_k.quality.name.lower(),
-                *map(_number, figures),
-                found.mu_s.reason,
+                friction.estimator.value,
+                friction.mu_s.quality.name.lower(),
+                friction.mu_k.quality.name.lower(),
+                *map(_number, measured),
+                friction.mu_s.reason,
             ]
         )
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from impactcell import campaign
 from impactcell.campaign.recorded import from_captures
-from impactcell.cli.paths import recorded as opened
+from impactcell.cli.paths import open_journal
 from impactcell.errors import CampaignError
-from impactcell.process.console import note, tell
+from impactcell.process.console import print_note, print_result
 
 
 def export(
@@ -21,14 +21,14 @@ def export(
     CampaignError
         It is not there, holds no captures in that range, or the directory exists already.
     """
-    with opened(journal) as source:
+    with open_journal(journal) as source:
         try:
             recorded = from_captures(source.captures(first_cycle, last_cycle))
         except CampaignError as error:
             raise CampaignError(f"{journal}: {error}") from error
     campaign.write(recorded.campaign, output)
     if recorded.other_stroke:
-        note(f"{recorded.other_stroke} cycles with another stroke were left out")
+        print_note(f"{recorded.other_stroke} cycles with another stroke were left out")
     if recorded.no_channels:
-        note(f"{recorded.no_channels} cycles without samples were left out")
-    tell(f"{len(recorded.campaign.shots)} shots in {output}")
+        print_note(f"{recorded.no_channels} cycles without samples were left out")
+    print_result(f"{len(recorded.campaign.shots)} shots in {output}")

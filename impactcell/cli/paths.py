@@ -6,7 +6,7 @@ from impactcell.errors import CampaignError, ImpactCellError
 from impactcell.journal.store import Journal
 
 
-def recorded(journal: Path) -> Journal:
+def open_journal(journal: Path) -> Journal:
     """Open a cell's journal to read it.
 
     Raises
@@ -21,7 +21,7 @@ def recorded(journal: Path) -> Journal:
     return Journal(journal, None, read_only=True)
 
 
-def check_target(file: Path, error: type[ImpactCellError]) -> None:
+def check_output(file: Path, error: type[ImpactCellError]) -> None:
     """Raise `error` for a file whose directory is not there, which would else be found after the work."""
     if not file.parent.is_dir():
         raise error(f"{file}: cannot be written: there is no directory {file.parent}; make it first")

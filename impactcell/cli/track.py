@@ -11,7 +11,7 @@ from impactcell.errors import SeriesError
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
-FEWEST = 2
+FEWEST_CYCLES = 2
 
 
 def track(
@@ -43,10 +43,11 @@ def track(
         knowledge = BatchKnowledge.KNOWN if has_batch else BatchKnowledge.UNKNOWN
     settings = TrackerSettings(wear_limit=math.inf if limit is None else limit, batch=knowledge)
     tracked = replay(settings, readings)
-    if tracked.used < FEWEST:
+    if tracked.used < FEWEST_CYCLES:
         why = f"; {tracked.notes[0][1]}" if tracked.notes else ""
         raise SeriesError(
-            f"{series}: only {tracked.used} of {len(readings)} cycles can be used, it takes {FEWEST}{why}"
+            f"{series}: only {tracked.used} of {len(readings)} cycles can be used, "
+            f"it takes {FEWEST_CYCLES}{why}"
         )
     text = json.dumps(_as_json(tracked)) if as_json else _as_text(tracked)
     sys.stdout.write(text + "\n")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from impactcell.records import AlarmName, Snapshot
-from impactcell.settings import Cell
+from impactcell.settings import CellConfig
 
 SHOTS = 60
 """Cycles with the effect that the workflow is given."""
@@ -18,7 +18,7 @@ MARGIN = 5
 Say = Callable[[str], None]
 
 
-class Remedy:
+class AutoTeach:
     """Watches the gap alarm of a cell; once it has enough cycles since the change, it looks for the cause.
 
     Parameters
@@ -29,7 +29,7 @@ class Remedy:
         Told in words what is being done and found.
     """
 
-    def __init__(self, cell: Cell, say: Say) -> None:
+    def __init__(self, cell: CellConfig, say: Say) -> None:
         self._cell = cell
         self._say = say
         self._since: int | None = None

@@ -16,16 +16,16 @@ from typing import Any
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from impactcell.demo.auto_teach import Remedy
-from impactcell.demo.scenario_setup import USER, Stage, set_up
+from impactcell.demo.auto_teach import AutoTeach
+from impactcell.demo.scenario_setup import USER, DemoSetup, set_up_scenario
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
-from impactcell.process.console import quiet
-from impactcell.process.signals import signalled
+from impactcell.process.console import is_quiet
+from impactcell.process.signals import stop_on_signals
 from impactcell.records import ModuleStatus, Snapshot
 from impactcell.service import Service
 
-SHOWN = 400
+SHOWN_CYCLES = 400
 PATIENCE_S = 60.0
 """Without a cycle for so long, the demo has failed."""
 QUIET_S = 4.0
@@ -42,14 +42,14 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     ImpactCellError
         The simulator did not start, or no cycle came.
     """
-    if sys.stderr.isatty() and not quiet():
+    if sys.stderr.isatty() and not is_quiet():
         sys.stderr.write("setting up; the first time on a machine takes a minute or two, to compile\n")
     # Until the event loop takes the signal over, an end has to pass through `set_up`, which cleans up.
     signal.signal(signal.SIGTERM, _end)
-    with set_up(scenario, cycles) as stage:
-        show = _Show(stage, cycles)
-        if as_json or quiet() or not sys.stdout.isatty():
-            interrupted = asyncio.run(show.run(_nothing if as_json or quiet() else _plain))
+    with set_up_scenario(scenario, cycles) as setup:
+        show = _DemoRun(setup, cycles)
+        if as_json or is_quiet() or not sys.stdout.isatty():
+            interrupted = asyncio.run(show.run(_draw_nothing if as_json or is_quiet() else _print_line))
         else:
             interrupted = asyncio.run(_live(show))
     if as_json:
@@ -59,51 +59,51 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
 
 
 @dataclass(slots=True)
-class _Show:
+class _DemoRun:
     """Runs the service over the stage and keeps what it said."""
 
-    stage: Stage
+    setup: DemoSetup
     cycles: int | None
-    snapshots: deque[Snapshot] = field(default_factory=lambda: deque(maxlen=SHOWN))
+    snapshots: deque[Snapshot] = field(default_factory=lambda: deque(maxlen=SHOWN_CYCLES))
     seen: int = 0
     raised: list[dict[str, Any]] = field(default_factory=list)
     service: Service | None = None
     endpoint: str = ""
     missed: int = 0
-    told: list[tuple[int, str]] = field(default_factory=list)
+    messages: list[tuple[int, str]] = field(default_factory=list)
 
-    async def run(self, draw: Callable[["_Show", Snapshot], None]) -> bool:
+    async def run(self, draw: Callable[["_DemoRun", Snapshot], None]) -> bool:
         """Run to the end; True if it was ended by Ctrl-C."""
         stop, news = asyncio.Event(), asyncio.Event()
-        remedy = Remedy(self.stage.cell, self._say)
+        auto_teach = AutoTeach(self.setup.cell, self._tell)
 
         def observe(_: str, snapshot: Snapshot) -> None:
             self._take(snapshot)
-            remedy.take(snapshot)
+            auto_teach.take(snapshot)
             news.set()
             draw(self, snapshot)
             if self.cycles is not None and self.seen >= self.cycles:
                 stop.set()
 
-        self.service = Service([self.stage.cell], observe)
+        self.service = Service([self.setup.cell], observe)
         watch = asyncio.create_task(self._watch(news, stop))
-        with signalled(stop) as came:
+        with stop_on_signals(stop) as signals:
             try:
                 await self.service.run(stop, self._started)
             finally:
-                await remedy.close()
+                await auto_teach.close()
                 watch.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
                     await watch
-        return signal.SIGINT in came
+        return signal.SIGINT in signals
 
-    def _say(self, text: str) -> None:
-        if not self.told or self.told[-1][1] != text:
-            self.told.append((self.snapshots[-1].cycle if self.snapshots else 0, text))
+    def _tell(self, text: str) -> None:
+        if not self.messages or self.messages[-1][1] != text:
+            self.messages.append((self.snapshots[-1].cycle if self.snapshots else 0, text))
 
     def _started(self) -> None:
         assert self.service is not None  # noqa: S101 - it calls us
-        self.endpoint = self.service.endpoints[self.stage.cell.name]
+        self.endpoint = self.service.endpoints[self.setup.cell.name]
 
     def _take(self, snapshot: Snapshot) -> None:
         assert self._status is not None  # noqa: S101 - its cell calls us
@@ -121,7 +121,7 @@ class _Show:
         while True:
             news.clear()
             last = bool(self.snapshots) and math.isclose(
-                self.snapshots[-1].positioning.target_m, self.stage.last_target_m, rel_tol=1e-6
+                self.snapshots[-1].positioning.target_m, self.setup.last_target_m, rel_tol=1e-6
             )
             try:
                 # Without an end, silence is part of the show.
@@ -130,7 +130,7 @@ class _Show:
             except TimeoutError:
                 stop.set()
                 if last:
-                    self._say("that was the last part")
+                    self._tell("that was the last part")
                     return
                 reason = "" if self._status is None else self._status.reason
                 raise ImpactCellError(
@@ -140,20 +140,20 @@ class _Show:
     @property
     def _status(self) -> ModuleStatus | None:
         """State of the link; None while the cell does not run."""
-        running = self.service.running.get(self.stage.cell.name) if self.service else None
+        running = self.service.running.get(self.setup.cell.name) if self.service else None
         return None if running is None else running.status
 
     def scene(self) -> Scene:
         """Return what the live view shows now."""
         last = self.snapshots[-1].cycle if self.snapshots else 0
-        happened = sorted([*self.stage.story, *self.told], key=lambda entry: entry[0])
-        told = [text for cycle, text in happened if cycle <= last]
-        who = f"user {USER}, password {self.stage.password}"
+        happened = sorted([*self.setup.story, *self.messages], key=lambda entry: entry[0])
+        messages = [text for cycle, text in happened if cycle <= last]
+        who = f"user {USER}, password {self.setup.password}"
         link = "connected" if self._status is None or self._status.connected else "not connected"
         return Scene(
-            self.stage.cell.name,
+            self.setup.cell.name,
             f"{self.endpoint} · {who}",
-            told[-1] if told else "",
+            messages[-1] if messages else "",
             list(self.snapshots),
             link,
         )
@@ -162,14 +162,14 @@ class _Show:
         """One object that says how the demo went; null for what is not known."""
         if not self.snapshots:
             return {
-                "cell": self.stage.cell.name,
+                "cell": self.setup.cell.name,
                 "endpoint": self.endpoint,
                 "cycles": 0,
                 "missed": self.missed,
             }
         last = self.snapshots[-1]
         return {
-            "cell": self.stage.cell.name,
+            "cell": self.setup.cell.name,
             "endpoint": self.endpoint,
             "cycles": self.seen,
             "missed": self.missed,
@@ -193,8 +193,8 @@ class _Show:
                 "last_shift_cycle": last.batch.last_shift_cycle,
             },
             "alarms": self.raised,
-            "story": [{"cycle": cycle, "what": text} for cycle, text in self.stage.story],
-            "told": [{"cycle": cycle, "what": text} for cycle, text in self.told],
+            "story": [{"cycle": cycle, "what": text} for cycle, text in self.setup.story],
+            "told": [{"cycle": cycle, "what": text} for cycle, text in self.messages],
         }
 
 
@@ -202,30 +202,30 @@ def _end(*_: object) -> None:
     raise SystemExit(0)
 
 
-async def _live(show: _Show) -> bool:
+async def _live(show: _DemoRun) -> bool:
     console = Console()
     logging.disable(logging.WARNING)  # a line of the log would push the view up; it shows the same itself
     try:
         with Live(console=console, auto_refresh=False, screen=True) as live:
 
-            def draw(now: _Show, _: Snapshot | None = None) -> None:
-                live.update(_drawn(now.scene()), refresh=True)
+            def draw(now: _DemoRun, _: Snapshot | None = None) -> None:
+                live.update(_rendered(now.scene()), refresh=True)
 
             draw(show)
             interrupted = await show.run(draw)
     finally:
         logging.disable(logging.NOTSET)
     if show.snapshots:
-        console.print(_drawn(replace(show.scene(), link="")))
+        console.print(_rendered(replace(show.scene(), link="")))
     return interrupted
 
 
-def _drawn(scene: Scene) -> RenderableType:
+def _rendered(scene: Scene) -> RenderableType:
     columns, lines = shutil.get_terminal_size()
     return render(scene, min(columns, 160), lines)
 
 
-def _plain(_: _Show, snapshot: Snapshot) -> None:
+def _print_line(_: _DemoRun, snapshot: Snapshot) -> None:
     mu_s = snapshot.friction.mu_s
     active = ", ".join(alarm.name.value for alarm in snapshot.alarms if alarm.active)
     print(  # noqa: T201 - the view of a demo without a terminal
@@ -235,7 +235,7 @@ def _plain(_: _Show, snapshot: Snapshot) -> None:
     )
 
 
-def _nothing(_: _Show, __: Snapshot) -> None:
+def _draw_nothing(_: _DemoRun, __: Snapshot) -> None:
     """Draw nothing: the summary, if anything, is all that is asked for."""
 
 

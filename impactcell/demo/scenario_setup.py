@@ -19,18 +19,18 @@ from impactcell.errors import ImpactCellError, SettingsError
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
 from impactcell.service.factory import cell_design
-from impactcell.service.warmup import rehearse
-from impactcell.settings import Cell, read_cell
+from impactcell.service.warmup import warm_up
+from impactcell.settings import CellConfig, read_cell
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 SCENARIOS = ("demo", "new-effect", "positioning")
 USER = "demo"
-HAPPENINGS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
+EVENT_SECTIONS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
 PREFERRED_PORT = 4840
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class DemoSetup:
     """A cell whose module answers, and the user who may look at it.
 
     Attributes
@@ -44,14 +44,14 @@ class Stage:
         Where the last part should go; nan where cycles come without end.
     """
 
-    cell: Cell
+    cell: CellConfig
     story: tuple[tuple[int, str], ...]
     password: str
     last_target_m: float = math.nan
 
 
 @contextlib.contextmanager
-def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
+def set_up_scenario(scenario: str, cycles: int | None) -> Iterator[DemoSetup]:
     """Start the simulator with a scenario of `config/sim`; what it needs is gone afterwards.
 
     Raises
@@ -70,28 +70,28 @@ def set_up(scenario: str, cycles: int | None) -> Iterator[Stage]:
     try:
         content = yaml.safe_load(source.read_text(encoding="utf-8"))
         content["register_map"] = str((source.parent / content["register_map"]).resolve())
-        content = paced(content, cycles)
+        content = fit_events(content, cycles)
         played = directory / "scenario.yaml"
         played.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
         password = secrets.token_urlsafe(9)
         write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
-        rehearse(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
+        warm_up(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
         with _simulator(played) as port:
-            cell = read_cell(_placed(scenario, directory, port))
-            yield Stage(cell, story(content), password, last_target_m(content))
+            cell = read_cell(_write_cell_file(scenario, directory, port))
+            yield DemoSetup(cell, story(content), password, last_target_m(content))
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 
 
-def paced(content: dict, cycles: int | None) -> dict:  # type: ignore[type-arg]
+def fit_events(content: dict, cycles: int | None) -> dict:  # type: ignore[type-arg]
     """Move what happens in a scenario to where a demo of `cycles` cycles has it in view."""
     if cycles is None:
         return content
-    last = max([1, *(entry[key] for section, key in HAPPENINGS for entry in content.get(section, []))])
+    last = max([1, *(entry[key] for section, key in EVENT_SECTIONS for entry in content.get(section, []))])
     scale = min(1.0, 0.9 * cycles / last)
     moved = {
         section: [{**entry, key: max(1, round(entry[key] * scale))} for entry in content[section]]
-        for section, key in HAPPENINGS
+        for section, key in EVENT_SECTIONS
         if section in content
     }
     return {**content, **moved}
@@ -152,7 +152,7 @@ def _simulator(scenario: Path) -> Iterator[int]:
         errors.close()
 
 
-def _placed(scenario: str, directory: Path, port: int) -> Path:
+def _write_cell_file(scenario: str, directory: Path, port: int) -> Path:
     """Write the scenario's cell file anew: for this module, with all that it writes in `directory`."""
     source = CONFIG / "cells" / f"{scenario}.yaml"
     content = yaml.safe_load(source.read_text(encoding="utf-8"))

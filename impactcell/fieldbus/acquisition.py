@@ -2,7 +2,7 @@
 
 `Module.captures` connects, checks who answers, polls, reads each new cycle consistently, catches up from the
 module's ring after an outage, and counts what the ring no longer had. It never raises for what the module or
-the link does: that is said in `Module.status` and in the `faults` of a `Reception`.
+the link does: that is said in `Module.status` and in the `faults` of a `ReceivedCycle`.
 """
 
 import asyncio
@@ -16,24 +16,24 @@ from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceEr
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader
-from impactcell.fieldbus.capture_ring import distance, next_wanted
-from impactcell.fieldbus.decoding import ModuleReport
+from impactcell.fieldbus.capture_ring import cycles_after, next_capture
+from impactcell.fieldbus.decoding import StatusBlock
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.poll_schedule import PollSchedule
-from impactcell.fieldbus.received_cycle import Reception
-from impactcell.fieldbus.register_client import MappedDevice
+from impactcell.fieldbus.received_cycle import ReceivedCycle
+from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import RegisterMap, Value
 from impactcell.fieldbus.transport import ModbusClient
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId, ModuleStatus
 
-__all__ = ["Module", "ModuleStatus", "Reception"]
+__all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
 
 _NOT_THIS_DEVICE: Final = (1, 2, 3, 10, 11)
 """Exceptions that say that there are no such registers, or nobody with this device id behind a gateway."""
 
 
-class Module:
+class ModuleAcquisition:
     """The FPGA module of one cell.
 
     Use as ``async with Module(...) as module: async for reception in module.captures(after): ...``.
@@ -62,11 +62,11 @@ class Module:
         self.link = link
         self.registers = registers
         self._log = CellLogger(logging.getLogger(__name__), cell)
-        self.report: ModuleReport | None = None
+        self.status_block: StatusBlock | None = None
         """What the module said at the last poll; None before the first."""
-        self._polled: Mapping[str, Value] = {}
+        self._status_values: Mapping[str, Value] = {}
         self._client = ModbusClient(link)
-        self.device = MappedDevice(self._client, registers)
+        self.device = RegisterClient(self._client, registers)
         self._reader = CaptureReader(cell, self.device)
         self._status = ModuleStatus()
         self._on_change = on_change
@@ -99,32 +99,32 @@ class Module:
         """Close the connection."""
         self._ready.clear()
         await self._client.close()
-        self._say(connected=False, reason=f"{self.cell}: connection closed", level=logging.INFO)
+        self._report_link(connected=False, reason=f"{self.cell}: connection closed", level=logging.INFO)
 
     async def wait_connected(self) -> None:
         """Wait until the right module answers; `captures` must be running meanwhile."""
         await self._ready.wait()
 
-    async def read_report(self) -> ModuleReport:
+    async def read_status(self) -> StatusBlock:
         """Read the status block now; raises FieldbusError where `captures` would only note it."""
-        values = await self.device.values(decoding.REPORT)
-        if self.report is None or values is not self._polled:
-            self.report, self._polled = decoding.report(self.registers, values), values
-        return self.report
+        values = await self.device.values(decoding.STATUS_REGISTERS)
+        if self.status_block is None or values is not self._status_values:
+            self.status_block, self._status_values = decoding.decode_status(self.registers, values), values
+        return self.status_block
 
-    async def acknowledge(self, mark: CycleId) -> None:
-        """Tell the module that the cycle `mark` and all before it are durable.
+    async def acknowledge(self, cycle_id: CycleId) -> None:
+        """Tell the module that the cycle `cycle_id` and all before it are durable.
 
         Without a connection it is told as soon as there is one; a module without the registers is not told.
         """
-        self._durable = mark
+        self._durable = cycle_id
         if self._ready.is_set():
             try:
                 await self._send_acknowledgement()
             except FieldbusError as error:
-                self._log.info("the acknowledgement will be repeated: %s", error, cycle=mark.cycle)
+                self._log.info("the acknowledgement will be repeated: %s", error, cycle=cycle_id.cycle)
 
-    async def captures(self, after: CycleId | None = None) -> AsyncGenerator[Reception]:
+    async def captures(self, after: CycleId | None = None) -> AsyncGenerator[ReceivedCycle]:
         """Yield each cycle after `after` once, in order; ends only when it is closed.
 
         Parameters
@@ -135,38 +135,48 @@ class Module:
         last, backoff, schedule = after, Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
         newest = CycleId(0, 0)
-        overtaken = 0
+        overwritten = 0
         while True:
             try:
-                asked_s = loop.time()
-                polled = await self._poll()
+                sent_s = loop.time()
+                status = await self._poll()
                 backoff.reset()
-                shown = CycleId(polled.session, polled.cycle_counter)
-                schedule.polled(asked_s, loop.time(), new=shown != newest)
+                shown = CycleId(status.session, status.cycle_counter)
+                schedule.record_poll(sent_s, loop.time(), new=shown != newest)
                 newest = shown
-                want = next_wanted(last, polled.session, polled.cycle_counter, polled.ring, overtaken // 2)
-                if want is None:
+                target = next_capture(
+                    last,
+                    status.session,
+                    status.cycle_counter,
+                    status.ring,
+                    overwritten // 2,
+                )
+                if target is None:
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
-                read = await self._reader.fetch(want)
+                fetched = await self._reader.fetch(target)
             except FieldbusError as error:
-                await self._down(error)
+                await self._disconnect(error)
                 await asyncio.sleep(backoff.next_delay_s())
                 continue
-            if read is None:  # overwritten meanwhile: look at the ring again, and then further from its end
-                overtaken = min(max(1, 2 * overtaken), self.registers.slots)
+            if fetched is None:  # look at the ring again, and then further from its end
+                overwritten = min(max(1, 2 * overwritten), self.registers.slots)
                 continue
-            overtaken //= 2
-            capture = replace(read.capture, session=want.mark.session)
-            schedule.learn(
+            overwritten //= 2
+            capture = replace(fetched.capture, session=target.cycle_id.session)
+            schedule.update(
                 1e-9 * capture.time_ns or loop.time(),
-                distance(last.cycle, want.mark.cycle) if last and last.session == want.mark.session else 0,
-                newest=want.mark == newest,
+                cycles_after(last.cycle, target.cycle_id.cycle)
+                if last and last.session == target.cycle_id.session
+                else 0,
+                newest=target.cycle_id == newest,
             )
-            last = want.mark
-            reception = Reception(capture, want.mark, want.missed, want.restarted, read.faults)
-            self._count(reception, readable=read.readable)
-            yield reception
+            last = target.cycle_id
+            received = ReceivedCycle(
+                capture, target.cycle_id, target.missed, target.restarted, fetched.faults
+            )
+            self._count(received, readable=fetched.readable)
+            yield received
             if last == newest:  # nothing waits behind it
                 await asyncio.sleep(schedule.delay_s(loop.time()))
 
@@ -199,35 +209,35 @@ class Module:
                     f"map {self.registers.name} expects {register.expect!r}"
                 )
 
-    async def _poll(self) -> ModuleReport:
+    async def _poll(self) -> StatusBlock:
         if not self._client.connected:
             await self._connect()
-        polled = await self.read_report()
+        status = await self.read_status()
         if self._durable != self._acknowledged:
             await self._send_acknowledgement()
         if not self._ready.is_set():
             self._connections += 1
-            self._say(connected=True, reason="")
+            self._report_link(connected=True, reason="")
             self._ready.set()
-        return polled
+        return status
 
     async def _send_acknowledgement(self) -> None:
-        mark = self._durable
-        if mark is not None and "acknowledge_cycle" in self.registers:
-            values = {"acknowledge_cycle": mark.cycle}
+        cycle_id = self._durable
+        if cycle_id is not None and "acknowledge_cycle" in self.registers:
+            values = {"acknowledge_cycle": cycle_id.cycle}
             if "acknowledge_session" in self.registers:
-                values["acknowledge_session"] = mark.session
+                values["acknowledge_session"] = cycle_id.session
             await self.device.write(values)
-        self._acknowledged = mark
+        self._acknowledged = cycle_id
 
-    async def _down(self, error: FieldbusError) -> None:
+    async def _disconnect(self, error: FieldbusError) -> None:
         """Close the connection after an error and say why, once for each new reason."""
         self._ready.clear()
         await self._client.close()
         reason = str(error) if str(error).startswith(self.cell) else f"{self.cell}: {error}"
-        self._say(connected=False, reason=reason)
+        self._report_link(connected=False, reason=reason)
 
-    def _say(self, *, connected: bool, reason: str, level: int = logging.WARNING) -> None:
+    def _report_link(self, *, connected: bool, reason: str, level: int = logging.WARNING) -> None:
         before = self._status
         self._status = replace(before, connected=connected, reason=reason)
         if (before.connected, before.reason) == (connected, reason):
@@ -239,19 +249,19 @@ class Module:
         if self._on_change is not None:
             self._on_change(self.status)
 
-    def _count(self, reception: Reception, *, readable: bool) -> None:
+    def _count(self, received: ReceivedCycle, *, readable: bool) -> None:
         status = self._status
         self._status = replace(
             status,
             received=status.received + 1,
-            missed=status.missed + reception.missed,
-            restarts=status.restarts + reception.restarted,
+            missed=status.missed + received.missed,
+            restarts=status.restarts + received.restarted,
             unreadable=status.unreadable + (not readable),
         )
-        cycle = reception.mark.cycle
-        if reception.missed:
+        cycle = received.cycle_id.cycle
+        if received.missed:
             self._log.warning(
-                "%d before it are lost: the module had overwritten them", reception.missed, cycle=cycle
+                "%d before it are lost: the module had overwritten them", received.missed, cycle=cycle
             )
-        for fault in reception.faults:
+        for fault in received.faults:
             self._log.warning("%s", fault.removeprefix(f"{self.cell}: cycle {cycle}: "), cycle=cycle)

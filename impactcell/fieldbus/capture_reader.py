@@ -12,25 +12,25 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
-from impactcell.fieldbus.capture_ring import Want
-from impactcell.fieldbus.register_client import MappedDevice
+from impactcell.fieldbus.capture_ring import NextCapture
+from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import Value, Words, capture_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.records import Capture
 
-_ATTEMPTS: Final = 5
+_MOST_ATTEMPTS: Final = 5
 """Readings of one cycle that may be discarded before it is given up."""
-_BREAKS: Final = 30
+_MOST_LINK_FAILURES: Final = 30
 """Times that the link may fail on one cycle, without getting further, before it is given up."""
 _PAUSE_S: Final = 0.001
 """Rest after the first discarded reading, doubled with each: the module may be writing the slot."""
-_REFUSED: Final = (1, 2, 3)
+_REQUEST_FAULTS: Final = (1, 2, 3)
 """Exceptions that the request earns; all others tell of a module, or a gateway, that cannot answer now."""
 _ARRAYS: Final = ("force", "position", "actuator")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ReadCapture:
+class FetchedCapture:
     """What came of reading one cycle.
 
     Attributes
@@ -47,16 +47,16 @@ class ReadCapture:
 
 
 @dataclass(slots=True, eq=False)
-class _Reading:
+class _PartialCapture:
     """A capture as far as it has been read."""
 
-    want: Want
+    target: NextCapture
     header: dict[str, Value]
     words: Words
     blocks: dict[str, PartialBlock]
 
     @property
-    def lacking(self) -> int:
+    def missing_requests(self) -> int:
         return sum(block.missing for block in self.blocks.values())
 
 
@@ -69,19 +69,19 @@ class CaptureReader:
         Readings thrown away because the capture changed meanwhile or did not fit its CRC.
     """
 
-    def __init__(self, cell: str, device: MappedDevice) -> None:
+    def __init__(self, cell: str, client: RegisterClient) -> None:
         self.discarded = 0
         self._cell = cell
-        self._device = device
-        self._registers = device.registers
-        self._reading: _Reading | None = None
-        self._failing: Want | None = None
-        self._failures = 0
-        self._breaks = 0
-        self._least = 0
+        self._client = client
+        self._registers = client.registers
+        self._partial: _PartialCapture | None = None
+        self._target: NextCapture | None = None
+        self._attempts = 0
+        self._link_failures = 0
+        self._fewest_missing = 0
 
-    async def fetch(self, want: Want) -> ReadCapture | None:
-        """Read the cycle `want`; None if it was overwritten before it could be read.
+    async def fetch(self, target: NextCapture) -> FetchedCapture | None:
+        """Read the cycle `target`; None if it was overwritten before it could be read.
 
         A cycle that cannot be read however often it is tried comes back without content, and `faults` says
         why.
@@ -92,90 +92,90 @@ class CaptureReader:
             If the link fails, or the module cannot answer now; the next call for the same cycle goes on where
             this one stopped.
         """
-        if self._failing is None or self._failing.mark != want.mark:
-            self._failing, self._failures, self._breaks, self._reading = want, 0, 0, None
+        if self._target is None or self._target.cycle_id != target.cycle_id:
+            self._target, self._attempts, self._link_failures, self._partial = target, 0, 0, None
         reason = "it kept changing while it was read; does another client select slots?"
-        while self._failures < _ATTEMPTS:
+        while self._attempts < _MOST_ATTEMPTS:
             try:
-                reading = await self._begin(want)
-                if reading is None:
-                    self._failures += 1
-                    reason = f"slot {want.slot} does not show it, although ring_cycle says so"
-                    if self._failures < _ATTEMPTS:
+                partial = await self._read_header(target)
+                if partial is None:
+                    self._attempts += 1
+                    reason = f"slot {target.slot} does not show it, although ring_cycle says so"
+                    if self._attempts < _MOST_ATTEMPTS:
                         return None
                     break
-                fault = await self._finish(reading)
+                fault = await self._read_samples(partial)
                 if fault is None:
-                    self._failing = self._reading = None
-                    return self._put_together(reading)
+                    self._target = self._partial = None
+                    return self._assemble(partial)
                 reason = fault
             except FieldbusError as error:
                 progressed = self._progressed()
-                if isinstance(error, ModbusExceptionError) and (progressed or error.code in _REFUSED):
+                if isinstance(error, ModbusExceptionError) and (progressed or error.code in _REQUEST_FAULTS):
                     reason = str(error)
                     if progressed:
                         continue
                 else:
-                    self._breaks += not progressed
+                    self._link_failures += not progressed
                     if isinstance(error, ProtocolError) or "capture_crc32" not in self._registers:
-                        self._reading = None  # what came before the fault may be wrong too
-                    if self._breaks < _BREAKS:
+                        self._partial = None  # what came before the fault may be wrong too
+                    if self._link_failures < _MOST_LINK_FAILURES:
                         raise
                     reason = f"the link failed each time: {error}"
                     break
-            self._reading = None
-            self._failures += 1
+            self._partial = None
+            self._attempts += 1
             self.discarded += 1
-            await asyncio.sleep(_PAUSE_S * 2**self._failures)
-        self._failing = self._reading = None
-        fault = f"{self._cell}: cycle {want.mark.cycle} could not be read: {reason}"
-        return ReadCapture(decoding.blank(want.mark.cycle), readable=False, faults=(fault,))
+            await asyncio.sleep(_PAUSE_S * 2**self._attempts)
+        self._target = self._partial = None
+        fault = f"{self._cell}: cycle {target.cycle_id.cycle} could not be read: {reason}"
+        return FetchedCapture(decoding.empty_capture(target.cycle_id.cycle), readable=False, faults=(fault,))
 
     def _progressed(self) -> bool:
         """Whether the interrupted reading got further than the one before."""
-        if self._reading is None:
+        if self._partial is None:
             return False
-        before, self._least = self._least, self._reading.lacking
-        return self._least < before
+        before, self._fewest_missing = self._fewest_missing, self._partial.missing_requests
+        return self._fewest_missing < before
 
-    async def _begin(self, want: Want) -> _Reading | None:
+    async def _read_header(self, target: NextCapture) -> _PartialCapture | None:
         """Show the slot and read its header, or go on with the reading that was interrupted."""
-        device, registers = self._device, self._registers
-        if self._reading is not None:
-            _, words = await device.header()
-            if words.tobytes() == self._reading.words.tobytes():
-                return self._reading
-            self._reading = None
+        client, registers = self._client, self._registers
+        if self._partial is not None:
+            _, words = await client.header()
+            if words.tobytes() == self._partial.words.tobytes():
+                return self._partial
+            self._partial = None
             self.discarded += 1
-        header, words = await device.header(want.slot)
-        if header["window_slot"] != want.slot:
-            header, words = await device.header()
-        if _even(header["window_sequence"]) and header["window_slot"] == want.slot:
+        header, words = await client.header(target.slot)
+        if header["window_slot"] != target.slot:
+            header, words = await client.header()
+        if _at_rest(header["window_sequence"]) and header["window_slot"] == target.slot:
             shown = (header["window_session"], header["window_cycle"])
-            if shown != (want.mark.session, want.mark.cycle):
+            if shown != (target.cycle_id.session, target.cycle_id.cycle):
                 return None
-        counts = decoding.used_counts(registers, header)
-        blocks = {name: device.part(name, count) for name, count in counts.items()}
-        self._reading = _Reading(want, header, words, blocks)
-        self._least = self._reading.lacking
-        return self._reading
+        counts = decoding.sample_counts(registers, header)
+        blocks = {name: client.partial_block(name, count) for name, count in counts.items()}
+        self._partial = _PartialCapture(target, header, words, blocks)
+        self._fewest_missing = self._partial.missing_requests
+        return self._partial
 
-    async def _finish(self, reading: _Reading) -> str | None:
+    async def _read_samples(self, partial: _PartialCapture) -> str | None:
         """Read the samples and what follows them; return why the reading is of no use, None if it is good."""
-        registers, header, want = self._registers, reading.header, reading.want
+        registers, header, target = self._registers, partial.header, partial.target
         before = header["window_sequence"]
         shown = (header["window_slot"], header["window_session"], header["window_cycle"])
-        if not _even(before):
+        if not _at_rest(before):
             return f"register window_sequence shows {before}: the window was being changed"
-        if shown != (want.slot, want.mark.session, want.mark.cycle):
+        if shown != (target.slot, target.cycle_id.session, target.cycle_id.cycle):
             address = registers["window_slot"].address
-            return f"register window_slot ({address}) shows {shown[0]} instead of {want.slot}"
-        complete, last = self._device.client.complete, self._device.part("window_sequence_after", 1)
-        provable = "capture_crc32" in registers and not decoding.lying_counts(registers, header)
+            return f"register window_slot ({address}) shows {shown[0]} instead of {target.slot}"
+        complete, last = self._client.modbus.complete, self._client.partial_block("window_sequence_after", 1)
+        provable = "capture_crc32" in registers and not decoding.excessive_counts(registers, header)
         if provable:  # in whatever order the device answers
-            await complete(*reading.blocks.values(), last)
+            await complete(*partial.blocks.values(), last)
         else:
-            await complete(*reading.blocks.values())
+            await complete(*partial.blocks.values())
             await complete(last)
         after = registers["window_sequence_after"].decode(last.words())
         if before != after:
@@ -183,19 +183,19 @@ class CaptureReader:
         if provable:
             crc = registers["capture_crc32"]
             first = registers["window_sequence"]
-            covered = reading.words[first.words : crc.address - first.address]
-            samples = [reading.blocks[name].words() for name in _ARRAYS if name in reading.blocks]
+            covered = partial.words[first.words : crc.address - first.address]
+            samples = [partial.blocks[name].words() for name in _ARRAYS if name in partial.blocks]
             if header["capture_crc32"] != capture_crc32(covered, *samples):
                 return f"register capture_crc32 ({crc.address}) does not fit what was read"
         return None
 
-    def _put_together(self, reading: _Reading) -> ReadCapture:
-        samples = {name: block.words() for name, block in reading.blocks.items()}
-        capture, faults = decoding.capture(self._registers, reading.header, samples)
+    def _assemble(self, partial: _PartialCapture) -> FetchedCapture:
+        samples = {name: block.words() for name, block in partial.blocks.items()}
+        capture, faults = decoding.capture_from_words(self._registers, partial.header, samples)
         named = tuple(f"{self._cell}: cycle {capture.cycle}: {fault}" for fault in faults)
-        return ReadCapture(capture, readable=True, faults=named)
+        return FetchedCapture(capture, readable=True, faults=named)
 
 
-def _even(sequence: Value) -> bool:
+def _at_rest(sequence: Value) -> bool:
     """Whether the window was at rest."""
     return isinstance(sequence, int) and sequence % 2 == 0

@@ -9,11 +9,11 @@ from typing import Final
 
 from impactcell.records import CycleId
 
-PERIOD: Final = 2**32 - 1
+CYCLE_PERIOD: Final = 2**32 - 1
 
 
 @dataclass(frozen=True, slots=True)
-class Want:
+class NextCapture:
     """The cycle to read next.
 
     Attributes
@@ -27,24 +27,24 @@ class Want:
         and the restart nobody knows; `missed` counts those of the new session.
     """
 
-    mark: CycleId
+    cycle_id: CycleId
     slot: int
     missed: int
     restarted: bool
 
 
-def distance(after: int, to: int) -> int:
+def cycles_after(after: int, to: int) -> int:
     """Return how many steps lead from cycle `after` to cycle `to`, 0 standing for before the first.
 
     >>> distance(4294967295, 2), distance(0, 3), distance(7, 7)
     (2, 3, 0)
     """
-    return to if after == 0 or to == 0 else (to - after) % PERIOD
+    return to if after == 0 or to == 0 else (to - after) % CYCLE_PERIOD
 
 
-def next_wanted(
+def next_capture(
     last: CycleId | None, session: int, counter: int, ring: Sequence[int], skip: int = 0
-) -> Want | None:
+) -> NextCapture | None:
     """Return the oldest cycle of the ring that comes after `last`, or None if there is nothing new.
 
     Parameters
@@ -60,19 +60,21 @@ def next_wanted(
     """
     if counter == 0 or last == CycleId(session, counter):
         return None
-    ages = {distance(cycle, counter): slot for slot, cycle in enumerate(ring) if cycle != 0}
-    restarted = last is not None and (last.session != session or distance(last.cycle, counter) > PERIOD // 2)
+    ages = {cycles_after(cycle, counter): slot for slot, cycle in enumerate(ring) if cycle != 0}
+    restarted = last is not None and (
+        last.session != session or cycles_after(last.cycle, counter) > CYCLE_PERIOD // 2
+    )
     if last is None or restarted:
-        behind = counter if restarted else PERIOD
-        held = sorted((age for age in ages if age <= PERIOD // 2), reverse=True)
+        behind = counter if restarted else CYCLE_PERIOD
+        held = sorted((age for age in ages if age <= CYCLE_PERIOD // 2), reverse=True)
     else:
-        behind = distance(last.cycle, counter)
+        behind = cycles_after(last.cycle, counter)
         held = sorted((age for age in ages if age < behind), reverse=True)
     if not held:
         return None
     age = held[min(skip, len(held) - 1)]
     slot = ages[age]
     missed = 0 if last is None else max(0, behind - age - 1)
-    if restarted and missed > PERIOD // 2:
+    if restarted and missed > CYCLE_PERIOD // 2:
         missed = 0  # no module makes so many cycles between two polls: its counter was set
-    return Want(CycleId(session, ring[slot]), slot, missed, restarted)
+    return NextCapture(CycleId(session, ring[slot]), slot, missed, restarted)

@@ -35,7 +35,7 @@ MAX_READ: Final = 125
 MAX_WRITE: Final = 123
 
 
-class Function(enum.IntEnum):
+class FunctionCode(enum.IntEnum):
     """Function codes of the Modbus Application Protocol V1.1b3 that are used here."""
 
     READ_HOLDING = 3
@@ -72,9 +72,9 @@ class Request:
         Bytes of the PDU of a good reply.
     reply_prefix : bytes
         How it must begin: function and byte count of a read, the whole echo of a write.
-    what : str
+    description : str
         The request in words, for messages.
-    tail : bytes
+    frame_tail : bytes
         The request's frame after its transaction.
     reply_head : bytes
         A good reply's frame after its transaction, as far as it is known beforehand: up to its data.
@@ -85,19 +85,21 @@ class Request:
     pdu: bytes
     reply_length: int
     reply_prefix: bytes
-    what: str
-    tail: bytes
+    description: str
+    frame_tail: bytes
     reply_head: bytes
     data_length: int
 
 
-def _request(unit: int, pdu: bytes, reply_length: int, reply_prefix: bytes, what: str) -> Request:
-    tail, head = frame(0, unit, pdu)[2:], HEADER.pack(0, 0, reply_length + 1, unit)[2:] + reply_prefix
-    return Request(pdu, reply_length, reply_prefix, what, tail, head, reply_length - len(reply_prefix))
+def _request(unit: int, pdu: bytes, reply_length: int, reply_prefix: bytes, description: str) -> Request:
+    frame_tail, head = frame(0, unit, pdu)[2:], HEADER.pack(0, 0, reply_length + 1, unit)[2:] + reply_prefix
+    return Request(
+        pdu, reply_length, reply_prefix, description, frame_tail, head, reply_length - len(reply_prefix)
+    )
 
 
 @lru_cache(maxsize=4096)
-def read_request(function: Function, address: int, count: int, unit: int = 1) -> Request:
+def read_request(function: FunctionCode, address: int, count: int, unit: int = 1) -> Request:
     """Request for `count` registers from `address` on (cached: the same blocks are read every cycle).
 
     Raises
@@ -107,10 +109,12 @@ def read_request(function: Function, address: int, count: int, unit: int = 1) ->
     """
     if not 1 <= count <= MAX_READ or not 0 <= address <= 65_536 - count:
         raise ValueError(f"a request cannot read {count} registers from {address}")
-    kind = ReadHoldingRegistersRequest if function == Function.READ_HOLDING else ReadInputRegistersRequest
+    kind = ReadHoldingRegistersRequest if function == FunctionCode.READ_HOLDING else ReadInputRegistersRequest
     pdu = bytes([function]) + kind(address=address, count=count).encode()
-    what = f"{count} {'holding' if function == Function.READ_HOLDING else 'input'} registers from {address}"
-    return _request(unit, pdu, 2 + 2 * count, bytes([function, 2 * count]), what)
+    description = (
+        f"{count} {'holding' if function == FunctionCode.READ_HOLDING else 'input'} registers from {address}"
+    )
+    return _request(unit, pdu, 2 + 2 * count, bytes([function, 2 * count]), description)
 
 
 def write_request(address: int, words: Words, unit: int = 1) -> Request:
@@ -124,15 +128,15 @@ def write_request(address: int, words: Words, unit: int = 1) -> Request:
     count = len(words)
     if not 1 <= count <= MAX_WRITE or not 0 <= address <= 65_536 - count:
         raise ValueError(f"a request cannot write {count} registers from {address}")
-    what = f"a write of {count} registers from {address}"
+    description = f"a write of {count} registers from {address}"
     values = [int(word) for word in words]
     if count == 1:
         single = WriteSingleRegisterRequest(address=address, registers=values)
-        pdu = bytes([Function.WRITE_SINGLE]) + single.encode()
-        return _request(unit, pdu, 5, pdu, what)
+        pdu = bytes([FunctionCode.WRITE_SINGLE]) + single.encode()
+        return _request(unit, pdu, 5, pdu, description)
     multiple = WriteMultipleRegistersRequest(address=address, registers=values)
-    pdu = bytes([Function.WRITE_MULTIPLE]) + multiple.encode()
-    return _request(unit, pdu, 5, pdu[:5], what)
+    pdu = bytes([FunctionCode.WRITE_MULTIPLE]) + multiple.encode()
+    return _request(unit, pdu, 5, pdu[:5], description)
 
 
 def frame(transaction: int, unit: int, pdu: bytes) -> bytes:
@@ -156,33 +160,33 @@ def check_reply(request: Request, pdu: bytes) -> bytes:
     function = request.pdu[0]
     if len(pdu) == 2 and pdu[0] == function | 0x80:
         name = EXCEPTION_NAMES.get(pdu[1], "unknown exception")
-        raise ModbusExceptionError(f"{request.what} refused: {name} (exception {pdu[1]})", pdu[1])
+        raise ModbusExceptionError(f"{request.description} refused: {name} (exception {pdu[1]})", pdu[1])
     if pdu[0] & 0x7F != function:
-        raise ProtocolError(f"{request.what}: answered with function {pdu[0]} instead of {function}")
+        raise ProtocolError(f"{request.description}: answered with function {pdu[0]} instead of {function}")
     if len(pdu) != request.reply_length:
         raise ProtocolError(
-            f"{request.what}: answered with {len(pdu)} bytes instead of {request.reply_length}"
+            f"{request.description}: answered with {len(pdu)} bytes instead of {request.reply_length}"
         )
-    raise ProtocolError(f"{request.what}: the answer is for another request")
+    raise ProtocolError(f"{request.description}: the answer is for another request")
 
 
 class FrameReader:
     """Cuts a stream of bytes into frames, however it arrives: in pieces, or several at once."""
 
-    __slots__ = ("_held",)
+    __slots__ = ("_buffer",)
 
     def __init__(self) -> None:
-        self._held = b""
+        self._buffer = b""
 
     @property
     def pending(self) -> int:
         """Bytes that are held back because their frame is not complete."""
-        return len(self._held)
+        return len(self._buffer)
 
     def take(self, data: bytes) -> bytes:
         """Hand over what is held back, and `data` behind it, to be fed again where it is not used."""
-        held, self._held = self._held, b""
-        return held + data if held else data
+        buffer, self._buffer = self._buffer, b""
+        return buffer + data if buffer else data
 
     def feed(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
         """Take in `data`; yield transaction, unit and PDU of each complete frame.
@@ -192,12 +196,12 @@ class FrameReader:
         ProtocolError
             At a header that is not Modbus TCP; what follows it cannot be trusted, the connection has to go.
         """
-        held = self._held + data if self._held else data
-        at, size = 0, len(held)
+        buffer = self._buffer + data if self._buffer else data
+        at, size = 0, len(buffer)
         unpack, header = HEADER.unpack_from, HEADER.size
         try:
             while size - at >= header:
-                transaction, protocol, length, unit = unpack(held, at)
+                transaction, protocol, length, unit = unpack(buffer, at)
                 if protocol or not 2 <= length <= MAX_LENGTH:
                     raise ProtocolError(
                         f"not a Modbus TCP frame: protocol {protocol}, length {length} (2..{MAX_LENGTH})"
@@ -205,8 +209,8 @@ class FrameReader:
                 end = at + 6 + length
                 if end > size:
                     break
-                pdu = held[at + header : end]
+                pdu = buffer[at + header : end]
                 at = end
                 yield transaction, unit, pdu
         finally:
-            self._held = held[at:]
+            self._buffer = buffer[at:]

@@ -14,8 +14,8 @@ from typing import Final
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import BUSY, FrameReader, check_reply
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.request_batching import Batch, Exchange, Flight
-from impactcell.fieldbus.transactions import Transactions
+from impactcell.fieldbus.request_batching import BatchInFlight, Exchange, RequestBatch
+from impactcell.fieldbus.transactions import TransactionIds
 
 BUSY_PAUSE_S: Final = 0.02
 """How long a device that said busy is left alone; it is asked again until the timeout has passed."""
@@ -34,7 +34,7 @@ class Connection(asyncio.BufferedProtocol):
         Set once the socket is gone.
     """
 
-    def __init__(self, link: ModuleLink, transactions: Transactions) -> None:
+    def __init__(self, link: ModuleLink, transactions: TransactionIds) -> None:
         self.link = link
         self.round_trip_s = float("nan")
         self.lost = asyncio.Event()
@@ -44,20 +44,20 @@ class Connection(asyncio.BufferedProtocol):
         self._socket: socket.socket | None = None
         self._received = memoryview(bytearray(_RECEIVED_AT_ONCE))
         self._reader = FrameReader()
-        self._waiting: deque[Batch] = deque()
-        self._flying: list[Flight] = []
-        self._in_flight = 0
-        self._busy: dict[asyncio.TimerHandle, Batch] = {}
+        self._waiting: deque[RequestBatch] = deque()
+        self._in_flight: list[BatchInFlight] = []
+        self._requests_in_flight = 0
+        self._busy: dict[asyncio.TimerHandle, RequestBatch] = {}
         self._unconfirmed: list[Exchange] = []
-        self._timer: asyncio.TimerHandle | None = None
-        self._resting: asyncio.TimerHandle | None = None
+        self._timeout_timer: asyncio.TimerHandle | None = None
+        self._pause_timer: asyncio.TimerHandle | None = None
 
     @property
     def open(self) -> bool:
         """Whether requests can be sent."""
         return self._transport is not None
 
-    def submit(self, batches: Sequence[Batch], *, first: bool = False) -> None:
+    def submit(self, batches: Sequence[RequestBatch], *, first: bool = False) -> None:
         """Send `batches` as the window allows; `first`: before all that waits."""
         if self._transport is None:
             raise LinkError(f"{self.link}: not connected")
@@ -67,18 +67,18 @@ class Connection(asyncio.BufferedProtocol):
             self._waiting.extendleft(batches)
         else:
             self._waiting.extend(batches)
-        self._pump()
+        self._send_waiting()
 
-    def give_up(self, error: FieldbusError) -> None:
+    def fail(self, error: FieldbusError) -> None:
         """Close the connection and fail all that is pending."""
-        for handle in (self._timer, self._resting, *self._busy):
+        for handle in (self._timeout_timer, self._pause_timer, *self._busy):
             if handle is not None:
                 handle.cancel()
-        pending = [*(flight.batch for flight in self._flying), *self._busy.values(), *self._waiting]
-        self._timer = self._resting = None
+        pending = [*(flight.batch for flight in self._in_flight), *self._busy.values(), *self._waiting]
+        self._timeout_timer = self._pause_timer = None
         self._busy.clear()
-        self._flying.clear()
-        self._in_flight = 0
+        self._in_flight.clear()
+        self._requests_in_flight = 0
         self._waiting.clear()
         transport, self._transport = self._transport, None
         if transport is not None:
@@ -103,21 +103,26 @@ class Connection(asyncio.BufferedProtocol):
         if self._transport is None:
             return
         try:
-            rest = self._take_good(self._reader.take(bytes(self._received[:nbytes])))
+            rest = self._consume_good_replies(self._reader.take(bytes(self._received[:nbytes])))
             if rest:
                 for transaction, unit, pdu in self._reader.feed(rest):
-                    self._answer(transaction, unit, pdu)
-            if not self._reader.pending and not self._flying:
+                    self._handle_frame(transaction, unit, pdu)
+            if not self._reader.pending and not self._in_flight:
                 self._confirm()
         except ProtocolError as error:
-            self.give_up(ProtocolError(f"{self.link}: {error}"))
+            self.fail(ProtocolError(f"{self.link}: {error}"))
             return
-        if self._reader.pending and not self._flying:
-            self.give_up(ProtocolError(f"{self.link}: more bytes than were asked for"))
+        if self._reader.pending and not self._in_flight:
+            self.fail(ProtocolError(f"{self.link}: more bytes than were asked for"))
             return
-        if self.link.pause_s and self._resting is None:
-            self._resting = self._loop.call_later(self.link.pause_s, self._rested)
-        if not self._pump() and self._flying and self._socket is not None and _QUICKACK is not None:
+        if self.link.pause_s and self._pause_timer is None:
+            self._pause_timer = self._loop.call_later(self.link.pause_s, self._end_pause)
+        if (
+            not self._send_waiting()
+            and self._in_flight
+            and self._socket is not None
+            and _QUICKACK is not None
+        ):
             # A peer that holds back small replies waits for this; else the next request says it as well. The
             # system falls back to delayed acknowledgements by itself, so it is set anew each time.
             self._socket.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
@@ -126,15 +131,15 @@ class Connection(asyncio.BufferedProtocol):
         """Fail what is pending (called by asyncio)."""
         self.lost.set()
         if self._transport is not None:
-            self.give_up(LinkError(f"{self.link}: connection lost{f': {exc}' if exc else ''}"))
+            self.fail(LinkError(f"{self.link}: connection lost{f': {exc}' if exc else ''}"))
 
-    def _pump(self) -> bool:
+    def _send_waiting(self) -> bool:
         """Send what the window allows, in one write; return whether there was anything."""
-        if self._transport is None or self._resting is not None:
+        if self._transport is None or self._pause_timer is not None:
             return False
         frames: list[bytes] = []
         now = self._loop.time()
-        while self._waiting and (room := self.link.window - self._in_flight) > 0:
+        while self._waiting and (room := self.link.window - self._requests_in_flight) > 0:
             batch = self._waiting[0]
             if batch.exchange.done.done():  # its block has failed, or nobody waits for it any more
                 self._waiting.popleft()
@@ -143,82 +148,82 @@ class Connection(asyncio.BufferedProtocol):
                 batch = batch.split(room)
             else:
                 self._waiting.popleft()
-            flight = Flight(batch, self._fresh_transactions(len(batch.requests)), now)
-            self._flying.append(flight)
-            self._in_flight += len(batch.requests)
+            flight = BatchInFlight(batch, self._fresh_transactions(len(batch.requests)), now)
+            self._in_flight.append(flight)
+            self._requests_in_flight += len(batch.requests)
             frames += flight.frames()
         if frames:
             self._transport.write(b"".join(frames))
-            if self._timer is None:
-                self._timer = self._loop.call_later(self.link.timeout_s, self._check_time)
+            if self._timeout_timer is None:
+                self._timeout_timer = self._loop.call_later(self.link.timeout_s, self._check_timeout)
         return bool(frames)
 
     def _fresh_transactions(self, count: int) -> tuple[bytes, ...]:
         """Draw transaction ids, none of which is in flight."""
         drawn = self._transactions.draw(count)
-        for flight in self._flying:
+        for flight in self._in_flight:
             if not set(drawn).isdisjoint(flight.transactions):
                 return self._fresh_transactions(count)
         return drawn
 
-    def _check_time(self) -> None:
+    def _check_timeout(self) -> None:
         """Give up if the oldest request has waited too long; else look again when it will have."""
-        self._timer = None
-        if not self._flying:
+        self._timeout_timer = None
+        if not self._in_flight:
             return
-        oldest = self._flying[0]  # they stay in the order of sending
+        oldest = self._in_flight[0]  # they stay in the order of sending
         left_s = oldest.sent_s + self.link.timeout_s - self._loop.time()
         if left_s > 0.0:
-            self._timer = self._loop.call_later(left_s, self._check_time)
+            self._timeout_timer = self._loop.call_later(left_s, self._check_timeout)
             return
         timeout = f"within {self.link.timeout_s:g} s"
-        self.give_up(LinkError(f"{self.link}: no answer to {oldest.batch.requests[0].what} {timeout}"))
+        self.fail(LinkError(f"{self.link}: no answer to {oldest.batch.requests[0].description} {timeout}"))
 
-    def _take_good(self, stream: bytes) -> bytes:
+    def _consume_good_replies(self, stream: bytes) -> bytes:
         """Use the good replies at the front of `stream`, up to anything unusual; return the rest."""
         at = 0
-        while self._flying:
-            flight = self._flying[0]
-            count, at, data = flight.good_replies(stream, at)
+        while self._in_flight:
+            flight = self._in_flight[0]
+            count, at, data = flight.match_replies(stream, at)
             if not count:
                 break
-            self._use(self._land(flight, 0, count), data)
+            self._accept_replies(self._take_from_flight(flight, 0, count), data)
         return stream[at:]
 
-    def _answer(self, number: int, unit: int, pdu: bytes) -> None:
+    def _handle_frame(self, number: int, unit: int, pdu: bytes) -> None:
         """Use one reply; raises ProtocolError, with the request still open, where it is not a good one."""
         transaction = number.to_bytes(2, "big")
-        flight = next((each for each in self._flying if transaction in each.transactions), None)
+        flight = next((each for each in self._in_flight if transaction in each.transactions), None)
         if flight is None:
             raise ProtocolError(f"an answer to transaction {number}, which is not open")
         at = flight.transactions.index(transaction)
         request = flight.batch.requests[at]
         if unit != self.link.device_id:
-            raise ProtocolError(f"an answer from device {unit} to {request.what}")
+            raise ProtocolError(f"an answer from device {unit} to {request.description}")
         try:
             data = check_reply(request, pdu)
-        except ModbusExceptionError as refused:
+        except ModbusExceptionError as exception:
             self._confirm()
-            self._refused(self._land(flight, at, 1), refused)
+            self._handle_exception(self._take_from_flight(flight, at, 1), exception)
             return
-        self._use(self._land(flight, at, 1), data)
+        self._accept_replies(self._take_from_flight(flight, at, 1), data)
 
-    def _land(self, flight: Flight, first: int, count: int) -> Flight:
+    def _take_from_flight(self, flight: BatchInFlight, first: int, count: int) -> BatchInFlight:
         """Take `count` requests of `flight`, from `first` on, out of what is in flight."""
-        self._in_flight -= count
-        at = self._flying.index(flight)
+        self._requests_in_flight -= count
+        at = self._in_flight.index(flight)
         if first:
-            self._flying.insert(at, flight.split(first))
+            self._in_flight.insert(at, flight.split(first))
             at += 1
         if count < len(flight.transactions):
             return flight.split(count)
-        return self._flying.pop(at)
+        return self._in_flight.pop(at)
 
-    def _use(self, landed: Flight, data: bytes) -> None:
+    def _accept_replies(self, answered: BatchInFlight, data: bytes) -> None:
         """Take the data of good replies."""
         if self._unconfirmed:
             self._confirm()
-        batch = landed.batch
+        batch = answered.batch
         exchange, count = batch.exchange, len(batch.requests)
         if exchange.done.done():  # it has ended, and what came until then may be in use
             return
@@ -226,7 +231,7 @@ class Connection(asyncio.BufferedProtocol):
             batch.block.fill(batch.first, count, data)
         exchange.unanswered -= count
         if not exchange.unanswered:
-            self.round_trip_s = self._loop.time() - landed.sent_s
+            self.round_trip_s = self._loop.time() - answered.sent_s
             self._unconfirmed.append(exchange)
 
     def _confirm(self) -> None:
@@ -241,23 +246,23 @@ class Connection(asyncio.BufferedProtocol):
                 exchange.done.set_result(None)
         self._unconfirmed.clear()
 
-    def _refused(self, landed: Flight, refused: ModbusExceptionError) -> None:
+    def _handle_exception(self, answered: BatchInFlight, exception: ModbusExceptionError) -> None:
         """Ask a busy device again for the one request that it refused; else end its exchange."""
-        batch = landed.batch
+        batch = answered.batch
         exchange = batch.exchange
-        first_sent_s = exchange.first_sent_s.setdefault(batch.requests[0], landed.sent_s)
-        if refused.code == BUSY and self._loop.time() + BUSY_PAUSE_S < first_sent_s + self.link.timeout_s:
+        first_sent_s = exchange.first_sent_s.setdefault(batch.requests[0], answered.sent_s)
+        if exception.code == BUSY and self._loop.time() + BUSY_PAUSE_S < first_sent_s + self.link.timeout_s:
 
             def again() -> None:
                 del self._busy[handle]
                 self._waiting.appendleft(batch)
-                self._pump()
+                self._send_waiting()
 
             handle = self._loop.call_later(BUSY_PAUSE_S, again)
             self._busy[handle] = batch
             return
-        exchange.fail(ModbusExceptionError(f"{self.link}: {refused}", refused.code))
+        exchange.fail(ModbusExceptionError(f"{self.link}: {exception}", exception.code))
 
-    def _rested(self) -> None:
-        self._resting = None
-        self._pump()
+    def _end_pause(self) -> None:
+        self._pause_timer = None
+        self._send_waiting()

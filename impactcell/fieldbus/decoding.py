@@ -1,4 +1,4 @@
-"""Words of the module's window and status block become a `Capture` and a `ModuleReport`. Pure, never fails.
+"""Words of the module's window and status block become a `Capture` and a `StatusBlock`. Pure, never fails.
 
 What is wrong with a value is said in `faults`, each naming cell, cycle and register; the value itself is then
 left out (nan, None), so that nothing wrong is ever passed on as measured.
@@ -15,7 +15,7 @@ from impactcell.records import BatchAnnouncement, Capture, Channel, Summary, uni
 
 
 @dataclass(frozen=True, slots=True)
-class PositioningReport:
+class PositioningStatus:
     """What the module says of positioning; see the map for the codes.
 
     Attributes
@@ -28,7 +28,7 @@ class PositioningReport:
         Raised by the PLC with each new target.
     mass_kg : float
         nan where the PLC does not know it.
-    accepted : int
+    accepted_command : int
         Sequence number of the last command that the module looked at.
     cycle : int
         Cycle made by that command, 0 for none.
@@ -40,12 +40,12 @@ class PositioningReport:
     target_m: float
     target_sequence: int
     mass_kg: float
-    accepted: int
+    accepted_command: int
     cycle: int
 
 
 @dataclass(frozen=True, slots=True)
-class ModuleReport:
+class StatusBlock:
     """The status block of one poll."""
 
     state: str
@@ -53,10 +53,10 @@ class ModuleReport:
     cycle_counter: int
     ring: tuple[int, ...]
     batch: BatchAnnouncement | None
-    positioning: PositioningReport | None
+    positioning: PositioningStatus | None
 
 
-REPORT = (
+STATUS_REGISTERS = (
     "state", "session", "cycle_counter", "ring_cycle",
     "batch_sequence", "batch_from_cycle", "batch_announced",
     "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
@@ -70,7 +70,7 @@ LATEST_NS = 2**63 - 1
 """The year 2262."""
 
 _BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
-_POSITIONING = REPORT[7:]
+_POSITIONING = STATUS_REGISTERS[7:]
 
 
 def _code_name(register: Register, value: Value) -> str:
@@ -86,8 +86,8 @@ def _number(value: Value) -> float:
     return float(value) if isinstance(value, int | float) else math.nan
 
 
-def report(registers: RegisterMap, values: Mapping[str, Value]) -> ModuleReport:
-    """Put the decoded registers of `REPORT` together."""
+def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> StatusBlock:
+    """Put the decoded registers of `STATUS_REGISTERS` together."""
     batch = positioning = None
     if all(name in values for name in _BATCH):
         batch = BatchAnnouncement(
@@ -96,17 +96,17 @@ def report(registers: RegisterMap, values: Mapping[str, Value]) -> ModuleReport:
             str(values["batch_announced"]),
         )
     if all(name in values for name in _POSITIONING):
-        positioning = PositioningReport(
+        positioning = PositioningStatus(
             state=_code_name(registers["positioning_state"], values["positioning_state"]),
             result=_code_name(registers["command_result"], values["command_result"]),
             position_m=_number(values["part_position"]),
             target_m=_number(values["target_position"]),
             target_sequence=_integer(values["target_sequence"]),
             mass_kg=_number(values["part_mass"]),
-            accepted=_integer(values["command_accepted"]),
+            accepted_command=_integer(values["command_accepted"]),
             cycle=_integer(values["command_cycle"]),
         )
-    return ModuleReport(
+    return StatusBlock(
         state=_code_name(registers["state"], values["state"]),
         session=_integer(values["session"]),
         cycle_counter=_integer(values["cycle_counter"]),
@@ -116,7 +116,7 @@ def report(registers: RegisterMap, values: Mapping[str, Value]) -> ModuleReport:
     )
 
 
-def used_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, int]:
+def sample_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, int]:
     """Return how many samples of each array are used: what the header says, at most what the map has."""
     return {
         name: min(_integer(header.get(f"{name}_count", 0)), registers[name].count)
@@ -125,7 +125,7 @@ def used_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str
     }
 
 
-def lying_counts(registers: RegisterMap, header: Mapping[str, Value]) -> list[str]:
+def excessive_counts(registers: RegisterMap, header: Mapping[str, Value]) -> list[str]:
     """Return a fault for each count that is more than the map has room for."""
     return [
         f"register {name}_count ({registers[f'{name}_count'].address}): {header[f'{name}_count']} samples, "
@@ -135,12 +135,12 @@ def lying_counts(registers: RegisterMap, header: Mapping[str, Value]) -> list[st
     ]
 
 
-def blank(cycle: int) -> Capture:
+def empty_capture(cycle: int) -> Capture:
     """Return the capture of a cycle that could not be read: its number, and nothing else."""
     return Capture(cycle=cycle, velocity_m_s=math.nan, mass_kg=math.nan, force=None, position=None)
 
 
-def capture(
+def capture_from_words(
     registers: RegisterMap, header: Mapping[str, Value], samples: Mapping[str, Words]
 ) -> tuple[Capture, list[str]]:
     """Put a capture together; `samples` holds the words of the used part of each array.
@@ -152,8 +152,8 @@ def capture(
     list of str
         What is wrong with it, register by register.
     """
-    faults = lying_counts(registers, header)
-    lying = {fault.split("_count", 1)[0].removeprefix("register ") for fault in faults}
+    faults = excessive_counts(registers, header)
+    excessive = {fault.split("_count", 1)[0].removeprefix("register ") for fault in faults}
     velocity = _checked(registers, header, "velocity", faults, math.nan)
     mass = _checked(registers, header, "mass", faults, math.nan, missing=True)
     if not math.isnan(mass) and not LIGHTEST_KG <= mass <= HEAVIEST_KG:
@@ -172,7 +172,7 @@ def capture(
         )
         direction = 1
     channels = {
-        name: None if name in lying else _channel(registers, header, name, words, faults)
+        name: None if name in excessive else _channel(registers, header, name, words, faults)
         for name, words in samples.items()
     }
     summary = None
@@ -248,11 +248,11 @@ def _channel(
         if clipped:
             faults.append(f"{where}: {clipped} samples at full scale ({low:g} to {high:g})")
     if not (math.isfinite(least) and math.isfinite(most)):
-        known = np.isfinite(values)
+        finite = np.isfinite(values)
         faults.append(
-            f"{where}: {known.size - np.count_nonzero(known)} of {known.size} samples are not a number"
+            f"{where}: {finite.size - np.count_nonzero(finite)} of {finite.size} samples are not a number"
         )
-        time_s, values = time_s[known], values[known]
+        time_s, values = time_s[finite], values[finite]
         if not values.size:
             return None
         least, most = values.min(), values.max()

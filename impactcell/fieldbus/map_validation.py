@@ -48,7 +48,7 @@ _KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
 }
 
 
-def declared_fields(
+def validate_map(
     mapping: Mapping[str, Any], units: Container[str], kinds: Container[str]
 ) -> tuple[str, dict[str, dict[str, Any]], list[str]]:
     """Name of the map, the arguments of each register that is declared soundly, and all faults found.
@@ -69,13 +69,13 @@ def declared_fields(
     order = mapping.get("word_order", "big")
     if order not in _ORDERS:
         faults.append("word_order must be big or little")
-    sound: dict[str, dict[str, Any]] = {}
+    arguments: dict[str, dict[str, Any]] = {}
     for key, entry in mapping["registers"].items():
-        found = list(_entry_faults(entry, units, kinds))
-        faults += [f"register {key}: {fault}" for fault in found]
-        if not found:
-            sound[str(key)] = _arguments(str(key), entry, order)
-    return name, sound, faults
+        entry_faults = list(_entry_faults(entry, units, kinds))
+        faults += [f"register {key}: {fault}" for fault in entry_faults]
+        if not entry_faults:
+            arguments[str(key)] = _arguments(str(key), entry, order)
+    return name, arguments, faults
 
 
 def _entry_faults(entry: object, units: Container[str], kinds: Container[str]) -> list[str]:

@@ -42,38 +42,40 @@ class PollSchedule:
     """
 
     def __init__(self) -> None:
-        self._asked_s = self._before_s = -math.inf
+        self._last_poll_s = self._poll_before_s = -math.inf
         self._seen_s = math.inf
         self._shown_s = _UNKNOWN
-        self._made_s: float | None = None
+        self._cycle_time_s: float | None = None
         self._period_s: float | None = None
         self._spread_s = 0.0
         self._lag_s = _UNKNOWN
-        self._took_s: deque[float] = deque(maxlen=_ROUND_TRIPS)
-        self._first_s: float | None = None
+        self._round_trips_s: deque[float] = deque(maxlen=_ROUND_TRIPS)
+        self._first_poll_s: float | None = None
 
-    def polled(self, asked_s: float, answered_s: float, *, new: bool) -> None:
+    def record_poll(self, sent_s: float, answered_s: float, *, new: bool) -> None:
         """Take note of a poll, and whether it showed a cycle that the one before did not."""
         if new:
-            self._before_s, self._seen_s = self._asked_s, answered_s
-        self._asked_s = asked_s
-        self._took_s.append(answered_s - asked_s)
-        if self._first_s is None:
-            self._first_s = asked_s
+            self._poll_before_s, self._seen_s = self._last_poll_s, answered_s
+        self._last_poll_s = sent_s
+        self._round_trips_s.append(answered_s - sent_s)
+        if self._first_poll_s is None:
+            self._first_poll_s = sent_s
 
-    def learn(self, made_s: float, cycles: int = 1, *, newest: bool = True) -> None:
+    def update(self, cycle_time_s: float, cycles: int = 1, *, newest: bool = True) -> None:
         """Take note of when a cycle was made, on any clock.
 
         Parameters
         ----------
-        made_s : float
+        cycle_time_s : float
         cycles : int
             How many after the one before; 0 if that is not known.
         newest : bool
             Whether it is the one that the last poll with something new showed.
         """
-        passed_s = math.nan if self._made_s is None or cycles <= 0 else made_s - self._made_s
-        shown_s = (self._before_s, self._seen_s) if newest else _UNKNOWN
+        passed_s = (
+            math.nan if self._cycle_time_s is None or cycles <= 0 else cycle_time_s - self._cycle_time_s
+        )
+        shown_s = (self._poll_before_s, self._seen_s) if newest else _UNKNOWN
         # A clock may have been set, stand still or count in another unit; the polls cannot be so wrong.
         passed_s = min(max(passed_s, shown_s[0] - self._shown_s[1]), shown_s[1] - self._shown_s[0])
         self._shown_s = shown_s
@@ -85,9 +87,9 @@ class PollSchedule:
                 error_s = min(period_s, _LONGEST * self._period_s) - self._period_s
                 self._period_s += _GAIN * error_s
                 self._spread_s += _GAIN * (abs(error_s) - self._spread_s)
-        self._made_s = made_s
+        self._cycle_time_s = cycle_time_s
         if newest:
-            self._lag_s = self._bounds(self._before_s - made_s, self._seen_s - made_s)
+            self._lag_s = self._bounds(self._poll_before_s - cycle_time_s, self._seen_s - cycle_time_s)
 
     def _bounds(self, least_s: float, most_s: float) -> tuple[float, float]:
         """Bounds of the lag, given those that the newest cycle shows."""
@@ -102,17 +104,17 @@ class PollSchedule:
 
     def delay_s(self, now_s: float) -> float:
         """Return the wait before the next poll: a round trip or three at least, so that a slow line rests."""
-        round_trip_s = min(self._took_s, default=0.0)
+        round_trip_s = min(self._round_trips_s, default=0.0)
         rest_s = _REST * round_trip_s
         low_s, high_s = self._lag_s
-        if self._made_s is None or self._period_s is None or low_s == -math.inf:
-            waited_s = 0.0 if self._first_s is None else now_s - self._first_s
+        if self._cycle_time_s is None or self._period_s is None or low_s == -math.inf:
+            waited_s = 0.0 if self._first_poll_s is None else now_s - self._first_poll_s
             return max(rest_s, _between(QUIET_S, 0.01 * waited_s))
         fine_s = max(FINE_S, self._spread_s, 0.5 * (high_s - low_s))
         coarse_s = _between(COARSE_S, _IRREGULAR * self._spread_s)
         least_s = max(round_trip_s, min(fine_s, coarse_s))
         quiet_s = max(rest_s, QUIET_S, coarse_s)
-        due_s = self._made_s + self._period_s
+        due_s = self._cycle_time_s + self._period_s
         margin_s = 2.0 * self._spread_s + FINE_S
         early_s = due_s + low_s - margin_s - now_s
         if early_s > 0.0:
@@ -128,6 +130,6 @@ class PollSchedule:
         return max(quiet_s, min(0.1 * overdue_s, IDLE_S))
 
 
-def _between(shortest_s: float, wanted_s: float) -> float:
+def _between(shortest_s: float, wait_s: float) -> float:
     """Limit a wait to what is never too long."""
-    return min(max(shortest_s, wanted_s), IDLE_S)
+    return min(max(shortest_s, wait_s), IDLE_S)

@@ -6,14 +6,14 @@ from impactcell.records import Capture, CycleId
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reception:
+class ReceivedCycle:
     """One cycle as received.
 
     Attributes
     ----------
     capture : Capture
         In SI; without channels where they could not be read.
-    mark : CycleId
+    cycle_id : CycleId
         Session and cycle: what to acknowledge once it is durable, and where to go on after a restart.
     missed : int
         Cycles right before it that the ring no longer had.
@@ -24,7 +24,7 @@ class Reception:
     """
 
     capture: Capture
-    mark: CycleId
+    cycle_id: CycleId
     missed: int = 0
     restarted: bool = False
     faults: tuple[str, ...] = ()

@@ -13,11 +13,11 @@ from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Wo
 from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.fieldbus.transport import ModbusClient
 
-_TORN_READS: Final = 8
+_STABLE_READ_ATTEMPTS: Final = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Block:
+class RegisterBlock:
     """Neighbouring registers that are read together."""
 
     table: str
@@ -37,7 +37,7 @@ class Block:
         return {register.name: register.decode(words[where]) for register, where in self.fields}
 
 
-def plan(registers: Iterable[Register], max_registers: int) -> tuple[Block, ...]:
+def group_registers(registers: Iterable[Register], max_registers: int) -> tuple[RegisterBlock, ...]:
     """Group registers into blocks of at most `max_registers`, cut only between values.
 
     A value that is larger than that is a block of its own.
@@ -49,17 +49,17 @@ def plan(registers: Iterable[Register], max_registers: int) -> tuple[Block, ...]
             last.append(register)
         else:
             blocks.append([register])
-    return tuple(Block.of(group) for group in blocks)
+    return tuple(RegisterBlock.of(group) for group in blocks)
 
 
-class MappedDevice:
+class RegisterClient:
     """A device whose registers have names."""
 
-    def __init__(self, client: ModbusClient, registers: RegisterMap) -> None:
-        self.client = client
+    def __init__(self, modbus: ModbusClient, registers: RegisterMap) -> None:
+        self.modbus = modbus
         self.registers = registers
-        self._header = Block.of(registers.header())
-        self._plans: dict[tuple[str, ...], tuple[Block, ...]] = {}
+        self._header = RegisterBlock.of(registers.header())
+        self._groups: dict[tuple[str, ...], tuple[RegisterBlock, ...]] = {}
         self._last: dict[tuple[str, ...], tuple[list[bytes], dict[str, Value]]] = {}
 
     async def values(self, names: tuple[str, ...]) -> Mapping[str, Value]:
@@ -71,24 +71,24 @@ class MappedDevice:
         raw = [words.tobytes() for words in await self._read(blocks)]
         last = self._last.get(names)
         if last is None or last[0] != raw:  # nearly always a poll finds all unchanged
-            found: dict[str, Value] = {}
+            decoded: dict[str, Value] = {}
             for i, block in enumerate(blocks):
-                if block.count > self.client.link.max_registers:
-                    raw[i] = await self._settled(block, raw[i])
-                found |= block.decode(np.frombuffer(raw[i], WIRE))
-            last = self._last[names] = (raw, found)
+                if block.count > self.modbus.link.max_registers:
+                    raw[i] = await self._read_until_stable(block, raw[i])
+                decoded |= block.decode(np.frombuffer(raw[i], WIRE))
+            last = self._last[names] = (raw, decoded)
         return last[1]
 
-    def part(self, name: str, values: int) -> PartialBlock:
+    def partial_block(self, name: str, values: int) -> PartialBlock:
         """Give the first `values` values of a register as a block that is still to be read."""
         register = self.registers[name]
-        return self.client.block(register.address, values * register.words_per_value, register.table)
+        return self.modbus.block(register.address, values * register.words_per_value, register.table)
 
     async def words(self, name: str, values: int) -> Words:
         """Read the words of the first `values` values of a register."""
-        part = self.part(name, values)
-        await self.client.complete(part)
-        return part.words()
+        partial_block = self.partial_block(name, values)
+        await self.modbus.complete(partial_block)
+        return partial_block.words()
 
     async def header(self, slot: int | None = None) -> tuple[dict[str, Value], Words]:
         """Read the window's header: its values, and its words from `window_sequence` to the first array.
@@ -100,42 +100,44 @@ class MappedDevice:
         blocks = self._blocks(tuple(register.name for register, _ in header.fields))
         select = self.registers["slot_select"]
         write = None if slot is None else (select.address, select.encode(slot))
-        for block, part in zip(blocks, await self._read(blocks, write), strict=True):
-            words[block.address - header.address :][: block.count] = part
+        for block, partial_block in zip(blocks, await self._read(blocks, write), strict=True):
+            words[block.address - header.address :][: block.count] = partial_block
         return header.decode(words), words
 
     async def write(self, values: Mapping[str, ArrayLike | str]) -> None:
         """Write registers; neighbours go out in one request, so that the device takes them together."""
         registers = [self.registers[name] for name in values]
-        for block in _runs(registers):
+        for block in _adjacent_runs(registers):
             words = [register.encode(values[register.name]) for register in block]
-            await self.client.write(block[0].address, np.concatenate(words))
+            await self.modbus.write(block[0].address, np.concatenate(words))
 
-    def _blocks(self, names: tuple[str, ...]) -> tuple[Block, ...]:
-        blocks = self._plans.get(names)
+    def _blocks(self, names: tuple[str, ...]) -> tuple[RegisterBlock, ...]:
+        blocks = self._groups.get(names)
         if blocks is None:
             present = [self.registers[name] for name in names if name in self.registers]
-            blocks = self._plans[names] = plan(present, self.client.link.max_registers)
+            blocks = self._groups[names] = group_registers(present, self.modbus.link.max_registers)
         return blocks
 
-    async def _read(self, blocks: Iterable[Block], write: tuple[int, Words] | None = None) -> list[Words]:
-        parts = [self.client.block(block.address, block.count, block.table) for block in blocks]
-        await self.client.complete(*parts, write=write)
-        return [part.words() for part in parts]
+    async def _read(
+        self, blocks: Iterable[RegisterBlock], write: tuple[int, Words] | None = None
+    ) -> list[Words]:
+        parts = [self.modbus.block(block.address, block.count, block.table) for block in blocks]
+        await self.modbus.complete(*parts, write=write)
+        return [partial_block.words() for partial_block in parts]
 
-    async def _settled(self, block: Block, raw: bytes) -> bytes:
+    async def _read_until_stable(self, block: RegisterBlock, raw: bytes) -> bytes:
         """Read a block that takes several requests until two readings agree; `raw` is the first."""
-        for _ in range(_TORN_READS):
+        for _ in range(_STABLE_READ_ATTEMPTS):
             before, raw = raw, (await self._read([block]))[0].tobytes()
             if before == raw:
                 return raw
         raise ProtocolError(
-            f"{self.client.link}: {block.count} registers from {block.address} "
+            f"{self.modbus.link}: {block.count} registers from {block.address} "
             "change faster than they can be read"
         )
 
 
-def _runs(registers: list[Register]) -> list[list[Register]]:
+def _adjacent_runs(registers: list[Register]) -> list[list[Register]]:
     """Group registers that lie side by side, at most as many as one request can write."""
     runs: list[list[Register]] = []
     for register in sorted(registers, key=lambda r: r.address):

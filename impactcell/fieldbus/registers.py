@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from impactcell.errors import MapError
-from impactcell.fieldbus.map_validation import declared_fields
+from impactcell.fieldbus.map_validation import validate_map
 from impactcell.fieldbus.register import KINDS, SI_FACTOR, WIRE, Register, Value, Words
 
 __all__ = ["REGISTER_SPACE", "REQUIRED", "WIRE", "Register", "RegisterMap", "Value", "Words", "capture_crc32"]
@@ -48,7 +48,7 @@ class RegisterMap:
         """
         if not isinstance(mapping, Mapping) or not isinstance(mapping.get("registers"), Mapping):
             raise MapError("register map: must be a mapping with format, name and registers")
-        name, declared, faults = declared_fields(mapping, units=SI_FACTOR, kinds=KINDS)
+        name, declared, faults = validate_map(mapping, units=SI_FACTOR, kinds=KINDS)
         registers = {key: Register(**values) for key, values in declared.items()}
         faults += _layout_faults(registers.values())
         faults += [f"register {key} is missing" for key in REQUIRED if key not in mapping["registers"]]

@@ -15,10 +15,10 @@ from typing import Any, Final
 import numpy as np
 
 from impactcell.errors import FieldbusError
-from impactcell.fieldbus.codec import Function, Request, read_request
+from impactcell.fieldbus.codec import FunctionCode, Request, read_request
 from impactcell.fieldbus.registers import WIRE, Words
 
-_READ_FUNCTION: Final = {"holding": Function.READ_HOLDING, "input": Function.READ_INPUT}
+_READ_FUNCTION: Final = {"holding": FunctionCode.READ_HOLDING, "input": FunctionCode.READ_INPUT}
 
 
 class Exchange:
@@ -78,7 +78,7 @@ class PartialBlock:
         """Return the registers, shape (count,), dtype `WIRE`; zero where they are missing."""
         return np.frombuffer(self._data, dtype=WIRE)
 
-    def batches(self, exchange: Exchange, unit: int) -> Iterator["Batch"]:
+    def batches(self, exchange: Exchange, unit: int) -> Iterator["RequestBatch"]:
         """Yield the requests that have not been answered, those together that are alike and side by side."""
         requests = _requests(self.table, self.address, self.count, self.step, unit)
         alike = self.count // self.step
@@ -87,7 +87,7 @@ class PartialBlock:
             limit = alike if first < alike else len(requests)
             end = self._answered.find(1, first, limit)
             end = limit if end < 0 else end
-            yield Batch(exchange, self, first, requests[first:end])
+            yield RequestBatch(exchange, self, first, requests[first:end])
 
     def fill(self, first: int, count: int, data: bytes) -> None:
         """Put in the data of the replies to `count` requests from number `first` on."""
@@ -97,7 +97,7 @@ class PartialBlock:
 
 
 @dataclass(slots=True, eq=False)
-class Batch:
+class RequestBatch:
     """Requests alike but for their address, from number `first` of `block` on; a write has no block."""
 
     exchange: Exchange
@@ -105,9 +105,9 @@ class Batch:
     first: int
     requests: tuple[Request, ...]
 
-    def split(self, count: int) -> "Batch":
+    def split(self, count: int) -> "RequestBatch":
         """Keep all but the first `count` requests, and return those."""
-        front = Batch(self.exchange, self.block, self.first, self.requests[:count])
+        front = RequestBatch(self.exchange, self.block, self.first, self.requests[:count])
         self.first += count
         self.requests = self.requests[count:]
         return front
@@ -120,18 +120,18 @@ def _layout(head: int, data: int) -> np.dtype[Any]:
 
 
 @dataclass(slots=True, eq=False)
-class Flight:
+class BatchInFlight:
     """A batch in flight, or what is left of it, sent at `sent_s` under `transactions`."""
 
-    batch: Batch
+    batch: RequestBatch
     transactions: tuple[bytes, ...]
     sent_s: float
 
     def frames(self) -> Iterator[bytes]:
         """Yield the requests as they go out."""
-        return map(add, self.transactions, [request.tail for request in self.batch.requests])
+        return map(add, self.transactions, [request.frame_tail for request in self.batch.requests])
 
-    def good_replies(self, stream: bytes, at: int) -> tuple[int, int, bytes]:
+    def match_replies(self, stream: bytes, at: int) -> tuple[int, int, bytes]:
         """Look whether `stream` goes on, from `at`, with good replies to the first requests.
 
         Returns
@@ -157,8 +157,8 @@ class Flight:
                 return count, end, replies["data"].tobytes()
         return 0, at, b""
 
-    def split(self, count: int) -> "Flight":
+    def split(self, count: int) -> "BatchInFlight":
         """Keep all but the first `count` requests, and return those."""
-        front = Flight(self.batch.split(count), self.transactions[:count], self.sent_s)
+        front = BatchInFlight(self.batch.split(count), self.transactions[:count], self.sent_s)
         self.transactions = self.transactions[count:]
         return front

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from impactcell.errors import LinkError, ModbusExceptionError, PositioningError, ProtocolError
-from impactcell.fieldbus.acquisition import Module
-from impactcell.fieldbus.decoding import PositioningReport
+from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.decoding import PositioningStatus
 
 _POLL_S: Final = 0.005
 _PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
@@ -27,7 +27,7 @@ class TapCommand:
     direction: int
 
 
-class Positioner:
+class TapCommander:
     """Commands taps through a `Module` whose `captures` are running.
 
     Parameters
@@ -36,10 +36,10 @@ class Positioner:
         How long a tap and its slide may take, an outage in between included.
     """
 
-    def __init__(self, module: Module, patience_s: float = 10.0) -> None:
+    def __init__(self, module: ModuleAcquisition, patience_s: float = 10.0) -> None:
         self._module = module
         self._patience_s = patience_s
-        self._one_at_a_time = asyncio.Lock()
+        self._lock = asyncio.Lock()
 
     @property
     def available(self) -> bool:
@@ -58,18 +58,18 @@ class Positioner:
             have been struck.
         """
         self._check(command)
-        async with self._one_at_a_time:
+        async with self._lock:
             commanded = False
             try:
                 async with asyncio.timeout(self._patience_s):
-                    session, before = await self._report()
+                    session, before = await self._read_positioning()
                     if before.state != "ready":
                         raise PositioningError(
                             f"{self._module.cell}: module takes no command, it is {before.state}"
                         )
-                    await self._load(command)
+                    await self._write_parameters(command)
                     commanded = True
-                    return await self._execute(session, before.accepted % (2**32 - 1) + 1)
+                    return await self._execute(session, before.accepted_command % (2**32 - 1) + 1)
             except TimeoutError:
                 struck = "the part may have been struck" if commanded else "nothing has been commanded"
                 raise PositioningError(
@@ -91,12 +91,12 @@ class Positioner:
         if command.direction not in (-1, 1):
             raise PositioningError(f"{cell}: tap direction must be 1 or -1, not {command.direction}")
 
-    async def _report(self) -> tuple[int, PositioningReport]:
+    async def _read_positioning(self) -> tuple[int, PositioningStatus]:
         """Return session and a fresh report, waiting for the link if it is down."""
         while True:
             await self._module.wait_connected()
             try:
-                report = await self._module.read_report()
+                report = await self._module.read_status()
             except (LinkError, ProtocolError):
                 await asyncio.sleep(_POLL_S)
                 continue
@@ -104,17 +104,17 @@ class Positioner:
                 raise PositioningError(f"{self._module.cell}: the map lacks registers of a positioning cell")
             return report.session, report.positioning
 
-    async def _load(self, command: TapCommand) -> None:
+    async def _write_parameters(self, command: TapCommand) -> None:
         """Write the parameters and read them back."""
         registers = self._module.registers
-        wanted = dict(
+        parameters = dict(
             zip(_PARAMETERS, (command.velocity_m_s, command.stroke_m, command.direction), strict=True)
         )
-        codes = {name: registers[name].encode(value) for name, value in wanted.items()}
+        codes = {name: registers[name].encode(value) for name, value in parameters.items()}
         while True:
             await self._module.wait_connected()
             try:
-                await self._module.device.write(wanted)
+                await self._module.device.write(parameters)
                 for name, words in codes.items():
                     shown = await self._module.device.words(name, 1)
                     if shown.tobytes() != words.tobytes():
@@ -135,10 +135,10 @@ class Positioner:
         cell = self._module.cell
         written = False
         while True:
-            now, shown = await self._report()
-            if now != session:
+            session_now, shown = await self._read_positioning()
+            if session_now != session:
                 raise PositioningError(f"{cell}: module was started anew during tap {sequence}")
-            if shown.accepted == sequence:
+            if shown.accepted_command == sequence:
                 if shown.result == "done":
                     return shown.cycle
                 if shown.result != "executing":

@@ -4,17 +4,17 @@ import random
 from functools import cache
 from typing import Final
 
-IDS: Final = 65_536
+ID_COUNT: Final = 65_536
 _STRIDE: Final = 40_503
 """Odd, so that it visits all 16-bit numbers; 2^16 over the golden ratio, so that neighbours lie far apart."""
 
 
 @cache
 def _in_order() -> tuple[bytes, ...]:
-    return tuple((number * _STRIDE % IDS).to_bytes(2, "big") for number in range(IDS))
+    return tuple((number * _STRIDE % ID_COUNT).to_bytes(2, "big") for number in range(ID_COUNT))
 
 
-class Transactions:
+class TransactionIds:
     """Transaction ids: each of the 65 536 once before any comes again.
 
     They start anywhere, so that a gateway's late reply to an earlier client is not for one of ours, and lie
@@ -29,6 +29,6 @@ class Transactions:
     def draw(self, count: int) -> tuple[bytes, ...]:
         """Draw the next ids, as they stand on the wire."""
         first, end = self._next, self._next + count
-        self._next = end % IDS
+        self._next = end % ID_COUNT
         ids = _in_order()
-        return ids[first:end] if end <= IDS else ids[first:] + ids[: self._next]
+        return ids[first:end] if end <= ID_COUNT else ids[first:] + ids[: self._next]

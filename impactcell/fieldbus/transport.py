@@ -8,8 +8,8 @@ from impactcell.fieldbus.codec import write_request
 from impactcell.fieldbus.connection import Connection
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import Words
-from impactcell.fieldbus.request_batching import Batch, Exchange, PartialBlock
-from impactcell.fieldbus.transactions import Transactions
+from impactcell.fieldbus.request_batching import Exchange, PartialBlock, RequestBatch
+from impactcell.fieldbus.transactions import TransactionIds
 
 
 class ModbusClient:
@@ -22,7 +22,7 @@ class ModbusClient:
     def __init__(self, link: ModuleLink) -> None:
         self.link = link
         self._connection: Connection | None = None
-        self._transactions = Transactions()
+        self._transactions = TransactionIds()
 
     @property
     def connected(self) -> bool:
@@ -70,7 +70,7 @@ class ModbusClient:
         connection, self._connection = self._connection, None
         if connection is None:
             return
-        connection.give_up(LinkError(f"{self.link}: connection closed"))
+        connection.fail(LinkError(f"{self.link}: connection closed"))
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(self.link.timeout_s):
                 await connection.lost.wait()
@@ -104,7 +104,7 @@ class ModbusClient:
             Address and words of holding registers that are written right before, in one request.
         """
         exchange, unit = Exchange(), self.link.device_id
-        batches = [] if write is None else [Batch(exchange, None, 0, (write_request(*write, unit),))]
+        batches = [] if write is None else [RequestBatch(exchange, None, 0, (write_request(*write, unit),))]
         for block in blocks:
             batches += block.batches(exchange, unit)
         if batches:
@@ -115,7 +115,7 @@ class ModbusClient:
         """Write holding registers in one request, before any read that waits; raises as `read` does."""
         exchange = Exchange()
         request = write_request(address, words, self.link.device_id)
-        self._open().submit([Batch(exchange, None, 0, (request,))], first=True)
+        self._open().submit([RequestBatch(exchange, None, 0, (request,))], first=True)
         await exchange.done
 
     def _open(self) -> Connection:

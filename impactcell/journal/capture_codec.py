@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from impactcell.errors import JournalError
-from impactcell.journal.rice_codec import is_uniform, packed, unpacked
+from impactcell.journal.rice_codec import is_uniform, rice_decode, rice_encode
 from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 
 MAGIC = b"ICC3"
@@ -96,10 +96,10 @@ def _encode_channel(channel: Channel, arrays: list[bytes]) -> dict[str, Any]:
         keep("times", _plain(channel.time_s))
     else:
         header["uniform"] = [float(channel.time_s[0]), rate_hz]
-    done = False
+    encoded = False
     if channel.resolution:
-        done, shifts, words = packed(channel.values, channel.resolution)
-    if done:
+        encoded, shifts, words = rice_encode(channel.values, channel.resolution)
+    if encoded:
         keep("shifts", shifts.tobytes())
         keep("words", words.astype("<u4", copy=False).tobytes())
     else:
@@ -120,7 +120,7 @@ def _decode_channel(header: dict[str, Any], arrays: io.BytesIO) -> Channel:
     if "words" in header:
         shifts = np.frombuffer(take("shifts"), np.uint8)
         words = np.frombuffer(take("words"), "<u4").astype(np.uint32, copy=False)
-        values = unpacked(shifts, words, count, resolution)
+        values = rice_decode(shifts, words, count, resolution)
     else:
         values = _floats(take("values"))
     return Channel(

@@ -39,7 +39,7 @@ def _for_now(path: Path, reason: object, *, full: bool) -> JournalFullError:
     return JournalFullError(f"{path}: cannot be used now ({reason}); check its disk, directory and owner")
 
 
-def opened(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.Connection:
+def open_database(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.Connection:
     """Open a journal's file, made anew where it is empty and may be written.
 
     Raises
@@ -145,6 +145,8 @@ def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
             "name another file"
         )
     named = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
-    kept = named[0] if named else ""
-    if cell is not None and kept != cell:
-        raise ForeignJournalError(f"{path}: the journal of cell '{kept}', not of '{cell}'; name another file")
+    named_cell = named[0] if named else ""
+    if cell is not None and named_cell != cell:
+        raise ForeignJournalError(
+            f"{path}: the journal of cell '{named_cell}', not of '{cell}'; name another file"
+        )

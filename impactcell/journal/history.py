@@ -28,7 +28,7 @@ _TOKEN = struct.Struct(">qq")
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class HistoryQuery:
     """Which part of the past is wanted.
 
     Attributes
@@ -51,7 +51,7 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True)
-class PastValue:
+class StoredValue:
     """One stored value; nan where the cycle had none."""
 
     time_ns: int
@@ -67,7 +67,7 @@ class Page(Generic[T]):
     resume: bytes | None
 
 
-def past_values(database: sqlite3.Connection, variable: str, question: Question) -> Page[PastValue]:
+def stored_values(database: sqlite3.Connection, variable: str, query: HistoryQuery) -> Page[StoredValue]:
     """Read stored values of a variable of `VARIABLES`.
 
     Raises
@@ -78,17 +78,17 @@ def past_values(database: sqlite3.Connection, variable: str, question: Question)
     if variable not in VARIABLES:
         raise JournalError(f"{variable} has no history; these have: {', '.join(VARIABLES)}")
     value, quality = VARIABLES[variable]
-    rows, resume = _page(database, question, f"seq, time_ns, {value}, {quality}", "cycles", "seq")
+    rows, resume = _page(database, query, f"seq, time_ns, {value}, {quality}", "cycles", "seq")
     return Page(
         tuple(
-            PastValue(time_ns, math.nan if stored is None else stored, Quality(level))
+            StoredValue(time_ns, math.nan if stored is None else stored, Quality(level))
             for _, time_ns, stored, level in rows
         ),
         resume,
     )
 
 
-def past_alarms(database: sqlite3.Connection, question: Question) -> Page[Alarm]:
+def stored_alarms(database: sqlite3.Connection, query: HistoryQuery) -> Page[Alarm]:
     """Read the states that each transition of an alarm led to.
 
     Raises
@@ -96,7 +96,7 @@ def past_alarms(database: sqlite3.Connection, question: Question) -> Page[Alarm]
     JournalError
         The token is not one of ours, or a record is of another version.
     """
-    rows, resume = _page(database, question, "id, time_ns, record", "alarms", "id")
+    rows, resume = _page(database, query, "id, time_ns, record", "alarms", "id")
     try:
         return Page(tuple(json_text.loads(Alarm, record.encode()) for _, _, record in rows), resume)
     except ValueError as error:
@@ -104,13 +104,13 @@ def past_alarms(database: sqlite3.Connection, question: Question) -> Page[Alarm]
 
 
 def _page(
-    database: sqlite3.Connection, question: Question, columns: str, table: str, key: str
+    database: sqlite3.Connection, query: HistoryQuery, columns: str, table: str, key: str
 ) -> tuple[list[tuple[Any, ...]], bytes | None]:
-    direction, beyond = ("DESC", "<") if question.newest_first else ("ASC", ">")
+    direction, beyond = ("DESC", "<") if query.newest_first else ("ASC", ">")
     after = None
-    if question.resume is not None:
+    if query.resume is not None:
         try:
-            after = _TOKEN.unpack(question.resume)
+            after = _TOKEN.unpack(query.resume)
         except struct.error as error:
             raise JournalError("this token continues no page of a history") from error
     rows = database.execute(
@@ -118,8 +118,8 @@ def _page(
         "WHERE (?1 IS NULL OR time_ns >= ?1) AND (?2 IS NULL OR time_ns <= ?2) "
         f"AND (?3 IS NULL OR (time_ns, {key}) {beyond} (?3, ?4)) "
         f"ORDER BY time_ns {direction}, {key} {direction} LIMIT ?5",
-        (question.start_ns, question.end_ns, *(after or (None, None)), question.limit + 1),
+        (query.start_ns, query.end_ns, *(after or (None, None)), query.limit + 1),
     ).fetchall()
-    more = len(rows) > question.limit
-    rows = rows[: question.limit]
+    more = len(rows) > query.limit
+    rows = rows[: query.limit]
     return rows, _TOKEN.pack(rows[-1][1], rows[-1][0]) if more and rows else None

@@ -7,7 +7,7 @@ from typing import IO
 from impactcell.errors import JournalError
 
 
-def locked(path: Path) -> IO[str]:
+def lock_journal(path: Path) -> IO[str]:
     """Keep a second service from the same journal: a lock beside it, held as long as it is open."""
     lock = path.with_name(f"{path.name}.lock").open("w")
     try:

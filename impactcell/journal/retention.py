@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 _CHUNK = 64
 _NS_PER_DAY = 86_400 * 10**9
-MOST = 512
+PRUNE_LIMIT = 512
 """Captures, and cycles, dropped at once: after a long rest, or with a shorter retention, gigabytes may have
 to go, and neither a cycle nor the end of the service is to wait for that."""
-ROOM = 0.05
+FREE_SHARE = 0.05
 """Share of the size that is left free, for what comes until thinning is due again."""
 
 
@@ -22,7 +22,8 @@ class Retention:
         Cycles, and captures, older than this are dropped. One without a time (0, from a module whose clock is
         not set) is of unknown age, and goes only when its room is needed.
     max_size_bytes : int
-        When less than `ROOM` of it is left, captures are dropped oldest first, then cycles with their alarms.
+        When less than `FREE_SHARE` of it is left, captures are dropped oldest first, then cycles with their
+        alarms.
     """
 
     days: float = 365.0
@@ -30,7 +31,7 @@ class Retention:
     max_size_bytes: int = 4096 * 2**20
 
 
-def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> bool:
+def prune(database: sqlite3.Connection, keep: Retention, now_ns: int) -> bool:
     """Drop what `keep` does not keep, and give the space back; the last cycle always stays.
 
     Called inside no transaction; each step commits by itself, so a crash in between loses nothing else.
@@ -38,25 +39,25 @@ def thin(database: sqlite3.Connection, keep: Retention, now_ns: int) -> bool:
     Returns
     -------
     bool
-        Whether there may be more to drop; a call drops no more than `MOST` for each reason.
+        Whether there may be more to drop; a call drops no more than `PRUNE_LIMIT` for each reason.
     """
     oldest_ns = now_ns - int(keep.days * _NS_PER_DAY)
     oldest_capture_ns = now_ns - int(min(keep.captures_days, keep.days) * _NS_PER_DAY)
     captures = database.execute(
         "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns > 0 AND time_ns < ? "
         "AND EXISTS (SELECT 1 FROM captures WHERE captures.seq = cycles.seq) ORDER BY time_ns LIMIT ?)",
-        (oldest_capture_ns, MOST),
+        (oldest_capture_ns, PRUNE_LIMIT),
     )
     cycles = database.execute(
         "DELETE FROM cycles WHERE seq IN (SELECT seq FROM cycles WHERE time_ns > 0 AND time_ns < ? "
         "AND seq < (SELECT max(seq) FROM cycles) ORDER BY time_ns LIMIT ?)",
-        (oldest_ns, MOST),
+        (oldest_ns, PRUNE_LIMIT),
     )
-    more = MOST in (captures.rowcount, cycles.rowcount)
+    more = PRUNE_LIMIT in (captures.rowcount, cycles.rowcount)
     database.execute("DELETE FROM alarms WHERE time_ns > 0 AND time_ns < ?", (oldest_ns,))
     database.execute("DELETE FROM audit WHERE time_ns < ?", (oldest_ns,))
-    for _ in range(MOST // _CHUNK):
-        if _size(database) <= (1.0 - ROOM) * keep.max_size_bytes or not _drop_oldest(database):
+    for _ in range(PRUNE_LIMIT // _CHUNK):
+        if _size(database) <= (1.0 - FREE_SHARE) * keep.max_size_bytes or not _drop_oldest(database):
             break
     else:
         more = True

@@ -18,12 +18,12 @@ Words = NDArray[np.uint32]
 
 BLOCK = 128
 WORD = 32
-LONGEST = 31
+LONGEST_CODE = 31
 """Bits that a difference may take: what is left in a word, and one more, then fit into 63 bits."""
 
 
 @compiled
-def packed(values: FloatArray, resolution: float) -> tuple[bool, Shifts, Words]:
+def rice_encode(values: FloatArray, resolution: float) -> tuple[bool, Shifts, Words]:
     """Write the codes of `values` in few bits.
 
     Returns
@@ -58,9 +58,9 @@ def packed(values: FloatArray, resolution: float) -> tuple[bool, Shifts, Words]:
             largest |= folded[i]
             total += folded[i]
         k = 0
-        while k < LONGEST and (total > length << (k + 1) or (largest >> k) + 1 + k > LONGEST):
+        while k < LONGEST_CODE and (total > length << (k + 1) or (largest >> k) + 1 + k > LONGEST_CODE):
             k += 1
-        if k == LONGEST or largest >= 1 << LONGEST:
+        if k == LONGEST_CODE or largest >= 1 << LONGEST_CODE:
             return False, shifts, words
         shifts[block] = k
         for i in range(length):
@@ -75,12 +75,12 @@ def packed(values: FloatArray, resolution: float) -> tuple[bool, Shifts, Words]:
 
 
 @compiled
-def unpacked(shifts: Shifts, words: Words, count: int, resolution: float) -> FloatArray:
+def rice_decode(shifts: Shifts, words: Words, count: int, resolution: float) -> FloatArray:
     """Give the values back; nan for those that the words do not hold."""
     values = np.full(count, np.nan)
     code, bits, filled, size = 0, 0, 0, 0
     for i in range(min(count, len(shifts) * BLOCK)):
-        if filled < LONGEST and size < len(words):
+        if filled < LONGEST_CODE and size < len(words):
             bits |= int(words[size]) << filled
             size, filled = size + 1, filled + WORD
         k, zeros = int(shifts[i // BLOCK]), 0

@@ -16,10 +16,10 @@ from typing import Self
 
 from impactcell.errors import JournalError
 from impactcell.journal.capture_codec import decode_capture, encode_capture
-from impactcell.journal.database import errors, opened
-from impactcell.journal.history import Page, PastValue, Question, past_alarms, past_values
-from impactcell.journal.lock import locked
-from impactcell.journal.retention import Retention, thin
+from impactcell.journal.database import errors, open_database
+from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
+from impactcell.journal.lock import lock_journal
+from impactcell.journal.retention import Retention, prune
 from impactcell.journal.schema import COLUMNS
 from impactcell.records import Alarm, Capture, CycleId, Snapshot
 from impactcell.serialization import json_text
@@ -64,13 +64,13 @@ class Journal:
 
     def __init__(self, path: Path, cell: str | None, *, read_only: bool = False) -> None:
         self.path = path
-        self._appended: CycleId | None = None
+        self._last_stored: CycleId | None = None
         with self._errors():
             if read_only and not path.is_file():
                 raise JournalError(f"{path}: there is no such journal")
-            self._lock = None if read_only else locked(path)
+            self._lock = None if read_only else lock_journal(path)
         try:
-            self._db = opened(path, cell, read_only=read_only)
+            self._db = open_database(path, cell, read_only=read_only)
         except BaseException:
             if self._lock is not None:
                 self._lock.close()
@@ -100,7 +100,7 @@ class Journal:
         """Model the recording cell runs with, as JSON; empty before the first."""
         return self._meta("model")
 
-    def keep_model(self, model: str) -> None:
+    def store_model(self, model: str) -> None:
         """Keep the model that the cell runs with from now on."""
         with self._transaction():
             self._db.execute("INSERT OR REPLACE INTO meta VALUES ('model', ?)", (model,))
@@ -117,9 +117,9 @@ class Journal:
         JournalError
             If the cycle is stored already, or the file cannot be written.
         """
-        made = CycleId(capture.session, capture.cycle)
+        cycle_id = CycleId(capture.session, capture.cycle)
         with self._transaction():
-            if made == self.position():
+            if cycle_id == self.last_cycle_id():
                 raise JournalError(f"{self.path}: cycle {capture.cycle} is stored already")
             row = self._db.execute(
                 _INSERT_CYCLE, [_sql(column.of(capture, snapshot)) for column in COLUMNS]
@@ -127,7 +127,7 @@ class Journal:
             self._db.execute("INSERT INTO captures VALUES (?, ?)", (row, encode_capture(capture)))
             self._put_alarms(changed)
             self._db.execute("INSERT OR REPLACE INTO state VALUES (1, ?, ?)", (row, state))
-        self._appended = made
+        self._last_stored = cycle_id
 
     def record(self, state: bytes, changed: Sequence[Alarm] = (), audit: AuditEntry | None = None) -> None:
         """Store what happened between cycles: alarms, a person's action and the state they led to."""
@@ -149,10 +149,10 @@ class Journal:
             row = self._db.execute("SELECT blob FROM state").fetchone()
         return None if row is None else bytes(row[0])
 
-    def position(self) -> CycleId | None:
+    def last_cycle_id(self) -> CycleId | None:
         """Return the last durable cycle; None in a new journal."""
-        if self._appended is not None:
-            return self._appended
+        if self._last_stored is not None:
+            return self._last_stored
         with self._errors():
             row = self._db.execute("SELECT session, cycle FROM cycles ORDER BY seq DESC LIMIT 1").fetchone()
         return None if row is None else CycleId(*row)
@@ -168,25 +168,25 @@ class Journal:
             for (blob,) in rows:
                 yield decode_capture(blob)
 
-    def values(self, variable: str, question: Question) -> Page[PastValue]:
+    def values(self, variable: str, query: HistoryQuery) -> Page[StoredValue]:
         """Return stored values of a variable; see `impactcell.journal.history`."""
         with self._errors():
-            return past_values(self._db, variable, question)
+            return stored_values(self._db, variable, query)
 
-    def alarms(self, question: Question) -> Page[Alarm]:
+    def alarms(self, query: HistoryQuery) -> Page[Alarm]:
         """Return the states that each transition of an alarm led to."""
         with self._errors():
-            return past_alarms(self._db, question)
+            return stored_alarms(self._db, query)
 
     def checkpoint(self) -> None:
         """Move what has been committed from the log into the file; it is as durable before as after."""
         with self._errors():
             self._db.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
-    def thin(self, keep: Retention, now_ns: int) -> bool:
+    def prune(self, keep: Retention, now_ns: int) -> bool:
         """Drop what `keep` does not keep, and say if there is more; see `impactcell.journal.retention`."""
         with self._errors():
-            return thin(self._db, keep, now_ns)
+            return prune(self._db, keep, now_ns)
 
     def count(self) -> int:
         """Return how many cycles the journal holds."""

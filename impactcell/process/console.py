@@ -6,21 +6,21 @@ import sys
 _log = logging.getLogger("impactcell")
 
 
-def tell(text: str) -> None:
+def print_result(text: str) -> None:
     """Say on standard output what was done; nothing with `-q`.
 
     What a verb is asked for (rows, a list, JSON) is its result and is written whatever the options.
     """
-    if not quiet():
+    if not is_quiet():
         sys.stdout.write(f"{text}\n")
 
 
-def note(text: str) -> None:
+def print_note(text: str) -> None:
     """Say on standard error what a reader of the result should know; nothing with `-q`."""
     if _log.isEnabledFor(logging.WARNING):
         sys.stderr.write(f"{text}\n")
 
 
-def quiet() -> bool:
+def is_quiet() -> bool:
     """Whether `-q` was given."""
     return not _log.isEnabledFor(logging.INFO)

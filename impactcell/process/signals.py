@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 
 @contextlib.contextmanager
-def signalled(stop: asyncio.Event) -> Iterator[list[signal.Signals]]:
+def stop_on_signals(stop: asyncio.Event) -> Iterator[list[signal.Signals]]:
     """Set `stop` on SIGTERM and on Ctrl-C meanwhile; yields the signals that came, SIGINT being Ctrl-C."""
     loop = asyncio.get_running_loop()
     came: list[signal.Signals] = []

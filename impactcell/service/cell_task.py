@@ -10,7 +10,7 @@ from functools import partial
 
 from impactcell.alarms import RuleResult
 from impactcell.errors import ImpactCellError, JournalError, PositioningError
-from impactcell.fieldbus.acquisition import Module, Reception
+from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.process.cell_logger import CellLogger
@@ -24,27 +24,27 @@ from impactcell.records import (
     Snapshot,
 )
 from impactcell.scada import Server
-from impactcell.service.factory import cell_design, module_link, retention
+from impactcell.service.factory import cell_design, module_link, retention_policy
 from impactcell.service.monitoring import CellHealth
 from impactcell.service.positioning import PositioningTask
-from impactcell.service.worker import Worker
-from impactcell.settings import Cell, read_cell
+from impactcell.service.worker import CellWorker
+from impactcell.settings import CellConfig, read_cell
 
 TICK_S = 1.0
 STALE_PERIODS = 10.0
 STALE_AT_LEAST_S = 5.0
-_TOLD_ELSEWHERE = (AlarmName.MODULE_CONNECTION, AlarmName.JOURNAL_FAULT)
+_LOGGED_ELSEWHERE = (AlarmName.MODULE_CONNECTION, AlarmName.JOURNAL_FAULT)
 
-Observer = Callable[[str, Snapshot], None]
+SnapshotCallback = Callable[[str, Snapshot], None]
 
 
-class RunningCell:
+class CellTask:
     """Module, worker and nodes of one cell.
 
     Parameters
     ----------
     cell : Cell
-    observe : callable, optional
+    on_snapshot : callable, optional
         Called with the cell's name and each snapshot, after it was published.
 
     Raises
@@ -53,14 +53,14 @@ class RunningCell:
         The journal cannot be opened.
     """
 
-    def __init__(self, cell: Cell, observe: Observer | None = None) -> None:
+    def __init__(self, cell: CellConfig, on_snapshot: SnapshotCallback | None = None) -> None:
         self.cell = cell
         self.log = CellLogger(logging.getLogger(__name__), cell.name)
         settings = cell.settings.journal
         journal = None if settings is None else Journal(settings.file, cell.name)
-        keep = Retention() if settings is None else retention(settings)
+        keep = Retention() if settings is None else retention_policy(settings)
         try:
-            self.worker = Worker(cell_design(cell), journal, keep)
+            self.worker = CellWorker(cell_design(cell), journal, keep)
         except JournalError:
             if journal is not None:
                 journal.close()
@@ -68,15 +68,15 @@ class RunningCell:
         self.server: Server | None = None
         self._notes: tuple[str, ...] = ()
         self._active = {alarm.name for alarm in self.worker.alarms if alarm.active}
-        self._observe = observe
-        self._module = Module(cell.name, module_link(cell), cell.register_map, self._link_changed)
+        self._on_snapshot = on_snapshot
+        self._module = ModuleAcquisition(cell.name, module_link(cell), cell.register_map, self._link_changed)
         self._positioning: PositioningTask | None = None
         if cell.settings.positioning is not None:
             self._positioning = PositioningTask(
                 cell, cell_design(cell), self._module, self.worker, self._positioning_changed
             )
-        self._positioning_news = asyncio.Event()
-        self._link_news: asyncio.Queue[ModuleStatus] = asyncio.Queue()
+        self._positioning_change = asyncio.Event()
+        self._link_changes: asyncio.Queue[ModuleStatus] = asyncio.Queue()
         self._last_cycle_s = time.monotonic()
         self._stale = False
         self._model_seen_ns = self._model_time_ns()
@@ -106,14 +106,14 @@ class RunningCell:
     async def run(self, server: Server) -> None:
         """Run until cancelled."""
         self.server = server
-        self._show_restored(server)
+        self._publish_restored(server)
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self._acquire(), name=f"{self.cell.name} cycles")
-                group.create_task(self._follow_link(), name=f"{self.cell.name} link")
+                group.create_task(self._publish_link(), name=f"{self.cell.name} link")
                 if self._positioning is not None:
                     group.create_task(self._positioning.run(), name=f"{self.cell.name} taps")
-                    group.create_task(self._follow_positioning(), name=f"{self.cell.name} positioning")
+                    group.create_task(self._publish_positioning(), name=f"{self.cell.name} positioning")
                 group.create_task(self._tick(), name=f"{self.cell.name} clock")
         finally:
             await self._module.close()
@@ -126,23 +126,25 @@ class RunningCell:
         """Take over from the cell's files what can change without a restart: model, tracking, alarms."""
         self._model_seen_ns = self._model_time_ns()
         try:
-            fresh = await asyncio.to_thread(read_cell, self.cell.path)
+            reloaded = await asyncio.to_thread(read_cell, self.cell.path)
         except ImpactCellError as error:
             self.log.warning("not reloaded, all goes on as before: %s", error)
             return
-        fixed = {
+        unchangeable = {
             name: getattr(self.cell.settings, name)
             for name in ("cell", "module", "opcua", "journal", "monitoring", "identification", "positioning")
-            if getattr(fresh.settings, name) != getattr(self.cell.settings, name)
+            if getattr(reloaded.settings, name) != getattr(self.cell.settings, name)
         }
-        if fixed:
-            self.log.warning("changed, but taken over only by a restart: %s", ", ".join(fixed))
-        self.cell = replace(self.cell, settings=fresh.settings.model_copy(update=fixed), model=fresh.model)
+        if unchangeable:
+            self.log.warning("changed, but taken over only by a restart: %s", ", ".join(unchangeable))
+        self.cell = replace(
+            self.cell, settings=reloaded.settings.model_copy(update=unchangeable), model=reloaded.model
+        )
         design = cell_design(self.cell)
         await self.worker.redesign(design)
         if self._positioning is not None:
             self._positioning.redesign(design)
-        self.log.info("reloaded; model %s", fresh.model.name)
+        self.log.info("reloaded; model %s", reloaded.model.name)
 
     async def set_target(self, target_m: float, audit: AuditEntry) -> None:
         """Start a positioning task.
@@ -155,14 +157,14 @@ class RunningCell:
         try:
             await self._positioning_task().begin(target_m)
         except PositioningError as error:
-            await self.worker.note(replace(audit, result=str(error)))
+            await self.worker.record_audit(replace(audit, result=str(error)))
             raise
-        await self.worker.note(audit)
+        await self.worker.record_audit(audit)
 
     async def abort_positioning(self, audit: AuditEntry) -> None:
         """End the positioning task that runs."""
         await self._positioning_task().abort(audit.user)
-        await self.worker.note(audit)
+        await self.worker.record_audit(audit)
 
     def _positioning_task(self) -> PositioningTask:
         if self._positioning is None:
@@ -172,21 +174,21 @@ class RunningCell:
         return self._positioning
 
     async def _acquire(self) -> None:
-        await self.worker.rehearse()
+        await self.worker.warm_up()
         async with contextlib.aclosing(
             self._module.captures(after=self.worker.last or self.worker.durable)
-        ) as receptions:
-            async for reception in receptions:
-                await self._take(reception)
+        ) as received_cycles:
+            async for received in received_cycles:
+                await self._process(received)
 
-    async def _take(self, reception: Reception) -> None:
-        capture = reception.capture
+    async def _process(self, received: ReceivedCycle) -> None:
+        capture = received.capture
         task = self._positioning
         positioning = PositioningState() if task is None else task.state
-        processed = await self.worker.process(capture, positioning, self._announcement(), reception.faults)
+        result = await self.worker.process(capture, positioning, self._announcement(), received.faults)
         if task is not None:
-            await self.worker.run(partial(task.learn, processed.stepped.snapshot))
-        snapshot, notes = processed.stepped.snapshot, processed.stepped.notes
+            await self.worker.run(partial(task.update_friction, result.step_result.snapshot))
+        snapshot, notes = result.step_result.snapshot, result.step_result.notes
         for note in notes:
             if note not in self._notes:
                 self.log.info("%s", note, cycle=capture.cycle)
@@ -194,76 +196,80 @@ class RunningCell:
         self._last_cycle_s, self._stale = time.monotonic(), False
         if self.server is not None:
             self.server.publish(self.cell.name, snapshot)
-            self._show_module(self.server)
-        self._tell(processed.stepped.changed)
+            self._publish_module(self.server)
+        self._log_alarms(result.step_result.changed)
         mu_s, late_s = snapshot.friction.mu_s, time.time() - 1e-9 * capture.time_ns
         self.log.debug(
             "mu_s %.4f ± %.4f (%s), gap %.2f, published %s after its end",
             mu_s.value, mu_s.std, mu_s.quality.name.lower(), snapshot.friction.gap,
             f"{1e3 * late_s:.0f} ms" if capture.time_ns else "some time", cycle=capture.cycle,
         )  # fmt: skip
-        if processed.durable is not None:
-            await self._module.acknowledge(processed.durable)
-        await self._look_at_journal()
-        if self._observe is not None:
-            self._observe(self.cell.name, snapshot)
+        if result.durable is not None:
+            await self._module.acknowledge(result.durable)
+        await self._check_journal()
+        if self._on_snapshot is not None:
+            self._on_snapshot(self.cell.name, snapshot)
 
     def _positioning_changed(self) -> None:
-        self._positioning_news.set()
+        self._positioning_change.set()
 
-    async def _follow_positioning(self) -> None:
+    async def _publish_positioning(self) -> None:
         """Publish the task between cycles too, and raise or clear its alarm."""
         while True:
-            await self._positioning_news.wait()
-            self._positioning_news.clear()
+            await self._positioning_change.wait()
+            self._positioning_change.clear()
             task = self._positioning_task()
             if self.server is not None and self.worker.snapshot is not None:
                 snapshot = replace(self.worker.snapshot, positioning=task.state, alarms=self.worker.alarms)
                 self.server.publish(self.cell.name, snapshot)
             fault = task.fault
             reason, evidence = fault or ("", Evidence())
-            await self._find(RuleResult(AlarmName.POSITIONING_FAULT, fault is not None, reason, evidence))
+            await self._apply_rule_result(
+                RuleResult(AlarmName.POSITIONING_FAULT, fault is not None, reason, evidence)
+            )
 
     def _announcement(self) -> BatchAnnouncement | None:
-        report = self._module.report
-        if report is None or report.batch is None or not report.batch.sequence:
+        status_block = self._module.status_block
+        if status_block is None or status_block.batch is None or not status_block.batch.sequence:
             return None
-        return report.batch
+        return status_block.batch
 
     def _link_changed(self, status: ModuleStatus) -> None:
-        self._link_news.put_nowait(status)
+        self._link_changes.put_nowait(status)
 
-    async def _follow_link(self) -> None:
+    async def _publish_link(self) -> None:
         while True:
-            status = await self._link_news.get()
+            status = await self._link_changes.get()
             if self.server is not None:
                 if not status.connected:
                     self.server.mark_bad(self.cell.name, time.time_ns())
-                self._show_module(self.server)
-            await self._find(RuleResult(AlarmName.MODULE_CONNECTION, not status.connected, status.reason))
+                self._publish_module(self.server)
+            await self._apply_rule_result(
+                RuleResult(AlarmName.MODULE_CONNECTION, not status.connected, status.reason)
+            )
 
-    async def _look_at_journal(self) -> None:
+    async def _check_journal(self) -> None:
         fault = self.worker.journal_fault
         active = any(a.active for a in self.worker.alarms if a.name is AlarmName.JOURNAL_FAULT)
         if bool(fault) != active:
             if fault:
                 self.log.error("%s", fault)
-            await self._find(RuleResult(AlarmName.JOURNAL_FAULT, bool(fault), fault, Evidence()))
+            await self._apply_rule_result(RuleResult(AlarmName.JOURNAL_FAULT, bool(fault), fault, Evidence()))
 
-    async def _find(self, finding: RuleResult) -> None:
-        self._show_alarms(await self.worker.find(finding, time.time_ns()))
+    async def _apply_rule_result(self, rule_result: RuleResult) -> None:
+        self._publish_alarms(await self.worker.apply_rule_result(rule_result, time.time_ns()))
 
     async def _tick(self) -> None:
         while True:
             await asyncio.sleep(TICK_S)
-            self._show_alarms(await self.worker.pass_time(time.time_ns()))
+            self._publish_alarms(await self.worker.expire_shelving(time.time_ns()))
             silent_s = time.monotonic() - self._last_cycle_s
             late = silent_s > max(STALE_AT_LEAST_S, STALE_PERIODS * self.worker.period_s)
             if late and not self._stale and self.server is not None and self._module.status.connected:
                 self._stale = True
                 self.server.mark_stale(self.cell.name, time.time_ns())
             await self.worker.retry()
-            await self._look_at_journal()
+            await self._check_journal()
             if self._model_time_ns() not in (0, self._model_seen_ns):
                 await self.reload()
 
@@ -274,27 +280,27 @@ class RunningCell:
         except OSError:
             return 0
 
-    def _show_restored(self, server: Server) -> None:
-        self._show_alarms(self.worker.alarms)
-        self._show_module(server)
+    def _publish_restored(self, server: Server) -> None:
+        self._publish_alarms(self.worker.alarms)
+        self._publish_module(server)
         if self.worker.snapshot is not None:
             server.publish(self.cell.name, self.worker.snapshot)
             server.mark_stale(self.cell.name, self.worker.snapshot.time_ns)
 
-    def _show_alarms(self, moved: tuple[Alarm, ...]) -> None:
-        self._tell(moved)
+    def _publish_alarms(self, changed: tuple[Alarm, ...]) -> None:
+        self._log_alarms(changed)
         if self.server is not None:
-            for alarm in moved:
+            for alarm in changed:
                 self.server.alarm(self.cell.name, alarm)
 
-    def _tell(self, moved: tuple[Alarm, ...]) -> None:
+    def _log_alarms(self, changed: tuple[Alarm, ...]) -> None:
         """Log each alarm that comes or goes, but for those that their finder has told of already."""
-        for alarm in moved:
-            if alarm.active != (alarm.name in self._active) and alarm.name not in _TOLD_ELSEWHERE:
-                said = "alarm %s is active: %s" if alarm.active else "alarm %s is over: %s"
+        for alarm in changed:
+            if alarm.active != (alarm.name in self._active) and alarm.name not in _LOGGED_ELSEWHERE:
+                message = "alarm %s is active: %s" if alarm.active else "alarm %s is over: %s"
                 level = logging.WARNING if alarm.active else logging.INFO
-                self.log.log(level, said, alarm.name.value, alarm.message, cycle=alarm.cycle or None)
+                self.log.log(level, message, alarm.name.value, alarm.message, cycle=alarm.cycle or None)
             (self._active.add if alarm.active else self._active.discard)(alarm.name)
 
-    def _show_module(self, server: Server) -> None:
+    def _publish_module(self, server: Server) -> None:
         server.module(self.cell.name, self._module.status, time.time_ns())

@@ -18,8 +18,8 @@ from impactcell.scada import (
     ServerSettings,
     default_application_uri,
 )
-from impactcell.settings import Cell
-from impactcell.settings.sections import Journal
+from impactcell.settings import CellConfig
+from impactcell.settings.sections import JournalSection
 from impactcell.tracking.signature.tracker import SignatureSettings
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 
@@ -28,7 +28,7 @@ MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
 _CYCLE_RULES = (AlarmName.WEAR_LIMIT, AlarmName.BATCH_SHIFT, AlarmName.DEVIANT_CYCLE, AlarmName.MODEL_GAP)
 
 
-def cell_design(cell: Cell) -> CellDesign:
+def cell_design(cell: CellConfig) -> CellDesign:
     """How the cell is computed."""
     settings = cell.settings
     stroke_mm = settings.actuator.stroke_mm
@@ -57,7 +57,7 @@ def cell_design(cell: Cell) -> CellDesign:
     )
 
 
-def alarm_settings(cell: Cell) -> AlarmSettings:
+def alarm_settings(cell: CellConfig) -> AlarmSettings:
     """When the cell calls a person; what the YAML leaves out keeps its default."""
     chosen = cell.settings.alarms
 
@@ -75,7 +75,7 @@ def alarm_settings(cell: Cell) -> AlarmSettings:
     return AlarmSettings(rules, wear_on=chosen.wear_probability_on, wear_off=chosen.wear_probability_off)
 
 
-def module_link(cell: Cell) -> ModuleLink:
+def module_link(cell: CellConfig) -> ModuleLink:
     """How the module is reached."""
     module = cell.settings.module
     tls = module.tls
@@ -91,12 +91,12 @@ def module_link(cell: Cell) -> ModuleLink:
     )
 
 
-def retention(journal: Journal) -> Retention:
+def retention_policy(journal: JournalSection) -> Retention:
     """Say what the journal keeps."""
     return Retention(journal.retain_days, journal.retain_captures_days, int(journal.max_size_mb * 2**20))
 
 
-def server_settings(cell: Cell) -> ServerSettings:
+def server_settings(cell: CellConfig) -> ServerSettings:
     """How the OPC UA server of the cell, and of those that share its endpoint, is reached."""
     opcua = cell.settings.opcua
     return ServerSettings(
@@ -108,7 +108,7 @@ def server_settings(cell: Cell) -> ServerSettings:
     )
 
 
-def cell_description(cell: Cell) -> CellDescription:
+def cell_description(cell: CellConfig) -> CellDescription:
     """Nameplate and ranges of the cell as SCADA sees them."""
     settings = cell.settings
     plate, actuator = settings.identification, settings.actuator

@@ -16,13 +16,13 @@ BACKLOG = 64
 CHECKPOINT_EVERY = 24
 """Cycles after which the journal's log goes into its file: before SQLite, at 1000 pages, would make a cycle
 wait for that."""
-THIN_EVERY = 256
+PRUNE_EVERY = 256
 """Cycles between two looks at what the journal may drop."""
 
 Entry = Callable[[Journal], None]
 
 
-class Keeper:
+class JournalWriter:
     """Writes a cell's entries into its journal; used from the cell's thread only.
 
     Parameters
@@ -44,41 +44,41 @@ class Keeper:
         self._keep = keep
         self._log = CellLogger(logging.getLogger(__name__), cell)
         self._waiting: deque[Entry] = deque()
-        self._since_thinned, self._since_checkpoint = THIN_EVERY, CHECKPOINT_EVERY
+        self._since_pruned, self._since_checkpoint = PRUNE_EVERY, CHECKPOINT_EVERY
 
     @property
     def durable(self) -> CycleId | None:
         """The last cycle that is safely stored; None where there is none."""
-        return None if self.journal is None else self.journal.position()
+        return None if self.journal is None else self.journal.last_cycle_id()
 
     @property
-    def waits(self) -> bool:
+    def has_backlog(self) -> bool:
         """Whether something could not be written yet."""
         return bool(self._waiting)
 
     @property
-    def untidy(self) -> bool:
-        """Whether `tidy` is due."""
+    def maintenance_due(self) -> bool:
+        """Whether `maintain` is due."""
         return self.journal is not None and self._since_checkpoint >= CHECKPOINT_EVERY and not self._waiting
 
     def cycle(self, entry: Entry) -> None:
         """Write a cycle."""
-        self._since_thinned += 1
+        self._since_pruned += 1
         self._since_checkpoint += 1
         self.store(entry)
 
-    def tidy(self, time_ns: int) -> None:
+    def maintain(self, time_ns: int) -> None:
         """Do what no cycle has to wait for: empty the log, and drop what has become too old or too much."""
         if self.journal is None:
             return
         self._since_checkpoint = 0
         now_ns = time.time_ns()
         try:
-            if self._since_thinned >= THIN_EVERY:
-                self._since_thinned = 0
+            if self._since_pruned >= PRUNE_EVERY:
+                self._since_pruned = 0
                 # A module's clock that runs ahead must not make everything look old; 0 is no time at all.
-                if self.journal.thin(self._keep, min(time_ns or now_ns, now_ns)):
-                    self._since_thinned = THIN_EVERY
+                if self.journal.prune(self._keep, min(time_ns or now_ns, now_ns)):
+                    self._since_pruned = PRUNE_EVERY
             else:
                 self.journal.checkpoint()
         except JournalError as error:

@@ -41,7 +41,7 @@ class CellHealth:
         return self.connected and self.journal_ok
 
 
-def absent(cell: str) -> CellHealth:
+def waiting_cell(cell: str) -> CellHealth:
     """Health of a cell that waits until its journal can be opened; the alarm is the journal's."""
     return CellHealth(
         cell,

@@ -10,16 +10,16 @@ from impactcell.errors import PositioningError
 from impactcell.journal.store import AuditEntry
 from impactcell.records import Alarm, AlarmName
 from impactcell.scada import Actor, RefusedError
-from impactcell.service.cell_task import RunningCell
+from impactcell.service.cell_task import CellTask
 
 
-class CellActions:
+class OperatorCommands:
     """Implements `scada.Actions` for the running cells."""
 
-    def __init__(self, cells: Mapping[str, RunningCell]) -> None:
+    def __init__(self, cells: Mapping[str, CellTask]) -> None:
         self._cells = cells
 
-    def _cell(self, cell: str) -> RunningCell:
+    def _cell(self, cell: str) -> CellTask:
         if cell not in self._cells:
             raise RefusedError("BadInvalidState", f"{cell}: does not run, its journal cannot be opened")
         return self._cells[cell]
@@ -27,13 +27,13 @@ class CellActions:
     async def start_batch(self, cell: str, batch_id: str, *, expected: bool, actor: Actor) -> None:
         """Begin another batch of material."""
         audit = _audit(actor, "StartBatch", BatchId=batch_id, Expected=expected)
-        await self._cell(cell).worker.change(
+        await self._cell(cell).worker.change_state(
             lambda state: core.start_batch(state, batch_id, expected=expected), audit
         )
 
     async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
         """Learn the wear level anew after worn parts were replaced."""
-        await self._cell(cell).worker.change(
+        await self._cell(cell).worker.change_state(
             core.reset_wear_level, _audit(actor, "ResetWear", Comment=comment)
         )
 
@@ -66,10 +66,10 @@ class CellActions:
         alarm_event = AlarmEvent(
             event, time_ns=audit.time_ns, user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
         )
-        done = await self._cell(cell).worker.act(alarm, alarm_event, audit)
-        if done.refusal is not None:
-            raise RefusedError(done.refusal.value, f"{cell}: {alarm.value}: {done.refusal.value}")
-        return done.alarm
+        transition = await self._cell(cell).worker.apply_event(alarm, alarm_event, audit)
+        if transition.refusal is not None:
+            raise RefusedError(transition.refusal.value, f"{cell}: {alarm.value}: {transition.refusal.value}")
+        return transition.alarm
 
 
 def _audit(actor: Actor, action: str, **arguments: object) -> AuditEntry:

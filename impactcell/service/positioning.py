@@ -7,15 +7,15 @@ from collections.abc import Callable
 
 from impactcell.cell import CellDesign
 from impactcell.errors import FieldbusError, PositioningError
-from impactcell.fieldbus.acquisition import Module
-from impactcell.fieldbus.decoding import PositioningReport
-from impactcell.fieldbus.tap_commands import Positioner, TapCommand
+from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.decoding import PositioningStatus
+from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
 from impactcell.positioning import PlannerPosterior, SafetyLimits, TapPlanner, task_state_machine
 from impactcell.positioning.task_state_machine import TaskPhase, TaskState
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Evidence, PositioningState, Quality, Snapshot
-from impactcell.service.worker import Worker
-from impactcell.settings import Cell
+from impactcell.service.worker import CellWorker
+from impactcell.settings import CellConfig
 
 WATCH_S = 0.1
 """Between two looks at the PLC's target register."""
@@ -26,7 +26,7 @@ class PositioningTask:
 
     Parameters
     ----------
-    cell : Cell
+    cell : CellConfig
         With a `positioning` section.
     design : CellDesign
     module : Module
@@ -37,7 +37,12 @@ class PositioningTask:
     """
 
     def __init__(
-        self, cell: Cell, design: CellDesign, module: Module, worker: Worker, changed: Callable[[], None]
+        self,
+        cell: CellConfig,
+        design: CellDesign,
+        module: ModuleAcquisition,
+        worker: CellWorker,
+        changed: Callable[[], None],
     ) -> None:
         settings, actuator = cell.settings.positioning, cell.settings.actuator
         if settings is None:
@@ -66,7 +71,7 @@ class PositioningTask:
         self._design = design
         self._mass_kg = design.known.mass_kg
         self._module = module
-        self._positioner = Positioner(module)
+        self._positioner = TapCommander(module)
         self._worker = worker
         self._changed = changed
         self._sequence = TaskState()
@@ -99,32 +104,32 @@ class PositioningTask:
         PositioningError
             The target is refused; nothing has been commanded.
         """
-        report = self._report()
-        mass_kg = report.mass_kg
+        status_block = self._report()
+        mass_kg = status_block.mass_kg
         if math.isnan(mass_kg) and self._mass_kg is not None:
             mass_kg = self._mass_kg
         before = self._sequence
-        begun = await self._worker.run(
+        started = await self._worker.run(
             lambda: task_state_machine.begin_task(
                 before,
                 self._cell,
                 self._planner,
                 target_m=target_m,
-                position_m=report.position_m,
+                position_m=status_block.position_m,
                 mass_kg=mass_kg,
                 trained=self._trained,
             )
         )
         if self._sequence is not before:
             raise PositioningError(f"{self._cell.name}: another task was started meanwhile")
-        self._set(begun)
+        self._set_sequence(started)
         self._wake.set()
 
     async def abort(self, by: str) -> None:
         """Stop the task that runs, and the tap that is being executed; nothing happens where none runs."""
         if not self._sequence.running:
             return
-        self._set(task_state_machine.aborted(self._sequence, by))
+        self._set_sequence(task_state_machine.aborted(self._sequence, by))
         try:
             await self._positioner.abort()
         except FieldbusError as error:
@@ -136,7 +141,7 @@ class PositioningTask:
         """Go on with another model of the cell; what the planner has learned of its contact stays."""
         self._design = design
 
-    def learn(self, snapshot: Snapshot) -> None:
+    def update_friction(self, snapshot: Snapshot) -> None:
         """Take over the friction that the tracker believes in; call it in the worker's thread."""
         wear, batch, ratio = snapshot.wear, snapshot.batch, self._design.model.ratio
         if wear.quality is Quality.BAD or not math.isfinite(wear.level + wear.level_std):
@@ -163,24 +168,24 @@ class PositioningTask:
 
     async def _watch_plc(self) -> None:
         while True:
-            await self._look_at_plc()
+            await self._read_plc_target()
             await asyncio.sleep(WATCH_S)
 
-    async def _look_at_plc(self) -> None:
+    async def _read_plc_target(self) -> None:
         """Start a task where the PLC has raised the sequence of its target."""
-        report = None if self._module.report is None else self._module.report.positioning
-        if report is None or report.target_sequence == self._plc_target:
+        status_block = None if self._module.status_block is None else self._module.status_block.positioning
+        if status_block is None or status_block.target_sequence == self._plc_target:
             return
-        self._plc_target = report.target_sequence
-        if report.target_sequence == 0:
+        self._plc_target = status_block.target_sequence
+        if status_block.target_sequence == 0:
             return
         if self._sequence.running:
             await self.abort("the PLC, which has a new target")
         try:
-            await self.begin(report.target_m)
+            await self.begin(status_block.target_m)
         except PositioningError as error:
             self._log.warning("the PLC's target is refused: %s", error)
-            self._set(TaskState(TaskPhase.FAULTED, reason=str(error), evidence=Evidence()))
+            self._set_sequence(TaskState(TaskPhase.FAULTED, reason=str(error), evidence=Evidence()))
 
     async def _drive(self) -> None:
         """Command and observe, tap by tap, until the task no longer runs."""
@@ -188,16 +193,16 @@ class PositioningTask:
             tap = self._sequence.tap
             assert tap is not None  # noqa: S101 - COMMANDING has one
             waiting = task_state_machine.commanded(self._sequence)
-            self._set(waiting)
+            self._set_sequence(waiting)
             try:
                 await self._positioner.tap(TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction))
-                await self._module.read_report()
+                await self._module.read_status()
                 position_m = self._report().position_m
             except FieldbusError as error:
-                self._set(task_state_machine.failed(self._sequence, f"{self._cell.name}: {error}"))
+                self._set_sequence(task_state_machine.failed(self._sequence, f"{self._cell.name}: {error}"))
                 return
             except PositioningError as error:
-                self._set(task_state_machine.failed(self._sequence, str(error)))
+                self._set_sequence(task_state_machine.failed(self._sequence, str(error)))
                 return
             if self._sequence is not waiting:
                 return
@@ -206,7 +211,7 @@ class PositioningTask:
             )
             self._worker.belief = self._planner.belief
             if self._sequence is waiting:
-                self._set(after)
+                self._set_sequence(after)
 
     @property
     def _trained(self) -> bool:
@@ -215,15 +220,15 @@ class PositioningTask:
         seen = snapshot is not None and snapshot.wear.quality is not Quality.BAD
         return seen or bool(self._design.model.predictors)
 
-    def _report(self) -> PositioningReport:
-        report = None if self._module.report is None else self._module.report.positioning
-        if report is None or not self._module.status.connected:
+    def _report(self) -> PositioningStatus:
+        status_block = None if self._module.status_block is None else self._module.status_block.positioning
+        if status_block is None or not self._module.status.connected:
             raise PositioningError(
                 f"{self._cell.name}: the module does not answer, or has no positioning registers"
             )
-        return report
+        return status_block
 
-    def _set(self, now: TaskState) -> None:
+    def _set_sequence(self, now: TaskState) -> None:
         if now is not self._sequence:
             self._sequence = now
             self._changed()

@@ -14,15 +14,15 @@ from impactcell.alarms import RuleResult
 from impactcell.errors import JournalError
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
-from impactcell.process.signals import signalled
+from impactcell.process.signals import stop_on_signals
 from impactcell.records import AlarmName
 from impactcell.scada import Server
-from impactcell.service.cell_task import Observer, RunningCell
+from impactcell.service.cell_task import CellTask, SnapshotCallback
 from impactcell.service.factory import cell_description, cell_design, server_settings
 from impactcell.service.history_source import JournalHistory
-from impactcell.service.monitoring import CellHealth, Monitoring, absent
-from impactcell.service.operator_commands import CellActions
-from impactcell.settings import Cell
+from impactcell.service.monitoring import CellHealth, Monitoring, waiting_cell
+from impactcell.service.operator_commands import OperatorCommands
+from impactcell.settings import CellConfig
 
 log = logging.getLogger("impactcell.service")
 
@@ -42,7 +42,7 @@ class Service:
     Parameters
     ----------
     cells : sequence of Cell
-    observe : callable, optional
+    on_snapshot : callable, optional
         Called with the cell's name and each snapshot, after it was published.
 
     A cell whose journal cannot be opened is told and waits, without values, until it can; the others run.
@@ -53,16 +53,16 @@ class Service:
         No journal can be opened, and trying again cannot help; nothing has been started.
     """
 
-    def __init__(self, cells: Sequence[Cell], observe: Observer | None = None) -> None:
+    def __init__(self, cells: Sequence[CellConfig], on_snapshot: SnapshotCallback | None = None) -> None:
         self._cells = tuple(cells)
-        self._observe = observe
-        self.running: dict[str, RunningCell] = {}
+        self._on_snapshot = on_snapshot
+        self.running: dict[str, CellTask] = {}
         self.endpoints: dict[str, str] = {}
         """Where each cell is to be found, once `run` has started."""
 
     async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
         """Run until `stop` is set; `started` is called when every endpoint listens."""
-        self._begin()
+        self._create_tasks()
         async with contextlib.AsyncExitStack() as stack:
             await stack.enter_async_context(self._monitoring())
             servers = {}
@@ -89,12 +89,12 @@ class Service:
                 await asyncio.gather(*tasks, return_exceptions=True)
                 await asyncio.gather(*(running.close() for running in self.running.values()))
 
-    def _begin(self) -> None:
+    def _create_tasks(self) -> None:
         """Make every cell that can run."""
         faults: list[JournalError] = []
         for cell in self._cells:
             try:
-                self.running[cell.name] = RunningCell(cell, self._observe)
+                self.running[cell.name] = CellTask(cell, self._on_snapshot)
             except JournalError as error:
                 faults.append(error)
         if faults and not self.running and not any(fault.retry for fault in faults):
@@ -102,7 +102,7 @@ class Service:
 
     def _health(self) -> list[CellHealth]:
         cells = [(cell.name, self.running.get(cell.name)) for cell in self._cells]
-        return [absent(name) if running is None else running.health for name, running in cells]
+        return [waiting_cell(name) if running is None else running.health for name, running in cells]
 
     async def reload(self) -> None:
         """Read every cell's files again; see `RunningCell.reload`."""
@@ -118,20 +118,20 @@ class Service:
             cells[0].settings.opcua.users_file,
             [cell_description(cell) for cell in cells],
             JournalHistory(self.running),
-            CellActions(self.running),
+            OperatorCommands(self.running),
         )
 
     @contextlib.asynccontextmanager
     async def _monitoring(self) -> AsyncIterator[None]:
-        wanted = dict.fromkeys(cell.settings.monitoring for cell in self._cells)
-        listeners = [one for one in wanted if one is not None]
+        sections = dict.fromkeys(cell.settings.monitoring for cell in self._cells)
+        listeners = [section for section in sections if section is not None]
         with contextlib.ExitStack() as stack:
-            for one in listeners:
-                http = stack.enter_context(Monitoring(one.host, one.port, self._health))
+            for section in listeners:
+                http = stack.enter_context(Monitoring(section.host, section.port, self._health))
                 log.info("health and metrics at http://%s:%d", http.host, http.port)
             yield
 
-    async def _keep_running(self, cell: Cell, server: Server) -> None:
+    async def _keep_running(self, cell: CellConfig, server: Server) -> None:
         """Begin a cell anew after a fault of ours, so that it stops neither itself nor the others."""
         logger = CellLogger(log, cell.name)
         while True:
@@ -148,12 +148,12 @@ class Service:
                     server.mark_bad(cell.name, time.time_ns())
                 await asyncio.sleep(RESTART_S)
 
-    async def _open(self, cell: Cell, server: Server) -> None:
+    async def _open(self, cell: CellConfig, server: Server) -> None:
         """Make a cell as soon as its journal can be opened; each reason why it cannot is told once."""
         reason, again_s = "", AGAIN_S
         while True:
             # In a thread: a disk may take its time, and the others go on.
-            opening = asyncio.create_task(asyncio.to_thread(RunningCell, cell, self._observe))
+            opening = asyncio.create_task(asyncio.to_thread(CellTask, cell, self._on_snapshot))
             try:
                 self.running[cell.name] = await asyncio.shield(opening)
                 return await self.running[cell.name].reload()  # its files may be others by now
@@ -169,7 +169,7 @@ class Service:
             again_s = min(2.0 * again_s, AGAIN_AT_MOST_S)
 
 
-def run(cells: Sequence[Cell]) -> None:
+def run(cells: Sequence[CellConfig]) -> None:
     """Run the service until SIGTERM or Ctrl-C; SIGHUP reloads.
 
     Raises
@@ -199,7 +199,7 @@ async def _until_signalled(service: Service) -> bool:
         task.add_done_callback(reloads.discard)
 
     loop.add_signal_handler(signal.SIGHUP, reload)
-    with signalled(stop) as came:
+    with stop_on_signals(stop) as came:
         await service.run(stop, lambda: _say_started(service))
     return signal.SIGINT in came
 
@@ -209,7 +209,7 @@ def _say_started(service: Service) -> None:
         log.info("cell=%s at %s", cell, endpoint)
 
 
-def _tell_fault(cell: Cell, server: Server, reason: str) -> None:
+def _tell_fault(cell: CellConfig, server: Server, reason: str) -> None:
     """Log why a cell does not run, and raise its alarm; once it runs, it shows its own."""
     log.error("cell=%s waits until its journal can be opened: %s", cell.name, reason)
     design = cell_design(cell)

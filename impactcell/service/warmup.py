@@ -16,34 +16,34 @@ from impactcell.records import Capture, Channel, PositioningState, uniform_times
 CYCLES = 8
 FORCE_HZ, POSITION_HZ = 100_000.0, 10_000.0
 
-_one_at_a_time = threading.Lock()
-_rehearsed: set[tuple[object, ...]] = set()
+_lock = threading.Lock()
+_warm: set[tuple[object, ...]] = set()
 
 
-def rehearse(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
+def warm_up(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
     """Take cycles of the nominal plant through the whole pipeline, and forget them; `stop` ends it early.
 
     Once a process is enough for all cells that need the same code: many that start together are not kept from
     their modules by each other.
     """
     kind = (*design.model.plant.effects, design.tracker.batch, design.known.stroke_m is None)
-    with _one_at_a_time:
-        if kind not in _rehearsed and _rehearse(design, stop):
-            _rehearsed.add(kind)
+    with _lock:
+        if kind not in _warm and _run_cycles(design, stop):
+            _warm.add(kind)
             # What has been loaded and compiled by now stays: looking through all of it for garbage would hold
             # up a cycle for a tenth of a second now and then.
             gc.collect()
             gc.freeze()
 
 
-def _rehearse(design: CellDesign, stop: Callable[[], bool]) -> bool:
-    hurried = replace(design, signature=replace(design.signature, learned_cycles=2))
-    state = core.initial_state(hurried)
+def _run_cycles(design: CellDesign, stop: Callable[[], bool]) -> bool:
+    design_for_warmup = replace(design, signature=replace(design.signature, learned_cycles=2))
+    state = core.initial_state(design_for_warmup)
     for cycle in range(1, CYCLES + 1):
         if stop():
             return False
-        capture = _capture(hurried, cycle)
-        state = core.step(hurried, state, capture, PositioningState()).state
+        capture = _capture(design_for_warmup, cycle)
+        state = core.step(design_for_warmup, state, capture, PositioningState()).state
         encode_capture(capture)
     return True
 

@@ -28,8 +28,8 @@ from impactcell.records import (
 )
 from impactcell.serialization import json_text
 from impactcell.serialization.message_pack import pack, unpack
-from impactcell.service.journal_writer import Keeper
-from impactcell.service.warmup import rehearse
+from impactcell.service.journal_writer import JournalWriter
+from impactcell.service.warmup import warm_up
 
 T = TypeVar("T")
 
@@ -40,7 +40,7 @@ later, all of them, and keep the event loop waiting for the interpreter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Durable:
+class DurableState:
     """What a restart goes on from: the state, the last snapshot, what the planner has learned."""
 
     state: CellState
@@ -52,11 +52,11 @@ class Durable:
 class CycleResult:
     """Outcome of one cycle, and the last cycle that is safely stored (None: none yet)."""
 
-    stepped: StepResult
+    step_result: StepResult
     durable: CycleId | None
 
 
-class Worker:
+class CellWorker:
     """Applies `impactcell.cell` to one cell, one thing after the other, and stores what came of it.
 
     Every public coroutine runs its work in the cell's own thread, in the order of the calls.
@@ -73,7 +73,7 @@ class Worker:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"cell-{design.name}")
         self._design = design
         self.log = CellLogger(logging.getLogger(__name__), design.name)
-        self._keeper = Keeper(design.name, journal, keep)
+        self._journal_writer = JournalWriter(design.name, journal, keep)
         self._closing = threading.Event()
         self.last: CycleId | None = None
         """The last cycle taken in since the start, durable or not."""
@@ -81,7 +81,7 @@ class Worker:
         self._state = restored.state
         self._snapshot = restored.snapshot
         self.belief = restored.belief
-        self._keep_model()
+        self._store_model()
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -101,31 +101,31 @@ class Worker:
     @property
     def durable(self) -> CycleId | None:
         """The last cycle that is safely stored."""
-        return self._keeper.durable
+        return self._journal_writer.durable
 
     @property
     def journal_fault(self) -> str:
         """Why something was not stored, or is not yet; empty while all is."""
-        return self._keeper.fault
+        return self._journal_writer.fault
 
-    async def rehearse(self) -> None:
+    async def warm_up(self) -> None:
         """Compile what a cycle needs, so that the first one is not late.
 
         It runs in a thread that nobody waits for: compiling cannot be interrupted, and must not hold up
         an end of the service.
         """
-        loop, done = asyncio.get_running_loop(), asyncio.Event()
+        loop, transition = asyncio.get_running_loop(), asyncio.Event()
 
         def work() -> None:
             try:
-                rehearse(self._design, self._closing.is_set)
+                warm_up(self._design, self._closing.is_set)
             except Exception:
                 self.log.exception("the rehearsal failed; the first cycle will be slow")
             if not self._closing.is_set():
-                loop.call_soon_threadsafe(done.set)
+                loop.call_soon_threadsafe(transition.set)
 
         threading.Thread(target=work, name=f"rehearsal-{self._design.name}", daemon=True).start()
-        await done.wait()
+        await transition.wait()
 
     async def process(
         self,
@@ -136,34 +136,34 @@ class Worker:
     ) -> CycleResult:
         """Take one cycle through the pipeline and store it."""
         processed = await self.run(lambda: self._process(capture, positioning, announcement, faults))
-        if self._keeper.untidy:
-            self._thread.submit(self._tidy, capture.time_ns)  # what is shown need not wait for it
+        if self._journal_writer.maintenance_due:
+            self._thread.submit(self._maintain, capture.time_ns)  # what is shown need not wait for it
         return processed
 
-    async def find(self, finding: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
+    async def apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
         """Take what a rule beside the cycles says; the alarms that moved."""
-        return await self.run(lambda: self._find(finding, time_ns))
+        return await self.run(lambda: self._apply_rule_result(rule_result, time_ns))
 
-    async def pass_time(self, time_ns: int) -> tuple[Alarm, ...]:
+    async def expire_shelving(self, time_ns: int) -> tuple[Alarm, ...]:
         """End every shelving whose time is over; the alarms that moved."""
         if all(alarm.shelving is Shelving.UNSHELVED for alarm in self.alarms):
             return ()
-        return await self.run(lambda: self._pass_time(time_ns))
+        return await self.run(lambda: self._expire_shelving(time_ns))
 
-    async def act(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
+    async def apply_event(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
         """Apply a person's action on a condition, and write down who did it."""
-        return await self.run(lambda: self._act(name, event, audit))
+        return await self.run(lambda: self._apply_event(name, event, audit))
 
-    async def change(self, change: Callable[[CellState], CellState], audit: AuditEntry) -> None:
+    async def change_state(self, change_state: Callable[[CellState], CellState], audit: AuditEntry) -> None:
         """Change the state by a person's command, and write down who did it."""
-        await self.run(lambda: self._change(change, audit))
+        await self.run(lambda: self._change_state(change_state, audit))
 
     async def retry(self) -> None:
         """Try again to write what the journal could not take, also while no cycles come."""
-        if self._keeper.waits:
-            await self.run(self._keeper.retry)
+        if self._journal_writer.has_backlog:
+            await self.run(self._journal_writer.retry)
 
-    async def note(self, audit: AuditEntry) -> None:
+    async def record_audit(self, audit: AuditEntry) -> None:
         """Write down what a person did that is not in the state."""
         await self.run(lambda: self._record((), audit))
 
@@ -173,43 +173,43 @@ class Worker:
         def swap() -> None:
             self._design = design
             self._state = core.migrate_state(design, self._state)
-            self._keep_model()
+            self._store_model()
 
         await self.run(swap)
 
-    async def read(self, question: Callable[[Journal], T]) -> T | None:
+    async def query_journal(self, question: Callable[[Journal], T]) -> T | None:
         """Ask the journal; None without one."""
-        journal = self._keeper.journal
+        journal = self._journal_writer.journal
         return None if journal is None else await self.run(lambda: question(journal))
 
     async def close(self) -> None:
         """Finish what has begun, and close the journal."""
         self._closing.set()
-        await self.run(self._keeper.close)
+        await self.run(self._journal_writer.close)
         self._thread.shutdown(wait=False)
 
     async def run(self, work: Callable[[], T]) -> T:
         """Do some work in the cell's thread, after all that was asked for before."""
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
-    def _keep_model(self) -> None:
+    def _store_model(self) -> None:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
         model = json_text.dumps(self._design.model).decode()
-        self._keeper.store(lambda journal: journal.keep_model(model))
+        self._journal_writer.store(lambda journal: journal.store_model(model))
 
-    def _restore(self) -> Durable:
-        journal = self._keeper.journal
+    def _restore(self) -> DurableState:
+        journal = self._journal_writer.journal
         blob = None if journal is None else journal.state()
         if blob is None:
-            return Durable(core.initial_state(self._design))
+            return DurableState(core.initial_state(self._design))
         try:
-            stored = unpack(Durable, blob)
+            stored = unpack(DurableState, blob)
             return replace(stored, state=core.migrate_state(self._design, stored.state))
         except ValueError as error:
             self.log.warning(
                 "the journal's state is of another version (%s); tracking begins anew, cycles go on", error
             )
-            return Durable(core.initial_state(self._design))
+            return DurableState(core.initial_state(self._design))
 
     def _process(
         self,
@@ -219,22 +219,24 @@ class Worker:
         faults: tuple[str, ...],
     ) -> CycleResult:
         with _computing:
-            stepped = self._stepped(capture, positioning, announcement, faults)
+            step_result = self._step(capture, positioning, announcement, faults)
         self.last = CycleId(capture.session, capture.cycle)
-        self._state, self._snapshot = stepped.state, stepped.snapshot
-        if self._keeper.journal is None:
-            return CycleResult(stepped, self.last)
+        self._state, self._snapshot = step_result.state, step_result.snapshot
+        if self._journal_writer.journal is None:
+            return CycleResult(step_result, self.last)
         blob = self._blob()
-        self._keeper.cycle(lambda journal: journal.append(capture, stepped.snapshot, blob, stepped.changed))
-        return CycleResult(stepped, self.durable)
+        self._journal_writer.cycle(
+            lambda journal: journal.append(capture, step_result.snapshot, blob, step_result.changed)
+        )
+        return CycleResult(step_result, self.durable)
 
-    def _tidy(self, time_ns: int) -> None:
+    def _maintain(self, time_ns: int) -> None:
         try:
-            self._keeper.tidy(time_ns)
+            self._journal_writer.maintain(time_ns)
         except Exception:
             self.log.exception("the journal could not be tidied")
 
-    def _stepped(
+    def _step(
         self,
         capture: Capture,
         positioning: PositioningState,
@@ -252,33 +254,33 @@ class Worker:
             return core.step(self._design, self._state, empty, positioning, announcement, (*faults, fault))
 
     def _blob(self) -> bytes:
-        return pack(Durable(self._state, self._snapshot, self.belief))
+        return pack(DurableState(self._state, self._snapshot, self.belief))
 
-    def _find(self, finding: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
-        self._state, moved = core.apply_rule_result(self._design, self._state, finding, time_ns)
-        if moved:
-            self._record(moved, None)
-        return moved
+    def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
+        self._state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)
+        if changed:
+            self._record(changed, None)
+        return changed
 
-    def _pass_time(self, time_ns: int) -> tuple[Alarm, ...]:
-        self._state, moved = core.expire_shelving(self._state, time_ns)
-        if moved:
-            self._record(moved, None)
-        return moved
+    def _expire_shelving(self, time_ns: int) -> tuple[Alarm, ...]:
+        self._state, changed = core.expire_shelving(self._state, time_ns)
+        if changed:
+            self._record(changed, None)
+        return changed
 
-    def _act(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
-        self._state, done = core.apply_event(self._state, name, event)
-        result = "Good" if done.refusal is None else done.refusal.value
-        self._record((done.alarm,) if done.notifications else (), _with_result(audit, result))
-        return done
+    def _apply_event(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
+        self._state, transition = core.apply_event(self._state, name, event)
+        result = "Good" if transition.refusal is None else transition.refusal.value
+        self._record((transition.alarm,) if transition.notifications else (), _with_result(audit, result))
+        return transition
 
-    def _change(self, change: Callable[[CellState], CellState], audit: AuditEntry) -> None:
-        self._state = change(self._state)
+    def _change_state(self, change_state: Callable[[CellState], CellState], audit: AuditEntry) -> None:
+        self._state = change_state(self._state)
         self._record((), audit)
 
-    def _record(self, moved: tuple[Alarm, ...], audit: AuditEntry | None) -> None:
+    def _record(self, changed: tuple[Alarm, ...], audit: AuditEntry | None) -> None:
         blob = self._blob()
-        self._keeper.store(lambda journal: journal.record(blob, moved, audit))
+        self._journal_writer.store(lambda journal: journal.record(blob, changed, audit))
 
 
 def _with_result(audit: AuditEntry, result: str) -> AuditEntry:

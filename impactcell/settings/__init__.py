@@ -1,6 +1,6 @@
 """A cell's YAML file as frozen models; every fault at once, with file, line and column."""
 
-from impactcell.settings.cells import Cell, read_cell, read_cells, read_register_map
+from impactcell.settings.cells import CellConfig, read_cell, read_cells, read_register_map
 from impactcell.settings.sections import CellSettings, schema
 
-__all__ = ["Cell", "CellSettings", "read_cell", "read_cells", "read_register_map", "schema"]
+__all__ = ["CellConfig", "CellSettings", "read_cell", "read_cells", "read_register_map", "schema"]

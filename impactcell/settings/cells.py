@@ -14,7 +14,7 @@ from impactcell.settings.sections import CellSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cell:
+class CellConfig:
     """One cell as its files describe it."""
 
     path: Path
@@ -28,7 +28,7 @@ class Cell:
         return self.settings.cell
 
 
-def read_cell(path: Path) -> Cell:
+def read_cell(path: Path) -> CellConfig:
     """Read a cell file with the register map and the model that it names.
 
     Raises
@@ -37,7 +37,7 @@ def read_cell(path: Path) -> Cell:
         With every fault of the three files, one `file:line:column: message` a line.
     """
     faults: list[str] = []
-    settings = layout = model = None
+    settings = register_map = model = None
     try:
         settings, _ = yaml_loader.read(path, CellSettings)
         map_file: Path | None = settings.module.register_map
@@ -45,21 +45,21 @@ def read_cell(path: Path) -> Cell:
         order = settings.module.word_order
     except SettingsError as error:
         faults.append(str(error))
-        (map_file, model_file), order = _named(path), None
+        (map_file, model_file), order = _referenced_files(path), None
     try:
-        layout = None if map_file is None else read_register_map(map_file, order)
+        register_map = None if map_file is None else read_register_map(map_file, order)
     except SettingsError as error:
         faults.append(str(error))
     try:
         model = None if model_file is None else read_model(model_file)
     except SettingsError as error:
         faults.append(str(error))
-    if settings is None or layout is None or model is None:
+    if settings is None or register_map is None or model is None:
         raise SettingsError("\n".join(faults))
-    return Cell(path, settings, layout, model)
+    return CellConfig(path, settings, register_map, model)
 
 
-def _named(path: Path) -> tuple[Path | None, Path | None]:
+def _referenced_files(path: Path) -> tuple[Path | None, Path | None]:
     """Map and model that a faulty cell file names: their faults are told together with its own."""
     try:
         data, _ = yaml_loader.load(path)
@@ -69,8 +69,8 @@ def _named(path: Path) -> tuple[Path | None, Path | None]:
     module = cell.get("module")
     names = module.get("register_map") if isinstance(module, dict) else None, cell.get("model")
     files = [path.parent / name if isinstance(name, str) else None for name in names]
-    found = [file if file is not None and file.is_file() else None for file in files]
-    return found[0], found[1]
+    files = [file if file is not None and file.is_file() else None for file in files]
+    return files[0], files[1]
 
 
 def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
@@ -85,24 +85,24 @@ def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
     if not isinstance(data, dict):
         raise SettingsError(f"{path}:1:1: a register map is a mapping of format, name and registers")
     try:
-        layout = RegisterMap.from_mapping(data)
+        register_map = RegisterMap.from_mapping(data)
     except MapError as error:
         raise SettingsError("\n".join(f"{path}: {fault}" for fault in str(error).splitlines())) from error
-    return layout if word_order is None else layout.with_word_order(word_order)
+    return register_map if word_order is None else register_map.with_word_order(word_order)
 
 
-def _port(cell: Cell) -> int | None:
+def _port(cell: CellConfig) -> int | None:
     """Port of the cell's endpoint; None where the system chooses one."""
     return urlsplit(cell.settings.opcua.endpoint).port or None
 
 
-def _module(cell: Cell) -> tuple[str, int, int, Path]:
+def _acknowledgement_target(cell: CellConfig) -> tuple[str, int, int, Path]:
     """Say where a cell acknowledges cycles; a device may serve several cells, each by a map of its own."""
     module = cell.settings.module
     return module.host, module.port, module.device_id, module.register_map
 
 
-def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
+def read_cells(paths: Sequence[Path]) -> tuple[CellConfig, ...]:
     """Read the cells of one process; see that they do not get in each other's way.
 
     Raises
@@ -120,7 +120,7 @@ def read_cells(paths: Sequence[Path]) -> tuple[Cell, ...]:
         for other in cells[:index]:
             if cell.name == other.name:
                 faults.append(f"{cell.path}: cell '{cell.name}' is in {other.path} too; rename one")
-            if _module(cell) == _module(other):
+            if _acknowledgement_target(cell) == _acknowledgement_target(other):
                 faults.append(
                     f"{cell.path}: {other.path} has the same module and register map; "
                     "a module's cycles belong to one cell"

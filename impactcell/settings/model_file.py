@@ -108,7 +108,7 @@ class ModelFile(_Part):
 
     @model_validator(mode="after")
     def _one_predictor_a_tap(self) -> Self:
-        ranges = sorted((one.mass_kg, *one.velocity_range_m_s) for one in self.predictors)
+        ranges = sorted((predictor.mass_kg, *predictor.velocity_range_m_s) for predictor in self.predictors)
         for (mass, _, last), (next_mass, first, _) in pairwise(ranges):
             if mass == next_mass and first < last:
                 raise ValueError(f"two predictors for {mass:.6g} kg have velocities in common")
@@ -126,29 +126,33 @@ def read_model(path: Path) -> Model:
     file, positions = yaml_loader.read(path, ModelFile)
     faults = []
     for identifier, parameters in file.plant.effects.items():
-        place = ("plant", "effects", identifier)
+        location = ("plant", "effects", identifier)
         if identifier not in LIBRARY:
-            near = yaml_loader.nearest(identifier, LIBRARY)
+            suggestion = yaml_loader.suggest(identifier, LIBRARY)
             faults.append(
-                yaml_loader.complaint(path, positions.key(place), f"no effect {identifier!r}; {near}")
+                yaml_loader.format_error(
+                    path, positions.key(location), f"no effect {identifier!r}; {suggestion}"
+                )
             )
             continue
-        known = [parameter.name for parameter in LIBRARY[identifier].parameters]
+        parameter_names = [parameter.name for parameter in LIBRARY[identifier].parameters]
         faults += [
-            yaml_loader.complaint(
+            yaml_loader.format_error(
                 path,
-                positions.key((*place, name)),
-                f"{identifier} has no parameter {name!r}; {yaml_loader.nearest(name, known)}",
+                positions.key((*location, name)),
+                f"{identifier} has no parameter {name!r}; {yaml_loader.suggest(name, parameter_names)}",
             )
             for name in parameters
-            if name not in known
+            if name not in parameter_names
         ]
     if faults:
         raise SettingsError("\n".join(faults))
     try:
         return _from_file(file)
     except ImpactCellError as fault:
-        raise SettingsError(yaml_loader.complaint(path, positions.value(("plant",)), str(fault))) from fault
+        raise SettingsError(
+            yaml_loader.format_error(path, positions.value(("plant",)), str(fault))
+        ) from fault
 
 
 def write_model(model: Model, path: Path) -> None:
@@ -174,13 +178,15 @@ def _from_file(file: ModelFile) -> Model:
     intervals: dict[str, dict[str, tuple[float, float]]] = {}
     for identifier, parameters in file.plant.effects.items():
         effects[identifier] = {}
-        for name, given in parameters.items():
-            if isinstance(given, ParameterFile):
-                effects[identifier][name] = given.value
-                if given.ci95 is not None:
-                    intervals.setdefault(identifier, {})[name] = given.ci95
+        for name, parameter_value in parameters.items():
+            if isinstance(parameter_value, ParameterFile):
+                effects[identifier][name] = parameter_value.value
+                if parameter_value.ci95 is not None:
+                    intervals.setdefault(identifier, {})[name] = parameter_value.ci95
             else:
-                effects[identifier][name] = tuple(given) if isinstance(given, list) else given
+                effects[identifier][name] = (
+                    tuple(parameter_value) if isinstance(parameter_value, list) else parameter_value
+                )
     plant = Plant(
         stiffness_n_per_m=file.plant.stiffness_n_per_m,
         damping_n_s_per_m=file.plant.damping_n_s_per_m,
@@ -191,15 +197,17 @@ def _from_file(file: ModelFile) -> Model:
     )
     predictors = tuple(
         Predictor(
-            mass_kg=one.mass_kg,
-            mu_s_range=one.mu_s_range,
-            velocity_range_m_s=one.velocity_range_m_s,
-            force=ForceForm(**one.force.model_dump()),
-            distance=DistanceForm(**one.distance.model_dump()),
-            force_sensitivity=Sensitivity(**one.force_sensitivity.model_dump()),
-            distance_sensitivity=Sensitivity(**one.distance_sensitivity.model_dump()),
+            mass_kg=predictor.mass_kg,
+            mu_s_range=predictor.mu_s_range,
+            velocity_range_m_s=predictor.velocity_range_m_s,
+            force=ForceForm(**predictor.force.model_dump()),
+            distance=DistanceForm(**predictor.distance.model_dump()),
+            force_sensitivity=Sensitivity(**predictor.force_sensitivity.model_dump()),
+            distance_sensitivity=Sensitivity(**predictor.distance_sensitivity.model_dump()),
         )
-        for one in sorted(file.predictors, key=lambda one: (one.mass_kg, one.velocity_range_m_s))
+        for predictor in sorted(
+            file.predictors, key=lambda predictor: (predictor.mass_kg, predictor.velocity_range_m_s)
+        )
     )
     return Model(
         name=file.name,
@@ -239,15 +247,15 @@ def _to_mapping(model: Model) -> dict[str, object]:
         "stroke_m": None if math.isinf(model.stroke_m) else float(model.stroke_m),
         "predictors": [
             {
-                "mass_kg": float(one.mass_kg),
-                "mu_s_range": _floats(one.mu_s_range),
-                "velocity_range_m_s": _floats(one.velocity_range_m_s),
-                "force": _slots(one.force),
-                "distance": _slots(one.distance),
-                "force_sensitivity": _slots(one.force_sensitivity),
-                "distance_sensitivity": _slots(one.distance_sensitivity),
+                "mass_kg": float(predictor.mass_kg),
+                "mu_s_range": _floats(predictor.mu_s_range),
+                "velocity_range_m_s": _floats(predictor.velocity_range_m_s),
+                "force": _slots(predictor.force),
+                "distance": _slots(predictor.distance),
+                "force_sensitivity": _slots(predictor.force_sensitivity),
+                "distance_sensitivity": _slots(predictor.distance_sensitivity),
             }
-            for one in model.predictors
+            for predictor in model.predictors
         ],
         "provenance": dict(model.provenance),
     }

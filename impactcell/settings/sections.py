@@ -72,7 +72,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
 
-class Identification(Section):
+class IdentificationSection(Section):
     """Machinery identification (OPC 40001-1), shown to SCADA."""
 
     manufacturer: str = "unknown"
@@ -87,7 +87,7 @@ class Identification(Section):
     """Where the cell stands."""
 
 
-class Tls(Section):
+class TlsSection(Section):
     """Modbus/TCP Security: both sides show certificates."""
 
     ca_certificate: InputFile
@@ -98,7 +98,7 @@ class Tls(Section):
     """Our own private key (PEM)."""
 
 
-class Module(Section):
+class ModuleSection(Section):
     """The FPGA module on Modbus TCP."""
 
     host: str = "127.0.0.1"
@@ -119,18 +119,18 @@ class Module(Section):
     """Rest that a slow device needs between requests."""
     timeout_ms: Positive = 500.0
     """An answer later than this closes the connection."""
-    tls: Tls | None = None
+    tls: TlsSection | None = None
     """Encrypted link; absent: plain Modbus TCP."""
 
 
-class Part(Section):
+class PartSection(Section):
     """The part that is struck."""
 
     mass_kg: Positive | None = None
     """Mass where the module does not report one for each cycle."""
 
 
-class Actuator(Section):
+class ActuatorSection(Section):
     """The actuator and the limits that no command passes."""
 
     stroke_mm: Positive | None = None
@@ -145,7 +145,7 @@ class Actuator(Section):
     """Actuators on both ends: the part can be struck back."""
 
 
-class Sensors(Section):
+class SensorSection(Section):
     """Noise of the sensors, one standard deviation."""
 
     force_noise_std_n: Positive = 0.4
@@ -154,14 +154,14 @@ class Sensors(Section):
     """Position sensor."""
 
 
-class Tracking(Section):
+class TrackingSection(Section):
     """How friction is followed over time and material."""
 
     batch: Literal["known", "unknown"] = "known"
     """known: the PLC names every batch; unknown: changes of batch are found from the friction."""
 
 
-class Alarms(Section):
+class AlarmSection(Section):
     """When a person is called."""
 
     wear_limit: Positive
@@ -184,7 +184,7 @@ class Alarms(Section):
         return self
 
 
-class Signature(Section):
+class SignatureSection(Section):
     """Friction along the stroke."""
 
     length_mm: Positive = 4.0
@@ -195,7 +195,7 @@ class Signature(Section):
     """Cycles from which the cell learns how its cycles vary before any is judged."""
 
 
-class Positioning(Section):
+class PositioningSection(Section):
     """Placing the part by taps."""
 
     tolerance_um: Positive = 50.0
@@ -208,7 +208,7 @@ class Positioning(Section):
     """Accepted chance that a task overshoots."""
 
 
-class OpcUa(Section):
+class OpcUaSection(Section):
     """The OPC UA server; cells with the same endpoint share one."""
 
     endpoint: Annotated[str, AfterValidator(_endpoint)] = "opc.tcp://127.0.0.1:4840/impactcell"
@@ -223,7 +223,7 @@ class OpcUa(Section):
     """Sessions beyond this are refused."""
 
 
-class Journal(Section):
+class JournalSection(Section):
     """The durable store of the cell."""
 
     file: OutputFile
@@ -236,7 +236,7 @@ class Journal(Section):
     """Size that is kept; from 5 % below it on, captures are thinned, oldest first, then summaries."""
 
 
-class Monitoring(Section):
+class MonitoringSection(Section):
     """Health and metrics over HTTP; every cell of a process shares one listener."""
 
     host: str = "127.0.0.1"
@@ -252,22 +252,22 @@ class CellSettings(Section):
     """Version of this file format."""
     cell: Annotated[str, AfterValidator(_cell_name)]
     """Name of the cell, in OPC UA, in logs and in messages."""
-    identification: Identification = Identification()
-    module: Module
+    identification: IdentificationSection = IdentificationSection()
+    module: ModuleSection
     model: InputFile
     """Model of the plant and its calibration, made by `impactcell calibrate`."""
-    part: Part = Part()
-    actuator: Actuator = Actuator()
-    sensors: Sensors = Sensors()
-    tracking: Tracking = Tracking()
-    alarms: Alarms
-    signature: Signature = Signature()
-    positioning: Positioning | None = None
+    part: PartSection = PartSection()
+    actuator: ActuatorSection = ActuatorSection()
+    sensors: SensorSection = SensorSection()
+    tracking: TrackingSection = TrackingSection()
+    alarms: AlarmSection
+    signature: SignatureSection = SignatureSection()
+    positioning: PositioningSection | None = None
     """Absent: the cell only watches."""
-    opcua: OpcUa = Field(default={}, validate_default=True)
-    journal: Journal | None = None
+    opcua: OpcUaSection = Field(default={}, validate_default=True)
+    journal: JournalSection | None = None
     """Absent: nothing is kept over a restart."""
-    monitoring: Monitoring | None = None
+    monitoring: MonitoringSection | None = None
     """Absent: no HTTP."""
 
 

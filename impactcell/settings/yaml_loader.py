@@ -26,7 +26,7 @@ MOST_NODES = 200_000
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FilePosition:
     """Where something stands in a file; both counted from 1, printed as `line:column`."""
 
     line: int
@@ -40,10 +40,10 @@ class Place:
 class Positions:
     """Where each key and each value of a YAML file stands, by its path of keys and indices."""
 
-    keys: Mapping[Location, Place]
-    values: Mapping[Location, Place]
+    keys: Mapping[Location, FilePosition]
+    values: Mapping[Location, FilePosition]
 
-    def known(self, location: Sequence[str | int]) -> Location:
+    def existing_path(self, location: Sequence[str | int]) -> Location:
         """Give the part of `location` that the file has, leaving out tags that only a schema knows."""
         path: Location = ()
         for part in location:
@@ -51,13 +51,13 @@ class Positions:
                 path = (*path, part)
         return path
 
-    def value(self, location: Sequence[str | int]) -> Place:
+    def value(self, location: Sequence[str | int]) -> FilePosition:
         """Place of the value at `location`, or of the nearest enclosing one."""
-        return self.values[self.known(location)]
+        return self.values[self.existing_path(location)]
 
-    def key(self, location: Sequence[str | int]) -> Place:
+    def key(self, location: Sequence[str | int]) -> FilePosition:
         """Place of the key at `location`, or of the nearest enclosing one."""
-        path = self.known(location)
+        path = self.existing_path(location)
         return self.keys.get(path, self.values[path])
 
 
@@ -136,12 +136,12 @@ def load(path: Path) -> tuple[object, Positions]:
             loader.dispose()
     except yaml.MarkedYAMLError as fault:
         mark = fault.problem_mark or fault.context_mark
-        place = Place(mark.line + 1, mark.column + 1) if mark else Place(1, 1)
+        place = FilePosition(mark.line + 1, mark.column + 1) if mark else FilePosition(1, 1)
         context = f" ({fault.context})" if fault.context else ""
         raise SettingsError(f"{path}:{place}: {fault.problem}{context}") from fault
     except yaml.reader.ReaderError as fault:
         before = text[: fault.position]
-        place = Place(before.count("\n") + 1, fault.position - (before.rfind("\n") + 1) + 1)
+        place = FilePosition(before.count("\n") + 1, fault.position - (before.rfind("\n") + 1) + 1)
         raise SettingsError(f"{path}:{place}: a character YAML does not allow ({fault.reason})") from fault
     except RecursionError as fault:
         raise SettingsError(f"{path}:1:1: nested too deeply") from fault
@@ -150,11 +150,11 @@ def load(path: Path) -> tuple[object, Positions]:
 
 
 def _positions(path: Path, root: yaml.Node) -> Positions:
-    keys: dict[Location, Place] = {}
-    values: dict[Location, Place] = {}
+    keys: dict[Location, FilePosition] = {}
+    values: dict[Location, FilePosition] = {}
 
     def visit(node: yaml.Node, location: Location, above: tuple[yaml.Node, ...]) -> None:
-        place = Place(node.start_mark.line + 1, node.start_mark.column + 1)
+        place = FilePosition(node.start_mark.line + 1, node.start_mark.column + 1)
         if node in above:
             raise SettingsError(f"{path}:{place}: this part of the file contains itself")
         values[location] = place
@@ -176,7 +176,7 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
                     if key_node.tag == "tag:yaml.org,2002:int":
                         key = int(key_node.value, 0) if "x" in key_node.value else int(key_node.value)
                     here = (*location, key)
-                    keys[here] = Place(key_node.start_mark.line + 1, key_node.start_mark.column + 1)
+                    keys[here] = FilePosition(key_node.start_mark.line + 1, key_node.start_mark.column + 1)
                     visit(value_node, here, within)
 
     visit(root, (), ())
@@ -195,50 +195,52 @@ def read(path: Path, schema: type[M]) -> tuple[M, Positions]:
     try:
         return schema.model_validate(data, context={"directory": path.parent}), positions
     except ValidationError as error:
-        raise SettingsError("\n".join(complaints(path, positions, error, schema))) from error
+        raise SettingsError("\n".join(format_errors(path, positions, error, schema))) from error
 
 
-def complaint(path: Path, place: Place, message: str) -> str:
+def format_error(path: Path, place: FilePosition, message: str) -> str:
     """One fault in the form every fault takes: `file:line:column: message`."""
     return f"{path}:{place}: {message}"
 
 
-def nearest(name: str, allowed: Iterable[str]) -> str:
+def suggest(name: str, allowed: Iterable[str]) -> str:
     """Suggest what `name` may have meant: the nearest of `allowed`, or all of it."""
     names = sorted(allowed)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean {near[0]!r}?" if near else f"allowed here: {', '.join(names)}"
 
 
-def complaints(
+def format_errors(
     path: Path, positions: Positions, error: ValidationError, schema: type[BaseModel]
 ) -> list[str]:
     """Turn a pydantic error into `file:line:column: message`, in the order of the file, each once."""
-    found = {
-        (place.line, place.column, complaint(path, place, message))
+    files = {
+        (place.line, place.column, format_error(path, place, message))
         for place, message in (
             _explain(details, positions, schema) for details in error.errors(include_url=False)
         )
     }
-    return [text for _, _, text in sorted(found)]
+    return [text for _, _, text in sorted(files)]
 
 
-def _explain(details: ErrorDetails, positions: Positions, schema: type[BaseModel]) -> tuple[Place, str]:
+def _explain(
+    details: ErrorDetails, positions: Positions, schema: type[BaseModel]
+) -> tuple[FilePosition, str]:
     location = tuple(details["loc"])
     kind = details["type"]
     if kind == "extra_forbidden":
         name = str(location[-1])
-        hint = nearest(name, _allowed(schema, location[:-1]))
+        hint = suggest(name, _allowed(schema, location[:-1]))
         return positions.key(location), f"unknown key {_dotted(location)!r}; {hint}"
     if kind == "missing":
         return positions.key(
             location[:-1]
-        ), f"{_dotted((*positions.known(location), location[-1]))!r} is missing"
+        ), f"{_dotted((*positions.existing_path(location), location[-1]))!r} is missing"
     text = details["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    name = _dotted(positions.known(location))
-    given = details.get("input")
-    if kind != "value_error" and isinstance(given, str | int | float | bool | None):
-        text += f", not {'empty' if given is None else repr(given)}"
+    name = _dotted(positions.existing_path(location))
+    input_value = details.get("input")
+    if kind != "value_error" and isinstance(input_value, str | int | float | bool | None):
+        text += f", not {'empty' if input_value is None else repr(input_value)}"
     return positions.value(location), f"{name}: {text}" if name else text
 
 

@@ -16,11 +16,11 @@ from impactcell import cell as core
 from impactcell.journal import store
 from impactcell.records import Capture, Channel, ModuleStatus, PositioningState, Summary, uniform_times
 from impactcell.scada import Server
-from impactcell.service.cell_task import RunningCell
+from impactcell.service.cell_task import CellTask
 from impactcell.service.factory import cell_description, server_settings
 from impactcell.service.history_source import JournalHistory
-from impactcell.service.operator_commands import CellActions
-from impactcell.service.worker import Worker
+from impactcell.service.operator_commands import OperatorCommands
+from impactcell.service.worker import CellWorker
 from impactcell.settings import read_cell
 from tests.benchmarks._modules import FORCE_HZ, POSITION_HZ, taps
 from tests.benchmarks.table import Table
@@ -33,10 +33,10 @@ PARTS: tuple[tuple[str, Any, str], ...] = (
     ("friction by every predictor", core, "estimate"),
     (WEAR, core, "track"),
     (SIGNATURE, core, "_sign"),
-    (STATE, Worker, "_blob"),
+    (STATE, CellWorker, "_blob"),
     ("capture as bytes", store, "encode_capture"),
     ("journal, capture as bytes included", store.Journal, "append"),
-    (THREAD, Worker, "_process"),
+    (THREAD, CellWorker, "_process"),
     (VALUES, Server, "publish"),
     (LINK, Server, "module"),
 )
@@ -90,9 +90,9 @@ def timed(spent: dict[str, float]) -> Iterator[None]:
 async def cycles(file: Path, number: int) -> list[dict[str, float]]:
     """Spent time by part of each cycle after learning."""
     cell = read_cell(file)
-    running = RunningCell(cell)
+    running = CellTask(cell)
     recorded, rows = captures(), []
-    history, actions = JournalHistory({cell.name: running}), CellActions({cell.name: running})
+    history, actions = JournalHistory({cell.name: running}), OperatorCommands({cell.name: running})
     async with Server(server_settings(cell), [cell_description(cell)], history, actions) as server:
         for cycle in range(1, LEARNING + number + 1):
             np.add(ELSEWHERE, 1.0, out=ELSEWHERE)
@@ -102,7 +102,7 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
             spent: dict[str, float] = defaultdict(float)
             with timed(spent):
                 done = running.worker._process(capture, PositioningState(), None, ())
-                server.publish(cell.name, done.stepped.snapshot)
+                server.publish(cell.name, done.step_result.snapshot)
                 server.module(
                     cell.name,
                     ModuleStatus(connected=True, received=cycle, round_trip_s=1e-3),

@@ -13,7 +13,7 @@ import time
 import numpy as np
 import yaml
 
-from impactcell.fieldbus.acquisition import Module
+from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap
 from simulator.modbus_server import ModbusServer
@@ -65,13 +65,13 @@ async def follow(port: int, layout: RegisterMap, seconds: float) -> tuple[list[f
     """Delays of the cycles received, their number, and how many were missed."""
     delays_s = []
     async with (
-        Module(f"port {port}", ModuleLink(port=port, window=16), layout) as module,
+        ModuleAcquisition(f"port {port}", ModuleLink(port=port, window=16), layout) as module,
         contextlib.aclosing(module.captures()) as receptions,
     ):
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
-                async for reception in receptions:
-                    delays_s.append(1e-9 * (time.time_ns() - reception.capture.time_ns))  # noqa: PERF401
+                async for received in receptions:
+                    delays_s.append(1e-9 * (time.time_ns() - received.capture.time_ns))  # noqa: PERF401
         return delays_s[2:], module.status.received, module.status.missed
 
 

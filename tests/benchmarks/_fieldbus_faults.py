@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from impactcell.errors import FieldbusError
-from impactcell.fieldbus.acquisition import Module
+from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.transport import ModbusClient
@@ -118,7 +118,7 @@ async def outage(registers: RegisterMap, seed: int) -> tuple[float, bool, bool]:
     loop = asyncio.get_running_loop()
     async with (
         ModbusServer(device) as server,
-        Module(f"cell-{seed}", ModuleLink(port=server.port, window=16), registers) as module,
+        ModuleAcquisition(f"cell-{seed}", ModuleLink(port=server.port, window=16), registers) as module,
         contextlib.aclosing(module.captures()) as receptions,
     ):
         await anext(receptions)
@@ -132,12 +132,12 @@ async def outage(registers: RegisterMap, seed: int) -> tuple[float, bool, bool]:
         first_s = loop.time() - back_s
         lost = max(0, cycles + 1 - registers.slots)
         received += [await anext(receptions) for _ in range(cycles - lost)]
-        numbers = [reception.capture.cycle for reception in received]
+        numbers = [received.capture.cycle for received in received]
         exact = numbers == list(range(2 + lost, cycles + 3)) and module.status.missed == lost
         whole = True
-        for reception in received:
-            force = reception.capture.force
-            expected = np.random.default_rng(reception.capture.cycle).normal(0, 50, SAMPLES)
+        for each in received:
+            force = each.capture.force
+            expected = np.random.default_rng(each.capture.cycle).normal(0, 50, SAMPLES)
             whole &= force is not None and bool(np.allclose(force.values, expected, atol=0.0126))
     return first_s, exact, whole
 

@@ -18,7 +18,7 @@ from impactcell.journal.store import Journal
 from impactcell.physics import TapInput, simulate_tap
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
 from impactcell.service.factory import cell_design
-from impactcell.service.worker import Worker
+from impactcell.service.worker import CellWorker
 from impactcell.settings import read_cell
 from tests.benchmarks.table import Table
 from tests.integration.processes import CONFIG
@@ -68,8 +68,8 @@ async def endure(directory: Path, cycles: int) -> Endured:
     """Run so many cycles, and say every fiftieth of the way how it stands."""
     design = cell_design(read_cell(CONFIG / "cells" / "prototype.yaml"))
     path = directory / "cell.sqlite"
-    worker = Worker(design, Journal(path, design.name), KEEP)
-    await worker.rehearse()
+    worker = CellWorker(design, Journal(path, design.name), KEEP)
+    await worker.warm_up()
     made, process = captures(), psutil.Process()
     memory: list[float] = []
     began_s = time.process_time()
@@ -81,7 +81,7 @@ async def endure(directory: Path, cycles: int) -> Endured:
             size = path.stat().st_size / 2**20
             print(f"endurance: {cycle} cycles, {memory[-1]:.1f} MB, file {size:.1f} MB", file=sys.stderr)
     cpu_s = (time.process_time() - began_s) / cycles
-    held = await worker.read(lambda journal: journal.count())
+    held = await worker.query_journal(lambda journal: journal.count())
     await worker.close()
     return Endured(memory, path.stat().st_size, held or 0, cpu_s)
 

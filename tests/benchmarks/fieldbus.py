@@ -8,7 +8,7 @@ import time
 import numpy as np
 import yaml
 
-from impactcell.fieldbus.acquisition import Module
+from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap
 from simulator.modbus_server import ModbusServer
@@ -28,7 +28,7 @@ async def _captures(number: int) -> tuple[float, float]:
     taken: list[float] = []
     async with (
         ModbusServer(device) as server,
-        Module("cell", ModuleLink(port=server.port, window=16), registers) as module,
+        ModuleAcquisition("cell", ModuleLink(port=server.port, window=16), registers) as module,
         contextlib.aclosing(module.captures()) as receptions,
     ):
         for _ in range(number):

@@ -5,23 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from impactcell.journal.history import Question
+from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
 from impactcell.records import Alarm
 from impactcell.serialization.message_pack import unpack
-from impactcell.service.worker import Durable
+from impactcell.service.worker import DurableState
 
 
-def stored(journal: Journal) -> Durable:
+def stored(journal: Journal) -> DurableState:
     """The state as it is stored."""
-    return unpack(Durable, journal.state() or b"")
+    return unpack(DurableState, journal.state() or b"")
 
 
-def described(durable: Durable, journal: Journal) -> dict[str, Any]:
+def described(durable: DurableState, journal: Journal) -> dict[str, Any]:
     """All that an installed cell has learned and been told; floats exactly, as `float.hex`."""
     assert durable.snapshot is not None
     assert durable.belief is not None
-    position = journal.position()
+    position = journal.last_cycle_id()
     assert position is not None
     return {
         "last durable cycle": {"session": position.session, "cycle": position.cycle},
@@ -34,7 +34,7 @@ def described(durable: Durable, journal: Journal) -> dict[str, Any]:
         "alarms": _alarms(durable),
         "planner": _planner(durable),
         "last snapshot": _snapshot(durable),
-        "transitions of alarms": [_alarm(alarm) for alarm in journal.alarms(Question()).entries],
+        "transitions of alarms": [_alarm(alarm) for alarm in journal.alarms(HistoryQuery()).entries],
         "audit": [
             {"time_ns": e.time_ns, "user": e.user, "action": e.action, "with": e.arguments, "came": e.result}
             for e in journal.audit()
@@ -42,7 +42,7 @@ def described(durable: Durable, journal: Journal) -> dict[str, Any]:
     }
 
 
-def _cycle(durable: Durable) -> dict[str, Any]:
+def _cycle(durable: DurableState) -> dict[str, Any]:
     state = durable.state
     person = state.batch.by_person
     assert person is not None
@@ -61,7 +61,7 @@ def _cycle(durable: Durable) -> dict[str, Any]:
     }
 
 
-def _wear_and_batch(durable: Durable) -> dict[str, Any]:
+def _wear_and_batch(durable: DurableState) -> dict[str, Any]:
     state = durable.state.tracker
     known, shift = state.filter, state.shift
     assert known is not None
@@ -105,7 +105,7 @@ def _wear_and_batch(durable: Durable) -> dict[str, Any]:
     }
 
 
-def _signature(durable: Durable) -> dict[str, Any]:
+def _signature(durable: DurableState) -> dict[str, Any]:
     state = durable.state.signature
     reference, variation = state.reference, state.reference.variation
     return {
@@ -122,7 +122,7 @@ def _signature(durable: Durable) -> dict[str, Any]:
     }
 
 
-def _model_gap(durable: Durable) -> dict[str, Any]:
+def _model_gap(durable: DurableState) -> dict[str, Any]:
     gap = durable.state.gap
     return {
         "count": gap.count,
@@ -133,7 +133,7 @@ def _model_gap(durable: Durable) -> dict[str, Any]:
     }
 
 
-def _alarms(durable: Durable) -> dict[str, Any]:
+def _alarms(durable: DurableState) -> dict[str, Any]:
     book = durable.state.alarms
     counters = dict(zip((alarm.name for alarm in book.alarms), book.delays, strict=True))
     alarms = {
@@ -180,7 +180,7 @@ def _alarm(alarm: Alarm) -> dict[str, Any]:
     }
 
 
-def _planner(durable: Durable) -> dict[str, Any]:
+def _planner(durable: DurableState) -> dict[str, Any]:
     belief = durable.belief
     assert belief is not None
     return {
@@ -193,7 +193,7 @@ def _planner(durable: Durable) -> dict[str, Any]:
     }
 
 
-def _snapshot(durable: Durable) -> dict[str, Any]:
+def _snapshot(durable: DurableState) -> dict[str, Any]:
     snapshot = durable.snapshot
     assert snapshot is not None
     friction, wear, batch = snapshot.friction, snapshot.wear, snapshot.batch

@@ -17,8 +17,8 @@ from impactcell.journal.store import Journal
 from impactcell.records import AlarmName
 from impactcell.scada import Actor, Role
 from impactcell.service.factory import cell_design
-from impactcell.service.operator_commands import CellActions
-from impactcell.service.warmup import rehearse
+from impactcell.service.operator_commands import OperatorCommands
+from impactcell.service.warmup import warm_up
 from impactcell.settings import read_cell
 from tests.data.contents import described, stored
 from tests.integration.processes import simulator, told, write_cell
@@ -67,7 +67,7 @@ ENGINEER = Actor("eve", Role.ENGINEER, "127.0.0.1")
 async def make(directory: Path) -> Path:
     """Run both cells over one journal; its file."""
     # What is compiled before the module starts keeps its ring from being overwritten meanwhile.
-    rehearse(cell_design(read_cell(write_cell(directory, 1, **CELL_FILE))))
+    warm_up(cell_design(read_cell(write_cell(directory, 1, **CELL_FILE))))
     async with simulator(directory, **WEARING) as module:
         async with serving(write_cell(directory, module["port"], **CELL_FILE)) as watched:
             await _wearing(watched)
@@ -82,7 +82,7 @@ async def make(directory: Path) -> Path:
 
 async def _wearing(watched: Watched) -> None:
     """Let the cell wear; people see its alarms, and each is left in another state."""
-    act = CellActions(watched.service.running).act_on_condition
+    act = OperatorCommands(watched.service.running).act_on_condition
     await watched.alarm(CELL, AlarmName.DEVIANT_CYCLE, active=True)
     await act(CELL, AlarmName.DEVIANT_CYCLE, EventKind.ACKNOWLEDGE, OPERATOR, comment="a chip on the table")
     await act(CELL, AlarmName.DEVIANT_CYCLE, EventKind.SHELVE_TIMED, OPERATOR, shelve_s=YEARS_S)
@@ -104,7 +104,7 @@ async def _wearing(watched: Watched) -> None:
 
 async def _positioning(watched: Watched, module: dict[str, Any]) -> None:
     """Bring a part to its target, and begin with another one that the module does not live to see."""
-    actions = CellActions(watched.service.running)
+    actions = OperatorCommands(watched.service.running)
     await watched.connected(CELL)
     async with asyncio.timeout(120):
         while not any("inside" in entry for entry in told(module["truth"])):

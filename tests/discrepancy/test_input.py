@@ -68,7 +68,7 @@ def test_captures_of_a_journal_are_as_good_as_a_campaign(tmp_path: Path) -> None
 def test_the_model_that_a_journal_was_recorded_with_is_the_nominal_one(tmp_path: Path) -> None:
     model = read_model(Path("config/models/prototype.yaml"))
     with Journal(tmp_path / "j", "press-1") as journal:
-        journal.keep_model(json_text.dumps(model).decode())
+        journal.store_model(json_text.dumps(model).decode())
         for capture in make("viscous_friction", shots=18).shots:
             journal.append(capture, make_snapshot(capture), b"state")
     discrepancy(None, tmp_path / "out", journal=tmp_path / "j")
@@ -174,7 +174,7 @@ class Terminal(io.StringIO):
 def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
     for stream, shown in ((Terminal(), True), (io.StringIO(), False)):
         monkeypatch.setattr("sys.stderr", stream)
-        with command._steps() as say:
+        with command._progress() as say:
             say("naming effects")
         assert ("naming effects" in stream.getvalue()) is shown
 

@@ -14,7 +14,7 @@ from impactcell.records import PositioningState
 from impactcell.serialization import json_text
 from impactcell.serialization.message_pack import unpack
 from impactcell.service.factory import cell_design
-from impactcell.service.worker import Durable
+from impactcell.service.worker import DurableState
 from impactcell.settings import read_cell
 from tests.integration.processes import simulator, started, write_cell
 
@@ -80,7 +80,7 @@ def judged(cell_file: Path, journal_file: Path, told: list[str]) -> Outcome:
     design = cell_design(read_cell(cell_file))
     state, cycles = core.initial_state(design), []
     with Journal(journal_file, "press-1", read_only=True) as journal:
-        stored = unpack(Durable, journal.state() or b"")
+        stored = unpack(DurableState, journal.state() or b"")
         for capture in journal.captures():
             state = core.step(design, state, capture, PositioningState()).state
             cycles.append(capture.cycle)

@@ -17,7 +17,7 @@ from impactcell.journal.store import Journal
 from impactcell.records import AlarmName, Quality
 from impactcell.scada import Actor, RefusedError, Role
 from impactcell.service.history_source import JournalHistory
-from impactcell.service.operator_commands import CellActions
+from impactcell.service.operator_commands import OperatorCommands
 from tests.integration.processes import CONFIG, simulator, write_cell
 from tests.integration.watched import serving
 
@@ -131,7 +131,10 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
             with pytest.raises(urllib.error.HTTPError, match="503") as caught:
                 await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz")
             caught.value.close()
-            actions, history = CellActions(watched.service.running), JournalHistory(watched.service.running)
+            actions, history = (
+                OperatorCommands(watched.service.running),
+                JournalHistory(watched.service.running),
+            )
             with pytest.raises(RefusedError, match="does not run"):
                 await actions.start_batch("press-1", "B", expected=True, actor=actor)
             with pytest.raises(RefusedError, match="cannot be opened"):

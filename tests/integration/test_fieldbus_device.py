@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
-from impactcell.fieldbus.acquisition import Module, Reception
-from impactcell.fieldbus.capture_ring import PERIOD
+from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
+from impactcell.fieldbus.capture_ring import CYCLE_PERIOD
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap
 from simulator.device import Device
@@ -28,19 +28,19 @@ class Cell:
 
     server: ModbusServer
     device: Device
-    module: Module
-    receptions: AsyncGenerator[Reception, None]
+    module: ModuleAcquisition
+    receptions: AsyncGenerator[ReceivedCycle, None]
     truths: list[dict[str, Any]]
 
-    async def take(self, count: int) -> list[Reception]:
+    async def take(self, count: int) -> list[ReceivedCycle]:
         return [await anext(self.receptions) for _ in range(count)]
 
-    def assert_true(self, received: list[Reception]) -> None:
+    def assert_true(self, received: list[ReceivedCycle]) -> None:
         by_mark = {(truth["session"], truth["cycle"]): truth for truth in self.truths}
-        for reception in received:
-            truth = by_mark[reception.mark.session, reception.mark.cycle]
-            capture = reception.capture
-            assert reception.faults == ()
+        for each in received:
+            truth = by_mark[each.cycle_id.session, each.cycle_id.cycle]
+            capture = each.capture
+            assert each.faults == ()
             assert capture.time_ns == truth["time_ns"]
             assert capture.summary is not None
             assert capture.summary.peak_force_n == pytest.approx(truth["peak_force_n"], rel=1e-6)
@@ -73,7 +73,7 @@ async def running(window: int = 16, timeout_s: float = 10.0) -> AsyncIterator[Ce
     )
     async with (
         ModbusServer(device) as server,
-        Module(
+        ModuleAcquisition(
             "cell-1", ModuleLink(port=server.port, window=window, timeout_s=timeout_s), registers
         ) as module,
         contextlib.aclosing(module.captures()) as receptions,
@@ -88,7 +88,7 @@ async def test_every_cycle_arrives_once_and_true(window: int) -> None:
         for _ in range(12):
             cell.device.overrun(1)
             received += await cell.take(1)
-        assert [r.mark.cycle for r in received] == list(range(1, 13))
+        assert [r.cycle_id.cycle for r in received] == list(range(1, 13))
         cell.assert_true(received)
         assert cell.module.status.missed == 0
 
@@ -101,7 +101,7 @@ async def test_every_cycle_arrives_once_and_true_whatever_befalls_the_link() -> 
         for _ in range(4):
             cell.device.overrun(10)
             received += await cell.take(10)
-        assert [r.mark.cycle for r in received] == list(range(1, 41))
+        assert [r.cycle_id.cycle for r in received] == list(range(1, 41))
         assert sum(cell.server.faults.happened.values()) > 10
         assert cell.module.status.missed == 0
         cell.assert_true(received)
@@ -115,7 +115,7 @@ async def test_a_restart_begins_a_session_at_cycle_one() -> None:
         session = cell.device.restart()
         cell.device.overrun(3)
         received = await cell.take(3)
-        assert [(r.mark.session, r.mark.cycle) for r in received] == [
+        assert [(r.cycle_id.session, r.cycle_id.cycle) for r in received] == [
             (session, 1),
             (session, 2),
             (session, 3),
@@ -130,7 +130,7 @@ async def test_an_overrun_of_the_ring_is_counted_exactly() -> None:
         await cell.take(3)
         cell.device.overrun(40)
         received = await cell.take(16)
-        assert [r.mark.cycle for r in received] == list(range(28, 44))
+        assert [r.cycle_id.cycle for r in received] == list(range(28, 44))
         assert [r.missed for r in received] == [24] + [0] * 15
         cell.assert_true(received)
 
@@ -139,11 +139,11 @@ async def test_the_counter_wraps_without_loss() -> None:
     async with running() as cell:
         cell.device.overrun(2)
         await cell.take(2)
-        cell.device.set_counter(PERIOD - 2)
+        cell.device.set_counter(CYCLE_PERIOD - 2)
         cell.device.overrun(1)
         received = await cell.take(1)
         cell.device.overrun(5)
         received += await cell.take(5)
-        assert [r.mark.cycle for r in received] == [PERIOD - 1, PERIOD, 1, 2, 3, 4]
+        assert [r.cycle_id.cycle for r in received] == [CYCLE_PERIOD - 1, CYCLE_PERIOD, 1, 2, 3, 4]
         assert cell.module.status.missed == 0
         cell.assert_true(received)

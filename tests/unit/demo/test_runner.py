@@ -9,7 +9,7 @@ from typing import cast
 import pytest
 
 from impactcell.demo import runner
-from impactcell.demo.scenario_setup import Stage, last_target_m
+from impactcell.demo.scenario_setup import DemoSetup, last_target_m
 from impactcell.records import PositioningState
 from tests.snapshots import make_capture, make_snapshot
 
@@ -24,12 +24,12 @@ async def test_a_demo_with_a_last_part_ends_with_it(
     monkeypatch: pytest.MonkeyPatch, content: dict[str, object], target_m: float, over: bool
 ) -> None:
     monkeypatch.setattr(runner, "QUIET_S", 0.05)
-    stage = cast("Stage", SimpleNamespace(last_target_m=last_target_m(content)))
-    playing, stop = runner._Show(stage, cycles=None), asyncio.Event()
+    stage = cast("DemoSetup", SimpleNamespace(last_target_m=last_target_m(content)))
+    playing, stop = runner._DemoRun(stage, cycles=None), asyncio.Event()
     state = PositioningState(target_m=target_m)
     playing.snapshots.append(replace(make_snapshot(make_capture(7)), positioning=state))
     watch = asyncio.create_task(playing._watch(asyncio.Event(), stop))
     await asyncio.wait({watch}, timeout=0.5)
     assert (watch.done(), stop.is_set()) == (over, over)
-    assert playing.told == ([(7, "that was the last part")] if over else [])
+    assert playing.messages == ([(7, "that was the last part")] if over else [])
     watch.cancel()

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from impactcell.fieldbus.acquisition import Module, Reception
-from impactcell.fieldbus.capture_ring import PERIOD
+from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
+from impactcell.fieldbus.capture_ring import CYCLE_PERIOD
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap, Words
 from impactcell.records import CycleId, ModuleStatus
@@ -46,12 +46,12 @@ def samples_of(cycle: int, count: int = SAMPLES) -> dict[str, np.ndarray]:
 
 def make(device: ScriptedDevice, cycles: int = 1, **header: Any) -> None:
     for _ in range(cycles):
-        device.complete(samples_of(int(device.get("cycle_counter")) % PERIOD + 1), **(HEADER | header))
+        device.complete(samples_of(int(device.get("cycle_counter")) % CYCLE_PERIOD + 1), **(HEADER | header))
 
 
-def assert_whole(reception: Reception) -> None:
-    expected = samples_of(reception.capture.cycle)
-    force, position = reception.capture.force, reception.capture.position
+def assert_whole(received: ReceivedCycle) -> None:
+    expected = samples_of(received.capture.cycle)
+    force, position = received.capture.force, received.capture.position
     assert force is not None
     assert position is not None
     assert force.values.size == expected["force"].size
@@ -66,17 +66,19 @@ async def running(
     after: CycleId | None = None,
     statuses: list[ModuleStatus] | None = None,
     **link: Any,
-) -> AsyncIterator[tuple[ModbusServer, Module, AsyncIterator[Reception]]]:
+) -> AsyncIterator[tuple[ModbusServer, ModuleAcquisition, AsyncIterator[ReceivedCycle]]]:
     link = {"window": 16, "timeout_s": 10.0} | link
     async with (
         ModbusServer(device) as server,
-        Module("cell-1", ModuleLink(port=server.port, **link), fpga, statuses and statuses.append) as module,
+        ModuleAcquisition(
+            "cell-1", ModuleLink(port=server.port, **link), fpga, statuses and statuses.append
+        ) as module,
         contextlib.aclosing(module.captures(after)) as receptions,
     ):
         yield server, module, receptions
 
 
-async def take(receptions: AsyncIterator[Reception], count: int) -> list[Reception]:
+async def take(receptions: AsyncIterator[ReceivedCycle], count: int) -> list[ReceivedCycle]:
     return [await anext(receptions) for _ in range(count)]
 
 
@@ -85,11 +87,11 @@ async def test_a_cycle_arrives_whole_in_si(fpga: RegisterMap, window: int, max_r
     device = ScriptedDevice(fpga, session=9)
     make(device)
     async with running(fpga, device, window=window, max_registers=max_registers) as (_, module, receptions):
-        [reception] = await take(receptions, 1)
-        assert_whole(reception)
-        assert reception.mark == CycleId(9, 1)
-        assert reception.faults == ()
-        capture = reception.capture
+        [received] = await take(receptions, 1)
+        assert_whole(received)
+        assert received.cycle_id == CycleId(9, 1)
+        assert received.faults == ()
+        capture = received.capture
         assert capture.velocity_m_s == pytest.approx(0.05, rel=1e-6)
         assert capture.mass_kg == pytest.approx(18.9, rel=1e-6)
         assert (capture.direction, capture.batch_id, capture.time_ns) == (-1, "B-17", HEADER["cycle_time"])
@@ -112,9 +114,9 @@ async def test_new_cycles_come_as_they_are_made(fpga: RegisterMap) -> None:
             next_one = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
             await asyncio.sleep(0)
             make(device)
-            reception = await next_one
-            assert (reception.capture.cycle, reception.missed) == (cycle, 0)
-            assert_whole(reception)
+            received = await next_one
+            assert (received.capture.cycle, received.missed) == (cycle, 0)
+            assert_whole(received)
         assert module.status.missed == 0
 
 
@@ -133,8 +135,8 @@ async def test_an_outage_loses_exactly_what_the_ring_lost(fpga: RegisterMap, awa
         received = await take(receptions, away + 1 - lost)
         assert [r.capture.cycle for r in received] == list(range(4 + lost, 5 + away))
         assert [r.missed for r in received] == [lost] + [0] * (len(received) - 1)
-        for reception in received:
-            assert_whole(reception)
+        for each in received:
+            assert_whole(each)
         assert (module.status.missed, module.status.received) == (lost, 3 + len(received))
 
 
@@ -142,7 +144,11 @@ async def test_goes_on_after_the_last_durable_cycle(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga, session=4)
     make(device, 10)
     async with running(fpga, device, after=CycleId(4, 7)) as (_, _, receptions):
-        assert [r.mark for r in await take(receptions, 3)] == [CycleId(4, 8), CycleId(4, 9), CycleId(4, 10)]
+        assert [r.cycle_id for r in await take(receptions, 3)] == [
+            CycleId(4, 8),
+            CycleId(4, 9),
+            CycleId(4, 10),
+        ]
 
 
 async def test_a_restart_of_the_module_is_told(fpga: RegisterMap) -> None:
@@ -154,19 +160,26 @@ async def test_a_restart_of_the_module_is_told(fpga: RegisterMap) -> None:
         device.start(session=5)
         make(device, 2)
         received = await take(receptions, 2)
-        assert [r.mark for r in received] == [CycleId(5, 1), CycleId(5, 2)]
+        assert [r.cycle_id for r in received] == [CycleId(5, 1), CycleId(5, 2)]
         assert [(r.restarted, r.missed) for r in received] == [(True, 0), (False, 0)]
         assert (module.status.restarts, module.status.reconnects) == (1, 1)
 
 
 async def test_the_counter_wraps_without_loss(fpga: RegisterMap) -> None:
-    device = ScriptedDevice(fpga, counter=PERIOD - 3)
-    async with running(fpga, device, after=CycleId(1, PERIOD - 3)) as (_, module, receptions):
+    device = ScriptedDevice(fpga, counter=CYCLE_PERIOD - 3)
+    async with running(fpga, device, after=CycleId(1, CYCLE_PERIOD - 3)) as (_, module, receptions):
         make(device, 6)
         received = await take(receptions, 6)
-        assert [r.capture.cycle for r in received] == [PERIOD - 2, PERIOD - 1, PERIOD, 1, 2, 3]
-        for reception in received:
-            assert_whole(reception)
+        assert [r.capture.cycle for r in received] == [
+            CYCLE_PERIOD - 2,
+            CYCLE_PERIOD - 1,
+            CYCLE_PERIOD,
+            1,
+            2,
+            3,
+        ]
+        for each in received:
+            assert_whole(each)
         assert module.status.missed == 0
 
 
@@ -183,8 +196,8 @@ async def test_a_capture_overwritten_while_it_is_read_is_never_mixed(
         received = await take(receptions, 16)
         assert [r.capture.cycle for r in received] == list(range(2 + made, 18 + made))
         assert [r.missed for r in received] == [made] + [0] * 15
-        for reception in received:
-            assert_whole(reception)
+        for each in received:
+            assert_whole(each)
 
 
 async def test_another_client_that_selects_slots_does_not_mix_captures(fpga: RegisterMap) -> None:
@@ -198,8 +211,8 @@ async def test_another_client_that_selects_slots_does_not_mix_captures(fpga: Reg
     device.on_read.append((fpga["force"].address + 500, interfere))
     device.on_read.append((fpga["position"].address + 100, interfere))
     async with running(fpga, device) as (_, module, receptions):
-        for reception in await take(receptions, 3):
-            assert_whole(reception)
+        for received in await take(receptions, 3):
+            assert_whole(received)
         assert module.status.discarded >= 1
 
 
@@ -217,8 +230,8 @@ async def test_a_module_that_is_busy_for_the_selection_of_a_slot_is_asked_again(
 
     device.write = busy  # type: ignore[method-assign]
     async with running(fpga, device) as (_, module, receptions):
-        for reception in await take(receptions, 3):
-            assert_whole(reception)
+        for received in await take(receptions, 3):
+            assert_whole(received)
         assert module.status.discarded == 0
     assert refused == [fpga["slot_select"].address] * 2
 
@@ -238,8 +251,8 @@ async def test_a_module_that_cannot_answer_for_a_while_loses_nothing(
             asyncio.get_running_loop().call_later(0.7, server.faults.clear)
 
         device.on_read.append((fpga[register].address, refuse))
-        for reception in await take(receptions, 3):
-            assert_whole(reception)
+        for received in await take(receptions, 3):
+            assert_whole(received)
         assert module.status.unreadable == 0
 
 
@@ -254,8 +267,8 @@ async def test_a_wrong_crc_is_read_again(fpga: RegisterMap) -> None:
 
     device.on_read += [(address, flip), (fpga["window_sequence_after"].address, flip)]
     async with running(fpga, device) as (_, module, receptions):
-        [reception] = await take(receptions, 1)
-        assert_whole(reception)
+        [received] = await take(receptions, 1)
+        assert_whole(received)
         assert module.status.discarded == 1
 
 
@@ -323,11 +336,11 @@ async def test_what_a_module_need_not_know_is_no_fault(fpga: RegisterMap) -> Non
     device = ScriptedDevice(fpga)
     make(device, mass=math.nan, dwell=math.nan, stroke=math.inf, batch_id="", cycle_time=0)
     async with running(fpga, device) as (_, _, receptions):
-        [reception] = await take(receptions, 1)
-    assert reception.faults == ()
-    assert math.isnan(reception.capture.mass_kg)
-    assert reception.capture.stroke_m == math.inf
-    assert reception.capture.batch_id is None
+        [received] = await take(receptions, 1)
+    assert received.faults == ()
+    assert math.isnan(received.capture.mass_kg)
+    assert received.capture.stroke_m == math.inf
+    assert received.capture.batch_id is None
 
 
 @pytest.mark.parametrize(
@@ -389,11 +402,11 @@ async def test_only_what_is_durable_is_acknowledged_also_after_an_outage(fpga: R
     async with running(fpga, device) as (server, module, receptions):
         received = await take(receptions, 3)
         assert device.acknowledged == []
-        await module.acknowledge(received[1].mark)
+        await module.acknowledge(received[1].cycle_id)
         assert device.acknowledged == [(3, 2)]
         server.drop_clients()
         await asyncio.sleep(0.01)
-        await module.acknowledge(received[2].mark)
+        await module.acknowledge(received[2].cycle_id)
         await take(receptions, 1)
         assert device.acknowledged == [(3, 2), (3, 3)]
 
@@ -408,8 +421,8 @@ async def test_every_fault_ends_with_every_cycle_whole_and_in_order(
         server.faults.inject(Fault(kind, probability=0.05, seconds=0.3, remaining=5))
         received = await take(receptions, 10)
         assert [r.capture.cycle for r in received] == list(range(1, 11))
-        for reception in received:
-            assert_whole(reception)
+        for each in received:
+            assert_whole(each)
         assert (module.status.missed, module.status.unreadable) == (0, 0)
 
 
@@ -428,11 +441,11 @@ async def test_a_module_that_makes_cycles_faster_than_they_can_be_read_is_follow
         last = 0
         total = 0
         while last < device.get("cycle_counter"):
-            reception = await anext(receptions)
-            assert_whole(reception)
-            assert reception.capture.cycle > last
-            total += 1 + reception.missed
-            last = reception.capture.cycle
+            received = await anext(receptions)
+            assert_whole(received)
+            assert received.capture.cycle > last
+            total += 1 + received.missed
+            last = received.capture.cycle
         first = last - total
         assert first >= 0
         assert module.status.received + module.status.missed == total
@@ -450,11 +463,15 @@ async def test_the_report_has_batch_and_positioning(fpga: RegisterMap) -> None:
     device.put("target_sequence", 4)
     async with running(fpga, device) as (_, module, receptions):
         await take(receptions, 1)
-        report = module.report
-    assert report is not None
-    assert report.batch is not None
-    assert (report.batch.batch_id, report.batch.from_cycle, report.batch.sequence) == ("B-18", 5, 1)
-    assert report.positioning is not None
-    assert (report.positioning.state, report.positioning.target_sequence) == ("ready", 4)
-    assert report.positioning.target_m == pytest.approx(-0.0123)
-    assert report.state == "ready"
+        status_block = module.status_block
+    assert status_block is not None
+    assert status_block.batch is not None
+    assert (status_block.batch.batch_id, status_block.batch.from_cycle, status_block.batch.sequence) == (
+        "B-18",
+        5,
+        1,
+    )
+    assert status_block.positioning is not None
+    assert (status_block.positioning.state, status_block.positioning.target_sequence) == ("ready", 4)
+    assert status_block.positioning.target_m == pytest.approx(-0.0123)
+    assert status_block.state == "ready"

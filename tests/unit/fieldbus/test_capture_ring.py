@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.fieldbus.capture_ring import PERIOD, distance, next_wanted
+from impactcell.fieldbus.capture_ring import CYCLE_PERIOD, cycles_after, next_capture
 from impactcell.records import CycleId
 
 SLOTS = 8
@@ -11,7 +11,7 @@ SLOTS = 8
 
 def number(absolute: int) -> int:
     """Cycle number of the absolute-th cycle: 1, 2, ... 2^32 - 1, 1, ..."""
-    return (absolute - 1) % PERIOD + 1
+    return (absolute - 1) % CYCLE_PERIOD + 1
 
 
 def ring_of(newest: int, oldest: int) -> list[int]:
@@ -22,7 +22,7 @@ def ring_of(newest: int, oldest: int) -> list[int]:
 
 
 @given(
-    first=st.sampled_from([1, PERIOD - 20]),
+    first=st.sampled_from([1, CYCLE_PERIOD - 20]),
     taken=st.integers(0, 30),
     made=st.lists(st.integers(0, 25), min_size=1, max_size=12),
 )
@@ -34,14 +34,14 @@ def test_every_cycle_once_in_order_or_counted_as_missed(first: int, taken: int, 
     received: list[int] = []
     for burst in made:
         newest += burst
-        while want := next_wanted(last, 7, number(newest), ring_of(newest, first)):
+        while want := next_capture(last, 7, number(newest), ring_of(newest, first)):
             assert not want.restarted
             absolute = last_absolute + want.missed + 1
-            assert number(absolute) == want.mark.cycle
-            assert ring_of(newest, first)[want.slot] == want.mark.cycle
+            assert number(absolute) == want.cycle_id.cycle
+            assert ring_of(newest, first)[want.slot] == want.cycle_id.cycle
             missed += want.missed
             received.append(absolute)
-            last_absolute, last = absolute, want.mark
+            last_absolute, last = absolute, want.cycle_id
         assert last_absolute == newest
         assert received == sorted(set(received))
     total = sum(made)
@@ -49,64 +49,64 @@ def test_every_cycle_once_in_order_or_counted_as_missed(first: int, taken: int, 
     assert missed == sum(max(0, burst - SLOTS) for burst in made)
 
 
-@given(st.integers(1, 3 * PERIOD), st.integers(0, 1000))
+@given(st.integers(1, 3 * CYCLE_PERIOD), st.integers(0, 1000))
 def test_distance_counts_steps(start: int, steps: int) -> None:
-    assert distance(number(start), number(start + steps)) == steps
+    assert cycles_after(number(start), number(start + steps)) == steps
 
 
 def test_first_contact_begins_with_the_oldest_and_misses_nothing() -> None:
-    want = next_wanted(None, 3, 20, ring_of(20, 1))
+    want = next_capture(None, 3, 20, ring_of(20, 1))
     assert want is not None
-    assert (want.mark, want.missed, want.restarted) == (CycleId(3, 13), 0, False)
+    assert (want.cycle_id, want.missed, want.restarted) == (CycleId(3, 13), 0, False)
 
 
 def test_first_contact_across_the_wrap() -> None:
-    newest = PERIOD + 3
-    want = next_wanted(None, 3, number(newest), ring_of(newest, PERIOD - 100))
+    newest = CYCLE_PERIOD + 3
+    want = next_capture(None, 3, number(newest), ring_of(newest, CYCLE_PERIOD - 100))
     assert want is not None
-    assert want.mark.cycle == number(newest - SLOTS + 1)
+    assert want.cycle_id.cycle == number(newest - SLOTS + 1)
 
 
 def test_nothing_new() -> None:
-    assert next_wanted(CycleId(1, 20), 1, 20, ring_of(20, 1)) is None
-    assert next_wanted(None, 1, 0, [0] * SLOTS) is None
-    assert next_wanted(CycleId(1, 20), 2, 0, [0] * SLOTS) is None
+    assert next_capture(CycleId(1, 20), 1, 20, ring_of(20, 1)) is None
+    assert next_capture(None, 1, 0, [0] * SLOTS) is None
+    assert next_capture(CycleId(1, 20), 2, 0, [0] * SLOTS) is None
 
 
 def test_a_restart_is_seen_and_begins_at_one() -> None:
-    want = next_wanted(CycleId(1, 5000), 2, 3, ring_of(3, 1))
+    want = next_capture(CycleId(1, 5000), 2, 3, ring_of(3, 1))
     assert want is not None
-    assert (want.mark, want.missed, want.restarted) == (CycleId(2, 1), 0, True)
+    assert (want.cycle_id, want.missed, want.restarted) == (CycleId(2, 1), 0, True)
 
 
 def test_a_restart_longer_ago_than_the_ring_counts_what_is_gone() -> None:
-    want = next_wanted(CycleId(1, 5000), 2, 30, ring_of(30, 1))
+    want = next_capture(CycleId(1, 5000), 2, 30, ring_of(30, 1))
     assert want is not None
-    assert (want.mark, want.missed, want.restarted) == (CycleId(2, 23), 22, True)
+    assert (want.cycle_id, want.missed, want.restarted) == (CycleId(2, 23), 22, True)
 
 
 def test_a_counter_that_goes_back_is_a_restart_even_in_the_same_session() -> None:
-    want = next_wanted(CycleId(1, 5000), 1, 2, ring_of(2, 1))
+    want = next_capture(CycleId(1, 5000), 1, 2, ring_of(2, 1))
     assert want is not None
-    assert (want.mark, want.restarted) == (CycleId(1, 1), True)
+    assert (want.cycle_id, want.restarted) == (CycleId(1, 1), True)
 
 
 def test_a_counter_that_was_set_close_to_its_wrap_misses_nothing() -> None:
-    newest = PERIOD - 1
-    want = next_wanted(CycleId(1, 5), 1, newest, ring_of(newest, newest))
+    newest = CYCLE_PERIOD - 1
+    want = next_capture(CycleId(1, 5), 1, newest, ring_of(newest, newest))
     assert want is not None
-    assert (want.mark.cycle, want.missed, want.restarted) == (newest, 0, True)
+    assert (want.cycle_id.cycle, want.missed, want.restarted) == (newest, 0, True)
 
 
 def test_a_cycle_beyond_the_counter_is_not_taken_yet() -> None:
     ring = ring_of(21, 1)
-    want = next_wanted(CycleId(1, 19), 1, 20, ring)
+    want = next_capture(CycleId(1, 19), 1, 20, ring)
     assert want is not None
-    assert want.mark.cycle == 20
-    assert next_wanted(CycleId(1, 20), 1, 20, ring) is None
+    assert want.cycle_id.cycle == 20
+    assert next_capture(CycleId(1, 20), 1, 20, ring) is None
 
 
 def test_skipping_leaves_out_the_oldest_and_counts_them() -> None:
-    want = next_wanted(CycleId(1, 12), 1, 20, ring_of(20, 1), skip=3)
+    want = next_capture(CycleId(1, 12), 1, 20, ring_of(20, 1), skip=3)
     assert want is not None
-    assert (want.mark.cycle, want.missed) == (16, 3)
+    assert (want.cycle_id.cycle, want.missed) == (16, 3)

@@ -11,7 +11,14 @@ from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.register_message import ReadHoldingRegistersResponse
 
 from impactcell.errors import ModbusExceptionError, ProtocolError
-from impactcell.fieldbus.codec import FrameReader, Function, check_reply, frame, read_request, write_request
+from impactcell.fieldbus.codec import (
+    FrameReader,
+    FunctionCode,
+    check_reply,
+    frame,
+    read_request,
+    write_request,
+)
 from impactcell.fieldbus.registers import WIRE
 
 PDU = st.binary(min_size=1, max_size=253)
@@ -43,13 +50,15 @@ def test_arbitrary_bytes_end_in_frames_or_a_protocol_error(pieces: list[bytes]) 
 
 
 @settings(max_examples=300)
-@given(PDU, st.sampled_from(list(Function)), st.integers(1, 120))
-def test_arbitrary_reply_ends_in_a_value_or_a_named_error(pdu: bytes, function: Function, count: int) -> None:
-    if function in (Function.READ_HOLDING, Function.READ_INPUT):
+@given(PDU, st.sampled_from(list(FunctionCode)), st.integers(1, 120))
+def test_arbitrary_reply_ends_in_a_value_or_a_named_error(
+    pdu: bytes, function: FunctionCode, count: int
+) -> None:
+    if function in (FunctionCode.READ_HOLDING, FunctionCode.READ_INPUT):
         request = read_request(function, 100, count)
     else:
         request = write_request(
-            100, np.arange(1 if function == Function.WRITE_SINGLE else count + 1).astype(WIRE)
+            100, np.arange(1 if function == FunctionCode.WRITE_SINGLE else count + 1).astype(WIRE)
         )
     try:
         data = check_reply(request, pdu)
@@ -67,7 +76,7 @@ def test_a_reply_made_by_pymodbus_is_read(values: list[int], transaction: int, u
     wire = FramerSocket(DecodePDU(is_server=False)).buildFrame(response)
     [(found_transaction, found_unit, pdu)] = FrameReader().feed(wire)
     assert (found_transaction, found_unit) == (transaction, unit)
-    data = check_reply(read_request(Function.READ_HOLDING, 0, len(values)), pdu)
+    data = check_reply(read_request(FunctionCode.READ_HOLDING, 0, len(values)), pdu)
     assert struct.unpack(f">{len(values)}H", data) == tuple(values)
 
 
@@ -82,7 +91,7 @@ def test_pymodbus_reads_our_requests(address: int, values: list[int]) -> None:
         values,
         6 if len(values) == 1 else 16,
     )
-    read = frame(7, 9, read_request(Function.READ_INPUT, address, len(values)).pdu)
+    read = frame(7, 9, read_request(FunctionCode.READ_INPUT, address, len(values)).pdu)
     _, pdu = framer.handleFrame(read, 0, 0)
     assert pdu is not None
     assert (pdu.address, pdu.count, pdu.function_code, pdu.dev_id) == (address, len(values), 4, 9)
@@ -118,7 +127,7 @@ def test_a_header_that_is_not_modbus_is_named(header: bytes, told: str) -> None:
     ],
 )
 def test_exceptions_have_names(code: int, name: str) -> None:
-    request = read_request(Function.READ_HOLDING, 320, 125)
+    request = read_request(FunctionCode.READ_HOLDING, 320, 125)
     with pytest.raises(
         ModbusExceptionError, match=f"125 holding registers from 320 refused: {name}"
     ) as caught:
@@ -139,7 +148,7 @@ def test_exceptions_have_names(code: int, name: str) -> None:
 )
 def test_a_reply_to_something_else_is_refused(pdu: bytes, told: str) -> None:
     with pytest.raises(ProtocolError, match=told):
-        check_reply(read_request(Function.READ_HOLDING, 10, 2), pdu)
+        check_reply(read_request(FunctionCode.READ_HOLDING, 10, 2), pdu)
 
 
 def test_an_echo_of_another_write_is_refused() -> None:
@@ -156,7 +165,7 @@ def test_an_echo_of_another_write_is_refused() -> None:
 @pytest.mark.parametrize(("address", "count"), [(0, 0), (0, 126), (65_535, 2), (-1, 1)])
 def test_requests_stay_in_the_register_space(address: int, count: int) -> None:
     with pytest.raises(ValueError, match="cannot read"):
-        read_request(Function.READ_HOLDING, address, count)
+        read_request(FunctionCode.READ_HOLDING, address, count)
     with pytest.raises(ValueError, match="cannot write"):
         write_request(address, np.zeros(count, dtype=WIRE))
 
@@ -177,6 +186,6 @@ def test_the_reasons_for_framing_of_our_own_still_hold() -> None:
     for stream in (foreign, endless, eight):
         with pytest.raises(ProtocolError):
             [
-                check_reply(read_request(Function.READ_HOLDING, 0, 1), each[2])
+                check_reply(read_request(FunctionCode.READ_HOLDING, 0, 1), each[2])
                 for each in FrameReader().feed(stream)
             ]

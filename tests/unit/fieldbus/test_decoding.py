@@ -40,13 +40,13 @@ def test_arbitrary_window_words_become_a_sound_capture(fpga: RegisterMap, data: 
         register.name: register.decode(words[register.address - first : register.end - first])
         for register in fpga.header()
     }
-    counts = decoding.used_counts(fpga, header)
+    counts = decoding.sample_counts(fpga, header)
     samples = {}
     for name in ARRAYS:
         assert counts[name] <= fpga[name].count
         size = 2 * fpga[name].words_per_value * data.draw(st.integers(0, 6))
         samples[name] = words_of(data.draw(st.binary(min_size=size, max_size=size)))
-    capture, faults = decoding.capture(fpga, header, samples)
+    capture, faults = decoding.capture_from_words(fpga, header, samples)
     assert all("register " in fault for fault in faults)
     assert math.isnan(capture.velocity_m_s) or 0.0 < capture.velocity_m_s < math.inf
     assert math.isnan(capture.mass_kg) or 0.0 < capture.mass_kg < math.inf
@@ -59,14 +59,14 @@ def test_arbitrary_window_words_become_a_sound_capture(fpga: RegisterMap, data: 
 @settings(max_examples=200)
 @given(data=st.data())
 def test_arbitrary_status_words_become_a_report(fpga: RegisterMap, data: st.DataObject) -> None:
-    registers = [fpga[name] for name in decoding.REPORT]
+    registers = [fpga[name] for name in decoding.STATUS_REGISTERS]
     words = {
         register.name: words_of(
             data.draw(st.binary(min_size=2 * register.words, max_size=2 * register.words))
         )
         for register in registers
     }
-    report = decoding.report(fpga, {name: fpga[name].decode(each) for name, each in words.items()})
+    report = decoding.decode_status(fpga, {name: fpga[name].decode(each) for name, each in words.items()})
     assert len(report.ring) == fpga.slots
     assert report.batch is not None
     assert report.positioning is not None
@@ -87,7 +87,7 @@ def test_a_map_without_the_optional_registers_still_gives_captures(fpga: Registe
         "force": bare["force"].encode(np.array([1.0, 2.0, 1.5])),
         "position": bare["position"].encode(np.array([0.0, 1e-6])),
     }
-    capture, faults = decoding.capture(bare, header, samples)
+    capture, faults = decoding.capture_from_words(bare, header, samples)
     assert faults == []
     assert (capture.cycle, capture.direction, capture.stroke_m) == (7, 1, math.inf)
     assert capture.summary is None

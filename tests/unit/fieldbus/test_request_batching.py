@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from impactcell.errors import LinkError, ModbusExceptionError, ProtocolError
-from impactcell.fieldbus.codec import Function, read_request
+from impactcell.fieldbus.codec import FunctionCode, read_request
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.request_batching import Batch, Exchange, Flight, PartialBlock
-from impactcell.fieldbus.transactions import IDS, Transactions
+from impactcell.fieldbus.request_batching import BatchInFlight, Exchange, PartialBlock, RequestBatch
+from impactcell.fieldbus.transactions import ID_COUNT, TransactionIds
 from impactcell.fieldbus.transport import ModbusClient
 
 HEAD = struct.Struct(">HHHBBB")
@@ -38,7 +38,7 @@ def good_reply(transaction: int, values: list[int], unit: int = 1) -> bytes:
 
 
 @given(
-    st.lists(st.integers(0, IDS - 1), min_size=1, max_size=20, unique=True),
+    st.lists(st.integers(0, ID_COUNT - 1), min_size=1, max_size=20, unique=True),
     st.integers(1, 125),
     st.lists(st.tuples(st.integers(0, 6000), st.integers(1, 255)), max_size=2),
     st.integers(0, 6000),
@@ -48,10 +48,10 @@ def test_replies_are_good_together_if_each_is_by_itself(
     transactions: list[int], count: int, flips: list[tuple[int, int]], length: int, at: int
 ) -> None:
     requests = tuple(
-        read_request(Function.READ_HOLDING, i * count, count, 7) for i in range(len(transactions))
+        read_request(FunctionCode.READ_HOLDING, i * count, count, 7) for i in range(len(transactions))
     )
     ids = tuple(each.to_bytes(2, "big") for each in transactions)
-    flight = Flight(Batch(EXCHANGE, None, 0, requests), ids, 0.0)
+    flight = BatchInFlight(RequestBatch(EXCHANGE, None, 0, requests), ids, 0.0)
     replies = bytearray(b"".join(good_reply(each, [each] * count, 7) for each in transactions))
     for where, bits in flips:
         replies[where % len(replies)] ^= bits
@@ -61,7 +61,7 @@ def test_replies_are_good_together_if_each_is_by_itself(
         HEAD.unpack_from(reply) == (transaction, 0, 3 + 2 * count, 7, 3, 2 * count)
         for reply, transaction in zip(whole, transactions, strict=False)
     )
-    taken, end, data = flight.good_replies(stream, at)
+    taken, end, data = flight.match_replies(stream, at)
     assert taken == (len(whole) if each_good else 0)
     assert end == at + taken * size
     assert data == b"".join(reply[HEAD.size :] for reply in whole[:taken])
@@ -92,12 +92,12 @@ def test_what_is_missing_of_a_block_is_asked_for_in_batches_alike(
 
 @pytest.mark.parametrize("step", [1, 16, 125])
 def test_no_transaction_comes_again_before_all_others_did(step: int) -> None:
-    transactions = Transactions()
-    drawn = [transactions.draw(step) for _ in range(2 * IDS // step)]
+    transactions = TransactionIds()
+    drawn = [transactions.draw(step) for _ in range(2 * ID_COUNT // step)]
     assert all(len(each) == step for each in drawn)
     ids = list(itertools.chain.from_iterable(drawn))
-    assert len(set(ids[:IDS])) == IDS
-    assert ids[IDS:] == ids[: len(ids) - IDS]
+    assert len(set(ids[:ID_COUNT])) == ID_COUNT
+    assert ids[ID_COUNT:] == ids[: len(ids) - ID_COUNT]
 
 
 async def answered(window: int, blocks: list[PartialBlock], replies: list[bytes]) -> ModbusClient:
@@ -153,7 +153,7 @@ async def test_a_transaction_in_flight_is_not_given_to_another_request() -> None
         seen.extend([(await reader.readexactly(12))[:2] for _ in range(2)])
         writer.close()
 
-    class Repeating(Transactions):
+    class Repeating(TransactionIds):
         def draw(self, count: int) -> tuple[bytes, ...]:
             ids = super().draw(count)
             self._next -= count * (len(drawn) < 2)

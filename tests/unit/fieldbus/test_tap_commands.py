@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from impactcell.errors import PositioningError
-from impactcell.fieldbus.acquisition import Module
+from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.registers import RegisterMap, Words
-from impactcell.fieldbus.tap_commands import Positioner, TapCommand
+from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 
@@ -51,11 +51,11 @@ class PositioningDevice(ScriptedDevice):
 @asynccontextmanager
 async def ready(
     fpga: RegisterMap, device: ScriptedDevice, patience_s: float = 20.0
-) -> AsyncIterator[tuple[ModbusServer, Module, Positioner]]:
+) -> AsyncIterator[tuple[ModbusServer, ModuleAcquisition, TapCommander]]:
     """A module whose captures are being taken, as the service does."""
     async with (
         ModbusServer(device) as server,
-        Module("cell-1", ModuleLink(port=server.port, timeout_s=5.0), fpga) as module,
+        ModuleAcquisition("cell-1", ModuleLink(port=server.port, timeout_s=5.0), fpga) as module,
     ):
 
         async def follow() -> None:
@@ -66,7 +66,7 @@ async def ready(
         following = asyncio.create_task(follow())
         await module.wait_connected()
         try:
-            yield server, module, Positioner(module, patience_s)
+            yield server, module, TapCommander(module, patience_s)
         finally:
             following.cancel()
             await asyncio.gather(following, return_exceptions=True)

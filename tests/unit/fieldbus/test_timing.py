@@ -32,9 +32,9 @@ def follow(
             asked_s = now_s + schedule.delay_s(now_s)
             now_s = asked_s + round_trip_s + held_up.exponential(busy_s)
             polls += 1
-            schedule.polled(asked_s, now_s, new=now_s >= due_s)
+            schedule.record_poll(asked_s, now_s, new=now_s >= due_s)
         late.append(now_s - due_s)
-        schedule.learn(clock(due_s))
+        schedule.update(clock(due_s))
     return late, polls / len(periods_s)
 
 
@@ -61,18 +61,18 @@ def test_a_cycle_seen_late_does_not_make_the_next_one_late() -> None:
 def test_cycles_that_waited_at_the_start_do_not_make_later_ones_late(first_s: float) -> None:
     """Fifteen in the ring, the newest of them old: its age says little of when the next one can be seen."""
     schedule, now_s = PollSchedule(), 0.0
-    schedule.polled(0.0, 0.0, new=True)
+    schedule.record_poll(0.0, 0.0, new=True)
     for cycle in range(-14, 1):
-        schedule.learn(0.5 * cycle - first_s, newest=cycle == 0)
+        schedule.update(0.5 * cycle - first_s, newest=cycle == 0)
     late, polls = [], 0
     for cycle in range(1, 60):
         due_s = 0.5 * cycle - first_s
         while now_s < due_s:
             now_s += schedule.delay_s(now_s)
             polls += 1
-            schedule.polled(now_s, now_s, new=now_s >= due_s)
+            schedule.record_poll(now_s, now_s, new=now_s >= due_s)
         late.append(now_s - due_s)
-        schedule.learn(due_s)
+        schedule.update(due_s)
     assert max(late) <= QUIET_S + 1e-9
     assert max(late[3:]) < 2 * FINE_S
     assert polls < 10 * 59
@@ -89,9 +89,9 @@ def test_a_module_that_is_slow_for_once_or_for_good() -> None:
         while now_s < shown_s:
             now_s += schedule.delay_s(now_s)
             polls[cycle] += 1
-            schedule.polled(now_s, now_s, new=now_s >= shown_s)
+            schedule.record_poll(now_s, now_s, new=now_s >= shown_s)
         late.append(now_s - shown_s)
-        schedule.learn(0.5 * cycle)
+        schedule.update(0.5 * cycle)
     assert max(late[51:100]) < 2 * FINE_S
     assert max(late[20:50]) < 2 * FINE_S
     assert max(late[110:]) < 2 * FINE_S
@@ -147,9 +147,9 @@ def test_irregular_cycles_are_never_seen_later_than_the_quiet_poll() -> None:
 def test_an_idle_module_is_left_in_peace() -> None:
     schedule = PollSchedule()
     for cycle in range(5):
-        schedule.polled(0.5 * cycle - 0.01, 0.5 * cycle - 0.01, new=False)
-        schedule.polled(0.5 * cycle, 0.5 * cycle, new=True)
-        schedule.learn(0.5 * cycle)
+        schedule.record_poll(0.5 * cycle - 0.01, 0.5 * cycle - 0.01, new=False)
+        schedule.record_poll(0.5 * cycle, 0.5 * cycle, new=True)
+        schedule.update(0.5 * cycle)
     assert schedule.delay_s(60.0) == IDLE_S
 
 
@@ -163,7 +163,7 @@ def test_cycles_by_hand_every_minute_or_so_cost_few_polls() -> None:
 def test_a_module_without_cycles_is_left_in_peace_after_a_while() -> None:
     schedule, now_s, polls = PollSchedule(), 0.0, 0
     while now_s < 60.0:
-        schedule.polled(now_s, now_s, new=False)
+        schedule.record_poll(now_s, now_s, new=False)
         now_s += schedule.delay_s(now_s)
         polls += 1
     assert polls < 1000
@@ -173,7 +173,7 @@ def test_a_module_without_cycles_is_left_in_peace_after_a_while() -> None:
 def test_a_slow_line_has_rest_between_polls() -> None:
     schedule = PollSchedule()
     assert schedule.delay_s(0.0) > 0.0
-    schedule.polled(0.0, 0.2, new=False)
+    schedule.record_poll(0.0, 0.2, new=False)
     assert schedule.delay_s(0.2) == pytest.approx(0.6)
 
 
@@ -188,10 +188,10 @@ def test_one_slow_answer_does_not_put_off_the_next_poll() -> None:
     """A module that is busy with its new cycle answers late just when that cycle is due."""
     schedule = PollSchedule()
     for cycle in range(20):
-        schedule.polled(0.5 * cycle - 0.002, 0.5 * cycle - 0.001, new=False)
-        schedule.polled(0.5 * cycle + 0.001, 0.5 * cycle + 0.002, new=True)
-        schedule.learn(0.5 * cycle)
-    schedule.polled(9.998, 10.006, new=False)
+        schedule.record_poll(0.5 * cycle - 0.002, 0.5 * cycle - 0.001, new=False)
+        schedule.record_poll(0.5 * cycle + 0.001, 0.5 * cycle + 0.002, new=True)
+        schedule.update(0.5 * cycle)
+    schedule.record_poll(9.998, 10.006, new=False)
     assert schedule.delay_s(10.006) <= COARSE_S
 
 

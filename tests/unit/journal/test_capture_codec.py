@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from impactcell.errors import JournalError
 from impactcell.journal.capture_codec import decode_capture, encode_capture
-from impactcell.journal.rice_codec import BLOCK, packed, unpacked
+from impactcell.journal.rice_codec import BLOCK, rice_decode, rice_encode
 from impactcell.records import Capture, Channel, Summary, uniform_times
 from tests.snapshots import make_capture
 
@@ -90,21 +90,21 @@ def test_same_bits_come_back(
 )
 def test_codes_come_back_whatever_their_steps(codes: list[int], resolution: float) -> None:
     values = np.array(codes, dtype=np.float64) * resolution
-    done, shifts, words = packed(values, resolution)
+    done, shifts, words = rice_encode(values, resolution)
     assert done
-    assert unpacked(shifts, words, len(values), resolution).tobytes() == values.tobytes()
+    assert rice_decode(shifts, words, len(values), resolution).tobytes() == values.tobytes()
 
 
 @pytest.mark.parametrize("odd", [0.013, float("nan"), float("inf"), -0.0, 1e300, 0.02 * 2**40])
 def test_what_is_no_near_multiple_is_not_packed(odd: float) -> None:
-    done, _, _ = packed(np.array([0.02, odd]), 0.02)
+    done, _, _ = rice_encode(np.array([0.02, odd]), 0.02)
     assert not done
 
 
 def test_words_that_end_too_soon_give_no_values() -> None:
-    done, shifts, words = packed(np.arange(300.0) % 7, 1.0)
+    done, shifts, words = rice_encode(np.arange(300.0) % 7, 1.0)
     assert done
-    short = unpacked(shifts, words[:-3], 300, 1.0)
+    short = rice_decode(shifts, words[:-3], 300, 1.0)
     assert np.isnan(short[-1])
     assert (short[:200] == np.arange(200) % 7).all()
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from impactcell.errors import JournalError
-from impactcell.journal.history import Page, PastValue, Question
+from impactcell.journal.history import HistoryQuery, Page, StoredValue
 from impactcell.journal.store import Journal
 from impactcell.records import Alarm, AlarmName, Coefficient, Evidence, Quality
 from tests.snapshots import make_capture, make_snapshot
@@ -34,10 +34,10 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Journal]:
         yield journal
 
 
-def read_all(journal: Journal, question: Question) -> list[PastValue]:
-    entries: list[PastValue] = []
+def read_all(journal: Journal, question: HistoryQuery) -> list[StoredValue]:
+    entries: list[StoredValue] = []
     while True:
-        page: Page[PastValue] = journal.values("Friction/StaticFriction", question)
+        page: Page[StoredValue] = journal.values("Friction/StaticFriction", question)
         assert len(page.entries) <= question.limit
         entries += page.entries
         if page.resume is None:
@@ -55,7 +55,7 @@ def test_pages_join_to_the_whole(
 ) -> None:
     whole = [(1000 + c // 3 - 5 * (c > 30), c) for c in range(CYCLES)]
     wanted = sorted((t, c) for t, c in whole if (start is None or t >= start) and (end is None or t <= end))
-    got = read_all(journal, Question(start, end, limit, newest_first))
+    got = read_all(journal, HistoryQuery(start, end, limit, newest_first))
     expected = wanted[::-1] if newest_first else wanted
     assert [entry.time_ns for entry in got] == [t for t, _ in expected]
     for entry, (_, cycle) in zip(got, expected, strict=True):
@@ -67,16 +67,16 @@ def test_pages_join_to_the_whole(
 
 
 def test_alarms_come_back_whole(journal: Journal) -> None:
-    page = journal.alarms(Question(limit=3))
+    page = journal.alarms(HistoryQuery(limit=3))
     assert page.resume is not None
     assert page.entries[0].evidence.size == math.inf
-    rest = journal.alarms(Question(limit=100, resume=page.resume))
+    rest = journal.alarms(HistoryQuery(limit=100, resume=page.resume))
     assert len(page.entries) + len(rest.entries) == CYCLES // 4
     assert rest.resume is None
 
 
 def test_what_has_no_past_is_said(journal: Journal) -> None:
     with pytest.raises(JournalError, match="Friction/StaticFriction"):
-        journal.values("Friction/PeakForce", Question())
+        journal.values("Friction/PeakForce", HistoryQuery())
     with pytest.raises(JournalError, match="token"):
-        journal.values("Wear/Level", Question(resume=b"x"))
+        journal.values("Wear/Level", HistoryQuery(resume=b"x"))

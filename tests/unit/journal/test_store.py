@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
-from impactcell.journal.history import Question
-from impactcell.journal.retention import ROOM, Retention
+from impactcell.journal.history import HistoryQuery
+from impactcell.journal.retention import FREE_SHARE, Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.records import Alarm, AlarmName, CycleId
 from tests.snapshots import make_capture, make_snapshot
@@ -28,12 +28,12 @@ def test_cycle_capture_and_state_come_back_after_reopening(tmp_path: Path) -> No
     path = tmp_path / "cell.sqlite"
     with Journal(path, "press-1") as journal:
         assert journal.state() is None
-        assert journal.position() is None
+        assert journal.last_cycle_id() is None
         append(journal, 1)
         append(journal, 2)
     with Journal(path, "press-1") as journal:
         assert journal.state() == b"state 2"
-        assert journal.position() == CycleId(1, 2)
+        assert journal.last_cycle_id() == CycleId(1, 2)
         first, second = journal.captures()
         assert (first.cycle, second.cycle) == (1, 2)
         assert [capture.cycle for capture in journal.captures(2, 2)] == [2]
@@ -46,7 +46,7 @@ def test_a_cycle_is_stored_once(tmp_path: Path) -> None:
             append(journal, 1)
         assert journal.state() == b"state 1"
         append(journal, 1, session=2)
-        assert journal.position() == CycleId(2, 1)
+        assert journal.last_cycle_id() == CycleId(2, 1)
     with Journal(tmp_path / "j", "c") as journal, pytest.raises(JournalError, match="stored already"):
         append(journal, 1, session=2)
 
@@ -58,7 +58,7 @@ def test_cycle_numbers_may_come_again(tmp_path: Path) -> None:
         for number in numbers:
             append(journal, number)
         assert [capture.cycle for capture in journal.captures()] == numbers
-        assert journal.position() == CycleId(1, 1)
+        assert journal.last_cycle_id() == CycleId(1, 1)
 
 
 def test_a_failed_append_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -69,13 +69,13 @@ def test_a_failed_append_leaves_nothing_behind(tmp_path: Path) -> None:
         with pytest.raises(JournalFullError, match="make room"):
             append_many(journal, range(2, 50))
         stored = [capture.cycle for capture in journal.captures()]
-        last = journal.position()
+        last = journal.last_cycle_id()
         assert last is not None
         assert journal.state() == f"state {last.cycle}".encode()
         assert stored == list(range(1, last.cycle + 1))
         journal._db.execute("PRAGMA max_page_count = 1000000")
         append(journal, last.cycle + 1)
-        assert journal.position() == CycleId(1, last.cycle + 1)
+        assert journal.last_cycle_id() == CycleId(1, last.cycle + 1)
 
 
 def test_actions_are_audited_with_their_state(tmp_path: Path) -> None:
@@ -166,8 +166,8 @@ def test_a_damaged_file_gives_what_is_whole_and_then_says_so(tmp_path: Path) -> 
 def test_the_model_is_kept_beside_the_captures(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", "c") as journal:
         assert journal.model == ""
-        journal.keep_model("first")
-        journal.keep_model("second")
+        journal.store_model("first")
+        journal.store_model("second")
     with Journal(tmp_path / "j", None, read_only=True) as journal:
         assert journal.model == "second"
 
@@ -184,7 +184,7 @@ def test_captures_are_thinned_before_cycles(tmp_path: Path) -> None:
         for cycle in range(1, 301):
             append(journal, cycle, samples=1000)
         size = 400_000
-        journal.thin(Retention(max_size_bytes=size), now_ns=make_capture(300).time_ns)
+        journal.prune(Retention(max_size_bytes=size), now_ns=make_capture(300).time_ns)
         kept = [capture.cycle for capture in journal.captures()]
         assert kept
         assert kept[-1] == 300
@@ -193,7 +193,7 @@ def test_captures_are_thinned_before_cycles(tmp_path: Path) -> None:
         pages, page_size = (
             journal._db.execute(f"PRAGMA {p}").fetchone()[0] for p in ("page_count", "page_size")
         )
-        assert pages * page_size <= (1.0 - ROOM) * size
+        assert pages * page_size <= (1.0 - FREE_SHARE) * size
 
 
 def test_age_drops_captures_then_cycles_but_never_the_last(tmp_path: Path) -> None:
@@ -202,10 +202,10 @@ def test_age_drops_captures_then_cycles_but_never_the_last(tmp_path: Path) -> No
         for cycle in (1, 2, 3):
             append(journal, cycle)
         now_ns = make_capture(3).time_ns
-        journal.thin(Retention(days=10, captures_days=5), now_ns + 6 * day_ns)
+        journal.prune(Retention(days=10, captures_days=5), now_ns + 6 * day_ns)
         assert list(journal.captures()) == []
-        assert journal.position() == CycleId(1, 3)
-        journal.thin(Retention(days=10, captures_days=5), now_ns + 11 * day_ns)
+        assert journal.last_cycle_id() == CycleId(1, 3)
+        journal.prune(Retention(days=10, captures_days=5), now_ns + 11 * day_ns)
         assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(3,)]
         assert journal.state() == b"state 3"
 
@@ -216,11 +216,11 @@ def test_what_has_no_time_is_of_no_age_but_takes_room(tmp_path: Path) -> None:
             capture = replace(make_capture(cycle), time_ns=0) if cycle == 2 else make_capture(cycle)
             journal.append(capture, make_snapshot(capture), b"state", [Alarm(AlarmName.WEAR_LIMIT)])
         now_ns = make_capture(3).time_ns + 11 * 86_400 * 10**9
-        journal.thin(Retention(days=10, captures_days=5), now_ns)
+        journal.prune(Retention(days=10, captures_days=5), now_ns)
         assert [capture.cycle for capture in journal.captures()] == [2]
         assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(2,), (3,)]
-        assert len(journal.alarms(Question(None, None, 10)).entries) == 3
-        journal.thin(Retention(max_size_bytes=1), now_ns)
+        assert len(journal.alarms(HistoryQuery(None, None, 10)).entries) == 3
+        journal.prune(Retention(max_size_bytes=1), now_ns)
         assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(3,)]
 
 
@@ -229,7 +229,7 @@ def test_a_capture_goes_with_its_cycle(tmp_path: Path) -> None:
         for cycle in (1, 2, 3):
             append(journal, cycle)
         now_ns = make_capture(3).time_ns
-        journal.thin(Retention(days=10, captures_days=30), now_ns + 11 * 86_400 * 10**9)
+        journal.prune(Retention(days=10, captures_days=30), now_ns + 11 * 86_400 * 10**9)
         assert journal._db.execute("SELECT count(*) FROM captures").fetchone() == (0,)
 
 
@@ -237,13 +237,13 @@ def test_a_capture_goes_with_its_cycle(tmp_path: Path) -> None:
 def test_no_call_drops_everything_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keep: Retention
 ) -> None:
-    monkeypatch.setattr("impactcell.journal.retention.MOST", 128)
+    monkeypatch.setattr("impactcell.journal.retention.PRUNE_LIMIT", 128)
     with Journal(tmp_path / "j", "c") as journal:
         for cycle in range(1, 301):
             append(journal, cycle, samples=10)
         now_ns = make_capture(300).time_ns + 2 * 86_400 * 10**9
         left = [300]
-        while journal.thin(keep, now_ns):
+        while journal.prune(keep, now_ns):
             left.append(len(list(journal.captures())))
         assert left[:3] == [300, 172, 44]
         assert list(journal.captures()) == []

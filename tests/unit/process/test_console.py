@@ -8,7 +8,7 @@ import pytest
 from impactcell.cli import discrepancy as command
 from impactcell.cli.app import app
 from impactcell.journal.store import Journal
-from impactcell.process.console import note
+from impactcell.process.console import print_note
 from tests.snapshots import make_capture, make_snapshot
 
 PKG = logging.getLogger("impactcell")
@@ -54,7 +54,7 @@ def test_discrepancy(
 @pytest.mark.parametrize(("level", "said"), [(logging.INFO, "2 left out\n"), (logging.ERROR, "")])
 def test_a_note_is_no_error(capsys: pytest.CaptureFixture[str], level: int, said: str) -> None:
     PKG.setLevel(level)
-    note("2 left out")
+    print_note("2 left out")
     assert capsys.readouterr() == ("", said)
 
 

@@ -16,8 +16,8 @@ from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.records import Capture, Channel, CycleId, PositioningState, Quality
 from impactcell.service.factory import cell_design
-from impactcell.service.journal_writer import Keeper
-from impactcell.service.worker import Worker
+from impactcell.service.journal_writer import JournalWriter
+from impactcell.service.worker import CellWorker
 from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
 from tests.snapshots import make_capture
@@ -33,14 +33,14 @@ def cycles(path: Path) -> list[int]:
         return [capture.cycle for capture in journal.captures()]
 
 
-async def process(worker: Worker, capture: Capture) -> CycleId | None:
+async def process(worker: CellWorker, capture: Capture) -> CycleId | None:
     return (await worker.process(capture, PositioningState(), None)).durable
 
 
 async def test_an_entry_that_can_never_be_stored_blocks_nothing(
     tmp_path: Path, design: core.CellDesign
 ) -> None:
-    worker = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     assert await process(worker, make_capture(1)) == CycleId(1, 1)
     assert await process(worker, make_capture(1)) == CycleId(1, 1)
     assert "stored already" in worker.journal_fault
@@ -56,7 +56,7 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
 ) -> None:
     monkeypatch.setattr("impactcell.service.journal_writer.CHECKPOINT_EVERY", 2)
     journal = Journal(tmp_path / "j", "c")
-    worker = Worker(design, journal, Retention())
+    worker = CellWorker(design, journal, Retention())
     shown, done = threading.Event(), []
 
     def late(name: str) -> Callable[..., None]:
@@ -66,7 +66,7 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
 
         return work
 
-    monkeypatch.setattr(journal, "thin", late("thin"))
+    monkeypatch.setattr(journal, "prune", late("prune"))
     monkeypatch.setattr(journal, "checkpoint", late("checkpoint"))
     for cycle in range(1, 6):
         shown.clear()
@@ -74,7 +74,7 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
         shown.set()
         await worker.run(lambda: None)
     await worker.close()
-    assert done == ["thin", "checkpoint", "checkpoint"]
+    assert done == ["prune", "checkpoint", "checkpoint"]
 
 
 @pytest.mark.parametrize(
@@ -86,8 +86,8 @@ def test_what_is_kept_follows_the_module_unless_it_has_no_time_or_runs_ahead(
     monkeypatch.setattr("impactcell.service.journal_writer.time.time_ns", lambda: 10**18)
     looks: list[int] = []
     with Journal(tmp_path / "j", "c") as journal:
-        monkeypatch.setattr(journal, "thin", lambda _, now_ns: looks.append(now_ns))
-        Keeper("c", journal, Retention()).tidy(module_ns)
+        monkeypatch.setattr(journal, "prune", lambda _, now_ns: looks.append(now_ns))
+        JournalWriter("c", journal, Retention()).maintain(module_ns)
     assert looks == [looked_ns]
 
 
@@ -96,14 +96,14 @@ async def test_what_is_too_much_to_drop_at_once_goes_in_the_next_looks(
 ) -> None:
     monkeypatch.setattr("impactcell.service.journal_writer.CHECKPOINT_EVERY", 1)
     journal = Journal(tmp_path / "j", "c")
-    worker = Worker(design, journal, Retention())
+    worker = CellWorker(design, journal, Retention())
     more, looks = [False, True, True], []
 
-    def thin(*_: object) -> bool:
+    def prune(*_: object) -> bool:
         looks.append(len(more))
         return more.pop()
 
-    monkeypatch.setattr(journal, "thin", thin)
+    monkeypatch.setattr(journal, "prune", prune)
     for cycle in range(1, 7):
         await process(worker, make_capture(cycle))
     await worker.close()
@@ -114,7 +114,7 @@ async def test_what_cannot_be_stored_now_is_stored_later_in_order(
     tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     journal = Journal(tmp_path / "j", "c")
-    worker = Worker(design, journal, Retention())
+    worker = CellWorker(design, journal, Retention())
 
     def full(*_: object) -> None:
         raise JournalFullError("the disk is full")
@@ -134,7 +134,7 @@ async def test_what_cannot_be_stored_now_is_stored_later_in_order(
 async def test_a_capture_that_cannot_be_computed_counts_as_unreadable(
     design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    worker = Worker(design, None, Retention())
+    worker = CellWorker(design, None, Retention())
     step = core.step
 
     def fails_with_samples(
@@ -146,14 +146,14 @@ async def test_a_capture_that_cannot_be_computed_counts_as_unreadable(
 
     monkeypatch.setattr(core, "step", fails_with_samples)
     processed = await worker.process(make_capture(1), PositioningState(), None)
-    assert processed.stepped.snapshot.cycle == 1
-    assert processed.stepped.snapshot.friction.mu_s.quality is Quality.BAD
+    assert processed.step_result.snapshot.cycle == 1
+    assert processed.step_result.snapshot.friction.mu_s.quality is Quality.BAD
     assert worker.last == CycleId(1, 1)
     await worker.close()
 
 
 async def test_odd_captures_are_survived(design: core.CellDesign) -> None:
-    worker = Worker(design, None, Retention())
+    worker = CellWorker(design, None, Retention())
     good = make_capture(1)
     force = good.force
     assert force is not None
@@ -167,18 +167,18 @@ async def test_odd_captures_are_survived(design: core.CellDesign) -> None:
         start=1,
     ):
         processed = await worker.process(replace(odd, cycle=cycle), PositioningState(), None)
-        assert processed.stepped.snapshot.cycle == cycle
+        assert processed.step_result.snapshot.cycle == cycle
     await worker.close()
 
 
 async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, design: core.CellDesign) -> None:
-    worker = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     await process(worker, make_capture(1))
     finer = replace(design, signature=replace(design.signature, points=50))
     await worker.redesign(finer)
     await process(worker, make_capture(2))
     await worker.close()
-    again = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    again = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     assert again.durable == CycleId(1, 2)
     await process(again, make_capture(3))
     await again.close()
@@ -187,7 +187,7 @@ async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, desig
 async def test_a_state_of_other_fields_is_refused_with_a_message_and_learned_anew(
     tmp_path: Path, design: core.CellDesign, caplog: pytest.LogCaptureFixture
 ) -> None:
-    worker = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     await process(worker, make_capture(1))
     await worker.close()
     with Journal(tmp_path / "j", "c") as journal:
@@ -197,7 +197,7 @@ async def test_a_state_of_other_fields_is_refused_with_a_message_and_learned_ane
         older = stored.replace(b"deviant_run", b"deviant_fun")
         assert worker.snapshot is not None
         journal.append(make_capture(2), replace(worker.snapshot, cycle=2), older)
-    again = Worker(design, Journal(tmp_path / "j", "c"), Retention())
+    again = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     assert "not a stored Durable" in caplog.text
     assert "tracking begins anew" in caplog.text
     assert again.durable == CycleId(1, 2)  # cycles go on
@@ -228,7 +228,7 @@ async def test_no_more_cells_compute_at_a_time_than_there_are_cores(
 
     monkeypatch.setattr("impactcell.service.worker._computing", threading.BoundedSemaphore(2))
     monkeypatch.setattr(core, "step", counted)
-    cells = [Worker(design, None, Retention()) for _ in range(5)]
+    cells = [CellWorker(design, None, Retention()) for _ in range(5)]
     await asyncio.gather(*(process(cell, make_capture(1)) for cell in cells))
     for cell in cells:
         await cell.close()
