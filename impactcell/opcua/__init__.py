@@ -1,27 +1,45 @@
-"""What asyncua 2.1 lacks as a server, mended in this one place; each module says what and why.
+"""An OPC UA server's services, on asyncua's types, codec and cryptography; it knows nothing of what it shows.
 
 asyncua keeps what it does well: the types and the binary codec, the cryptography of secure channels, the
 standard address space, the import of NodeSet2 files. Its classes are used as they are and none is patched,
-but for the decoder of null arrays (`codec.bound_null_arrays`). Its service layer - connections, sessions,
-subscriptions, reads, calls, history - is not used at all; these modules take its place.
+but for the decoder of null arrays (`asyncua_adapter.bound_null_arrays`). Its service layer is not used at
+all: the modules here take its place, and each says what it does better. Names are those of the standard:
+services and parameters of Part 4, aggregates of Part 13, history of Part 11.
 
-==================  =================================================================================
-`codec`             lengths that are negative or bound nothing; one exception for what cannot be read
-`connection`        malformed Hello, half-open connections, oversized messages, clients that do not read
-`channel`           trust checked before a channel opens; renewal; limits
-`sessions`          tokens that cannot be guessed, bound to their channel; limits; timeouts
-`access`            no session without encryption; certificates and signatures compared
-`dispatch`          every fault of a request becomes the status code of the standard
-`attributes`        index ranges, encodings, timestamps, the reader's own rights
-`views`             continuation points, masks, reference types that exist
-`calls`             arguments checked, callers known, methods bound to their objects
-`changes`           deadbands, NaN, index ranges of monitored items
-`items`             queues that tell of overflow
-`subscriptions`     retransmission, lifetime, late publishing, MoreNotifications
-`monitored`         items that exist, with the filters they can have
-`monitoring`        Republish, TransferSubscriptions, subscriptions that belong to their session
-`eventfilter`       OfType with subtypes, three-valued where clauses
-`histories`         rights, events; with `spans` time bounds and continuation, `processed` aggregates
-`wire`              values encoded once for all subscribers
-==================  =================================================================================
+Who uses the server gives it an address space, methods and the answers of `host_interface`, and starts a
+`service_host.ServiceHost`.
+
+===========================  ==============================================================================
+`host_interface`             settings, limits, and what the server asks of its host
+`asyncua_adapter`            all that is used of asyncua beside its public types
+`binary_codec`               requests and responses as bytes; one exception for what cannot be read
+`tcp_connection`             malformed Hello, half-open connections, oversized messages, clients that do not
+                             read
+`secure_channel`             trust checked before a channel opens; renewal; limits
+`trust_list`                 the server's certificate and those it trusts; `certificates` makes them
+`request_dispatch`           from a request to its service; every fault becomes the standard's status code
+`discovery_service`          GetEndpoints, FindServers
+`session_service`            CreateSession, ActivateSession, CloseSession: no session without encryption,
+                             certificates and signatures compared
+`authentication`             identity tokens into users; guessing becomes slow
+`session_table`              tokens that cannot be guessed, bound to their channel; limits; timeouts;
+                             continuation points
+`attribute_service`          Read, Write: index ranges, encodings, timestamps, the reader's own rights
+`view_service`               Browse, BrowseNext, TranslateBrowsePathsToNodeIds: continuation points, masks
+`method_service`             Call: arguments checked, callers known, methods bound to their objects
+`variable_store`             values as they are now, encoded once for all subscribers
+`subscription_service`       Publish, Republish, TransferSubscriptions; subscriptions belong to their session
+`subscription`               publishing cycles, retransmission, lifetime, MoreNotifications
+`monitored_item_service`     items that exist, with the filters they can have
+`monitored_item`             queues that tell of overflow
+`data_change_filter`         deadbands, NaN, index ranges
+`event_filter`               OfType with subtypes, three-valued where clauses, for `event_notification`
+`notification_encoding`      publish responses put together from parts encoded once
+`history_service`            HistoryRead: raw values, aggregates, events
+`historical_variable`        spans of time, read page by page
+`history_aggregates`         Average, Minimum, Maximum, Count by their definition; `history_processed` reads
+                             what they need
+`type_instances`             objects made from types, with NodeIds that stay the same
+`service_host`               listener, services and clock put together
+===========================  ==============================================================================
 """

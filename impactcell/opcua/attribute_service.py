@@ -9,17 +9,18 @@ from typing import Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.data_change_filter import cut, parse_range
 from impactcell.opcua.host_interface import AccessPolicy, Permission, Role
-from impactcell.opcua.node_values import with_timestamps
-from impactcell.opcua.request_dispatch import Context, Service, bounded
+from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
+from impactcell.opcua.variable_store import with_timestamps
 
-KNOWN_ATTRIBUTES: Final = frozenset(int(attribute) for attribute in ua.AttributeIds)
-BINARY: Final = ua.QualifiedName("Default Binary", 0)
+ATTRIBUTE_IDS: Final = frozenset(int(attribute) for attribute in ua.AttributeIds)
+DEFAULT_BINARY: Final = ua.QualifiedName("Default Binary", 0)
+"""The one encoding of structures that is offered (Part 6, 5.2)."""
 
 
-class Attributes:
+class AttributeService:
     """Answers Read and Write."""
 
     def __init__(self, space: AddressSpace, access: AccessPolicy) -> None:
@@ -33,47 +34,53 @@ class Attributes:
             "Write": Service(ua.WriteParameters, self.write),
         }
 
-    async def read(self, context: Context, wanted: ua.ReadParameters) -> ua.ReadResponse:
+    async def read(self, context: RequestContext, parameters: ua.ReadParameters) -> ua.ReadResponse:
         """Read attributes."""
-        nodes = bounded(wanted.NodesToRead)
-        if wanted.MaxAge < 0:
-            raise FaultError(ua.StatusCodes.BadMaxAgeInvalid)
-        if wanted.TimestampsToReturn == ua.TimestampsToReturn.Invalid:
-            raise FaultError(ua.StatusCodes.BadTimestampsToReturnInvalid)
+        read_values = check_operations(parameters.NodesToRead)
+        if parameters.MaxAge < 0:
+            raise StatusCodeError(ua.StatusCodes.BadMaxAgeInvalid)
+        if parameters.TimestampsToReturn == ua.TimestampsToReturn.Invalid:
+            raise StatusCodeError(ua.StatusCodes.BadTimestampsToReturnInvalid)
         role = context.actor.role
         response = ua.ReadResponse()
-        response.Results = [self._read(node, wanted.TimestampsToReturn, role) for node in nodes]
+        response.Results = [
+            self._read_result(read_value, parameters.TimestampsToReturn, role) for read_value in read_values
+        ]
         return response
 
-    def _read(self, wanted: ua.ReadValueId, timestamps: ua.TimestampsToReturn, role: Role) -> ua.DataValue:
+    def _read_result(
+        self, read_value: ua.ReadValueId, timestamps: ua.TimestampsToReturn, role: Role
+    ) -> ua.DataValue:
         try:
-            return self._value(wanted, timestamps, role)
-        except FaultError as fault:
+            return self._read_value(read_value, timestamps, role)
+        except StatusCodeError as fault:
             return ua.DataValue(StatusCode=ua.StatusCode(fault.code))
 
-    def _value(self, wanted: ua.ReadValueId, timestamps: ua.TimestampsToReturn, role: Role) -> ua.DataValue:
-        if wanted.NodeId not in self._space:
-            raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
-        if not self._access.permits(role, Permission.READ, wanted.NodeId):
-            raise FaultError(ua.StatusCodes.BadUserAccessDenied)
-        if wanted.AttributeId not in KNOWN_ATTRIBUTES:
-            raise FaultError(ua.StatusCodes.BadAttributeIdInvalid)
-        attribute = ua.AttributeIds(wanted.AttributeId)
-        span = parse_range(wanted.IndexRange)
-        encoding = wanted.DataEncoding
+    def _read_value(
+        self, read_value: ua.ReadValueId, timestamps: ua.TimestampsToReturn, role: Role
+    ) -> ua.DataValue:
+        if read_value.NodeId not in self._space:
+            raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
+        if not self._access.permits(role, Permission.READ, read_value.NodeId):
+            raise StatusCodeError(ua.StatusCodes.BadUserAccessDenied)
+        if read_value.AttributeId not in ATTRIBUTE_IDS:
+            raise StatusCodeError(ua.StatusCodes.BadAttributeIdInvalid)
+        attribute = ua.AttributeIds(read_value.AttributeId)
+        index_range = parse_range(read_value.IndexRange)
+        encoding = read_value.DataEncoding
         if attribute != ua.AttributeIds.Value:
             if encoding is not None and encoding.Name:
-                raise FaultError(ua.StatusCodes.BadDataEncodingInvalid)
-            held = self.own_view(wanted.NodeId, attribute, role)
-            return cut(ua.DataValue(held.Value, held.StatusCode), span)
-        if encoding is not None and encoding.Name and encoding != BINARY:
-            raise FaultError(ua.StatusCodes.BadDataEncodingUnsupported)
-        held = self._space.read_attribute_value(wanted.NodeId, attribute)
-        return with_timestamps(cut(held, span), timestamps)
+                raise StatusCodeError(ua.StatusCodes.BadDataEncodingInvalid)
+            data = self.read_as(read_value.NodeId, attribute, role)
+            return cut(ua.DataValue(data.Value, data.StatusCode), index_range)
+        if encoding is not None and encoding.Name and encoding != DEFAULT_BINARY:
+            raise StatusCodeError(ua.StatusCodes.BadDataEncodingUnsupported)
+        data = self._space.read_attribute_value(read_value.NodeId, attribute)
+        return with_timestamps(cut(data, index_range), timestamps)
 
-    def own_view(self, node: ua.NodeId, attribute: ua.AttributeIds, role: Role) -> ua.DataValue:
+    def read_as(self, node: ua.NodeId, attribute: ua.AttributeIds, role: Role) -> ua.DataValue:
         """Read an attribute as a role sees it: the `User...` attributes are of the reader."""
-        held = self._space.read_attribute_value(node, attribute)
+        data = self._space.read_attribute_value(node, attribute)
         if attribute == ua.AttributeIds.UserAccessLevel:
             return self._space.read_attribute_value(node, ua.AttributeIds.AccessLevel)
         if (
@@ -82,22 +89,23 @@ class Attributes:
         ):
             may_call = self._access.permits(role, Permission.CALL, node)
             return ua.DataValue(ua.Variant(may_call, ua.VariantType.Boolean))
-        return held
+        return data
 
-    async def write(self, context: Context, wanted: ua.WriteParameters) -> ua.WriteResponse:
+    async def write(self, context: RequestContext, parameters: ua.WriteParameters) -> ua.WriteResponse:
         """Refuse to write: what a client changes, it changes through methods."""
         response = ua.WriteResponse()
         response.Results = [
-            ua.StatusCode(self._refusal(node, context.actor.role)) for node in bounded(wanted.NodesToWrite)
+            ua.StatusCode(self._refusal(write_value, context.actor.role))
+            for write_value in check_operations(parameters.NodesToWrite)
         ]
         return response
 
-    def _refusal(self, wanted: ua.WriteValue, role: Role) -> int:
+    def _refusal(self, write_value: ua.WriteValue, role: Role) -> int:
         codes = ua.StatusCodes
-        if wanted.NodeId not in self._space:
+        if write_value.NodeId not in self._space:
             return int(codes.BadNodeIdUnknown)
-        if wanted.AttributeId not in self._space[wanted.NodeId].attributes:
+        if write_value.AttributeId not in self._space[write_value.NodeId].attributes:
             return int(codes.BadAttributeIdInvalid)
-        if not self._access.permits(role, Permission.WRITE, wanted.NodeId):
+        if not self._access.permits(role, Permission.WRITE, write_value.NodeId):
             return int(codes.BadUserAccessDenied)
         return int(codes.BadNotWritable)

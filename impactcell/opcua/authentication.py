@@ -17,18 +17,24 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import padding, rsa
 
 from impactcell.opcua.asyncua_adapter import SIGNATURE_CHECKS, InvalidSignature, x509_from_der
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import Actor, UserDirectory
 from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain
 
 _log = logging.getLogger(__name__)
 
-FREE_ATTEMPTS: Final = 4
+UNDELAYED_FAILURES: Final = 4
+"""Wrong passwords an address may send without a delay: people mistype."""
 FIRST_DELAY_S: Final = 0.25
-LONGEST_DELAY_S: Final = 8.0
-FORGET_S: Final = 900.0
-KNOWN_ADDRESSES: Final = 4_096
+"""Delay of the answer to the next one; it doubles with each."""
+MAX_DELAY_S: Final = 8.0
+"""Longest delay, seconds: one address then tries fewer than 11 000 passwords a day."""
+FORGET_AFTER_S: Final = 900.0
+"""An address that has been silent for so long begins anew."""
+MAX_ADDRESSES: Final = 4_096
+"""Addresses remembered at once, some 1 MB."""
 MAX_PASSWORD_BYTES: Final = 1_024
+"""Longest password that is hashed."""
 
 _OAEP: Final = {
     "http://www.w3.org/2001/04/xmlenc#rsa-oaep": hashes.SHA1,
@@ -36,55 +42,55 @@ _OAEP: Final = {
 }
 
 
-class _Address:
+class _AddressRecord:
     """What is known of one address: wrong passwords since the last right one, by user name."""
 
-    __slots__ = ("last_s", "lock", "wrong")
+    __slots__ = ("failures", "last_attempt_s", "lock")
 
     def __init__(self) -> None:
-        self.wrong: dict[str, int] = {}
-        self.last_s = 0.0
+        self.failures: dict[str, int] = {}
+        self.last_attempt_s = 0.0
         self.lock = asyncio.Lock()
 
 
-class Throttle:
+class LoginThrottle:
     """Delays answers to an address from its fifth wrong password on: 0.25 s, doubled each time, up to 8 s."""
 
     def __init__(self) -> None:
-        self._addresses: OrderedDict[str, _Address] = OrderedDict()
+        self._addresses: OrderedDict[str, _AddressRecord] = OrderedDict()
 
-    def of(self, address: str) -> _Address:
+    def record_of(self, address: str) -> _AddressRecord:
         """Look up an address; the longest unseen is forgotten when there are too many."""
-        known = self._addresses.setdefault(address, _Address())
+        record = self._addresses.setdefault(address, _AddressRecord())
         self._addresses.move_to_end(address)
         now = time.monotonic()
-        if now - known.last_s > FORGET_S:
-            known.wrong.clear()
-        known.last_s = now
-        while len(self._addresses) > KNOWN_ADDRESSES:
+        if now - record.last_attempt_s > FORGET_AFTER_S:
+            record.failures.clear()
+        record.last_attempt_s = now
+        while len(self._addresses) > MAX_ADDRESSES:
             self._addresses.popitem(last=False)
-        return known
+        return record
 
     @staticmethod
-    def delay(wrong: int) -> float:
+    def delay(failures: int) -> float:
         """Delay of the answer when `wrong` passwords, this one included, were wrong.
 
         >>> [Throttle.delay(n) for n in (4, 5, 6, 50)]
         [0.0, 0.25, 0.5, 8.0]
         """
-        if wrong <= FREE_ATTEMPTS:
+        if failures <= UNDELAYED_FAILURES:
             return 0.0
-        doublings = min(wrong - FREE_ATTEMPTS - 1, 16)
-        return min(FIRST_DELAY_S * 2.0**doublings, LONGEST_DELAY_S)
+        doublings = min(failures - UNDELAYED_FAILURES - 1, 16)
+        return min(FIRST_DELAY_S * 2.0**doublings, MAX_DELAY_S)
 
 
-class Logins:
+class Authenticator:
     """Turns identity tokens into actors."""
 
     def __init__(self, users: UserDirectory, trust: TrustList) -> None:
         self._users = users
         self._trust = trust
-        self._throttle = Throttle()
+        self._throttle = LoginThrottle()
         self._pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="argon2")
 
     def close(self) -> None:
@@ -110,53 +116,53 @@ class Logins:
             user).
         """
         if isinstance(token, ua.UserNameIdentityToken):
-            return await self._by_password(token, nonce, address, encrypted=encrypted)
+            return await self._identify_by_password(token, nonce, address, encrypted=encrypted)
         if isinstance(token, ua.X509IdentityToken):
-            return self._by_certificate(token, signature, nonce, address)
-        raise FaultError(ua.StatusCodes.BadIdentityTokenRejected)
+            return self._identify_by_certificate(token, signature, nonce, address)
+        raise StatusCodeError(ua.StatusCodes.BadIdentityTokenRejected)
 
-    async def _by_password(
+    async def _identify_by_password(
         self, token: ua.UserNameIdentityToken, nonce: bytes, address: str, *, encrypted: bool
     ) -> Actor:
         password = self._decrypt(token, nonce, encrypted=encrypted)
         name = token.UserName or ""
-        known = self._throttle.of(address)
-        async with known.lock:
+        record = self._throttle.record_of(address)
+        async with record.lock:
             user = self._users.find(name)
-            right = await asyncio.get_running_loop().run_in_executor(
+            matches = await asyncio.get_running_loop().run_in_executor(
                 self._pool, self._users.verify_password, user, password
             )
-            if right and user is not None:
-                known.wrong.pop(name, None)
+            if matches and user is not None:
+                record.failures.pop(name, None)
                 return Actor(user.name, user.role, address)
-            known.wrong[name] = known.wrong.get(name, 0) + 1
-            wrong = sum(known.wrong.values())
-            _log.warning("wrong password for %r from %s, number %d", name, address, wrong)
-            await asyncio.sleep(Throttle.delay(wrong))
-        raise FaultError(ua.StatusCodes.BadUserAccessDenied)
+            record.failures[name] = record.failures.get(name, 0) + 1
+            failures = sum(record.failures.values())
+            _log.warning("wrong password for %r from %s, number %d", name, address, failures)
+            await asyncio.sleep(LoginThrottle.delay(failures))
+        raise StatusCodeError(ua.StatusCodes.BadUserAccessDenied)
 
     def _decrypt(self, token: ua.UserNameIdentityToken, nonce: bytes, *, encrypted: bool) -> str:
         secret = token.Password or b""
         if token.EncryptionAlgorithm:
             algorithm = _OAEP.get(token.EncryptionAlgorithm)
             if algorithm is None:
-                raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
-            secret = self._open(secret, algorithm(), nonce)
+                raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid)
+            secret = self._decrypt_secret(secret, algorithm(), nonce)
         elif not encrypted:
-            raise FaultError(ua.StatusCodes.BadIdentityTokenRejected)
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenRejected)
         if len(secret) > MAX_PASSWORD_BYTES:
-            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid)
         try:
             return secret.decode("utf-8")
         except UnicodeDecodeError:
-            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid) from None
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid) from None
 
-    def _open(self, secret: bytes, algorithm: hashes.HashAlgorithm, nonce: bytes) -> bytes:
+    def _decrypt_secret(self, secret: bytes, algorithm: hashes.HashAlgorithm, nonce: bytes) -> bytes:
         """Decrypt a secret in the old format of Part 4, 7.40.2.2: length, password, nonce."""
         key: rsa.RSAPrivateKey = self._trust.private_key
         block = key.key_size // 8
         if not secret or len(secret) % block or len(secret) > 8 * block:
-            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid)
         scheme = padding.OAEP(mgf=padding.MGF1(algorithm), algorithm=algorithm, label=None)
         try:
             plain = b"".join(
@@ -164,30 +170,30 @@ class Logins:
             )
             length = struct.unpack_from("<I", plain)[0]
         except (ValueError, struct.error):
-            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid) from None
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid) from None
         body = plain[4 : 4 + length]
         # asyncua takes a password made for any nonce, so that one that was listened to could be sent again.
         if len(body) != length or length < len(nonce) or body[length - len(nonce) :] != nonce:
-            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid)
         return body[: length - len(nonce)]
 
-    def _by_certificate(
+    def _identify_by_certificate(
         self, token: ua.X509IdentityToken, signature: ua.SignatureData, nonce: bytes, address: str
     ) -> Actor:
         try:
             data = first_of_chain(token.CertificateData or b"")
             certificate = x509_from_der(data)
         except ValueError:
-            raise FaultError(ua.StatusCodes.BadIdentityTokenInvalid) from None
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid) from None
         check = SIGNATURE_CHECKS.get(signature.Algorithm or "")
         if check is None or not signature.Signature:
-            raise FaultError(ua.StatusCodes.BadUserSignatureInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadUserSignatureInvalid)
         try:
             check(certificate, self._trust.own_certificate + nonce, signature.Signature)
         except (InvalidSignature, ValueError, TypeError, AttributeError):
-            raise FaultError(ua.StatusCodes.BadUserSignatureInvalid) from None
+            raise StatusCodeError(ua.StatusCodes.BadUserSignatureInvalid) from None
         user = self._users.find_by_certificate(fingerprint(data))
         if user is None or not self._trust.is_valid_now(certificate):
             _log.warning("unknown user certificate %s from %s", fingerprint(data), address)
-            raise FaultError(ua.StatusCodes.BadUserAccessDenied)
+            raise StatusCodeError(ua.StatusCodes.BadUserAccessDenied)
         return Actor(user.name, user.role, address)

@@ -12,7 +12,7 @@ from impactcell.opcua.asyncua_adapter import (
 )
 
 
-class FaultError(Exception):
+class StatusCodeError(Exception):
     """A request that is refused with a status code; the session goes on."""
 
     def __init__(self, code: int) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace, DecodedDataChangeFilter
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 
 _NUMBERS: Final = (
     "SByte",
@@ -27,16 +27,16 @@ _NUMBERS: Final = (
 NUMERIC: Final = frozenset(ua.VariantType[name] for name in _NUMBERS)
 
 
-def same(one: Any, other: Any) -> bool:
+def same(first: Any, second: Any) -> bool:
     """Compare two values; a NaN equals a NaN."""
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(same, one, other))
-    if isinstance(one, float) and isinstance(other, float) and math.isnan(one):
-        return math.isnan(other)
-    return bool(one == other)
+    if isinstance(first, list) and isinstance(second, list):
+        return len(first) == len(second) and all(map(same, first, second))
+    if isinstance(first, float) and isinstance(second, float) and math.isnan(first):
+        return math.isnan(second)
+    return bool(first == second)
 
 
-class ChangeFilter:
+class DataChangeFilter:
     """Decides which values of one monitored item are reported."""
 
     __slots__ = ("_deadband", "_last", "_trigger")
@@ -46,9 +46,9 @@ class ChangeFilter:
         self._deadband = deadband
         self._last: ua.DataValue | None = None
 
-    def fresh(self) -> "ChangeFilter":
+    def fresh(self) -> "DataChangeFilter":
         """Make the same filter with nothing reported yet."""
-        return ChangeFilter(self._trigger, self._deadband)
+        return DataChangeFilter(self._trigger, self._deadband)
 
     def passes(self, data: ua.DataValue) -> bool:
         """Whether to report a value; what was reported is what the next one is compared with."""
@@ -68,22 +68,22 @@ class ChangeFilter:
             and last.SourceTimestamp != data.SourceTimestamp
         ):
             return True
-        one, other = last.Value.Value, data.Value.Value
+        first, second = last.Value.Value, data.Value.Value
         if self._deadband <= 0.0:
-            return not same(one, other)
-        if isinstance(one, list) and isinstance(other, list):
-            return len(one) != len(other) or any(map(self._beyond, one, other))
-        return self._beyond(one, other)
+            return not same(first, second)
+        if isinstance(first, list) and isinstance(second, list):
+            return len(first) != len(second) or any(map(self._beyond, first, second))
+        return self._beyond(first, second)
 
-    def _beyond(self, one: Any, other: Any) -> bool:
-        if same(one, other):
+    def _beyond(self, first: Any, second: Any) -> bool:
+        if same(first, second):
             return False
-        distance = abs(one - other)
+        distance = abs(first - second)
         # A step to or from NaN or infinity is always one.
         return not distance <= self._deadband
 
 
-def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, wanted: Any) -> ChangeFilter:
+def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, requested: Any) -> DataChangeFilter:
     """Make the filter a client asks for.
 
     Raises
@@ -91,34 +91,34 @@ def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, wanted: 
     FaultError
         BadFilterNotAllowed, BadMonitoredItemFilterUnsupported or BadDeadbandFilterInvalid.
     """
-    if wanted is None or isinstance(wanted, ua.ExtensionObject):
-        return ChangeFilter(ua.DataChangeTrigger.StatusValue, 0.0)
+    if requested is None or isinstance(requested, ua.ExtensionObject):
+        return DataChangeFilter(ua.DataChangeTrigger.StatusValue, 0.0)
     # asyncua exports a subclass of what it decodes, so the exported name would let nothing through.
-    if not isinstance(wanted, DecodedDataChangeFilter):
-        raise FaultError(ua.StatusCodes.BadFilterNotAllowed)
-    if wanted.DeadbandType == ua.DeadbandType.None_:
-        return ChangeFilter(wanted.Trigger, 0.0)
-    held = space.read_attribute_value(node, ua.AttributeIds.Value)
-    if attribute != ua.AttributeIds.Value or held.Value is None or held.Value.VariantType not in NUMERIC:
-        raise FaultError(ua.StatusCodes.BadFilterNotAllowed)
-    deadband = float(wanted.DeadbandValue)
+    if not isinstance(requested, DecodedDataChangeFilter):
+        raise StatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
+    if requested.DeadbandType == ua.DeadbandType.None_:
+        return DataChangeFilter(requested.Trigger, 0.0)
+    data = space.read_attribute_value(node, ua.AttributeIds.Value)
+    if attribute != ua.AttributeIds.Value or data.Value is None or data.Value.VariantType not in NUMERIC:
+        raise StatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
+    deadband = float(requested.DeadbandValue)
     if not deadband >= 0.0:
-        raise FaultError(ua.StatusCodes.BadDeadbandFilterInvalid)
-    if wanted.DeadbandType == ua.DeadbandType.Percent:
-        span = _eu_span(space, node)
-        if span is None:
-            raise FaultError(ua.StatusCodes.BadMonitoredItemFilterUnsupported)
+        raise StatusCodeError(ua.StatusCodes.BadDeadbandFilterInvalid)
+    if requested.DeadbandType == ua.DeadbandType.Percent:
+        eu_span = _eu_span(space, node)
+        if eu_span is None:
+            raise StatusCodeError(ua.StatusCodes.BadMonitoredItemFilterUnsupported)
         if deadband > 100.0:
-            raise FaultError(ua.StatusCodes.BadDeadbandFilterInvalid)
-        deadband = deadband / 100.0 * span
-    return ChangeFilter(wanted.Trigger, deadband)
+            raise StatusCodeError(ua.StatusCodes.BadDeadbandFilterInvalid)
+        deadband = deadband / 100.0 * eu_span
+    return DataChangeFilter(requested.Trigger, deadband)
 
 
 def _eu_span(space: AddressSpace, node: ua.NodeId) -> float | None:
     for reference in space[node].references:
         if reference.IsForward and reference.BrowseName == ua.QualifiedName("EURange", 0):
-            found = space.read_attribute_value(reference.NodeId, ua.AttributeIds.Value).Value.Value
-            return float(found.High - found.Low)
+            eu_range = space.read_attribute_value(reference.NodeId, ua.AttributeIds.Value).Value.Value
+            return float(eu_range.High - eu_range.Low)
     return None
 
 
@@ -137,19 +137,19 @@ def parse_range(text: str | None) -> tuple[int, int] | None:
         return None
     first, colon, last = text.partition(":")
     if not (first.isascii() and first.isdigit() and (not colon or (last.isascii() and last.isdigit()))):
-        raise FaultError(ua.StatusCodes.BadIndexRangeInvalid)
+        raise StatusCodeError(ua.StatusCodes.BadIndexRangeInvalid)
     low, high = int(first), int(last) if colon else int(first)
     if colon and high <= low:
-        raise FaultError(ua.StatusCodes.BadIndexRangeInvalid)
+        raise StatusCodeError(ua.StatusCodes.BadIndexRangeInvalid)
     return low, high
 
 
-def cut(data: ua.DataValue, span: tuple[int, int] | None) -> ua.DataValue:
+def cut(data: ua.DataValue, index_range: tuple[int, int] | None) -> ua.DataValue:
     """Cut a range out of an array, string or byte string; BadIndexRangeNoData where nothing is left of it."""
-    if span is None or data.Value is None:
+    if index_range is None or data.Value is None:
         return data
     value = data.Value.Value
-    part = value[span[0] : span[1] + 1] if isinstance(value, list | str | bytes) else None
+    part = value[index_range[0] : index_range[1] + 1] if isinstance(value, list | str | bytes) else None
     if not part:
         nothing = ua.StatusCode(ua.StatusCodes.BadIndexRangeNoData)
         return ua.DataValue(

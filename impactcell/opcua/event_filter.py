@@ -12,20 +12,21 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.type_instances import supertypes
 
 NULL: Final = ua.Variant()
 MAX_CLAUSES: Final = 200
+"""Longest select clause and longest where clause, elements; no type here has as many fields."""
 
 
 def _ordered(compare: Callable[[Any, Any], bool]) -> Callable[..., bool | None]:
-    def operator(one: Any, other: Any) -> bool | None:
-        if one is None or other is None:
+    def operator(left: Any, right: Any) -> bool | None:
+        if left is None or right is None:
             return None
         try:
-            return compare(one, other)
+            return compare(left, right)
         except TypeError:
             return None
 
@@ -36,16 +37,16 @@ def _not(value: bool | None) -> bool | None:  # noqa: FBT001
     return None if value is None else not value
 
 
-def _and(one: bool | None, other: bool | None) -> bool | None:  # noqa: FBT001
-    if one is False or other is False:
+def _and(left: bool | None, right: bool | None) -> bool | None:  # noqa: FBT001
+    if left is False or right is False:
         return False
-    return None if one is None or other is None else True
+    return None if left is None or right is None else True
 
 
-def _or(one: bool | None, other: bool | None) -> bool | None:  # noqa: FBT001
-    if one is True or other is True:
+def _or(left: bool | None, right: bool | None) -> bool | None:  # noqa: FBT001
+    if left is True or right is True:
         return True
-    return None if one is None or other is None else False
+    return None if left is None or right is None else False
 
 
 def _between(value: Any, low: Any, high: Any) -> bool | None:
@@ -65,25 +66,25 @@ def like(text: str, pattern: str) -> bool:
     >>> like("WearLimit", "Wear%"), like("cell-3", "cell-[1-2]")
     (True, False)
     """
-    out, at = "", 0
-    while at < len(pattern):
-        sign = pattern[at]
-        if sign == "\\" and at + 1 < len(pattern):
-            at += 1
-            out += re.escape(pattern[at])
-        elif sign == "%":
-            out += ".*"
-        elif sign == "_":
-            out += "."
-        elif sign == "[" and "]" in pattern[at + 2 :]:
-            end = pattern.index("]", at + 2)
-            out += "[" + pattern[at + 1 : end].replace("\\", r"\\").replace("[", r"\[") + "]"
-            at = end
+    expression, position = "", 0
+    while position < len(pattern):
+        character = pattern[position]
+        if character == "\\" and position + 1 < len(pattern):
+            position += 1
+            expression += re.escape(pattern[position])
+        elif character == "%":
+            expression += ".*"
+        elif character == "_":
+            expression += "."
+        elif character == "[" and "]" in pattern[position + 2 :]:
+            end = pattern.index("]", position + 2)
+            expression += "[" + pattern[position + 1 : end].replace("\\", r"\\").replace("[", r"\[") + "]"
+            position = end
         else:
-            out += re.escape(sign)
-        at += 1
+            expression += re.escape(character)
+        position += 1
     try:
-        return re.fullmatch(out, text, re.DOTALL) is not None
+        return re.fullmatch(expression, text, re.DOTALL) is not None
     except re.error:
         return False
 
@@ -98,7 +99,7 @@ _OPERATORS: Final[Mapping[ua.FilterOperator, tuple[int, int, Callable[..., bool 
     ua.FilterOperator.Like: (2, 2, _like),
     ua.FilterOperator.Not: (1, 1, _not),
     ua.FilterOperator.Between: (3, 3, _between),
-    ua.FilterOperator.InList: (2, MAX_CLAUSES, lambda a, *rest: None if a is None else a in rest),
+    ua.FilterOperator.InList: (2, MAX_CLAUSES, lambda a, *members: None if a is None else a in members),
     ua.FilterOperator.And: (2, 2, _and),
     ua.FilterOperator.Or: (2, 2, _or),
 }
@@ -113,28 +114,30 @@ class EventFilter:
         BadEventFilterInvalid: no filter, no fields, or a where clause that cannot be evaluated.
     """
 
-    def __init__(self, space: AddressSpace, wanted: Any) -> None:
-        if not isinstance(wanted, ua.EventFilter):
-            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
-        if not 0 < len(wanted.SelectClauses) <= MAX_CLAUSES:
-            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
+    def __init__(self, space: AddressSpace, requested: Any) -> None:
+        if not isinstance(requested, ua.EventFilter):
+            raise StatusCodeError(ua.StatusCodes.BadEventFilterInvalid)
+        if not 0 < len(requested.SelectClauses) <= MAX_CLAUSES:
+            raise StatusCodeError(ua.StatusCodes.BadEventFilterInvalid)
         self._space = space
-        self._elements = wanted.WhereClause.Elements or []
+        self._elements = requested.WhereClause.Elements or []
         if len(self._elements) > MAX_CLAUSES:
-            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadEventFilterInvalid)
         for index, element in enumerate(self._elements):
-            self._check(index, element)
-        self._paths = [self._path(clause) for clause in wanted.SelectClauses]
+            self._check_element(index, element)
+        self._paths = [self._browse_path(clause) for clause in requested.SelectClauses]
         self.result = ua.EventFilterResult()
-        self.result.SelectClauseResults = [self._known(clause) for clause in wanted.SelectClauses]
+        self.result.SelectClauseResults = [
+            self._select_clause_result(clause) for clause in requested.SelectClauses
+        ]
 
-    def _check(self, index: int, element: ua.ContentFilterElement) -> None:
+    def _check_element(self, index: int, element: ua.ContentFilterElement) -> None:
         operands = element.FilterOperands or []
         if element.FilterOperator == ua.FilterOperator.OfType:
             fits = len(operands) == 1 and isinstance(operands[0], ua.LiteralOperand)
         elif element.FilterOperator in _OPERATORS:
-            least, most, _ = _OPERATORS[element.FilterOperator]
-            fits = least <= len(operands) <= most
+            min_operands, max_operands, _ = _OPERATORS[element.FilterOperator]
+            fits = min_operands <= len(operands) <= max_operands
         else:
             fits = False
         for operand in operands:
@@ -144,14 +147,14 @@ class EventFilter:
             elif not isinstance(operand, ua.LiteralOperand | ua.SimpleAttributeOperand | ua.AttributeOperand):
                 fits = False
         if not fits:
-            raise FaultError(ua.StatusCodes.BadEventFilterInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadEventFilterInvalid)
 
-    def _known(self, clause: ua.SimpleAttributeOperand) -> ua.StatusCode:
-        known = clause.TypeDefinitionId in self._space
-        return ua.StatusCode(ua.StatusCodes.Good if known else ua.StatusCodes.BadTypeDefinitionInvalid)
+    def _select_clause_result(self, clause: ua.SimpleAttributeOperand) -> ua.StatusCode:
+        is_known = clause.TypeDefinitionId in self._space
+        return ua.StatusCode(ua.StatusCodes.Good if is_known else ua.StatusCodes.BadTypeDefinitionInvalid)
 
     @staticmethod
-    def _path(clause: ua.SimpleAttributeOperand) -> BrowsePath | None:
+    def _browse_path(clause: ua.SimpleAttributeOperand) -> BrowsePath | None:
         names = tuple(name.Name for name in clause.BrowsePath or [])
         if not names:
             return () if clause.AttributeId == ua.AttributeIds.NodeId else None
@@ -165,22 +168,22 @@ class EventFilter:
 
     def passes(self, event: EventNotification) -> bool:
         """Whether the client wants to hear of an event."""
-        return event.unfiltered or not self._elements or self._element(0, event) is True
+        return event.unfiltered or not self._elements or self._evaluate(0, event) is True
 
-    def _element(self, index: int, event: EventNotification) -> bool | None:
+    def _evaluate(self, index: int, event: EventNotification) -> bool | None:
         element = self._elements[index]
-        operands = [self._operand(operand, event) for operand in element.FilterOperands]
+        operands = [self._evaluate_operand(operand, event) for operand in element.FilterOperands]
         if element.FilterOperator == ua.FilterOperator.OfType:
             return operands[0] in supertypes(self._space, event.event_type)
         return _OPERATORS[element.FilterOperator][2](*operands)
 
-    def _operand(self, operand: Any, event: EventNotification) -> Any:
+    def _evaluate_operand(self, operand: Any, event: EventNotification) -> Any:
         if isinstance(operand, ua.ElementOperand):
-            return self._element(operand.Index, event)
+            return self._evaluate(operand.Index, event)
         if isinstance(operand, ua.LiteralOperand):
             return operand.Value.Value if operand.Value is not None else None
         if isinstance(operand, ua.AttributeOperand):
             names = tuple(part.TargetName.Name for part in operand.BrowsePath.Elements or [])
             return event.fields.get(names, NULL).Value
-        path = self._path(operand)
+        path = self._browse_path(operand)
         return None if path is None else event.fields.get(path, NULL).Value

@@ -21,24 +21,31 @@ from typing import Final
 from impactcell.opcua.host_interface import HistoricalValue
 
 RAW: Final = 0x400
+"""The result is a stored value (the info bits of an aggregate, Part 4, 7.39.2)."""
 CALCULATED: Final = 0x401
+"""It was computed."""
 PARTIAL: Final = 0x404
+"""The interval is shorter than was asked for."""
 MULTIPLE: Final = 0x410
-"""Bits of a status code that tell where an aggregate comes from (Part 4, 7.39.2)."""
+"""The extreme occurs more than once."""
 
 GOOD: Final = 0x0000_0000
+"""Status code Good (Part 6, annex A, as the three that follow)."""
 SUB_NORMAL: Final = 0x40A4_0000
+"""UncertainDataSubNormal: some values were left out."""
 BAD: Final = 0x8000_0000
+"""Bad: no value could be used."""
 NO_DATA: Final = 0x809B_0000
-
-
+"""BadNoData: there was no value."""
 SEVERITY_SHIFT: Final = 30
+"""Lowest of the two bits of a status code that tell its severity (Part 4, 7.39.1)."""
 SEVERITY_GOOD: Final = 0b00
+"""Severity Good."""
 SEVERITY_UNCERTAIN: Final = 0b01
-"""The two uppermost bits of a status code (Part 4, 7.39.1)."""
+"""Severity Uncertain."""
 
 
-class Aggregate(enum.Enum):
+class AggregateFunction(enum.Enum):
     """Aggregates this server computes."""
 
     AVERAGE = "Average"
@@ -48,7 +55,7 @@ class Aggregate(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Treatment:
+class AggregateConfiguration:
     """AggregateConfiguration of Part 13."""
 
     uncertain_as_bad: bool = True
@@ -57,7 +64,7 @@ class Treatment:
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class ProcessingInterval:
     """A processing interval from `start_ns`, which belongs to it, to `end_ns`, which does not.
 
     Where time runs backwards `start_ns` is the later one. `partial` is True where the interval is shorter
@@ -75,7 +82,7 @@ class Interval:
 
 
 @dataclass(frozen=True, slots=True)
-class Processed:
+class AggregateValue:
     """An aggregate of one interval; `status` is an OPC UA status code, `value` None where there is none."""
 
     time_ns: int
@@ -83,7 +90,7 @@ class Processed:
     status: int
 
 
-def intervals(start_ns: int, end_ns: int, step_ns: int) -> Iterator[Interval]:
+def processing_intervals(start_ns: int, end_ns: int, step_ns: int) -> Iterator[ProcessingInterval]:
     """Cut a span into processing intervals; a step of 0 leaves it whole.
 
     >>> [(i.start_ns, i.end_ns, i.partial) for i in intervals(0, 25, 10)]
@@ -93,22 +100,22 @@ def intervals(start_ns: int, end_ns: int, step_ns: int) -> Iterator[Interval]:
     """
     sign = 1 if end_ns >= start_ns else -1
     step = sign * step_ns if step_ns else end_ns - start_ns
-    at = start_ns
-    while sign * (end_ns - at) > 0:
-        stop = at + step
-        partial = sign * (stop - end_ns) > 0
-        yield Interval(at, end_ns if partial else stop, partial)
-        at = stop
+    lower_ns = start_ns
+    while sign * (end_ns - lower_ns) > 0:
+        upper_ns = lower_ns + step
+        partial = sign * (upper_ns - end_ns) > 0
+        yield ProcessingInterval(lower_ns, end_ns if partial else upper_ns, partial)
+        lower_ns = upper_ns
 
 
-def process(
-    aggregate: Aggregate,
-    interval: Interval,
+def aggregate_interval(
+    aggregate: AggregateFunction,
+    interval: ProcessingInterval,
     values: Sequence[HistoricalValue],
-    treatment: Treatment,
+    configuration: AggregateConfiguration,
     *,
     within: bool,
-) -> Processed:
+) -> AggregateValue:
     """Aggregate the values of one interval.
 
     Parameters
@@ -118,57 +125,65 @@ def process(
     within : bool
         Whether the interval touches the span of what is stored at all.
     """
-    if aggregate is Aggregate.COUNT:
-        return _count(interval, values, treatment, within=within)
-    good = [value for value in values if _is_good(value, treatment)]
+    if aggregate is AggregateFunction.COUNT:
+        return _count(interval, values, configuration, within=within)
+    good = [value for value in values if _is_good(value, configuration)]
     if not good:
-        return Processed(interval.start_ns, None, NO_DATA if not values else BAD)
-    status = _status(len(good), len(values), treatment)
-    if aggregate is Aggregate.AVERAGE:
+        return AggregateValue(interval.start_ns, None, NO_DATA if not values else BAD)
+    status = _status(len(good), len(values), configuration)
+    if aggregate is AggregateFunction.AVERAGE:
         mean = sum(value.value for value in good) / len(good)
-        return Processed(interval.start_ns, mean, status | CALCULATED)
-    pick = min if aggregate is Aggregate.MINIMUM else max
+        return AggregateValue(interval.start_ns, mean, status | CALCULATED)
+    pick = min if aggregate is AggregateFunction.MINIMUM else max
     return _extreme(pick, interval, values, good, status)
 
 
 def _count(
-    interval: Interval, values: Sequence[HistoricalValue], treatment: Treatment, *, within: bool
-) -> Processed:
+    interval: ProcessingInterval,
+    values: Sequence[HistoricalValue],
+    configuration: AggregateConfiguration,
+    *,
+    within: bool,
+) -> AggregateValue:
     bits = CALCULATED | (PARTIAL if interval.partial else 0)
     if not values:
         return (
-            Processed(interval.start_ns, 0, bits) if within else Processed(interval.start_ns, None, NO_DATA)
+            AggregateValue(interval.start_ns, 0, bits)
+            if within
+            else AggregateValue(interval.start_ns, None, NO_DATA)
         )
-    good = sum(1 for value in values if _is_good(value, treatment))
-    return Processed(interval.start_ns, good, _status(good, len(values), treatment) | bits)
+    good = sum(1 for value in values if _is_good(value, configuration))
+    return AggregateValue(interval.start_ns, good, _status(good, len(values), configuration) | bits)
 
 
 def _extreme(
     pick: Callable[..., float],
-    interval: Interval,
+    interval: ProcessingInterval,
     values: Sequence[HistoricalValue],
     good: Sequence[HistoricalValue],
     status: int,
-) -> Processed:
-    found = pick(value.value for value in good)
-    at = [value.time_ns for value in good if value.value == found]
-    if any(pick(value.value, found) != found for value in values if value not in good):
+) -> AggregateValue:
+    extreme = pick(value.value for value in good)
+    times_ns = [value.time_ns for value in good if value.value == extreme]
+    if any(pick(value.value, extreme) != extreme for value in values if value not in good):
         # Part 13, 5.4.3.10: a more extreme value exists that is not Good.
         status = max(status, SUB_NORMAL)
-    bits = RAW if interval.start_ns in at else CALCULATED
-    bits |= (MULTIPLE if len(at) > 1 else 0) | (PARTIAL if interval.partial else 0)
-    return Processed(interval.start_ns, found, status | bits)
+    bits = RAW if interval.start_ns in times_ns else CALCULATED
+    bits |= (MULTIPLE if len(times_ns) > 1 else 0) | (PARTIAL if interval.partial else 0)
+    return AggregateValue(interval.start_ns, extreme, status | bits)
 
 
-def _is_good(value: HistoricalValue, treatment: Treatment) -> bool:
+def _is_good(value: HistoricalValue, configuration: AggregateConfiguration) -> bool:
     severity = value.status >> SEVERITY_SHIFT
-    return severity == SEVERITY_GOOD or (severity == SEVERITY_UNCERTAIN and not treatment.uncertain_as_bad)
+    return severity == SEVERITY_GOOD or (
+        severity == SEVERITY_UNCERTAIN and not configuration.uncertain_as_bad
+    )
 
 
-def _status(good: int, all_values: int, treatment: Treatment) -> int:
+def _status(good: int, all_values: int, configuration: AggregateConfiguration) -> int:
     percent_good = 100.0 * good / all_values
-    if percent_good >= treatment.percent_good:
+    if percent_good >= configuration.percent_good:
         return GOOD
-    if 100.0 - percent_good >= treatment.percent_bad:
+    if 100.0 - percent_good >= configuration.percent_bad:
         return BAD
     return SUB_NORMAL

@@ -11,22 +11,23 @@ from typing import Any
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import AccessPolicy, Permission, RefusedError, Role
-from impactcell.opcua.request_dispatch import Context, Service, bounded
+from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
 
-MOST_CALLS = 100
+MAX_CALLS = 100
+"""Methods in one Call."""
 
 
 @dataclass(frozen=True, slots=True)
-class Argument:
+class InputArgument:
     """An argument a method takes."""
 
     name: str
     kind: ua.VariantType
 
 
-class ArgumentError(Exception):
+class InvalidArgumentError(Exception):
     """An argument of the right type with a value that is refused."""
 
     def __init__(self, index: int, code: int) -> None:
@@ -35,18 +36,18 @@ class ArgumentError(Exception):
         self.code = code
 
 
-Run = Callable[[Context, Sequence[Any]], Awaitable[None]]
+MethodHandler = Callable[[RequestContext, Sequence[Any]], Awaitable[None]]
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
     """A method as it can be called on one object."""
 
-    arguments: tuple[Argument, ...]
-    run: Run
+    arguments: tuple[InputArgument, ...]
+    handler: MethodHandler
 
 
-class Calls:
+class MethodService:
     """Answers Call. Methods are bound to (object, method) pairs; anything else is no method of the object."""
 
     def __init__(self, space: AddressSpace, access: AccessPolicy) -> None:
@@ -62,53 +63,58 @@ class Calls:
         """Make a method callable on an object."""
         self._bound[owner, method] = bound
 
-    async def call(self, context: Context, wanted: ua.CallParameters) -> ua.CallResponse:
+    async def call(self, context: RequestContext, parameters: ua.CallParameters) -> ua.CallResponse:
         """Call methods, one after the other."""
         response = ua.CallResponse()
         response.Results = [
-            await self._call(context, each) for each in bounded(wanted.MethodsToCall, MOST_CALLS)
+            await self._call(context, request)
+            for request in check_operations(parameters.MethodsToCall, MAX_CALLS)
         ]
         return response
 
-    async def _call(self, context: Context, wanted: ua.CallMethodRequest) -> ua.CallMethodResult:
+    async def _call(self, context: RequestContext, request: ua.CallMethodRequest) -> ua.CallMethodResult:
         result = ua.CallMethodResult()
-        arguments = list(wanted.InputArguments or [])
+        arguments = list(request.InputArguments or [])
         try:
-            method = self._find(wanted, context.actor.role)
-            result.InputArgumentResults = _check(method, arguments)
+            method = self._find(request, context.actor.role)
+            result.InputArgumentResults = _check_arguments(method, arguments)
             if any(not code.is_good() for code in result.InputArgumentResults):
                 result.StatusCode = ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
                 return result
-            await method.run(context, [argument.Value for argument in arguments])
-        except FaultError as fault:
+            await method.handler(context, [argument.Value for argument in arguments])
+        except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
-        except ArgumentError as error:
+        except InvalidArgumentError as error:
             result.InputArgumentResults[error.index] = ua.StatusCode(error.code)
             result.StatusCode = ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
         except RefusedError as refused:
             result.StatusCode = ua.StatusCode(getattr(ua.StatusCodes, refused.code))
         return result
 
-    def _find(self, wanted: ua.CallMethodRequest, role: Role) -> Method:
-        method = self._bound.get((wanted.ObjectId, wanted.MethodId))
+    def _find(self, request: ua.CallMethodRequest, role: Role) -> Method:
+        method = self._bound.get((request.ObjectId, request.MethodId))
         if method is not None:
-            if not self._access.permits(role, Permission.CALL, wanted.MethodId):
-                raise FaultError(ua.StatusCodes.BadUserAccessDenied)
+            if not self._access.permits(role, Permission.CALL, request.MethodId):
+                raise StatusCodeError(ua.StatusCodes.BadUserAccessDenied)
             return method
-        if wanted.ObjectId not in self._space:
-            raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
-        raise FaultError(ua.StatusCodes.BadMethodInvalid)
+        if request.ObjectId not in self._space:
+            raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
+        raise StatusCodeError(ua.StatusCodes.BadMethodInvalid)
 
 
-def _check(method: Method, arguments: list[ua.Variant]) -> list[ua.StatusCode]:
+def _check_arguments(method: Method, arguments: list[ua.Variant]) -> list[ua.StatusCode]:
     if len(arguments) < len(method.arguments):
-        raise FaultError(ua.StatusCodes.BadArgumentsMissing)
+        raise StatusCodeError(ua.StatusCodes.BadArgumentsMissing)
     if len(arguments) > len(method.arguments):
-        raise FaultError(ua.StatusCodes.BadTooManyArguments)
+        raise StatusCodeError(ua.StatusCodes.BadTooManyArguments)
     results = []
-    for wanted, given in zip(method.arguments, arguments, strict=True):
-        fits = given.VariantType == wanted.kind and not isinstance(given.Value, list) and not given.is_array
-        nullable = wanted.kind in (ua.VariantType.LocalizedText, ua.VariantType.ByteString)
-        fits = fits or (nullable and given.VariantType == ua.VariantType.Null)
+    for declared, argument in zip(method.arguments, arguments, strict=True):
+        fits = (
+            argument.VariantType == declared.kind
+            and not isinstance(argument.Value, list)
+            and not argument.is_array
+        )
+        nullable = declared.kind in (ua.VariantType.LocalizedText, ua.VariantType.ByteString)
+        fits = fits or (nullable and argument.VariantType == ua.VariantType.Null)
         results.append(ua.StatusCode(ua.StatusCodes.Good if fits else ua.StatusCodes.BadTypeMismatch))
     return results

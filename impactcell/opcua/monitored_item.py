@@ -11,20 +11,21 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
-from impactcell.opcua.binary_codec import FaultError, encode
-from impactcell.opcua.data_change_filter import ChangeFilter, change_filter, cut, parse_range
+from impactcell.opcua.binary_codec import StatusCodeError, encode
+from impactcell.opcua.data_change_filter import DataChangeFilter, change_filter, cut, parse_range
 from impactcell.opcua.event_filter import EventFilter
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.host_interface import ServerLimits
-from impactcell.opcua.node_values import Sample, Values
-from impactcell.opcua.type_instances import read
+from impactcell.opcua.type_instances import read_attribute
+from impactcell.opcua.variable_store import SharedValue, VariableStore
 
 OVERFLOW: Final = 0x0480
 """Bits of a status code: it describes a DataValue, and values before it were lost."""
-LEAST_EVENTS: Final = 100
+MIN_EVENT_QUEUE: Final = 100
+"""Shortest queue of an event item: a refresh of a few cells fits."""
 OVERFLOW_EVENT: Final = ua.NodeId(ua.ObjectIds.EventQueueOverflowEventType)
 
-Ready = Callable[["DataItem | EventItem"], None]
+ReadyCallback = Callable[["DataMonitoredItem | EventMonitoredItem"], None]
 
 
 def with_overflow(data: ua.DataValue) -> ua.DataValue:
@@ -35,7 +36,7 @@ def with_overflow(data: ua.DataValue) -> ua.DataValue:
     )
 
 
-class DataItem:
+class DataMonitoredItem:
     """Reports the values of one attribute."""
 
     def __init__(
@@ -44,33 +45,35 @@ class DataItem:
         request: ua.MonitoredItemCreateRequest,
         timestamps: ua.TimestampsToReturn,
         space: AddressSpace,
-        values: Values,
+        values: VariableStore,
         limits: ServerLimits,
-        ready: Ready,
+        ready: ReadyCallback,
     ) -> None:
         target = request.ItemToMonitor
         self.id = item_id
         self._node, self._attribute = target.NodeId, target.AttributeId
         self._values, self._space, self._limits, self._ready = values, space, limits, ready
         self._range = parse_range(target.IndexRange)
-        self._queue: deque[Sample] = deque()
+        self._queue: deque[SharedValue] = deque()
         self.mode = request.MonitoringMode
         self._configure(request.RequestedParameters, timestamps)
         if self._attribute == ua.AttributeIds.Value:
-            values.watch(self._node, self.offer)
+            values.add_observer(self._node, self.offer)
         if self.mode != ua.MonitoringMode.Disabled:
             self.offer_present()
 
-    def _configure(self, wanted: ua.MonitoringParameters, timestamps: ua.TimestampsToReturn) -> None:
-        self._filter: ChangeFilter = change_filter(self._space, self._node, self._attribute, wanted.Filter)
-        self.handle: int = wanted.ClientHandle
+    def _configure(self, parameters: ua.MonitoringParameters, timestamps: ua.TimestampsToReturn) -> None:
+        self._filter: DataChangeFilter = change_filter(
+            self._space, self._node, self._attribute, parameters.Filter
+        )
+        self.handle: int = parameters.ClientHandle
         self._timestamps = timestamps
-        self._size = min(max(wanted.QueueSize, 1), self._limits.queue_per_item)
-        self._discard_oldest: bool = wanted.DiscardOldest
+        self._size = min(max(parameters.QueueSize, 1), self._limits.queue_per_item)
+        self._discard_oldest: bool = parameters.DiscardOldest
 
-    def modify(self, wanted: ua.MonitoringParameters, timestamps: ua.TimestampsToReturn) -> None:
+    def modify(self, parameters: ua.MonitoringParameters, timestamps: ua.TimestampsToReturn) -> None:
         """Change filter, queue and handle; values that wait stay, as far as the queue holds them."""
-        self._configure(wanted, timestamps)
+        self._configure(parameters, timestamps)
         while len(self._queue) > self._size:
             self._queue.popleft()
 
@@ -82,27 +85,27 @@ class DataItem:
     def offer_present(self) -> None:
         """Report the present value, whatever was reported before."""
         self._filter = self._filter.fresh()
-        self.offer(Sample(self._space.read_attribute_value(self._node, self._attribute)))
+        self.offer(SharedValue(self._space.read_attribute_value(self._node, self._attribute)))
 
-    def offer(self, sample: Sample) -> None:
+    def offer(self, value: SharedValue) -> None:
         """Take in a value that was written."""
         if self.mode == ua.MonitoringMode.Disabled:
             return
         if self._range is not None:
-            sample = Sample(cut(sample.data, self._range))
-        if not self._filter.passes(sample.data):
+            value = SharedValue(cut(value.data, self._range))
+        if not self._filter.passes(value.data):
             return
         queue = self._queue
         if len(queue) >= self._size:
             if self._discard_oldest or self._size == 1:
                 queue.popleft()
-                queue.append(sample)
+                queue.append(value)
                 if self._size > 1:
-                    queue[0] = Sample(with_overflow(queue[0].data))
+                    queue[0] = SharedValue(with_overflow(queue[0].data))
             else:
-                queue[-1] = Sample(with_overflow(sample.data))
+                queue[-1] = SharedValue(with_overflow(value.data))
         else:
-            queue.append(sample)
+            queue.append(value)
         self._ready(self)
 
     @property
@@ -110,11 +113,12 @@ class DataItem:
         """Number of values that wait to be reported."""
         return len(self._queue) if self.mode == ua.MonitoringMode.Reporting else 0
 
-    def take(self, most: int) -> list[tuple[int, bytes]]:
+    def take(self, max_count: int) -> list[tuple[int, bytes]]:
         """Take up to `most` values, encoded, with the client's handle."""
         queue = self._queue
         return [
-            (self.handle, queue.popleft().encoded(self._timestamps)) for _ in range(min(most, len(queue)))
+            (self.handle, queue.popleft().encoded(self._timestamps))
+            for _ in range(min(max_count, len(queue)))
         ]
 
     def set_mode(self, mode: ua.MonitoringMode) -> None:
@@ -129,11 +133,11 @@ class DataItem:
 
     def close(self) -> None:
         """Watch no longer."""
-        self._values.unwatch(self._node, self.offer)
+        self._values.remove_observer(self._node, self.offer)
         self._queue.clear()
 
 
-class EventItem:
+class EventMonitoredItem:
     """Reports the events of one notifier."""
 
     def __init__(
@@ -142,28 +146,28 @@ class EventItem:
         request: ua.MonitoredItemCreateRequest,
         space: AddressSpace,
         limits: ServerLimits,
-        ready: Ready,
+        ready: ReadyCallback,
     ) -> None:
         self.id = item_id
         self.notifier = request.ItemToMonitor.NodeId
         self._space, self._limits, self._ready = space, limits, ready
-        notifies = read(space, self.notifier, ua.AttributeIds.EventNotifier)
+        notifies = read_attribute(space, self.notifier, ua.AttributeIds.EventNotifier)
         if notifies is None or not notifies & ua.EventNotifier.SubscribeToEvents.mask:
-            raise FaultError(ua.StatusCodes.BadAttributeIdInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadAttributeIdInvalid)
         self._queue: deque[bytes] = deque()
         self._overflowed = False
         self.mode = request.MonitoringMode
         self._configure(request.RequestedParameters)
 
-    def _configure(self, wanted: ua.MonitoringParameters) -> None:
-        self._filter = EventFilter(self._space, wanted.Filter)
-        self.handle: int = wanted.ClientHandle
-        size = wanted.QueueSize or self._limits.events_per_item
-        self._size = min(max(size, LEAST_EVENTS), self._limits.events_per_item)
+    def _configure(self, parameters: ua.MonitoringParameters) -> None:
+        self._filter = EventFilter(self._space, parameters.Filter)
+        self.handle: int = parameters.ClientHandle
+        size = parameters.QueueSize or self._limits.events_per_item
+        self._size = min(max(size, MIN_EVENT_QUEUE), self._limits.events_per_item)
 
-    def modify(self, wanted: ua.MonitoringParameters, _timestamps: ua.TimestampsToReturn) -> None:
+    def modify(self, parameters: ua.MonitoringParameters, _timestamps: ua.TimestampsToReturn) -> None:
         """Change filter, queue and handle."""
-        self._configure(wanted)
+        self._configure(parameters)
 
     @property
     def revised(self) -> tuple[int, Any]:
@@ -181,7 +185,7 @@ class EventItem:
                 self._overflowed = True
                 self._queue.popleft()
                 self._queue.appendleft(
-                    self._encode(EventNotification(OVERFLOW_EVENT, overflow_fields(), frozenset()))
+                    self._encode(EventNotification(OVERFLOW_EVENT, overflow_event_fields(), frozenset()))
                 )
         self._queue.append(self._encode(event))
         self._ready(self)
@@ -196,11 +200,11 @@ class EventItem:
         """Number of events that wait to be reported."""
         return len(self._queue) if self.mode == ua.MonitoringMode.Reporting else 0
 
-    def take(self, most: int) -> list[bytes]:
+    def take(self, max_count: int) -> list[bytes]:
         """Take up to `most` events, encoded."""
-        taken = [self._queue.popleft() for _ in range(min(most, len(self._queue)))]
+        notifications = [self._queue.popleft() for _ in range(min(max_count, len(self._queue)))]
         self._overflowed = self._overflowed and bool(self._queue)
-        return taken
+        return notifications
 
     def set_mode(self, mode: ua.MonitoringMode) -> None:
         """Report, only collect, or do nothing."""
@@ -215,7 +219,7 @@ class EventItem:
         self._queue.clear()
 
 
-def overflow_fields() -> dict[tuple[str, ...], ua.Variant]:
+def overflow_event_fields() -> dict[tuple[str, ...], ua.Variant]:
     """Fields of the event that tells that others were lost."""
     return {
         ("EventType",): ua.Variant(OVERFLOW_EVENT, ua.VariantType.NodeId),

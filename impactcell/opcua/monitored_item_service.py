@@ -5,149 +5,158 @@ from typing import Any
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import AccessPolicy, Permission, Role, ServerLimits
-from impactcell.opcua.monitored_item import DataItem, EventItem
-from impactcell.opcua.node_values import Values
-from impactcell.opcua.request_dispatch import Context, Service, bounded
-from impactcell.opcua.subscription import Item, Subscription
-from impactcell.opcua.subscription_service import Monitoring, each
+from impactcell.opcua.monitored_item import DataMonitoredItem, EventMonitoredItem
+from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
+from impactcell.opcua.subscription import MonitoredItem, Subscription
+from impactcell.opcua.subscription_service import SubscriptionService, apply_to_each
+from impactcell.opcua.variable_store import VariableStore
 
 
-class MonitoredItems:
+class MonitoredItemService:
     """Answers what clients ask of the items of their subscriptions."""
 
     def __init__(
         self,
         space: AddressSpace,
-        values: Values,
+        values: VariableStore,
         access: AccessPolicy,
         limits: ServerLimits,
-        monitoring: Monitoring,
+        subscriptions: SubscriptionService,
     ) -> None:
         self._space = space
         self._access = access
         self._values = values
         self._limits = limits
-        self._monitoring = monitoring
+        self._subscriptions = subscriptions
 
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
         return {
-            "CreateMonitoredItems": Service(ua.CreateMonitoredItemsParameters, self.create_items),
-            "ModifyMonitoredItems": Service(ua.ModifyMonitoredItemsParameters, self.modify_items),
-            "SetMonitoringMode": Service(ua.SetMonitoringModeParameters, self.set_monitoring),
-            "DeleteMonitoredItems": Service(ua.DeleteMonitoredItemsParameters, self.delete_items),
+            "CreateMonitoredItems": Service(ua.CreateMonitoredItemsParameters, self.create_monitored_items),
+            "ModifyMonitoredItems": Service(ua.ModifyMonitoredItemsParameters, self.modify_monitored_items),
+            "SetMonitoringMode": Service(ua.SetMonitoringModeParameters, self.set_monitoring_mode),
+            "DeleteMonitoredItems": Service(ua.DeleteMonitoredItemsParameters, self.delete_monitored_items),
         }
 
-    async def create_items(
-        self, context: Context, wanted: ua.CreateMonitoredItemsParameters
+    async def create_monitored_items(
+        self, context: RequestContext, parameters: ua.CreateMonitoredItemsParameters
     ) -> ua.CreateMonitoredItemsResponse:
         """Add monitored items."""
-        found = self._monitoring.find(wanted.SubscriptionId, context.session)
-        _check_timestamps(wanted.TimestampsToReturn)
+        subscription = self._subscriptions.find(parameters.SubscriptionId, context.session)
+        _check_timestamps(parameters.TimestampsToReturn)
         response = ua.CreateMonitoredItemsResponse()
         response.Results = [
-            self._create_item(found, item, wanted.TimestampsToReturn, context.actor.role)
-            for item in bounded(wanted.ItemsToCreate)
+            self._create_result(subscription, item, parameters.TimestampsToReturn, context.actor.role)
+            for item in check_operations(parameters.ItemsToCreate)
         ]
         return response
 
-    def _create_item(
+    def _create_result(
         self,
-        found: Subscription,
-        wanted: ua.MonitoredItemCreateRequest,
+        subscription: Subscription,
+        request: ua.MonitoredItemCreateRequest,
         timestamps: ua.TimestampsToReturn,
         role: Role,
     ) -> ua.MonitoredItemCreateResult:
         result = ua.MonitoredItemCreateResult()
         try:
-            item = self._make_item(found, wanted, timestamps, role)
-        except FaultError as fault:
+            item = self._make_item(subscription, request, timestamps, role)
+        except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
-        found.items[item.id] = item
+        subscription.items[item.id] = item
         if item.waiting:
-            found.ready(item)
+            subscription.ready(item)
         result.MonitoredItemId = item.id
         _revise_item(item, result)
         return result
 
     def _make_item(
         self,
-        found: Subscription,
-        wanted: ua.MonitoredItemCreateRequest,
+        subscription: Subscription,
+        request: ua.MonitoredItemCreateRequest,
         timestamps: ua.TimestampsToReturn,
         role: Role,
-    ) -> Item:
-        target = wanted.ItemToMonitor
+    ) -> MonitoredItem:
+        target = request.ItemToMonitor
         node = self._space.get(target.NodeId)
         if node is None:
-            raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
+            raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
         if not self._access.permits(role, Permission.SUBSCRIBE, target.NodeId):
-            raise FaultError(ua.StatusCodes.BadUserAccessDenied)
+            raise StatusCodeError(ua.StatusCodes.BadUserAccessDenied)
         if target.AttributeId not in node.attributes:
-            raise FaultError(ua.StatusCodes.BadAttributeIdInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadAttributeIdInvalid)
         if target.AttributeId == ua.AttributeIds.EventNotifier:
-            item = EventItem(found.next_item_id(), wanted, self._space, self._limits, found.ready)
-            self._monitoring.listen(item, found)
+            item = EventMonitoredItem(
+                subscription.next_item_id(), request, self._space, self._limits, subscription.ready
+            )
+            self._subscriptions.listen(item, subscription)
             return item
-        return DataItem(
-            found.next_item_id(), wanted, timestamps, self._space, self._values, self._limits, found.ready
+        return DataMonitoredItem(
+            subscription.next_item_id(),
+            request,
+            timestamps,
+            self._space,
+            self._values,
+            self._limits,
+            subscription.ready,
         )
 
-    async def modify_items(
-        self, context: Context, wanted: ua.ModifyMonitoredItemsParameters
+    async def modify_monitored_items(
+        self, context: RequestContext, parameters: ua.ModifyMonitoredItemsParameters
     ) -> ua.ModifyMonitoredItemsResponse:
         """Change monitored items."""
-        found = self._monitoring.find(wanted.SubscriptionId, context.session)
-        _check_timestamps(wanted.TimestampsToReturn)
+        subscription = self._subscriptions.find(parameters.SubscriptionId, context.session)
+        _check_timestamps(parameters.TimestampsToReturn)
         response = ua.ModifyMonitoredItemsResponse()
         results = []
-        for change in bounded(wanted.ItemsToModify):
+        for change in check_operations(parameters.ItemsToModify):
             result = ua.MonitoredItemModifyResult()
             try:
-                item = found.item(change.MonitoredItemId)
-                item.modify(change.RequestedParameters, wanted.TimestampsToReturn)
+                item = subscription.item(change.MonitoredItemId)
+                item.modify(change.RequestedParameters, parameters.TimestampsToReturn)
                 _revise_item(item, result)
-            except FaultError as fault:
+            except StatusCodeError as fault:
                 result.StatusCode = ua.StatusCode(fault.code)
             results.append(result)
         response.Results = results
         return response
 
-    async def set_monitoring(
-        self, context: Context, wanted: ua.SetMonitoringModeParameters
+    async def set_monitoring_mode(
+        self, context: RequestContext, parameters: ua.SetMonitoringModeParameters
     ) -> ua.SetMonitoringModeResponse:
         """Let items report, only sample, or rest."""
-        found = self._monitoring.find(wanted.SubscriptionId, context.session)
+        subscription = self._subscriptions.find(parameters.SubscriptionId, context.session)
         response = ua.SetMonitoringModeResponse()
-        response.Parameters.Results = each(
-            wanted.MonitoredItemIds, lambda number: found.item(number).set_mode(wanted.MonitoringMode)
+        response.Parameters.Results = apply_to_each(
+            parameters.MonitoredItemIds,
+            lambda number: subscription.item(number).set_mode(parameters.MonitoringMode),
         )
         return response
 
-    async def delete_items(
-        self, context: Context, wanted: ua.DeleteMonitoredItemsParameters
+    async def delete_monitored_items(
+        self, context: RequestContext, parameters: ua.DeleteMonitoredItemsParameters
     ) -> ua.DeleteMonitoredItemsResponse:
         """Take monitored items out."""
-        found = self._monitoring.find(wanted.SubscriptionId, context.session)
+        subscription = self._subscriptions.find(parameters.SubscriptionId, context.session)
 
         def delete(number: int) -> None:
-            self._monitoring.forget(found.item(number))
-            found.remove(number)
+            self._subscriptions.forget(subscription.item(number))
+            subscription.remove(number)
 
         response = ua.DeleteMonitoredItemsResponse()
-        response.Results = each(wanted.MonitoredItemIds, delete)
+        response.Results = apply_to_each(parameters.MonitoredItemIds, delete)
         return response
 
 
 def _check_timestamps(timestamps: ua.TimestampsToReturn) -> None:
     if timestamps == ua.TimestampsToReturn.Invalid:
-        raise FaultError(ua.StatusCodes.BadTimestampsToReturnInvalid)
+        raise StatusCodeError(ua.StatusCodes.BadTimestampsToReturnInvalid)
 
 
-def _revise_item(item: Item, result: Any) -> None:
+def _revise_item(item: MonitoredItem, result: Any) -> None:
     # 0: values are reported as they come, not sampled at an interval (Part 4, 5.13.1.2).
     result.RevisedSamplingInterval = 0.0
     result.RevisedQueueSize, filter_result = item.revised

@@ -14,47 +14,48 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import StrictBuffer
 from impactcell.opcua.binary_codec import (
     DecodingError,
-    FaultError,
+    StatusCodeError,
     decode,
     decode_type,
     encode,
     service_fault,
 )
 from impactcell.opcua.host_interface import Actor
-from impactcell.opcua.sessions import Session, Sessions
-from impactcell.opcua.tcp_connection import Connection
+from impactcell.opcua.session_table import Session, SessionTable
+from impactcell.opcua.tcp_connection import TcpConnection
 
 _log = logging.getLogger(__name__)
 
 MAX_OPERATIONS: Final = 10_000
+"""Operations in one request where a service sets no other limit."""
 
 
 @dataclass(frozen=True, slots=True)
-class Context:
+class RequestContext:
     """What comes with a request."""
 
-    connection: Connection
+    connection: TcpConnection
     header: ua.RequestHeader
     request_id: int
-    found_session: Session | None = None
+    session_or_none: Session | None = None
 
     @property
     def session(self) -> Session:
         """Session of the request; only services that need one ask for it."""
-        if self.found_session is None:
-            raise FaultError(ua.StatusCodes.BadSessionIdInvalid)
-        return self.found_session
+        if self.session_or_none is None:
+            raise StatusCodeError(ua.StatusCodes.BadSessionIdInvalid)
+        return self.session_or_none
 
     @property
     def actor(self) -> Actor:
         """User behind the request."""
         actor = self.session.actor
         if actor is None:
-            raise FaultError(ua.StatusCodes.BadSessionNotActivated)
+            raise StatusCodeError(ua.StatusCodes.BadSessionNotActivated)
         return actor
 
 
-Handler = Callable[[Context, Any], Awaitable[Any]]
+Handler = Callable[[RequestContext, Any], Awaitable[Any]]
 """Answers with a response object, with encoded bytes, or with None where the answer comes later."""
 
 
@@ -76,21 +77,21 @@ def request_id(name: str) -> int:
     return int(getattr(ua.ObjectIds, f"{name}Request_Encoding_DefaultBinary"))
 
 
-class Dispatcher:
+class RequestDispatcher:
     """Answers requests of all connections."""
 
     def __init__(
-        self, sessions: Sessions, services: Mapping[str, Service], lost: Callable[[Connection], None]
+        self, sessions: SessionTable, services: Mapping[str, Service], lost: Callable[[TcpConnection], None]
     ) -> None:
         self._sessions = sessions
         self._services = {request_id(name): service for name, service in services.items()}
         self._lost = lost
 
-    def disconnected(self, connection: Connection) -> None:
+    def disconnected(self, connection: TcpConnection) -> None:
         """Pass on that a connection has gone."""
         self._lost(connection)
 
-    async def handle(self, connection: Connection, request_id: int, body: bytes) -> None:
+    async def handle(self, connection: TcpConnection, request_id: int, body: bytes) -> None:
         """Answer one request.
 
         Raises
@@ -104,7 +105,7 @@ class Dispatcher:
         handle = header.RequestHandle
         try:
             answer = await self._answer(connection, request_id, kind, header, buffer)
-        except FaultError as fault:
+        except StatusCodeError as fault:
             answer = service_fault(handle, fault.code)
         except DecodingError as error:
             _log.warning("request from %s: %s", connection.address, error)
@@ -121,7 +122,7 @@ class Dispatcher:
 
     async def _answer(
         self,
-        connection: Connection,
+        connection: TcpConnection,
         request_id: int,
         kind: ua.NodeId,
         header: ua.RequestHeader,
@@ -129,15 +130,15 @@ class Dispatcher:
     ) -> Any:
         service = self._services.get(kind.Identifier) if kind.NamespaceIndex == 0 else None
         if service is None:
-            raise FaultError(ua.StatusCodes.BadServiceUnsupported)
+            raise StatusCodeError(ua.StatusCodes.BadServiceUnsupported)
         session = None
         if service.needs_session:
             session = self._sessions.resolve(header.AuthenticationToken, connection)
         parameters = decode(service.parameters, body) if service.parameters is not None else body
-        return await service.handler(Context(connection, header, request_id, session), parameters)
+        return await service.handler(RequestContext(connection, header, request_id, session), parameters)
 
 
-def bounded(operations: list[Any] | None, limit: int = MAX_OPERATIONS) -> list[Any]:
+def check_operations(operations: list[Any] | None, limit: int = MAX_OPERATIONS) -> list[Any]:
     """Check the operations of one request.
 
     Raises
@@ -146,7 +147,7 @@ def bounded(operations: list[Any] | None, limit: int = MAX_OPERATIONS) -> list[A
         BadNothingToDo or BadTooManyOperations.
     """
     if not operations:
-        raise FaultError(ua.StatusCodes.BadNothingToDo)
+        raise StatusCodeError(ua.StatusCodes.BadNothingToDo)
     if len(operations) > limit:
-        raise FaultError(ua.StatusCodes.BadTooManyOperations)
+        raise StatusCodeError(ua.StatusCodes.BadTooManyOperations)
     return operations

@@ -22,19 +22,24 @@ from impactcell.opcua.asyncua_adapter import (
     TransportLimits,
     uatcp_to_binary,
 )
-from impactcell.opcua.binary_codec import DecodingError, FaultError, decode, decode_type, encode
+from impactcell.opcua.binary_codec import StatusCodeError, decode, decode_type, encode
 from impactcell.opcua.trust_list import TrustList, UntrustedError
 
-CHUNK: Final = 65_536
+MAX_CHUNK: Final = 65_536
+"""Longest chunk taken and sent, bytes."""
 MIN_CHUNK: Final = 8_192
+"""Shortest chunk a client may ask for, bytes (Part 6, 7.1.2.3)."""
 MIN_LIFETIME_MS: Final = 60_000
+"""Shortest lifetime of a security token, milliseconds."""
 MAX_LIFETIME_MS: Final = 3_600_000
+"""Longest lifetime of a security token, milliseconds: one hour, as the standard's clients ask for."""
 NONCE_BYTES: Final = 32
+"""Length of a client's nonce (SecureChannelNonceLength of the policies in Part 7)."""
 GRACE: Final = 1.25
 """A security token is honoured this much longer than its lifetime (Part 4, 5.5.2)."""
 
 
-class ChannelError(Exception):
+class SecureChannelError(Exception):
     """The connection cannot go on: the code goes out in an Error message, then it is closed."""
 
     def __init__(self, code: int, reason: str) -> None:
@@ -42,7 +47,7 @@ class ChannelError(Exception):
         self.code = code
 
 
-class Channels:
+class ChannelSecurity:
     """What all channels share: policies on offer, the trust list, the counter of channels."""
 
     def __init__(
@@ -60,17 +65,17 @@ class Channels:
 
     def limits(self) -> TransportLimits:
         """Limits before Hello has been heard."""
-        return TransportLimits(CHUNK, CHUNK, self.message_bytes // MIN_CHUNK + 1, self.message_bytes)
+        return TransportLimits(MAX_CHUNK, MAX_CHUNK, self.message_bytes // MIN_CHUNK + 1, self.message_bytes)
 
 
-class Channel:
+class SecureChannel:
     """The secure channel of one connection."""
 
-    def __init__(self, shared: Channels) -> None:
-        self._shared = shared
-        self._limits = shared.limits()
+    def __init__(self, security: ChannelSecurity) -> None:
+        self._security = security
+        self._limits = security.limits()
         self._secure = SecureConnection(SecurityPolicyNone(), self._limits)
-        self._secure.set_policy_factories(shared.policies)
+        self._secure.set_policy_factories(security.policies)
         self._max_response = 0
         self._max_response_chunks = 0
         self.expires = float("inf")
@@ -101,19 +106,19 @@ class Channel:
         certificate: bytes | None = getattr(self._secure.security_policy, "peer_certificate", None)
         return certificate or None
 
-    def hello(self, body: bytes) -> bytes:
+    def acknowledge_hello(self, body: bytes) -> bytes:
         """Answer Hello with Acknowledge."""
         message = decode(ua.Hello, StrictBuffer(body))
         if message.EndpointUrl and len(message.EndpointUrl) > 4096:
-            raise ChannelError(
+            raise SecureChannelError(
                 ua.StatusCodes.BadTcpEndpointUrlInvalid, "an endpoint URL of more than 4096 characters"
             )
         if min(message.ReceiveBufferSize, message.SendBufferSize) < MIN_CHUNK:
-            raise ChannelError(
+            raise SecureChannelError(
                 ua.StatusCodes.BadConnectionRejected, f"buffers smaller than {MIN_CHUNK} bytes"
             )
-        self._limits.max_recv_buffer = min(message.SendBufferSize, CHUNK)
-        self._limits.max_send_buffer = min(message.ReceiveBufferSize, CHUNK)
+        self._limits.max_recv_buffer = min(message.SendBufferSize, MAX_CHUNK)
+        self._limits.max_send_buffer = min(message.ReceiveBufferSize, MAX_CHUNK)
         self._max_response = message.MaxMessageSize
         self._max_response_chunks = message.MaxChunkCount
         answer = ua.Acknowledge()
@@ -135,49 +140,56 @@ class Channel:
         if header.MessageType == ua.MessageType.SecureOpen:
             self._check_open(StrictBuffer(body))
         elif not self.is_open or time.monotonic() > self.expires:
-            raise ChannelError(ua.StatusCodes.BadSecureChannelClosed, "no open channel")
+            raise SecureChannelError(ua.StatusCodes.BadSecureChannelClosed, "no open channel")
         try:
             return self._secure.receive_from_header_and_body(header, StrictBuffer(body))
         except ua.UaStatusCodeError as error:
             code = error.code
             if code == ua.StatusCodes.BadRequestTooLarge:
                 code = ua.StatusCodes.BadTcpMessageTooLarge
-            raise ChannelError(code, "a message beyond the limits") from error
+            raise SecureChannelError(code, "a message beyond the limits") from error
         except (InvalidSignature, ua.UaError, ValueError, TypeError, OverflowError, IndexError) as error:
-            raise ChannelError(ua.StatusCodes.BadSecurityChecksFailed, f"security checks: {error}") from error
+            raise SecureChannelError(
+                ua.StatusCodes.BadSecurityChecksFailed, f"security checks: {error}"
+            ) from error
 
     def _check_open(self, body: Buffer) -> None:
         security = decode(ua.AsymmetricAlgorithmHeader, body)
         if self.is_open:
             if security.SecurityPolicyURI != self.policy_uri:
-                raise ChannelError(ua.StatusCodes.BadSecurityPolicyRejected, "another policy on renewal")
+                raise SecureChannelError(
+                    ua.StatusCodes.BadSecurityPolicyRejected, "another policy on renewal"
+                )
         elif security.SecurityPolicyURI == SecurityPolicyNone.URI:
             return
         if security.SecurityPolicyURI == SecurityPolicyNone.URI:
             return
-        if not any(policy.matches(security.SecurityPolicyURI) for policy in self._shared.policies):
-            raise ChannelError(
+        if not any(policy.matches(security.SecurityPolicyURI) for policy in self._security.policies):
+            raise SecureChannelError(
                 ua.StatusCodes.BadSecurityPolicyRejected, f"policy {security.SecurityPolicyURI}"
             )
         certificate = security.SenderCertificate
         if not certificate:
-            raise ChannelError(ua.StatusCodes.BadSecurityChecksFailed, "no certificate")
-        own = self._shared.trust.own_certificate
-        if security.ReceiverCertificateThumbPrint != hashlib.sha1(own, usedforsecurity=False).digest():
-            raise ChannelError(ua.StatusCodes.BadCertificateInvalid, "meant for another certificate")
+            raise SecureChannelError(ua.StatusCodes.BadSecurityChecksFailed, "no certificate")
+        server_certificate = self._security.trust.own_certificate
+        if (
+            security.ReceiverCertificateThumbPrint
+            != hashlib.sha1(server_certificate, usedforsecurity=False).digest()
+        ):
+            raise SecureChannelError(ua.StatusCodes.BadCertificateInvalid, "meant for another certificate")
         try:
-            self._shared.trust.check(certificate)
+            self._security.trust.check(certificate)
         except UntrustedError as error:
             # Part 4, 6.1.3: the client is told no more than this; the reason stays in our log.
-            raise ChannelError(
+            raise SecureChannelError(
                 ua.StatusCodes.BadSecurityChecksFailed, f"client certificate: {error}"
             ) from error
 
-    def open(self, message: ua.Message) -> bytes:
+    def open_secure_channel(self, message: ua.Message) -> bytes:
         """Issue or renew the security token; the response, ready to send."""
         body = StrictBuffer(bytes(message.body()))
         if decode_type(body) != ua.NodeId(ua.ObjectIds.OpenSecureChannelRequest_Encoding_DefaultBinary):
-            raise ChannelError(
+            raise SecureChannelError(
                 ua.StatusCodes.BadTcpMessageTypeInvalid, "an OPN message without a request to open"
             )
         # The structure begins with the type that has just been read.
@@ -185,28 +197,30 @@ class Channel:
         parameters = request.Parameters
         renew = parameters.RequestType == ua.SecurityTokenRequestType.Renew
         if renew != self.is_open:
-            raise ChannelError(
+            raise SecureChannelError(
                 ua.StatusCodes.BadSecureChannelIdInvalid, "issue on an open channel, or renew on none"
             )
         if parameters.SecurityMode != self._secure.security_policy.Mode:
             if renew or self._secure.security_policy.URI == SecurityPolicyNone.URI:
-                raise ChannelError(ua.StatusCodes.BadSecurityModeRejected, f"mode {parameters.SecurityMode}")
-            raise ChannelError(ua.StatusCodes.BadSecurityModeRejected, "only SignAndEncrypt is offered")
+                raise SecureChannelError(
+                    ua.StatusCodes.BadSecurityModeRejected, f"mode {parameters.SecurityMode}"
+                )
+            raise SecureChannelError(ua.StatusCodes.BadSecurityModeRejected, "only SignAndEncrypt is offered")
         if self.is_encrypted and len(parameters.ClientNonce or b"") < NONCE_BYTES:
-            raise ChannelError(ua.StatusCodes.BadNonceInvalid, "a nonce that is too short")
+            raise SecureChannelError(ua.StatusCodes.BadNonceInvalid, "a nonce that is too short")
         parameters.RequestedLifetime = min(
             max(parameters.RequestedLifetime, MIN_LIFETIME_MS), MAX_LIFETIME_MS
         )
         self.expires = time.monotonic() + parameters.RequestedLifetime / 1e3 * GRACE
         response = ua.OpenSecureChannelResponse()
-        response.Parameters = self._secure.open(parameters, self._shared)
+        response.Parameters = self._secure.open(parameters, self._security)
         response.ResponseHeader.RequestHandle = request.RequestHeader.RequestHandle
         data: bytes = self._secure.message_to_binary(
             encode(response), message_type=ua.MessageType.SecureOpen, request_id=message.request_id()
         )
         return data
 
-    def wrap(self, body: bytes, request_id: int) -> bytes:
+    def encode_response(self, body: bytes, request_id: int) -> bytes:
         """Turn a response into bytes to send.
 
         Raises
@@ -218,7 +232,7 @@ class Channel:
         if too_large or (
             self._max_response_chunks and len(body) > self._max_response_chunks * self._plain_chunk
         ):
-            raise FaultError(ua.StatusCodes.BadResponseTooLarge)
+            raise StatusCodeError(ua.StatusCodes.BadResponseTooLarge)
         data: bytes = self._secure.message_to_binary(body, request_id=request_id)
         return data
 
@@ -229,6 +243,3 @@ class Channel:
     def close(self) -> None:
         """Accept no further message."""
         self._secure.close()
-
-
-__all__ = ["Channel", "ChannelError", "Channels", "DecodingError"]

@@ -12,29 +12,31 @@ from asyncua import ua
 
 from impactcell.errors import AccessError
 from impactcell.opcua.asyncua_adapter import AddressSpace, SecurityPolicyFactory, bound_null_arrays
-from impactcell.opcua.attribute_service import Attributes
-from impactcell.opcua.authentication import Logins
-from impactcell.opcua.endpoints import POLICIES, Endpoints
-from impactcell.opcua.history_paging import PAGE
-from impactcell.opcua.history_processed import AGGREGATES
-from impactcell.opcua.history_service import MOST_NODES, Histories
+from impactcell.opcua.attribute_service import AttributeService
+from impactcell.opcua.authentication import Authenticator
+from impactcell.opcua.discovery_service import POLICIES, DiscoveryService
+from impactcell.opcua.historical_variable import VALUES_PER_PAGE
+from impactcell.opcua.history_processed import AGGREGATE_FUNCTIONS
+from impactcell.opcua.history_service import MAX_NODES_PER_READ, HistoryService
 from impactcell.opcua.host_interface import Actor, Host, ServerSettings
-from impactcell.opcua.method_service import Calls
-from impactcell.opcua.monitored_item_service import MonitoredItems
-from impactcell.opcua.node_values import Values
-from impactcell.opcua.request_dispatch import MAX_OPERATIONS, Dispatcher, Service
-from impactcell.opcua.secure_channel import Channels
-from impactcell.opcua.session_service import Access
-from impactcell.opcua.sessions import MAX_CONTINUATIONS, Sessions
-from impactcell.opcua.subscription_service import Monitoring
-from impactcell.opcua.tcp_connection import Connection
+from impactcell.opcua.method_service import MethodService
+from impactcell.opcua.monitored_item_service import MonitoredItemService
+from impactcell.opcua.request_dispatch import MAX_OPERATIONS, RequestDispatcher, Service
+from impactcell.opcua.secure_channel import ChannelSecurity
+from impactcell.opcua.session_service import SessionService
+from impactcell.opcua.session_table import MAX_CONTINUATION_POINTS, SessionTable
+from impactcell.opcua.subscription_service import SubscriptionService
+from impactcell.opcua.tcp_connection import TcpConnection
 from impactcell.opcua.trust_list import TrustList
-from impactcell.opcua.view_service import Views
+from impactcell.opcua.variable_store import VariableStore
+from impactcell.opcua.view_service import ViewService
 
 _log = logging.getLogger(__name__)
 
 BACKLOG: Final = 1_024
-CLOCK_S: Final = 1.0
+"""Connections the system keeps waiting to be taken."""
+CLOCK_PERIOD_S: Final = 1.0
+"""Seconds between two looks at the clock, at sessions that have timed out and at changed users."""
 
 
 class ServiceHost:
@@ -46,28 +48,30 @@ class ServiceHost:
         Certificate, key or users file are absent or unusable.
     """
 
-    def __init__(self, settings: ServerSettings, host: Host, space: AddressSpace, values: Values) -> None:
+    def __init__(
+        self, settings: ServerSettings, host: Host, space: AddressSpace, values: VariableStore
+    ) -> None:
         bound_null_arrays()
         self._settings = settings
         self._host = host
         self._space = space
         self._values = values
         self._trust = TrustList(settings.pki, settings.application_uri)
-        self._logins = Logins(host.users, self._trust)
-        self._sessions = Sessions(settings.limits)
-        self._endpoints = Endpoints(settings, host.product, self._trust.own_certificate)
-        self._connections: set[Connection] = set()
+        self._authenticator = Authenticator(host.users, self._trust)
+        self._sessions = SessionTable(settings.limits)
+        self._discovery = DiscoveryService(settings, host.product, self._trust.own_certificate)
+        self._connections: set[TcpConnection] = set()
         self._listener: asyncio.Server | None = None
         self._clock: asyncio.Task[None] | None = None
         self._started = datetime.now(UTC)
-        self.monitoring = Monitoring(settings.limits)
-        self.calls = Calls(space, host.access)
-        self._dispatcher: Dispatcher | None = None
+        self.subscription_service = SubscriptionService(settings.limits)
+        self.method_service = MethodService(space, host.access)
+        self._dispatcher: RequestDispatcher | None = None
 
     @property
     def port(self) -> int:
         """Port the server listens on."""
-        return self._endpoints.port
+        return self._discovery.port
 
     async def start(self) -> None:
         """Listen.
@@ -83,27 +87,28 @@ class ServiceHost:
                 "OPC UA sessions without encryption are allowed (allow_sessions_without_encryption); "
                 "use this for trials only"
             )
-        access = Access(
-            self._endpoints,
+        session_service = SessionService(
+            self._discovery,
             self._sessions,
-            self.monitoring,
-            self._logins,
+            self.subscription_service,
+            self._authenticator,
             self._trust,
             settings.limits,
             allow_none=settings.allow_none,
         )
         services: dict[str, Service] = {
-            **access.services(),
-            **Attributes(self._space, host.access).services(),
-            **Views(self._space).services(),
-            **self.calls.services(),
-            **self.monitoring.services(),
-            **MonitoredItems(
-                self._space, self._values, host.access, settings.limits, self.monitoring
+            **self._discovery.services(),
+            **session_service.services(),
+            **AttributeService(self._space, host.access).services(),
+            **ViewService(self._space).services(),
+            **self.method_service.services(),
+            **self.subscription_service.services(),
+            **MonitoredItemService(
+                self._space, self._values, host.access, settings.limits, self.subscription_service
             ).services(),
-            **Histories(self._space, host.access, host.history).services(),
+            **HistoryService(self._space, host.access, host.history).services(),
         }
-        dispatcher = Dispatcher(self._sessions, services, self._lost)
+        dispatcher = RequestDispatcher(self._sessions, services, self._connection_lost)
         factories = [
             SecurityPolicyFactory(
                 POLICIES[policy][0],
@@ -113,12 +118,12 @@ class ServiceHost:
             )
             for policy in settings.policies
         ]
-        channels = Channels(factories, self._trust, settings.limits.message_bytes)
+        channels = ChannelSecurity(factories, self._trust, settings.limits.message_bytes)
         self._describe_server()
         url = urlsplit(settings.endpoint)
         try:
             self._listener = await asyncio.get_running_loop().create_server(
-                lambda: Connection(dispatcher, channels, settings.limits, self._connections),
+                lambda: TcpConnection(dispatcher, channels, settings.limits, self._connections),
                 url.hostname,
                 url.port or 0,
                 backlog=BACKLOG,
@@ -130,7 +135,7 @@ class ServiceHost:
                 f"OPC UA server: cannot listen on {settings.endpoint} ({reason}); choose another endpoint, "
                 "or end what uses it"
             ) from error
-        self._endpoints.port = self._listener.sockets[0].getsockname()[1]
+        self._discovery.port = self._listener.sockets[0].getsockname()[1]
         self._clock = asyncio.get_running_loop().create_task(self._run_clock(), name="opcua clock")
         _log.info("OPC UA server listens on %s (port %d)", settings.endpoint, self.port)
 
@@ -142,45 +147,49 @@ class ServiceHost:
             self._clock.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await self._clock
-        self.monitoring.close()
+        self.subscription_service.close()
         for connection in tuple(self._connections):
-            connection.fail(ua.StatusCodes.BadServerHalted, "server stops")
+            connection.abort_with_error(ua.StatusCodes.BadServerHalted, "server stops")
             connection.close()
             await connection.wait_closed()
         if self._listener is not None:
             await self._listener.wait_closed()
-        self._logins.close()
+        self._authenticator.close()
 
-    def _lost(self, connection: Connection) -> None:
+    def _connection_lost(self, connection: TcpConnection) -> None:
         # A session with subscriptions waits for its client to come back; one without has nothing to
         # come back to.
         for session in self._sessions.detach(connection):
-            if not self.monitoring.of(session):
+            if not self.subscription_service.subscriptions_of(session):
                 self._sessions.remove(session)
 
     async def _run_clock(self) -> None:
         while True:
             self._tick()
-            await asyncio.sleep(CLOCK_S)
+            await asyncio.sleep(CLOCK_PERIOD_S)
 
     def _tick(self) -> None:
         now = datetime.now(UTC)
         ids = ua.ObjectIds
-        self._values.put(ua.NodeId(ids.Server_ServerStatus_CurrentTime), now, ua.VariantType.DateTime, now)
+        self._values.set_value(
+            ua.NodeId(ids.Server_ServerStatus_CurrentTime), now, ua.VariantType.DateTime, now
+        )
         status = ua.ServerStatusDataType(
             StartTime=self._started,
             CurrentTime=now,
             State=ua.ServerState.Running,
             BuildInfo=self._build_info(),
         )
-        self._values.put(ua.NodeId(ids.Server_ServerStatus), status, ua.VariantType.ExtensionObject, now)
+        self._values.set_value(
+            ua.NodeId(ids.Server_ServerStatus), status, ua.VariantType.ExtensionObject, now
+        )
         for session in self._sessions.expired():
             _log.info("session %r timed out", session.name)
-            self.monitoring.end_session(session, delete=False)
+            self.subscription_service.end_session(session, delete=False)
             self._sessions.remove(session)
-        self._follow_users()
+        self._apply_user_changes()
 
-    def _follow_users(self) -> None:
+    def _apply_user_changes(self) -> None:
         """End the sessions of users who are no longer in the users file, and follow changes of role."""
         for session in self._sessions.all():
             actor = session.actor
@@ -189,7 +198,7 @@ class ServiceHost:
             user = self._host.users.find(actor.user)
             if user is None:
                 _log.warning("user of session %r is gone; session ended", session.name)
-                self.monitoring.end_session(session, delete=True)
+                self.subscription_service.end_session(session, delete=True)
                 self._sessions.remove(session)
             elif user.role is not actor.role:
                 session.actor = Actor(actor.user, user.role, actor.address)
@@ -220,8 +229,16 @@ class ServiceHost:
             (ids.Server_ServerStatus_BuildInfo_SoftwareVersion, self._host.product.version, kinds.String),
             (ids.Server_ServerStatus_BuildInfo_BuildNumber, self._host.product.version, kinds.String),
             (ids.Server_ServerStatus_BuildInfo_BuildDate, now, kinds.DateTime),
-            (ids.Server_ServerCapabilities_MaxBrowseContinuationPoints, MAX_CONTINUATIONS, kinds.UInt16),
-            (ids.Server_ServerCapabilities_MaxHistoryContinuationPoints, MAX_CONTINUATIONS, kinds.UInt16),
+            (
+                ids.Server_ServerCapabilities_MaxBrowseContinuationPoints,
+                MAX_CONTINUATION_POINTS,
+                kinds.UInt16,
+            ),
+            (
+                ids.Server_ServerCapabilities_MaxHistoryContinuationPoints,
+                MAX_CONTINUATION_POINTS,
+                kinds.UInt16,
+            ),
             (ids.Server_ServerCapabilities_MaxQueryContinuationPoints, 0, kinds.UInt16),
             (ids.Server_ServerCapabilities_MaxSessions, limits.sessions, kinds.UInt32),
             (ids.Server_ServerCapabilities_MaxSubscriptions, limits.subscriptions, kinds.UInt32),
@@ -232,21 +249,21 @@ class ServiceHost:
             ),
             (
                 ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerHistoryReadData,
-                MOST_NODES,
+                MAX_NODES_PER_READ,
                 kinds.UInt32,
             ),
             (ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead, MAX_OPERATIONS, kinds.UInt32),
             (ids.HistoryServerCapabilities_AccessHistoryDataCapability, True, kinds.Boolean),
             (ids.HistoryServerCapabilities_AccessHistoryEventsCapability, True, kinds.Boolean),
-            (ids.HistoryServerCapabilities_MaxReturnDataValues, PAGE, kinds.UInt32),
-            (ids.HistoryServerCapabilities_MaxReturnEventValues, PAGE, kinds.UInt32),
+            (ids.HistoryServerCapabilities_MaxReturnDataValues, VALUES_PER_PAGE, kinds.UInt32),
+            (ids.HistoryServerCapabilities_MaxReturnEventValues, VALUES_PER_PAGE, kinds.UInt32),
         ]
         for number, value, kind in entries:
             node = ua.NodeId(number)
             if node in self._space:
-                self._values.put(node, value, kind, now)
+                self._values.set_value(node, value, kind, now)
 
 
 def aggregate_functions() -> list[ua.NodeId]:
     """List the aggregates that the server shows among its capabilities."""
-    return list(AGGREGATES)
+    return list(AGGREGATE_FUNCTIONS)

@@ -15,18 +15,22 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.opcua import notification_encoding
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import ServerLimits
-from impactcell.opcua.monitored_item import DataItem, EventItem
-from impactcell.opcua.sessions import PublishRequest, Session
-from impactcell.opcua.tcp_connection import Connection
+from impactcell.opcua.monitored_item import DataMonitoredItem, EventMonitoredItem
+from impactcell.opcua.session_table import PublishRequest, Session
+from impactcell.opcua.tcp_connection import TcpConnection
 
-Item = DataItem | EventItem
+MonitoredItem = DataMonitoredItem | EventMonitoredItem
 
-RETRANSMITTED: Final = 256
-MOST_NOTIFICATIONS: Final = 10_000
+MAX_RETRANSMISSIONS: Final = 256
+"""Messages kept until they are acknowledged."""
+MAX_NOTIFICATIONS: Final = 10_000
+"""Notifications in one message, where the client sets no limit."""
 MAX_LIFETIME_S: Final = 3_600.0
-MAX_SEQUENCE: Final = 2**32 - 1
+"""Longest a subscription lives unheard, seconds."""
+MAX_SEQUENCE_NUMBER: Final = 2**32 - 1
+"""After it comes 1 (Part 4, 7.9)."""
 
 
 class Subscription:
@@ -36,43 +40,51 @@ class Subscription:
         self,
         number: int,
         session: Session,
-        wanted: ua.CreateSubscriptionParameters,
+        parameters: ua.CreateSubscriptionParameters,
         limits: ServerLimits,
         expired: Callable[[Any], None],
     ) -> None:
         self.id = number
         self.session: Session | None = session
         self.owner = session.actor.user if session.actor is not None else ""
-        self.items: dict[int, Item] = {}
-        self.enabled: bool = wanted.PublishingEnabled
+        self.items: dict[int, MonitoredItem] = {}
+        self.enabled: bool = parameters.PublishingEnabled
         self.late = False
         self._limits = limits
         self._expired = expired
-        self._ready: OrderedDict[int, Item] = OrderedDict()
-        self._statuses: list[int] = []
-        self._sent: OrderedDict[int, bytes] = OrderedDict()
-        self._sequence = 1
-        self._said_nothing = 0
-        self._unheard = 0
+        self._ready_items: OrderedDict[int, MonitoredItem] = OrderedDict()
+        self._status_changes: list[int] = []
+        self._retransmission_queue: OrderedDict[int, bytes] = OrderedDict()
+        self._next_sequence_number = 1
+        self._keep_alive_counter = 0
+        self._lifetime_counter = 0
         self._first = True
         self._last_item = 0
         self._timer: asyncio.TimerHandle | None = None
         self._next = 0.0
-        self.configure(wanted)
+        self.configure(parameters)
         self._start()
 
-    def configure(self, wanted: ua.CreateSubscriptionParameters | ua.ModifySubscriptionParameters) -> None:
+    def configure(
+        self, parameters: ua.CreateSubscriptionParameters | ua.ModifySubscriptionParameters
+    ) -> None:
         """Settle the interval and the counts."""
         shortest = self._limits.publishing_interval_s
-        interval_s = wanted.RequestedPublishingInterval / 1e3
+        interval_s = parameters.RequestedPublishingInterval / 1e3
         # NaN and everything below become the shortest.
         self.interval_s = min(interval_s, MAX_LIFETIME_S) if interval_s > shortest else shortest
-        most = max(3, int(MAX_LIFETIME_S / self.interval_s))
-        self.keep_alive = min(max(wanted.RequestedMaxKeepAliveCount, 1), max(1, most // 3))
-        self.lifetime = min(max(wanted.RequestedLifetimeCount, 3 * self.keep_alive), most)
-        self.most = min(wanted.MaxNotificationsPerPublish or MOST_NOTIFICATIONS, MOST_NOTIFICATIONS)
-        self.priority: int = wanted.Priority
-        self._unheard = 0
+        max_lifetime_count = max(3, int(MAX_LIFETIME_S / self.interval_s))
+        self.max_keep_alive_count = min(
+            max(parameters.RequestedMaxKeepAliveCount, 1), max(1, max_lifetime_count // 3)
+        )
+        self.lifetime_count = min(
+            max(parameters.RequestedLifetimeCount, 3 * self.max_keep_alive_count), max_lifetime_count
+        )
+        self.max_notifications = min(
+            parameters.MaxNotificationsPerPublish or MAX_NOTIFICATIONS, MAX_NOTIFICATIONS
+        )
+        self.priority: int = parameters.Priority
+        self._lifetime_counter = 0
 
     def _start(self) -> None:
         loop = asyncio.get_running_loop()
@@ -86,20 +98,20 @@ class Subscription:
         self._timer = loop.call_at(self._next, self._tick)
         session = self.session
         if session is None or not session.publish_requests:
-            self._unheard += 1
-            if self._unheard >= self.lifetime:
+            self._lifetime_counter += 1
+            if self._lifetime_counter >= self.lifetime_count:
                 self.close()
                 self._expired(self)
                 return
         else:
-            self._unheard = 0
-        self._said_nothing += 1
-        if self._first or self._has_news() or self._said_nothing >= self.keep_alive:
+            self._lifetime_counter = 0
+        self._keep_alive_counter += 1
+        if self._first or self._has_news() or self._keep_alive_counter >= self.max_keep_alive_count:
             self.late = True
             self.serve()
 
     def _has_news(self) -> bool:
-        return bool(self._statuses) or (self.enabled and bool(self._ready))
+        return bool(self._status_changes) or (self.enabled and bool(self._ready_items))
 
     def serve(self) -> None:
         """Answer Publish requests as long as something is due and requests are there."""
@@ -107,56 +119,64 @@ class Subscription:
         while (
             self.late and session is not None and session.publish_requests and session.connection is not None
         ):
-            self._answer(session.connection, session.publish_requests.popleft())
+            self._respond(session.connection, session.publish_requests.popleft())
 
-    def _answer(self, connection: Connection, request: PublishRequest) -> None:
+    def _respond(self, connection: TcpConnection, request: PublishRequest) -> None:
         now = datetime.now(UTC)
-        notifications = self._take()
-        message = notification_encoding.notification_message(self._sequence, now, notifications)
+        notifications = self._take_notifications()
+        message = notification_encoding.notification_message(self._next_sequence_number, now, notifications)
         if notifications:
-            self._sent[self._sequence] = message
-            self._sequence = 1 if self._sequence == MAX_SEQUENCE else self._sequence + 1
-            while len(self._sent) > RETRANSMITTED:
-                self._sent.popitem(last=False)
+            self._retransmission_queue[self._next_sequence_number] = message
+            self._next_sequence_number = (
+                1 if self._next_sequence_number == MAX_SEQUENCE_NUMBER else self._next_sequence_number + 1
+            )
+            while len(self._retransmission_queue) > MAX_RETRANSMISSIONS:
+                self._retransmission_queue.popitem(last=False)
         self.late = self._has_news()
         self._first = False
-        self._said_nothing = self._unheard = 0
+        self._keep_alive_counter = self._lifetime_counter = 0
         body = notification_encoding.publish_response(
-            request.handle, now, self.id, list(self._sent), message, request.results, more=self.late
+            request.handle,
+            now,
+            self.id,
+            list(self._retransmission_queue),
+            message,
+            request.results,
+            more=self.late,
         )
         connection.respond(request.request_id, request.handle, body)
 
-    def _take(self) -> list[bytes]:
-        taken: list[bytes] = []
-        if self._statuses:
-            taken.append(notification_encoding.status_change(self._statuses.pop(0)))
+    def _take_notifications(self) -> list[bytes]:
+        notifications: list[bytes] = []
+        if self._status_changes:
+            notifications.append(notification_encoding.status_change(self._status_changes.pop(0)))
         if not self.enabled:
-            return taken
-        left = self.most
+            return notifications
+        room = self.max_notifications
         data: list[tuple[int, bytes]] = []
         events: list[bytes] = []
-        while self._ready and left > 0:
-            number, item = next(iter(self._ready.items()))
-            if isinstance(item, DataItem):
-                found = item.take(left) if item.waiting else []
-                data += found
-                left -= len(found)
+        while self._ready_items and room > 0:
+            number, item = next(iter(self._ready_items.items()))
+            if isinstance(item, DataMonitoredItem):
+                data_of_item = item.take(room) if item.waiting else []
+                data += data_of_item
+                room -= len(data_of_item)
             else:
-                told = item.take(left) if item.waiting else []
-                events += told
-                left -= len(told)
+                events_of_item = item.take(room) if item.waiting else []
+                events += events_of_item
+                room -= len(events_of_item)
             if not item.waiting:
-                del self._ready[number]
+                del self._ready_items[number]
         if data:
-            taken.append(notification_encoding.data_changes(data))
+            notifications.append(notification_encoding.data_changes(data))
         if events:
-            taken.append(notification_encoding.events(events))
-        return taken
+            notifications.append(notification_encoding.events(events))
+        return notifications
 
-    def ready(self, item: Item) -> None:
+    def ready(self, item: MonitoredItem) -> None:
         """Learn that an item has something to report."""
         if item.mode == ua.MonitoringMode.Reporting:
-            self._ready[item.id] = item
+            self._ready_items[item.id] = item
 
     def next_item_id(self) -> int:
         """Give a number no other item of this subscription has or had.
@@ -167,11 +187,11 @@ class Subscription:
             BadTooManyMonitoredItems.
         """
         if len(self.items) >= self._limits.items_per_subscription:
-            raise FaultError(ua.StatusCodes.BadTooManyMonitoredItems)
+            raise StatusCodeError(ua.StatusCodes.BadTooManyMonitoredItems)
         self._last_item += 1
         return self._last_item
 
-    def item(self, number: int) -> Item:
+    def item(self, number: int) -> MonitoredItem:
         """Find a monitored item.
 
         Raises
@@ -179,21 +199,21 @@ class Subscription:
         FaultError
             BadMonitoredItemIdInvalid.
         """
-        found = self.items.get(number)
-        if found is None:
-            raise FaultError(ua.StatusCodes.BadMonitoredItemIdInvalid)
-        return found
+        item = self.items.get(number)
+        if item is None:
+            raise StatusCodeError(ua.StatusCodes.BadMonitoredItemIdInvalid)
+        return item
 
     def remove(self, number: int) -> None:
         """Take an item out."""
         item = self.item(number)
         item.close()
-        self._ready.pop(number, None)
+        self._ready_items.pop(number, None)
         del self.items[number]
 
     def acknowledge(self, sequence: int) -> int:
         """Forget a message the client has; the status code of the acknowledgement."""
-        if self._sent.pop(sequence, None) is None:
+        if self._retransmission_queue.pop(sequence, None) is None:
             return int(ua.StatusCodes.BadSequenceNumberUnknown)
         return int(ua.StatusCodes.Good)
 
@@ -205,15 +225,15 @@ class Subscription:
         FaultError
             BadMessageNotAvailable.
         """
-        found = self._sent.get(sequence)
-        if found is None:
-            raise FaultError(ua.StatusCodes.BadMessageNotAvailable)
-        self._unheard = 0
-        return found
+        message = self._retransmission_queue.get(sequence)
+        if message is None:
+            raise StatusCodeError(ua.StatusCodes.BadMessageNotAvailable)
+        self._lifetime_counter = 0
+        return message
 
-    def available(self) -> list[int]:
+    def available_sequence_numbers(self) -> list[int]:
         """Sequence numbers that can be sent again."""
-        return list(self._sent)
+        return list(self._retransmission_queue)
 
     def move(self, session: Session, *, initial: bool) -> None:
         """Belong to another session; with `initial` every data item reports its present value again."""
@@ -222,17 +242,17 @@ class Subscription:
             now = datetime.now(UTC)
             request = old.publish_requests.popleft()
             parts = [notification_encoding.status_change(ua.StatusCodes.GoodSubscriptionTransferred)]
-            message = notification_encoding.notification_message(self._sequence, now, parts)
+            message = notification_encoding.notification_message(self._next_sequence_number, now, parts)
             body = notification_encoding.publish_response(
                 request.handle, now, self.id, [], message, request.results, more=False
             )
             old.connection.respond(request.request_id, request.handle, body)
         self.session = session
-        self._unheard = 0
+        self._lifetime_counter = 0
         if initial:
             for item in self.items.values():
                 if (
-                    isinstance(item, DataItem)
+                    isinstance(item, DataMonitoredItem)
                     and item.mode == ua.MonitoringMode.Reporting
                     and not item.waiting
                 ):
@@ -245,5 +265,5 @@ class Subscription:
         for item in self.items.values():
             item.close()
         self.items.clear()
-        self._ready.clear()
-        self._sent.clear()
+        self._ready_items.clear()
+        self._retransmission_queue.clear()

@@ -14,38 +14,46 @@ from typing import Final, Protocol, cast
 
 from asyncua import ua
 
-from impactcell.opcua.binary_codec import DecodingError, FaultError, encode, service_fault
+from impactcell.opcua.binary_codec import DecodingError, StatusCodeError, encode, service_fault
 from impactcell.opcua.host_interface import ServerLimits
-from impactcell.opcua.secure_channel import CHUNK, Channel, ChannelError, Channels
+from impactcell.opcua.secure_channel import MAX_CHUNK, ChannelSecurity, SecureChannel, SecureChannelError
 
 _log = logging.getLogger(__name__)
 
 HEADER: Final = struct.Struct("<3scI")
-HELLO_BYTES: Final = 8_192
-QUEUED_CHUNKS: Final = 64
+MAX_HELLO_BYTES: Final = 8_192
+"""Longest Hello: its URL has 4096 characters at most (Part 6, 7.1.2.3)."""
+MAX_QUEUED_CHUNKS: Final = 64
+"""Chunks read ahead of the one being answered; beyond, reading pauses."""
 LINGER_S: Final = 1.0
-UNSENT_BYTES: Final = 16 * 1024 * 1024
-CHUNK_KINDS: Final = (b"F", b"C", b"A")
-SECURE: Final = (b"OPN", b"MSG", b"CLO")
+"""Seconds that a peer has to read why its connection ends."""
+MAX_UNSENT_BYTES: Final = 16 * 1024 * 1024
+"""Output a client may leave unread, four of the largest responses."""
+CHUNK_TYPES: Final = (b"F", b"C", b"A")
+SECURE_MESSAGE_TYPES: Final = (b"OPN", b"MSG", b"CLO")
 
 
-class Peer(Protocol):
+class RequestHandler(Protocol):
     """What handles the requests of a connection."""
 
-    async def handle(self, connection: "Connection", request_id: int, body: bytes) -> None:
+    async def handle(self, connection: "TcpConnection", request_id: int, body: bytes) -> None:
         """Answer one request."""
 
-    def disconnected(self, connection: "Connection") -> None:
+    def disconnected(self, connection: "TcpConnection") -> None:
         """Learn that the connection has gone."""
 
 
-class Connection(asyncio.Protocol):
+class TcpConnection(asyncio.Protocol):
     """The server's end of one TCP connection."""
 
     def __init__(
-        self, peer: Peer, channels: Channels, limits: ServerLimits, open_connections: "set[Connection]"
+        self,
+        handler: RequestHandler,
+        channels: ChannelSecurity,
+        limits: ServerLimits,
+        open_connections: "set[TcpConnection]",
     ) -> None:
-        self._peer = peer
+        self._handler = handler
         self._limits = limits
         self._open_connections = open_connections
         self._buffer = bytearray()
@@ -56,7 +64,7 @@ class Connection(asyncio.Protocol):
         self._greeted = False
         self._paused = False
         self._discards = False
-        self.channel = Channel(channels)
+        self.channel = SecureChannel(channels)
         self.address = ""
         self.local_address: tuple[str, int] | None = None
         self.has_session = False
@@ -68,7 +76,9 @@ class Connection(asyncio.Protocol):
         self.address = str(name[0]) if name else ""
         self.local_address = self._transport.get_extra_info("sockname")
         if len(self._open_connections) >= self._limits.connections:
-            self.fail(ua.StatusCodes.BadTcpServerTooBusy, f"{self._limits.connections} connections already")
+            self.abort_with_error(
+                ua.StatusCodes.BadTcpServerTooBusy, f"{self._limits.connections} connections already"
+            )
             return
         wire = self._transport.get_extra_info("socket")
         if wire is not None:
@@ -89,7 +99,7 @@ class Connection(asyncio.Protocol):
             self._timer.cancel()
         if self._task is not None:
             self._task.cancel()
-            self._peer.disconnected(self)
+            self._handler.disconnected(self)
         self._transport = None
         if exc is not None:
             _log.info("connection from %s lost: %s", self.address, exc)
@@ -105,66 +115,68 @@ class Connection(asyncio.Protocol):
                 self._check_header(kind, chunk, size)
                 if len(self._buffer) < size:
                     break
-                start = 12 if kind in SECURE else 8
+                start = 12 if kind in SECURE_MESSAGE_TYPES else 8
                 header = ua.Header(
                     kind, chunk, int.from_bytes(self._buffer[8:12], "little") if start == 12 else 0
                 )
                 header.header_size, header.body_size, header.packet_size = start, size - start, size
                 self._frames.put_nowait((header, bytes(self._buffer[start:size])))
                 del self._buffer[:size]
-        except ChannelError as error:
-            self.fail(error.code, str(error))
+        except SecureChannelError as error:
+            self.abort_with_error(error.code, str(error))
             return
-        if self._frames.qsize() > QUEUED_CHUNKS and not self._paused and self._transport is not None:
+        if self._frames.qsize() > MAX_QUEUED_CHUNKS and not self._paused and self._transport is not None:
             self._transport.pause_reading()
             self._paused = True
 
     def _check_header(self, kind: bytes, chunk: bytes, size: int) -> None:
         if not self._greeted:
             if kind != b"HEL":
-                raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"{kind!r} in place of Hello")
-            limit = HELLO_BYTES
-        elif kind in SECURE:
-            limit = CHUNK
+                raise SecureChannelError(
+                    ua.StatusCodes.BadTcpMessageTypeInvalid, f"{kind!r} in place of Hello"
+                )
+            limit = MAX_HELLO_BYTES
+        elif kind in SECURE_MESSAGE_TYPES:
+            limit = MAX_CHUNK
         else:
-            raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of type {kind!r}")
-        if chunk not in CHUNK_KINDS or (kind != b"MSG" and chunk != b"F"):
-            raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a chunk of type {chunk!r}")
+            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of type {kind!r}")
+        if chunk not in CHUNK_TYPES or (kind != b"MSG" and chunk != b"F"):
+            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a chunk of type {chunk!r}")
         if size > limit:
-            raise ChannelError(ua.StatusCodes.BadTcpMessageTooLarge, f"a chunk of {size} bytes")
-        if size < (16 if kind in SECURE else 8):
-            raise ChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of {size} bytes")
+            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTooLarge, f"a chunk of {size} bytes")
+        if size < (16 if kind in SECURE_MESSAGE_TYPES else 8):
+            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of {size} bytes")
         self._greeted = True
 
     async def _serve(self) -> None:
         while (frame := await self._frames.get()) is not None:
-            if self._paused and self._frames.qsize() < QUEUED_CHUNKS // 2 and self._transport is not None:
+            if self._paused and self._frames.qsize() < MAX_QUEUED_CHUNKS // 2 and self._transport is not None:
                 self._paused = False
                 self._transport.resume_reading()
             try:
-                await self._take(*frame)
-            except ChannelError as error:
-                self.fail(error.code, str(error))
+                await self._receive_chunk(*frame)
+            except SecureChannelError as error:
+                self.abort_with_error(error.code, str(error))
             except DecodingError as error:
-                self.fail(ua.StatusCodes.BadDecodingError, str(error))
+                self.abort_with_error(ua.StatusCodes.BadDecodingError, str(error))
             except Exception:  # noqa: BLE001 - one connection's fault must not end the others
                 _log.exception("request from %s", self.address)
-                self.fail(ua.StatusCodes.BadInternalError, "internal error")
+                self.abort_with_error(ua.StatusCodes.BadInternalError, "internal error")
 
-    async def _take(self, header: ua.Header, body: bytes) -> None:
+    async def _receive_chunk(self, header: ua.Header, body: bytes) -> None:
         if header.MessageType == b"HEL":
-            self._send(self.channel.hello(body))
+            self._send(self.channel.acknowledge_hello(body))
             self._rearm(self._limits.activation_s)
             return
         message = self.channel.receive(header, body)
         if message is None:
             return
         if header.MessageType == b"OPN":
-            self._send(self.channel.open(message))
+            self._send(self.channel.open_secure_channel(message))
         elif header.MessageType == b"CLO":
             self.close()
         else:
-            await self._peer.handle(self, message.request_id(), bytes(message.body()))
+            await self._handler.handle(self, message.request_id(), bytes(message.body()))
 
     def activated(self) -> None:
         """Let the connection stay: a session lives on it."""
@@ -179,14 +191,14 @@ class Connection(asyncio.Protocol):
             self._timer = asyncio.get_running_loop().call_later(delay_s, self._too_slow)
 
     def _too_slow(self) -> None:
-        self.fail(ua.StatusCodes.BadTimeout, "no session in time")
+        self.abort_with_error(ua.StatusCodes.BadTimeout, "no session in time")
 
     def respond(self, request_id: int, handle: int, body: bytes) -> None:
         """Send a response, or a fault where the client cannot take it."""
         try:
-            data = self.channel.wrap(body, request_id)
-        except FaultError as fault:
-            data = self.channel.wrap(service_fault(handle, fault.code), request_id)
+            data = self.channel.encode_response(body, request_id)
+        except StatusCodeError as fault:
+            data = self.channel.encode_response(service_fault(handle, fault.code), request_id)
         self._send(data)
 
     def _send(self, data: bytes) -> None:
@@ -194,11 +206,11 @@ class Connection(asyncio.Protocol):
         if transport is None or transport.is_closing():
             return
         transport.write(data)
-        if transport.get_write_buffer_size() > UNSENT_BYTES:
+        if transport.get_write_buffer_size() > MAX_UNSENT_BYTES:
             _log.warning("%s does not read what it asked for; connection dropped", self.address)
             transport.abort()
 
-    def fail(self, code: int, reason: str) -> None:
+    def abort_with_error(self, code: int, reason: str) -> None:
         """Send an Error message and close."""
         if self._transport is not None and not self._transport.is_closing():
             level = logging.INFO if code == ua.StatusCodes.BadServerHalted else logging.WARNING

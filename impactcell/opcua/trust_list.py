@@ -33,9 +33,12 @@ from impactcell.opcua.certificates import make_certificate, own_hosts, write_pai
 _log = logging.getLogger(__name__)
 
 FOLDERS: Final = ("own", "trusted", "issuers", "revoked", "rejected")
-KEPT_REJECTED: Final = 100
+MAX_REJECTED: Final = 100
+"""Refused certificates kept for review."""
 MIN_KEY_BITS: Final = 2048
-MAX_CHAIN: Final = 5
+"""Shortest RSA key of the policies on offer (Part 7)."""
+MAX_CHAIN_LENGTH: Final = 5
+"""Certificates from a client's to a trusted authority."""
 
 
 class UntrustedError(Exception):
@@ -103,30 +106,34 @@ class TrustList:
                 (directory / folder).mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise AccessError(f"{directory / folder}: {error.strerror}") from error
-        own = directory / "own" / "cert.der"
-        key = directory / "own" / "key.pem"
-        if not own.exists() and not key.exists():
+        certificate_path = directory / "own" / "cert.der"
+        key_path = directory / "own" / "key.pem"
+        if not certificate_path.exists() and not key_path.exists():
             write_pair(directory / "own", *make_certificate("impactcell", application_uri, own_hosts()))
-            _log.warning("%s: made a certificate for %s; clients have to trust it", own, application_uri)
-        self.certificate = read_certificate(own)
+            _log.warning(
+                "%s: made a certificate for %s; clients have to trust it", certificate_path, application_uri
+            )
+        self.certificate = read_certificate(certificate_path)
         self.own_certificate = der(self.certificate)
         if application_uri not in application_uris(self.own_certificate):
             raise AccessError(
-                f"{own}: made for another application URI than {application_uri}; make a new one"
+                f"{certificate_path}: made for another application URI than {application_uri}; make a new one"
             )
         try:
-            private_key = serialization.load_pem_private_key(key.read_bytes(), None)
+            private_key = serialization.load_pem_private_key(key_path.read_bytes(), None)
         except OSError as error:
-            raise AccessError(f"{key}: {error.strerror}; make one with `impactcell certs make`") from error
+            raise AccessError(
+                f"{key_path}: {error.strerror}; make one with `impactcell certs make`"
+            ) from error
         except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-            raise AccessError(f"{key}: no private key in PEM without a passphrase") from error
+            raise AccessError(f"{key_path}: no private key in PEM without a passphrase") from error
         if not isinstance(private_key, rsa.RSAPrivateKey) or (
-            private_key.public_key().public_numbers() != self._own_numbers()
+            private_key.public_key().public_numbers() != self._public_numbers()
         ):
-            raise AccessError(f"{key}: not the RSA key of {own}")
+            raise AccessError(f"{key_path}: not the RSA key of {certificate_path}")
         self.private_key = private_key
 
-    def _own_numbers(self) -> rsa.RSAPublicNumbers | None:
+    def _public_numbers(self) -> rsa.RSAPublicNumbers | None:
         key = self.certificate.public_key()
         return key.public_numbers() if isinstance(key, rsa.RSAPublicKey) else None
 
@@ -162,11 +169,11 @@ class TrustList:
             raise UntrustedError(f"not an RSA key of {MIN_KEY_BITS} bits or more")
         if isinstance(certificate.signature_hash_algorithm, hashes.SHA1 | hashes.MD5):
             raise UntrustedError("signed with SHA-1 or MD5")
-        trusted = {der(found) for found in self._certificates("trusted")}
+        trusted = {der(trusted_certificate) for trusted_certificate in self._certificates("trusted")}
         if self._is_revoked(certificate):
             raise UntrustedError("revoked")
         current = certificate
-        for _ in range(MAX_CHAIN):
+        for _ in range(MAX_CHAIN_LENGTH):
             if der(current) in trusted:
                 return
             issuer = self._issuer_of(current)
@@ -217,8 +224,8 @@ class TrustList:
         name = certificate.subject.rfc4514_string().replace("/", "_").replace("\\", "_")[:80]
         path = folder / f"{name} [{thumbprint(der(certificate))}].der"
         try:
-            kept = sorted(folder.iterdir(), key=lambda found: found.stat().st_mtime)
-            for old in kept[: max(0, len(kept) - KEPT_REJECTED + 1)]:
+            rejected = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
+            for old in rejected[: max(0, len(rejected) - MAX_REJECTED + 1)]:
                 old.unlink()
             path.write_bytes(der(certificate))
         except OSError as error:

@@ -11,7 +11,7 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace, AttributeValue, NodeData
 
-AGGREGATES = frozenset(
+AGGREGATE_REFERENCES = frozenset(
     ua.NodeId(i)
     for i in (
         ua.ObjectIds.HasComponent,
@@ -25,11 +25,11 @@ HAS_TYPE_DEFINITION = ua.NodeId(ua.ObjectIds.HasTypeDefinition)
 HAS_MODELLING_RULE = ua.NodeId(ua.ObjectIds.HasModellingRule)
 MANDATORY = ua.NodeId(ua.ObjectIds.ModellingRule_Mandatory)
 
-Wanted = Callable[[str], bool]
+OptionalNodes = Callable[[str], bool]
 """Whether an optional node, named by its path below the instance, is wanted."""
 
 
-def read(space: AddressSpace, node: ua.NodeId, attribute: ua.AttributeIds) -> Any:
+def read_attribute(space: AddressSpace, node: ua.NodeId, attribute: ua.AttributeIds) -> Any:
     """Value of an attribute, None where the node has none."""
     data = space.read_attribute_value(node, attribute)
     return data.Value.Value if data.Value is not None else None
@@ -53,39 +53,43 @@ def supertypes(space: AddressSpace, node: ua.NodeId) -> Iterator[ua.NodeId]:
 def link(space: AddressSpace, source: ua.NodeId, reference: ua.NodeId, target: ua.NodeId) -> None:
     """Add a reference in both directions, once; a type is not told of its instances."""
     directions = ((source, target, True), (target, source, False))
-    for one, other, forward in directions[: 1 if reference == HAS_TYPE_DEFINITION else 2]:
-        data = space[one]
-        if any(r.NodeId == other and r.ReferenceTypeId == reference for r in data.references):
+    for start, end, forward in directions[: 1 if reference == HAS_TYPE_DEFINITION else 2]:
+        data = space[start]
+        if any(r.NodeId == end and r.ReferenceTypeId == reference for r in data.references):
             continue
-        types = targets(space[other], HAS_TYPE_DEFINITION)
+        types = targets(space[end], HAS_TYPE_DEFINITION)
         data.references.append(
             ua.ReferenceDescription(
                 ReferenceTypeId=reference,
                 IsForward=forward,
-                NodeId=other,
-                BrowseName=read(space, other, ua.AttributeIds.BrowseName),
-                DisplayName=read(space, other, ua.AttributeIds.DisplayName),
-                NodeClass=read(space, other, ua.AttributeIds.NodeClass),
+                NodeId=end,
+                BrowseName=read_attribute(space, end, ua.AttributeIds.BrowseName),
+                DisplayName=read_attribute(space, end, ua.AttributeIds.DisplayName),
+                NodeClass=read_attribute(space, end, ua.AttributeIds.NodeClass),
                 TypeDefinition=types[0] if types else ua.NodeId(),
             )
         )
 
 
 def set_attribute(
-    space: AddressSpace, node: ua.NodeId, attribute: ua.AttributeIds, value: object, kind: ua.VariantType
+    space: AddressSpace,
+    node: ua.NodeId,
+    attribute: ua.AttributeIds,
+    value: object,
+    variant_type: ua.VariantType,
 ) -> None:
     """Write an attribute in place, whatever it held before."""
-    space[node].attributes[attribute] = AttributeValue(ua.DataValue(ua.Variant(value, kind)))
+    space[node].attributes[attribute] = AttributeValue(ua.DataValue(ua.Variant(value, variant_type)))
 
 
 def instantiate(
     space: AddressSpace,
-    kind: ua.NodeId,
+    type_definition: ua.NodeId,
     node: ua.NodeId,
     browse_name: ua.QualifiedName,
     description: str,
     descriptions: Mapping[str, str],
-    wanted: Wanted = lambda _path: False,
+    is_wanted: OptionalNodes = lambda _path: False,
 ) -> None:
     """Make an object of a type: all mandatory nodes, and the optional ones that are `wanted`.
 
@@ -105,24 +109,24 @@ def instantiate(
     )
     for attribute, value, variant in attributes:
         set_attribute(space, node, attribute, value, variant)
-    link(space, node, HAS_TYPE_DEFINITION, kind)
-    _fill(space, node, _declarations(space, [kind]), descriptions, wanted, "")
+    link(space, node, HAS_TYPE_DEFINITION, type_definition)
+    _fill(space, node, _declarations(space, [type_definition]), descriptions, is_wanted, "")
 
 
 def _declarations(
     space: AddressSpace, sources: list[ua.NodeId]
 ) -> dict[tuple[int, str], tuple[ua.NodeId, ua.NodeId]]:
     """Instance declarations of nodes and of their types: browse name to (declaration, reference type)."""
-    found: dict[tuple[int, str], tuple[ua.NodeId, ua.NodeId]] = {}
+    declarations: dict[tuple[int, str], tuple[ua.NodeId, ua.NodeId]] = {}
     for source in sources:
-        for kind in supertypes(space, source):
-            for reference in space[kind].references:
-                if reference.IsForward and reference.ReferenceTypeId in AGGREGATES:
+        for type_definition in supertypes(space, source):
+            for reference in space[type_definition].references:
+                if reference.IsForward and reference.ReferenceTypeId in AGGREGATE_REFERENCES:
                     name = reference.BrowseName
-                    found.setdefault(
+                    declarations.setdefault(
                         (name.NamespaceIndex, name.Name), (reference.NodeId, reference.ReferenceTypeId)
                     )
-    return found
+    return declarations
 
 
 def _fill(
@@ -130,31 +134,31 @@ def _fill(
     parent: ua.NodeId,
     declarations: dict[tuple[int, str], tuple[ua.NodeId, ua.NodeId]],
     descriptions: Mapping[str, str],
-    wanted: Wanted,
+    is_wanted: OptionalNodes,
     below: str,
 ) -> None:
     for (_, name), (declaration, reference) in declarations.items():
         original = space[declaration]
         rules = targets(original, HAS_MODELLING_RULE)
         path = f"{below}{name}"
-        if not rules or (rules[0] != MANDATORY and not wanted(path)):
+        if not rules or (rules[0] != MANDATORY and not is_wanted(path)):
             continue
         node = ua.NodeId(f"{parent.Identifier}/{name}", parent.NamespaceIndex)
         copy = NodeData(node)
-        for attribute, held in original.attributes.items():
-            copy.attributes[attribute] = AttributeValue(held.value)
+        for attribute, attribute_value in original.attributes.items():
+            copy.attributes[attribute] = AttributeValue(attribute_value.value)
         space[node] = copy
         set_attribute(space, node, ua.AttributeIds.NodeId, node, ua.VariantType.NodeId)
         _describe(space, node, descriptions.get(name))
         types = targets(original, HAS_TYPE_DEFINITION)
-        for kind in types:
-            link(space, node, HAS_TYPE_DEFINITION, kind)
+        for type_definition in types:
+            link(space, node, HAS_TYPE_DEFINITION, type_definition)
         link(space, parent, reference, node)
-        _fill(space, node, _declarations(space, [declaration, *types]), descriptions, wanted, f"{path}/")
+        _fill(space, node, _declarations(space, [declaration, *types]), descriptions, is_wanted, f"{path}/")
 
 
 def _describe(space: AddressSpace, node: ua.NodeId, text: str | None) -> None:
-    held = read(space, node, ua.AttributeIds.Description)
-    if (held is None or not held.Text) and text is not None:
+    description = read_attribute(space, node, ua.AttributeIds.Description)
+    if (description is None or not description.Text) and text is not None:
         value = ua.LocalizedText(text)
         set_attribute(space, node, ua.AttributeIds.Description, value, ua.VariantType.LocalizedText)

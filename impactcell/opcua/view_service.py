@@ -9,14 +9,17 @@ from typing import Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
-from impactcell.opcua.binary_codec import FaultError
-from impactcell.opcua.request_dispatch import Context, Service, bounded
-from impactcell.opcua.sessions import Continuations
+from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
+from impactcell.opcua.session_table import ContinuationPoints
 from impactcell.opcua.type_instances import HAS_SUBTYPE, targets
 
-MOST_REFERENCES: Final = 1_000
-MAX_PATH: Final = 50
-WHOLE_PATH: Final = 2**32 - 1
+MAX_REFERENCES_PER_NODE: Final = 1_000
+"""References in one answer for a node; more come by continuation point."""
+MAX_PATH_ELEMENTS: Final = 50
+"""Elements of one browse path."""
+NO_REMAINING_PATH: Final = 2**32 - 1
+"""RemainingPathIndex of a path that was followed to its end (Part 4, 5.9.4)."""
 DIRECTIONS: Final = {
     ua.BrowseDirection.Forward: (True,),
     ua.BrowseDirection.Inverse: (False,),
@@ -24,7 +27,7 @@ DIRECTIONS: Final = {
 }
 
 
-class Views:
+class ViewService:
     """Answers what clients ask of the shape of the address space."""
 
     def __init__(self, space: AddressSpace) -> None:
@@ -37,153 +40,167 @@ class Views:
             "Browse": Service(ua.BrowseParameters, self.browse),
             "BrowseNext": Service(ua.BrowseNextParameters, self.browse_next),
             "TranslateBrowsePathsToNodeIds": Service(
-                ua.TranslateBrowsePathsToNodeIdsParameters, self.translate
+                ua.TranslateBrowsePathsToNodeIdsParameters, self.translate_browse_paths
             ),
-            "RegisterNodes": Service(ua.RegisterNodesParameters, self.register),
-            "UnregisterNodes": Service(ua.UnregisterNodesParameters, self.unregister),
+            "RegisterNodes": Service(ua.RegisterNodesParameters, self.register_nodes),
+            "UnregisterNodes": Service(ua.UnregisterNodesParameters, self.unregister_nodes),
         }
 
-    async def browse(self, context: Context, wanted: ua.BrowseParameters) -> ua.BrowseResponse:
+    async def browse(self, context: RequestContext, parameters: ua.BrowseParameters) -> ua.BrowseResponse:
         """Follow references from nodes."""
-        nodes = bounded(wanted.NodesToBrowse)
-        if not wanted.View.ViewId.is_null():
-            raise FaultError(ua.StatusCodes.BadViewIdUnknown)
-        most = min(wanted.RequestedMaxReferencesPerNode or MOST_REFERENCES, MOST_REFERENCES)
+        descriptions = check_operations(parameters.NodesToBrowse)
+        if not parameters.View.ViewId.is_null():
+            raise StatusCodeError(ua.StatusCodes.BadViewIdUnknown)
+        max_references = min(
+            parameters.RequestedMaxReferencesPerNode or MAX_REFERENCES_PER_NODE, MAX_REFERENCES_PER_NODE
+        )
         response = ua.BrowseResponse()
-        response.Results = [self._browse(node, most, context.session.browse) for node in nodes]
+        response.Results = [
+            self._browse(description, max_references, context.session.browse) for description in descriptions
+        ]
         return response
 
-    def _browse(self, wanted: ua.BrowseDescription, most: int, kept: Continuations) -> ua.BrowseResult:
+    def _browse(
+        self, description: ua.BrowseDescription, max_references: int, continuation_points: ContinuationPoints
+    ) -> ua.BrowseResult:
         result = ua.BrowseResult()
         try:
-            found = self._references(wanted)
-        except FaultError as fault:
+            references = self._references(description)
+        except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
-        return page(found, most, kept)
+        return page(references, max_references, continuation_points)
 
-    def _references(self, wanted: ua.BrowseDescription) -> list[ua.ReferenceDescription]:
-        node = self._space.get(wanted.NodeId)
+    def _references(self, description: ua.BrowseDescription) -> list[ua.ReferenceDescription]:
+        node = self._space.get(description.NodeId)
         if node is None:
-            raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
-        directions = DIRECTIONS.get(wanted.BrowseDirection)
+            raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
+        directions = DIRECTIONS.get(description.BrowseDirection)
         if directions is None:
-            raise FaultError(ua.StatusCodes.BadBrowseDirectionInvalid)
-        kinds = self._kinds(wanted.ReferenceTypeId, subtypes=wanted.IncludeSubtypes)
+            raise StatusCodeError(ua.StatusCodes.BadBrowseDirectionInvalid)
+        reference_types = self._reference_types(
+            description.ReferenceTypeId, subtypes=description.IncludeSubtypes
+        )
         return [
-            masked(reference, wanted.ResultMask)
+            masked(reference, description.ResultMask)
             for reference in node.references
             if reference.IsForward in directions
-            and (kinds is None or reference.ReferenceTypeId in kinds)
-            and (not wanted.NodeClassMask or wanted.NodeClassMask & reference.NodeClass)
+            and (reference_types is None or reference.ReferenceTypeId in reference_types)
+            and (not description.NodeClassMask or description.NodeClassMask & reference.NodeClass)
         ]
 
-    def _kinds(self, kind: ua.NodeId, *, subtypes: bool) -> frozenset[ua.NodeId] | None:
-        if kind.is_null():
+    def _reference_types(self, reference_type: ua.NodeId, *, subtypes: bool) -> frozenset[ua.NodeId] | None:
+        if reference_type.is_null():
             return None
-        found = self._space.get(kind)
+        node = self._space.get(reference_type)
         node_class = (
-            found.attributes[ua.AttributeIds.NodeClass].value.Value.Value if found is not None else None
+            node.attributes[ua.AttributeIds.NodeClass].value.Value.Value if node is not None else None
         )
         if node_class != ua.NodeClass.ReferenceType:
-            raise FaultError(ua.StatusCodes.BadReferenceTypeIdInvalid)
-        return self._with_subtypes(kind) if subtypes else frozenset({kind})
+            raise StatusCodeError(ua.StatusCodes.BadReferenceTypeIdInvalid)
+        return self._with_subtypes(reference_type) if subtypes else frozenset({reference_type})
 
-    def _with_subtypes(self, kind: ua.NodeId) -> frozenset[ua.NodeId]:
-        known = self._subtypes.get(kind)
-        if known is None:
-            below = [self._with_subtypes(found) for found in targets(self._space[kind], HAS_SUBTYPE)]
-            known = self._subtypes[kind] = frozenset({kind}).union(*below)
-        return known
+    def _with_subtypes(self, reference_type: ua.NodeId) -> frozenset[ua.NodeId]:
+        with_subtypes = self._subtypes.get(reference_type)
+        if with_subtypes is None:
+            below = [
+                self._with_subtypes(subtype) for subtype in targets(self._space[reference_type], HAS_SUBTYPE)
+            ]
+            with_subtypes = self._subtypes[reference_type] = frozenset({reference_type}).union(*below)
+        return with_subtypes
 
-    async def browse_next(self, context: Context, wanted: ua.BrowseNextParameters) -> ua.BrowseNextResponse:
+    async def browse_next(
+        self, context: RequestContext, parameters: ua.BrowseNextParameters
+    ) -> ua.BrowseNextResponse:
         """Go on where an answer was cut, or release what was kept for it."""
         response = ua.BrowseNextResponse()
         results = []
-        for point in bounded(wanted.ContinuationPoints):
+        for point in check_operations(parameters.ContinuationPoints):
             result = ua.BrowseResult()
             try:
-                rest, most = context.session.browse.take(point)
-                if not wanted.ReleaseContinuationPoints:
-                    result = page(rest, most, context.session.browse)
-            except FaultError as fault:
+                references, max_references = context.session.browse.take(point)
+                if not parameters.ReleaseContinuationPoints:
+                    result = page(references, max_references, context.session.browse)
+            except StatusCodeError as fault:
                 result.StatusCode = ua.StatusCode(fault.code)
             results.append(result)
         response.Parameters.Results = results
         return response
 
-    async def translate(
-        self, _context: Context, wanted: ua.TranslateBrowsePathsToNodeIdsParameters
+    async def translate_browse_paths(
+        self, _context: RequestContext, parameters: ua.TranslateBrowsePathsToNodeIdsParameters
     ) -> ua.TranslateBrowsePathsToNodeIdsResponse:
         """Follow paths of browse names."""
         response = ua.TranslateBrowsePathsToNodeIdsResponse()
-        response.Results = [self._translate(path) for path in bounded(wanted.BrowsePaths)]
+        response.Results = [self._translate(path) for path in check_operations(parameters.BrowsePaths)]
         return response
 
     def _translate(self, path: ua.BrowsePath) -> ua.BrowsePathResult:
         result = ua.BrowsePathResult()
         try:
-            found = self._follow(path)
-        except FaultError as fault:
+            nodes = self._follow(path)
+        except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
         result.Targets = [
             ua.BrowsePathTarget(
                 TargetId=ua.ExpandedNodeId(node.Identifier, node.NamespaceIndex, node.NodeIdType),
-                RemainingPathIndex=WHOLE_PATH,
+                RemainingPathIndex=NO_REMAINING_PATH,
             )
-            for node in found
+            for node in nodes
         ]
         return result
 
     def _follow(self, path: ua.BrowsePath) -> list[ua.NodeId]:
         elements = path.RelativePath.Elements
         if path.StartingNode not in self._space:
-            raise FaultError(ua.StatusCodes.BadNodeIdUnknown)
+            raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
         if not elements:
-            raise FaultError(ua.StatusCodes.BadNothingToDo)
-        if len(elements) > MAX_PATH:
-            raise FaultError(ua.StatusCodes.BadTooManyOperations)
-        current = [path.StartingNode]
+            raise StatusCodeError(ua.StatusCodes.BadNothingToDo)
+        if len(elements) > MAX_PATH_ELEMENTS:
+            raise StatusCodeError(ua.StatusCodes.BadTooManyOperations)
+        nodes = [path.StartingNode]
         for element in elements:
             if not element.TargetName.Name:
-                raise FaultError(ua.StatusCodes.BadBrowseNameInvalid)
-            kinds = self._kinds(element.ReferenceTypeId, subtypes=element.IncludeSubtypes)
-            current = [
+                raise StatusCodeError(ua.StatusCodes.BadBrowseNameInvalid)
+            reference_types = self._reference_types(element.ReferenceTypeId, subtypes=element.IncludeSubtypes)
+            nodes = [
                 reference.NodeId
-                for node in current
+                for node in nodes
                 if (data := self._space.get(node)) is not None
                 for reference in data.references
                 if reference.BrowseName == element.TargetName
                 and reference.IsForward != element.IsInverse
-                and (kinds is None or reference.ReferenceTypeId in kinds)
+                and (reference_types is None or reference.ReferenceTypeId in reference_types)
             ]
-        if not current:
-            raise FaultError(ua.StatusCodes.BadNoMatch)
-        return list(dict.fromkeys(current))
+        if not nodes:
+            raise StatusCodeError(ua.StatusCodes.BadNoMatch)
+        return list(dict.fromkeys(nodes))
 
-    async def register(
-        self, _context: Context, wanted: ua.RegisterNodesParameters
+    async def register_nodes(
+        self, _context: RequestContext, parameters: ua.RegisterNodesParameters
     ) -> ua.RegisterNodesResponse:
         """Take nodes a client will use often; their NodeIds are as quick as any."""
         response = ua.RegisterNodesResponse()
-        response.Parameters.RegisteredNodeIds = bounded(wanted.NodesToRegister)
+        response.Parameters.RegisteredNodeIds = check_operations(parameters.NodesToRegister)
         return response
 
-    async def unregister(
-        self, _context: Context, wanted: ua.UnregisterNodesParameters
+    async def unregister_nodes(
+        self, _context: RequestContext, parameters: ua.UnregisterNodesParameters
     ) -> ua.UnregisterNodesResponse:
         """Forget registered nodes."""
-        bounded(wanted.NodesToUnregister)
+        check_operations(parameters.NodesToUnregister)
         return ua.UnregisterNodesResponse()
 
 
-def page(found: list[ua.ReferenceDescription], most: int, kept: Continuations) -> ua.BrowseResult:
+def page(
+    references: list[ua.ReferenceDescription], max_references: int, continuation_points: ContinuationPoints
+) -> ua.BrowseResult:
     """Answer with as many references as fit, and keep the rest."""
     result = ua.BrowseResult()
-    result.References = found[:most]
-    if len(found) > most:
-        result.ContinuationPoint = kept.keep((found[most:], most))
+    result.References = references[:max_references]
+    if len(references) > max_references:
+        result.ContinuationPoint = continuation_points.keep((references[max_references:], max_references))
     return result
 
 

@@ -13,7 +13,7 @@ from impactcell.opcua.type_instances import (
     HAS_TYPE_DEFINITION,
     instantiate,
     link,
-    read,
+    read_attribute,
     set_attribute,
     targets,
 )
@@ -85,7 +85,7 @@ class CellSpace:
         self.node = ua.NodeId(description.name, self._cells)
         if self.node in self._space:
             raise SettingsError(f"cell {description.name!r} is there twice")
-        self.kind = self._named(
+        self.cell_type = self._named(
             ua.NodeId(ua.ObjectIds.BaseObjectType), "ImpactCellType", ua.ObjectIds.HasSubtype
         )
         self.folder = parent = self._named(
@@ -93,12 +93,12 @@ class CellSpace:
         )
         instantiate(
             self._space,
-            self.kind,
+            self.cell_type,
             self.node,
             ua.QualifiedName(description.name, self._cells),
             f"Cell {description.name}.",
             DESCRIPTIONS,
-            self._wanted,
+            self._is_wanted,
         )
         notifies = ua.EventNotifier.SubscribeToEvents.mask | ua.EventNotifier.HistoryRead.mask
         set_attribute(self._space, self.node, ua.AttributeIds.EventNotifier, notifies, ua.VariantType.Byte)
@@ -124,15 +124,14 @@ class CellSpace:
         """Event type of a condition."""
         return targets(self._space[self.path(alarm.value)], HAS_TYPE_DEFINITION)[0]
 
-    def _named(self, parent: ua.NodeId, name: str, reference: int) -> ua.NodeId:
-        for found in self._space[parent].references:
-            if found.ReferenceTypeId == ua.NodeId(reference) and found.BrowseName == ua.QualifiedName(
-                name, self._types
-            ):
-                return found.NodeId
+    def _named(self, parent: ua.NodeId, name: str, reference_type: int) -> ua.NodeId:
+        browse_name = ua.QualifiedName(name, self._types)
+        for reference in self._space[parent].references:
+            if reference.ReferenceTypeId == ua.NodeId(reference_type) and reference.BrowseName == browse_name:
+                return reference.NodeId
         raise LookupError(f"the NodeSet2 file has no {name}")
 
-    def _wanted(self, path: str) -> bool:
+    def _is_wanted(self, path: str) -> bool:
         head, _, rest = path.partition("/")
         if head == "Identification":
             field = _IDENTIFICATION.get(rest)
@@ -145,10 +144,12 @@ class CellSpace:
             if value is None:
                 continue
             node = self.path(f"Identification/{name}")
-            kind = ua.VariantType(read(self._space, node, ua.AttributeIds.DataType).Identifier)
-            if kind is ua.VariantType.LocalizedText:
+            variant_type = ua.VariantType(
+                read_attribute(self._space, node, ua.AttributeIds.DataType).Identifier
+            )
+            if variant_type is ua.VariantType.LocalizedText:
                 value = ua.LocalizedText(value)
-            set_attribute(self._space, node, ua.AttributeIds.Value, value, kind)
+            set_attribute(self._space, node, ua.AttributeIds.Value, value, variant_type)
 
     def _set_ranges(self) -> None:
         for path, row in CYCLE.items():
@@ -166,7 +167,11 @@ class CellSpace:
         for path in HISTORY:
             node = self.path(path)
             set_attribute(
-                self._space, node, ua.AttributeIds.Historizing, value=True, kind=ua.VariantType.Boolean
+                self._space,
+                node,
+                ua.AttributeIds.Historizing,
+                value=True,
+                variant_type=ua.VariantType.Boolean,
             )
             settings = self.path(f"{path}/HA Configuration")
             instantiate(
@@ -185,9 +190,9 @@ class CellSpace:
                 ("AggregateConfiguration/PercentDataGood", 100, ua.VariantType.Byte),
                 ("AggregateConfiguration/UseSlopedExtrapolation", False, ua.VariantType.Boolean),
             )
-            for name, value, kind in defaults:
+            for name, value, variant_type in defaults:
                 place = ua.NodeId(f"{settings.Identifier}/{name}", settings.NamespaceIndex)
-                set_attribute(self._space, place, ua.AttributeIds.Value, value, kind)
+                set_attribute(self._space, place, ua.AttributeIds.Value, value, variant_type)
 
 
 def cell_notifiers(cell: CellSpace) -> frozenset[ua.NodeId]:
@@ -195,10 +200,10 @@ def cell_notifiers(cell: CellSpace) -> frozenset[ua.NodeId]:
     return frozenset({cell.node, cell.folder, ua.NodeId(ua.ObjectIds.Server)})
 
 
-def method_declarations(space: AddressSpace, kind: ua.NodeId) -> dict[str, ua.NodeId]:
+def method_declarations(space: AddressSpace, type_node: ua.NodeId) -> dict[str, ua.NodeId]:
     """Methods of a type, by name."""
     return {
         reference.BrowseName.Name: reference.NodeId
-        for reference in space[kind].references
+        for reference in space[type_node].references
         if reference.IsForward and reference.NodeClass == ua.NodeClass.Method
     }

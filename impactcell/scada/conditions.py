@@ -13,13 +13,14 @@ from asyncua import ua
 
 from impactcell.alarms import is_retained
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
-from impactcell.opcua.node_values import GOOD, Values, moment
+from impactcell.opcua.variable_store import GOOD, VariableStore, moment
 from impactcell.records import Alarm, AlarmName, Shelving
 from impactcell.scada.cell_nodes import CellSpace
 
 MAX_SHELVE_S: Final = 24 * 3600.0
 """Longest time a condition can be shelved: nobody remembers longer why."""
 KEPT_EVENT_IDS: Final = 100
+"""EventIds of one condition that an action may name."""
 
 _LT: Final = ua.VariantType.LocalizedText
 _CLASSES: Final = {
@@ -77,7 +78,7 @@ class Condition:
     """One condition: its present state, its nodes, and the EventIds a client may act on."""
 
     def __init__(
-        self, cell: CellSpace, name: AlarmName, values: Values, notifiers: frozenset[ua.NodeId]
+        self, cell: CellSpace, name: AlarmName, values: VariableStore, notifiers: frozenset[ua.NodeId]
     ) -> None:
         self.cell = cell.description.name
         self.name = name
@@ -86,13 +87,13 @@ class Condition:
         self._space = cell
         self._values = values
         self._notifiers = notifiers
-        self._kind = cell.alarm_type(name)
-        self._known: dict[bytes, None] = {}
+        self._event_type = cell.alarm_type(name)
+        self._event_ids: dict[bytes, None] = {}
         self._last_severity = 0
         input_path = _INPUTS.get(name)
         self._input = cell.path(input_path) if input_path else ua.NodeId()
         cell.compute(f"{name.value}/ShelvingState/UnshelveTime", self._unshelve_time)
-        self._show(self.alarm)
+        self._write_nodes(self.alarm)
 
     def _unshelve_time(self) -> ua.DataValue:
         now = datetime.now(UTC)
@@ -108,18 +109,18 @@ class Condition:
             return None
         if alarm.active and not alarm.acknowledged and (self.alarm.acknowledged or not self.alarm.active):
             # A newly raised alarm: what was acknowledged before cannot stand for it.
-            self._known.clear()
+            self._event_ids.clear()
         self._last_severity = self.alarm.severity
         self.alarm = alarm
-        self._known[new] = None
-        while len(self._known) > KEPT_EVENT_IDS:
-            del self._known[next(iter(self._known))]
-        self._show(alarm)
+        self._event_ids[new] = None
+        while len(self._event_ids) > KEPT_EVENT_IDS:
+            del self._event_ids[next(iter(self._event_ids))]
+        self._write_nodes(alarm)
         return self.event(alarm)
 
-    def knows(self, given: bytes | None) -> bool:
+    def is_current_event(self, event_id: bytes | None) -> bool:
         """Whether an EventId was told since the alarm was raised."""
-        return given in self._known
+        return event_id in self._event_ids
 
     def event(self, alarm: Alarm) -> EventNotification:
         """Make the event that tells a state."""
@@ -127,13 +128,13 @@ class Condition:
         if not alarm.enabled:
             bad = ua.Variant(_DISABLED, ua.VariantType.StatusCode)
             fields = {p: v if not p or p[0] in _TOLD_WHEN_DISABLED else bad for p, v in fields.items()}
-        return EventNotification(self._kind, fields, self._notifiers)
+        return EventNotification(self._event_type, fields, self._notifiers)
 
     def present(self) -> EventNotification | None:
         """Make the event of the present state for a refresh; None where it is not to be shown."""
         return self.event(self.alarm) if is_retained(self.alarm) else None
 
-    def _show(self, alarm: Alarm) -> None:
+    def _write_nodes(self, alarm: Alarm) -> None:
         time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
         for path, variant in self._fields(alarm):
             if not path:
@@ -144,10 +145,10 @@ class Condition:
 
     def _fields(self, alarm: Alarm) -> Iterator[tuple[BrowsePath, ua.Variant]]:
         time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
-        yield from _plain(
+        yield from _variants(
             {
                 "EventId": (event_id(self.cell, alarm), ua.VariantType.ByteString),
-                "EventType": (self._kind, ua.VariantType.NodeId),
+                "EventType": (self._event_type, ua.VariantType.NodeId),
                 "SourceNode": (self._space.node, ua.VariantType.NodeId),
                 "SourceName": (self.cell, ua.VariantType.String),
                 "Time": (time_of, ua.VariantType.DateTime),
@@ -181,42 +182,42 @@ class Condition:
     @staticmethod
     def _states(alarm: Alarm, time_of: datetime) -> Iterator[tuple[BrowsePath, ua.Variant]]:
         enabled = "Enabled" if alarm.enabled else "Disabled"
-        shown = enabled
-        for name, (test, yes, no) in _STATES.items():
+        effective = enabled
+        for name, (test, true_text, false_text) in _STATES.items():
             on = test(alarm)
-            yield (name,), ua.Variant(ua.LocalizedText(yes if on else no), _LT)
+            yield (name,), ua.Variant(ua.LocalizedText(true_text if on else false_text), _LT)
             yield (name, "Id"), ua.Variant(on, ua.VariantType.Boolean)
             if name == "ActiveState":
                 yield (name, "TransitionTime"), ua.Variant(time_of, ua.VariantType.DateTime)
-                shown = yes if on and alarm.enabled else enabled
+                effective = true_text if on and alarm.enabled else enabled
         text, state = _SHELVING[alarm.shelving]
         if alarm.enabled and alarm.shelving is not Shelving.UNSHELVED:
-            shown = text
+            effective = text
         yield ("EnabledState",), ua.Variant(ua.LocalizedText(enabled), _LT)
         yield ("EnabledState", "Id"), ua.Variant(alarm.enabled, ua.VariantType.Boolean)
-        yield ("EnabledState", "EffectiveDisplayName"), ua.Variant(ua.LocalizedText(shown), _LT)
+        yield ("EnabledState", "EffectiveDisplayName"), ua.Variant(ua.LocalizedText(effective), _LT)
         yield ("EnabledState", "TransitionTime"), ua.Variant(time_of, ua.VariantType.DateTime)
         yield ("ShelvingState", "CurrentState"), ua.Variant(ua.LocalizedText(text), _LT)
         yield ("ShelvingState", "CurrentState", "Id"), ua.Variant(ua.NodeId(state), ua.VariantType.NodeId)
         yield ("ShelvingState", "UnshelveTime"), ua.Variant(unshelve_ms(alarm), ua.VariantType.Double)
 
 
-def _plain(fields: dict[str, tuple[Any, ua.VariantType]]) -> Iterator[tuple[BrowsePath, ua.Variant]]:
+def _variants(fields: dict[str, tuple[Any, ua.VariantType]]) -> Iterator[tuple[BrowsePath, ua.Variant]]:
     for name, (value, kind) in fields.items():
         yield (name,), ua.Variant(value, kind)
 
 
 def _evidence(alarm: Alarm) -> Iterator[tuple[BrowsePath, ua.Variant]]:
-    found = alarm.evidence
+    evidence = alarm.evidence
     yield ("CycleNumber",), ua.Variant(alarm.cycle, ua.VariantType.UInt32)
-    yield ("ChangeCycle",), ua.Variant(found.change_cycle, ua.VariantType.UInt32)
+    yield ("ChangeCycle",), ua.Variant(evidence.change_cycle, ua.VariantType.UInt32)
     for name, value in (
-        ("Statistic", found.statistic),
-        ("Threshold", found.threshold),
-        ("Size", found.size),
-        ("SizeStdDev", found.size_std),
-        ("FalseAlarmCycles", found.false_alarm_cycles),
-        ("FalseAlarmDays", found.false_alarm_days),
+        ("Statistic", evidence.statistic),
+        ("Threshold", evidence.threshold),
+        ("Size", evidence.size),
+        ("SizeStdDev", evidence.size_std),
+        ("FalseAlarmCycles", evidence.false_alarm_cycles),
+        ("FalseAlarmDays", evidence.false_alarm_days),
     ):
         yield (name,), ua.Variant(float(value), ua.VariantType.Double)
 
@@ -227,7 +228,7 @@ def refresh_event(kind: int) -> EventNotification:
     server = ua.NodeId(ua.ObjectIds.Server)
     identity = hashlib.sha256(f"{kind} {now.isoformat()}".encode()).digest()[:16]
     fields = dict(
-        _plain(
+        _variants(
             {
                 "EventId": (identity, ua.VariantType.ByteString),
                 "EventType": (ua.NodeId(kind), ua.VariantType.NodeId),

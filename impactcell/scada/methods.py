@@ -8,11 +8,11 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.alarms import EventKind
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import RefusedError
-from impactcell.opcua.method_service import Argument, ArgumentError, Calls, Method
-from impactcell.opcua.request_dispatch import Context
-from impactcell.opcua.subscription_service import Monitoring
+from impactcell.opcua.method_service import InputArgument, InvalidArgumentError, Method, MethodService
+from impactcell.opcua.request_dispatch import RequestContext
+from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.records import Alarm, AlarmName
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.cell_nodes import CellSpace
@@ -24,15 +24,17 @@ from impactcell.scada.rights import CONDITION_AREAS, Area
 _audit: Final = logging.getLogger("impactcell.audit")
 
 MAX_BATCH_ID: Final = 64
+"""Longest name of a batch, characters."""
 MAX_COMMENT: Final = 1_000
+"""Longest comment, characters."""
 
-_EVENT_ID: Final = Argument("EventId", ua.VariantType.ByteString)
-_COMMENT: Final = Argument("Comment", ua.VariantType.LocalizedText)
-_SHELVING_TIME: Final = Argument("ShelvingTime", ua.VariantType.Double)
+_EVENT_ID: Final = InputArgument("EventId", ua.VariantType.ByteString)
+_COMMENT: Final = InputArgument("Comment", ua.VariantType.LocalizedText)
+_SHELVING_TIME: Final = InputArgument("ShelvingTime", ua.VariantType.Double)
 
 _ids = ua.ObjectIds
 # Action: name of the method, its NodeIds on the types, its arguments.
-_CONDITION_METHODS: Final[Mapping[EventKind, tuple[str, tuple[int, ...], tuple[Argument, ...]]]] = {
+_CONDITION_METHODS: Final[Mapping[EventKind, tuple[str, tuple[int, ...], tuple[InputArgument, ...]]]] = {
     EventKind.ENABLE: ("Enable", (_ids.ConditionType_Enable,), ()),
     EventKind.DISABLE: ("Disable", (_ids.ConditionType_Disable,), ()),
     EventKind.COMMENT: ("AddComment", (_ids.ConditionType_AddComment,), (_EVENT_ID, _COMMENT)),
@@ -59,19 +61,19 @@ _CONDITION_METHODS: Final[Mapping[EventKind, tuple[str, tuple[int, ...], tuple[A
     ),
 }
 
-Tell = Callable[[str, Alarm], None]
+ShowAlarm = Callable[[str, Alarm], None]
 
 
 class MethodTable:
     """Makes methods callable, and tells the access policy which area they lie in."""
 
-    def __init__(self, calls: Calls, access: CellAccess) -> None:
-        self._calls = calls
+    def __init__(self, methods: MethodService, access: CellAccess) -> None:
+        self._methods = methods
         self._access = access
 
     def bind(self, owner: ua.NodeId, method: ua.NodeId, area: Area, bound: Method) -> None:
         """Make a method callable on an object."""
-        self._calls.bind(owner, method, bound)
+        self._methods.bind(owner, method, bound)
         self._access.add_method(method, area)
 
 
@@ -79,20 +81,20 @@ def _text(value: object, index: int) -> str:
     """Take a comment: an absent one leaves the last one standing (Part 9, 5.5.6)."""
     text = (value.Text or "") if isinstance(value, ua.LocalizedText) else ""
     if len(text) > MAX_COMMENT:
-        raise ArgumentError(index, ua.StatusCodes.BadOutOfRange)
+        raise InvalidArgumentError(index, ua.StatusCodes.BadOutOfRange)
     return text
 
 
-async def _audited(context: Context, what: str, work: Awaitable[Any]) -> Any:
+async def _audited(context: RequestContext, what: str, work: Awaitable[Any]) -> Any:
     actor = context.actor
     who = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
     try:
-        done = await work
+        result = await work
     except RefusedError as refused:
         _audit.warning("%s: %s: refused, %s: %s", who, what, refused.code, refused)
         raise
     _audit.info("%s: %s: done", who, what)
-    return done
+    return result
 
 
 def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeId], actions: Actions) -> None:
@@ -100,73 +102,73 @@ def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeI
     description: CellDescription = space.description
     cell = description.name
 
-    async def start_batch(context: Context, given: Sequence[Any]) -> None:
-        batch, expected = (given[0] or "").strip(), given[1]
+    async def start_batch(context: RequestContext, arguments: Sequence[Any]) -> None:
+        batch, expected = (arguments[0] or "").strip(), arguments[1]
         if not 0 < len(batch) <= MAX_BATCH_ID or not batch.isprintable():
-            raise ArgumentError(0, ua.StatusCodes.BadOutOfRange)
+            raise InvalidArgumentError(0, ua.StatusCodes.BadOutOfRange)
         work = actions.start_batch(cell, batch, expected=expected, actor=context.actor)
         await _audited(context, f"{cell}: StartBatch({batch!r}, expected={expected})", work)
 
-    async def reset_wear(context: Context, given: Sequence[Any]) -> None:
-        comment = _text(given[0], 0)
+    async def reset_wear(context: RequestContext, arguments: Sequence[Any]) -> None:
+        comment = _text(arguments[0], 0)
         await _audited(
             context, f"{cell}: ResetWear({comment!r})", actions.reset_wear(cell, comment, context.actor)
         )
 
-    async def set_target(context: Context, given: Sequence[Any]) -> None:
+    async def set_target(context: RequestContext, arguments: Sequence[Any]) -> None:
         low, high = target_range_mm(description.ranges)
-        target = given[0]
+        target = arguments[0]
         if not math.isfinite(target) or not low <= target <= high:
-            raise ArgumentError(0, ua.StatusCodes.BadOutOfRange)
+            raise InvalidArgumentError(0, ua.StatusCodes.BadOutOfRange)
         work = actions.set_target(cell, target / MM_PER_M, context.actor)
         await _audited(context, f"{cell}: SetTarget({target} mm)", work)
 
-    async def abort(context: Context, _given: Sequence[Any]) -> None:
+    async def abort(context: RequestContext, _given: Sequence[Any]) -> None:
         await _audited(context, f"{cell}: AbortPositioning()", actions.abort_positioning(cell, context.actor))
 
     text, flag = ua.VariantType.String, ua.VariantType.Boolean
-    for name, area, arguments, run in (
+    for name, area, arguments, handler in (
         (
             "StartBatch",
             Area.START_BATCH,
-            (Argument("BatchId", text), Argument("Expected", flag)),
+            (InputArgument("BatchId", text), InputArgument("Expected", flag)),
             start_batch,
         ),
         ("ResetWear", Area.RESET_WEAR, (_COMMENT,), reset_wear),
-        ("SetTarget", Area.SET_TARGET, (Argument("Target", ua.VariantType.Double),), set_target),
+        ("SetTarget", Area.SET_TARGET, (InputArgument("Target", ua.VariantType.Double),), set_target),
         ("AbortPositioning", Area.ABORT_POSITIONING, (), abort),
     ):
-        method = Method(arguments, run)
+        method = Method(arguments, handler)
         table.bind(space.node, space.path(name), area, method)
         table.bind(space.node, types[name], area, method)
 
 
 def bind_condition(
-    table: MethodTable, space: CellSpace, condition: Condition, actions: Actions, tell: Tell
+    table: MethodTable, space: CellSpace, condition: Condition, actions: Actions, show_alarm: ShowAlarm
 ) -> None:
     """Make the methods of a condition callable, on itself and on its shelving state."""
     shelving = space.path(f"{condition.name.value}/ShelvingState")
     for event, (name, type_ids, arguments) in _CONDITION_METHODS.items():
-        method = Method(arguments, _action(condition, event, actions, tell))
-        own = space.path(f"{condition.name.value}/{name}")
+        method = Method(arguments, _action(condition, event, actions, show_alarm))
+        instance_method = space.path(f"{condition.name.value}/{name}")
         for owner in (condition.node, shelving) if "/" in name else (condition.node,):
-            for each in (own, *(ua.NodeId(number) for number in type_ids)):
-                table.bind(owner, each, CONDITION_AREAS[event], method)
+            for method_id in (instance_method, *(ua.NodeId(number) for number in type_ids)):
+                table.bind(owner, method_id, CONDITION_AREAS[event], method)
 
 
 def _action(
-    condition: Condition, event: EventKind, actions: Actions, tell: Tell
-) -> Callable[[Context, Sequence[Any]], Awaitable[None]]:
-    async def act(context: Context, given: Sequence[Any]) -> None:
+    condition: Condition, event: EventKind, actions: Actions, show_alarm: ShowAlarm
+) -> Callable[[RequestContext, Sequence[Any]], Awaitable[None]]:
+    async def act(context: RequestContext, arguments: Sequence[Any]) -> None:
         comment, shelve_s = "", 0.0
         if event in (EventKind.ACKNOWLEDGE, EventKind.CONFIRM, EventKind.COMMENT):
-            if condition.alarm.enabled and not condition.knows(given[0]):
-                raise FaultError(ua.StatusCodes.BadEventIdUnknown)
-            comment = _text(given[1], 1)
+            if condition.alarm.enabled and not condition.is_current_event(arguments[0]):
+                raise StatusCodeError(ua.StatusCodes.BadEventIdUnknown)
+            comment = _text(arguments[1], 1)
         elif event is EventKind.SHELVE_TIMED:
-            shelve_s = given[0] / 1e3
+            shelve_s = arguments[0] / 1e3
             if not 0.0 < shelve_s <= MAX_SHELVE_S:
-                raise FaultError(ua.StatusCodes.BadShelvingTimeOutOfRange)
+                raise StatusCodeError(ua.StatusCodes.BadShelvingTimeOutOfRange)
         elif event is EventKind.SHELVE_ONE_SHOT:
             shelve_s = MAX_SHELVE_S
         what = f"{condition.cell}: {condition.name.value}: {event.value}"
@@ -177,13 +179,15 @@ def _action(
         work = actions.act_on_condition(
             condition.cell, condition.name, event, context.actor, comment=comment, shelve_s=shelve_s
         )
-        tell(condition.cell, await _audited(context, what, work))
+        show_alarm(condition.cell, await _audited(context, what, work))
 
     return act
 
 
 def bind_refresh(
-    table: MethodTable, monitoring: Monitoring, conditions: Mapping[tuple[str, AlarmName], Condition]
+    table: MethodTable,
+    subscriptions: SubscriptionService,
+    conditions: Mapping[tuple[str, AlarmName], Condition],
 ) -> None:
     """Make ConditionRefresh and ConditionRefresh2 callable."""
 
@@ -195,15 +199,17 @@ def bind_refresh(
             refresh_event(_ids.RefreshEndEventType),
         ]
 
-    async def refresh(context: Context, given: Sequence[Any]) -> None:
-        monitoring.refresh(context.session, given[0], None, events())
+    async def refresh(context: RequestContext, arguments: Sequence[Any]) -> None:
+        subscriptions.refresh(context.session, arguments[0], None, events())
 
-    async def refresh_item(context: Context, given: Sequence[Any]) -> None:
-        monitoring.refresh(context.session, given[0], given[1], events())
+    async def refresh_item(context: RequestContext, arguments: Sequence[Any]) -> None:
+        subscriptions.refresh(context.session, arguments[0], arguments[1], events())
 
     number = ua.VariantType.UInt32
-    one = Method((Argument("SubscriptionId", number),), refresh)
-    two = Method((Argument("SubscriptionId", number), Argument("MonitoredItemId", number)), refresh_item)
+    refresh_method = Method((InputArgument("SubscriptionId", number),), refresh)
+    refresh_item_method = Method(
+        (InputArgument("SubscriptionId", number), InputArgument("MonitoredItemId", number)), refresh_item
+    )
     owner = ua.NodeId(_ids.ConditionType)
-    table.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh), Area.REFRESH, one)
-    table.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh2), Area.REFRESH, two)
+    table.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh), Area.REFRESH, refresh_method)
+    table.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh2), Area.REFRESH, refresh_item_method)

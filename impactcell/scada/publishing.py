@@ -6,8 +6,8 @@ from typing import Final
 
 from asyncua import ua
 
-from impactcell.opcua.node_values import GOOD, Values, Variable, moment
-from impactcell.opcua.type_instances import read
+from impactcell.opcua.type_instances import read_attribute
+from impactcell.opcua.variable_store import GOOD, StoredVariable, VariableStore, moment
 from impactcell.records import ModuleStatus, Quality, Snapshot
 from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.node_table import CYCLE, MODULE
@@ -39,13 +39,13 @@ class CellValues:
     or status have changed, unless it asks for changes of the timestamp as well.
     """
 
-    def __init__(self, cell: CellSpace, values: Values, space: object, now: datetime) -> None:
-        self._variables: dict[str, tuple[Variable, ua.VariantType, bool]] = {}
+    def __init__(self, cell: CellSpace, values: VariableStore, space: object, now: datetime) -> None:
+        self._variables: dict[str, tuple[StoredVariable, ua.VariantType, bool]] = {}
         self._seen: set[str] = set()
         for path in (*CYCLE, *MODULE):
             node = cell.path(path)
-            kind = ua.VariantType(read(space, node, ua.AttributeIds.DataType).Identifier)
-            is_array = read(space, node, ua.AttributeIds.ValueRank) == 1
+            kind = ua.VariantType(read_attribute(space, node, ua.AttributeIds.DataType).Identifier)
+            is_array = read_attribute(space, node, ua.AttributeIds.ValueRank) == 1
             variable = values.variable(node)
             self._variables[path] = variable, kind, is_array
             empty = [] if is_array else _EMPTY[kind]
@@ -78,7 +78,7 @@ class CellValues:
         time = moment(time_ns)
         for path in CYCLE:
             if path in self._seen:
-                self._variables[path][0].restate(status, time)
+                self._variables[path][0].set_status(status, time)
 
     def _write(self, path: str, value: NodeValue, quality: Quality, time: datetime, now: datetime) -> None:
         variable, kind, is_array = self._variables[path]

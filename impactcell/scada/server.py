@@ -14,9 +14,9 @@ from impactcell import __version__
 from impactcell.opcua.asyncua_adapter import AddressSpace, address_space, new_standard_server
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.host_interface import Host, Product, ServerSettings
-from impactcell.opcua.node_values import Values
 from impactcell.opcua.service_host import ServiceHost, aggregate_functions
 from impactcell.opcua.type_instances import link
+from impactcell.opcua.variable_store import VariableStore
 from impactcell.records import Alarm, AlarmName, ModuleStatus, Snapshot
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.cell_history import CellHistory
@@ -96,21 +96,21 @@ class Server:
         space = address_space(model)
         _offer_aggregates(space)
         uris = await model.get_namespace_array()
-        values, access = Values(space), CellAccess()
+        values, access = VariableStore(space), CellAccess()
         cells = [CellSpace(model, uris, description) for description in self._descriptions]
         history = self._history_of(cells)
         host = ServiceHost(self._settings, Host(PRODUCT, users, access, history), space, values)
-        table = MethodTable(host.calls, access)
+        table = MethodTable(host.method_service, access)
         for cell in cells:
             name = cell.description.name
             self._cells[name] = CellValues(cell, values, space, datetime.now(UTC))
             access.add_notifiers(cell_notifiers(cell))
-            bind_cell(table, cell, method_declarations(space, cell.kind), self._actions)
+            bind_cell(table, cell, method_declarations(space, cell.cell_type), self._actions)
             for alarm in AlarmName:
                 condition = Condition(cell, alarm, values, cell_notifiers(cell))
                 self._conditions[name, alarm] = condition
                 bind_condition(table, cell, condition, self._actions, self.alarm)
-        bind_refresh(table, host.monitoring, self._conditions)
+        bind_refresh(table, host.subscription_service, self._conditions)
         await host.start()
         self._host = host
         return self
@@ -139,7 +139,7 @@ class Server:
         """
         event = self._conditions[cell, alarm.name].update(alarm)
         if event is not None and self._host is not None:
-            self._host.monitoring.event(event)
+            self._host.subscription_service.notify(event)
 
     def module(self, cell: str, state: ModuleStatus, time_ns: int) -> None:
         """Show the state of the link to the module."""

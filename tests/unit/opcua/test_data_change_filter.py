@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from impactcell.opcua.asyncua_adapter import StrictBuffer, bound_null_arrays
-from impactcell.opcua.binary_codec import DecodingError, FaultError, decode
-from impactcell.opcua.data_change_filter import ChangeFilter, cut, parse_range, same
+from impactcell.opcua.binary_codec import DecodingError, StatusCodeError, decode
+from impactcell.opcua.data_change_filter import DataChangeFilter, cut, parse_range, same
 from impactcell.opcua.event_filter import like
 
 TRIGGER = ua.DataChangeTrigger
@@ -25,7 +25,7 @@ def value(number: object, status: int = 0, second: int = 0) -> ua.DataValue:
 
 @given(st.lists(st.floats(-1, 1, allow_nan=False), min_size=1, max_size=50), st.floats(0.01, 0.5))
 def test_no_unreported_value_is_farther_than_the_deadband(values: list[float], deadband: float) -> None:
-    watched = ChangeFilter(TRIGGER.StatusValue, deadband)
+    watched = DataChangeFilter(TRIGGER.StatusValue, deadband)
     reported = math.nan
     for number in values:
         if watched.passes(value(number)):
@@ -36,9 +36,9 @@ def test_no_unreported_value_is_farther_than_the_deadband(values: list[float], d
 
 
 def test_triggers() -> None:
-    status = ChangeFilter(TRIGGER.Status, 0.0)
+    status = DataChangeFilter(TRIGGER.Status, 0.0)
     assert [status.passes(v) for v in (value(1.0), value(2.0), value(2.0, 0x80000000))] == [True, False, True]
-    timestamp = ChangeFilter(TRIGGER.StatusValueTimestamp, 0.0)
+    timestamp = DataChangeFilter(TRIGGER.StatusValueTimestamp, 0.0)
     assert [timestamp.passes(v) for v in (value(1.0), value(1.0), value(1.0, second=1))] == [
         True,
         False,
@@ -47,10 +47,10 @@ def test_triggers() -> None:
 
 
 def test_nan_is_the_same_as_nan() -> None:
-    watched = ChangeFilter(TRIGGER.StatusValue, 0.0)
+    watched = DataChangeFilter(TRIGGER.StatusValue, 0.0)
     numbers = (math.nan, math.nan, 1.0, [math.nan, 1.0], [math.nan, 1.0], [math.nan, 2.0])
     assert [watched.passes(value(n)) for n in numbers] == [True, False, True, True, False, True]
-    banded = ChangeFilter(TRIGGER.StatusValue, 0.5)
+    banded = DataChangeFilter(TRIGGER.StatusValue, 0.5)
     numbers = (1.0, math.nan, math.nan, math.inf, math.inf, 1.0)
     assert [banded.passes(value(n)) for n in numbers] == [True, True, False, True, False, True]
     assert not same(1, "1")
@@ -58,7 +58,7 @@ def test_nan_is_the_same_as_nan() -> None:
 
 @pytest.mark.parametrize("text", ["-1", "1:", ":3", "3:3", "4:2", "a", "1,2", "1:2:3", " 1", "٣"])
 def test_bad_index_ranges(text: str) -> None:
-    with pytest.raises(FaultError) as refused:
+    with pytest.raises(StatusCodeError) as refused:
         parse_range(text)
     assert refused.value.code == ua.StatusCodes.BadIndexRangeInvalid
 

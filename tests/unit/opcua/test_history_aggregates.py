@@ -14,16 +14,17 @@ from impactcell.opcua.history_aggregates import (
     PARTIAL,
     RAW,
     SUB_NORMAL,
-    Aggregate,
-    Interval,
-    Treatment,
-    intervals,
-    process,
+    AggregateConfiguration,
+    ProcessingInterval,
+    aggregate_interval,
+    processing_intervals,
 )
+from impactcell.opcua.history_aggregates import AggregateFunction as Function
 from impactcell.opcua.host_interface import HistoricalValue
 
 G, U, B = 0x0000_0000, 0x4000_0000, 0x8000_0000  # Good, Uncertain, Bad (Part 4, 7.39)
-WHOLE = Interval(0, 100)
+WHOLE = ProcessingInterval(0, 100)
+DEFAULT = AggregateConfiguration()
 
 
 def series(*entries: tuple[int, float, int]) -> list[HistoricalValue]:
@@ -33,44 +34,54 @@ def series(*entries: tuple[int, float, int]) -> list[HistoricalValue]:
 @pytest.mark.parametrize(
     ("aggregate", "values", "expected", "status"),
     [
-        (Aggregate.AVERAGE, series((0, 1.0, G), (10, 2.0, G), (20, 6.0, G)), 3.0, CALCULATED),
-        (Aggregate.AVERAGE, series((0, 1.0, G), (10, 9.0, U), (20, 3.0, G)), 2.0, SUB_NORMAL | CALCULATED),
-        (Aggregate.AVERAGE, series((0, 1.0, G), (10, 9.0, B)), 1.0, SUB_NORMAL | CALCULATED),
-        (Aggregate.AVERAGE, series((0, 9.0, B), (10, 9.0, U)), None, BAD),
-        (Aggregate.AVERAGE, [], None, NO_DATA),
-        (Aggregate.MINIMUM, series((0, 1.0, G), (10, 2.0, G)), 1.0, RAW),
-        (Aggregate.MINIMUM, series((0, 2.0, G), (10, 1.0, G)), 1.0, CALCULATED),
-        (Aggregate.MINIMUM, series((0, 2.0, G), (10, 1.0, G), (20, 1.0, G)), 1.0, MULTIPLE | CALCULATED),
-        (Aggregate.MAXIMUM, series((5, 2.0, G), (10, 7.0, U)), 2.0, SUB_NORMAL | CALCULATED),
-        (Aggregate.COUNT, series((0, 1.0, G), (10, 2.0, G)), 2, CALCULATED),
-        (Aggregate.COUNT, series((0, 1.0, G), (10, 2.0, B)), 1, SUB_NORMAL | CALCULATED),
-        (Aggregate.COUNT, series((0, 1.0, B)), 0, BAD | CALCULATED),
-        (Aggregate.COUNT, [], 0, CALCULATED),
+        (Function.AVERAGE, series((0, 1.0, G), (10, 2.0, G), (20, 6.0, G)), 3.0, CALCULATED),
+        (
+            Function.AVERAGE,
+            series((0, 1.0, G), (10, 9.0, U), (20, 3.0, G)),
+            2.0,
+            SUB_NORMAL | CALCULATED,
+        ),
+        (Function.AVERAGE, series((0, 1.0, G), (10, 9.0, B)), 1.0, SUB_NORMAL | CALCULATED),
+        (Function.AVERAGE, series((0, 9.0, B), (10, 9.0, U)), None, BAD),
+        (Function.AVERAGE, [], None, NO_DATA),
+        (Function.MINIMUM, series((0, 1.0, G), (10, 2.0, G)), 1.0, RAW),
+        (Function.MINIMUM, series((0, 2.0, G), (10, 1.0, G)), 1.0, CALCULATED),
+        (
+            Function.MINIMUM,
+            series((0, 2.0, G), (10, 1.0, G), (20, 1.0, G)),
+            1.0,
+            MULTIPLE | CALCULATED,
+        ),
+        (Function.MAXIMUM, series((5, 2.0, G), (10, 7.0, U)), 2.0, SUB_NORMAL | CALCULATED),
+        (Function.COUNT, series((0, 1.0, G), (10, 2.0, G)), 2, CALCULATED),
+        (Function.COUNT, series((0, 1.0, G), (10, 2.0, B)), 1, SUB_NORMAL | CALCULATED),
+        (Function.COUNT, series((0, 1.0, B)), 0, BAD | CALCULATED),
+        (Function.COUNT, [], 0, CALCULATED),
     ],
 )
 def test_by_definition(
-    aggregate: Aggregate, values: list[HistoricalValue], expected: object, status: int
+    aggregate: Function, values: list[HistoricalValue], expected: object, status: int
 ) -> None:
-    found = process(aggregate, WHOLE, values, Treatment(), within=True)
+    found = aggregate_interval(aggregate, WHOLE, values, DEFAULT, within=True)
     assert (found.time_ns, found.value, found.status) == (0, expected, status)
 
 
 def test_uncertain_as_good_and_percentages() -> None:
     values = series((0, 1.0, G), (10, 3.0, U), (20, 8.0, B), (30, 8.0, B))
-    as_good = Treatment(uncertain_as_bad=False, percent_good=50)
-    assert process(Aggregate.AVERAGE, WHOLE, values, as_good, within=True).value == 2.0
-    assert process(Aggregate.AVERAGE, WHOLE, values, as_good, within=True).status == CALCULATED
-    strict = Treatment(percent_bad=50, percent_good=100)
-    assert process(Aggregate.AVERAGE, WHOLE, values, strict, within=True).status == BAD | CALCULATED
+    as_good = AggregateConfiguration(uncertain_as_bad=False, percent_good=50)
+    assert aggregate_interval(Function.AVERAGE, WHOLE, values, as_good, within=True).value == 2.0
+    assert aggregate_interval(Function.AVERAGE, WHOLE, values, as_good, within=True).status == CALCULATED
+    strict = AggregateConfiguration(percent_bad=50, percent_good=100)
+    assert aggregate_interval(Function.AVERAGE, WHOLE, values, strict, within=True).status == BAD | CALCULATED
 
 
 def test_outside_of_what_is_stored_there_is_no_count() -> None:
-    assert process(Aggregate.COUNT, WHOLE, [], Treatment(), within=False).status == NO_DATA
+    assert aggregate_interval(Function.COUNT, WHOLE, [], DEFAULT, within=False).status == NO_DATA
 
 
 def test_a_partial_interval_says_so() -> None:
-    partial = Interval(90, 100, partial=True)
-    found = process(Aggregate.COUNT, partial, series((95, 1.0, G)), Treatment(), within=True)
+    partial = ProcessingInterval(90, 100, partial=True)
+    found = aggregate_interval(Function.COUNT, partial, series((95, 1.0, G)), DEFAULT, within=True)
     assert found.status == CALCULATED | PARTIAL
 
 
@@ -83,18 +94,24 @@ def test_every_value_lies_in_one_interval(
     entries: list[tuple[int, float]], step: int, backwards: bool
 ) -> None:
     start, end = (999, -1) if backwards else (0, 1000)
-    cut = list(intervals(start, end, step))
+    cut = list(processing_intervals(start, end, step))
     for time_ns, _ in entries:
         assert sum(time_ns in interval for interval in cut) == 1
     values = [HistoricalValue(*entry) for entry in entries]
     counted = sum(
-        process(Aggregate.COUNT, i, [v for v in values if v.time_ns in i], Treatment(), within=True).value  # type: ignore[misc]
+        aggregate_interval(
+            Function.COUNT,
+            i,
+            [v for v in values if v.time_ns in i],
+            DEFAULT,
+            within=True,
+        ).value  # type: ignore[misc]
         for i in cut
     )
     assert counted == len(entries)
     total = math.fsum(value for _, value in entries)
     means = [
-        (process(Aggregate.AVERAGE, i, inside, Treatment(), within=True).value or 0.0) * len(inside)
+        (aggregate_interval(Function.AVERAGE, i, inside, DEFAULT, within=True).value or 0.0) * len(inside)
         for i in cut
         if (inside := [v for v in values if v.time_ns in i])
     ]

@@ -142,7 +142,7 @@ def test_what_is_refused(pki: Path, what: str) -> None:
 
 
 def test_rejected_certificates_do_not_pile_up(pki: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("impactcell.opcua.trust_list.KEPT_REJECTED", 3)
+    monkeypatch.setattr("impactcell.opcua.trust_list.MAX_REJECTED", 3)
     trust = TrustList(pki, URI)
     for _ in range(5):
         with pytest.raises(UntrustedError):

@@ -24,7 +24,7 @@ def nanoseconds(time: datetime) -> int:
     return ((since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds) * 1_000
 
 
-class Sample:
+class SharedValue:
     """A value that was written once and goes out to many: each form of it is encoded once.
 
     asyncua encodes, and deep-copies, a value again for every monitored item that reports it.
@@ -38,10 +38,10 @@ class Sample:
 
     def encoded(self, timestamps: ua.TimestampsToReturn) -> bytes:
         """Binary form with the timestamps that were asked for."""
-        found = self._encoded.get(timestamps)
-        if found is None:
-            found = self._encoded[timestamps] = struct_to_binary(with_timestamps(self.data, timestamps))
-        return found
+        encoding = self._encoded.get(timestamps)
+        if encoding is None:
+            encoding = self._encoded[timestamps] = struct_to_binary(with_timestamps(self.data, timestamps))
+        return encoding
 
 
 def with_timestamps(data: ua.DataValue, timestamps: ua.TimestampsToReturn) -> ua.DataValue:
@@ -56,17 +56,17 @@ def with_timestamps(data: ua.DataValue, timestamps: ua.TimestampsToReturn) -> ua
     )
 
 
-Watcher = Callable[[Sample], None]
+ValueObserver = Callable[[SharedValue], None]
 
 
-class Variable:
+class StoredVariable:
     """A variable that is written often: its place in the address space need not be looked up each time."""
 
-    __slots__ = ("_attribute", "watchers")
+    __slots__ = ("_attribute", "observers")
 
     def __init__(self, attribute: AttributeValue) -> None:
         self._attribute = attribute
-        self.watchers: list[Watcher] = []
+        self.observers: list[ValueObserver] = []
 
     @property
     def data(self) -> ua.DataValue:
@@ -76,19 +76,19 @@ class Variable:
     def write(self, data: ua.DataValue) -> None:
         """Replace the value and tell all who watch it."""
         self._attribute.value = data
-        if self.watchers:
-            sample = Sample(data)
-            for watcher in tuple(self.watchers):
-                watcher(sample)
+        if self.observers:
+            sample = SharedValue(data)
+            for observer in tuple(self.observers):
+                observer(sample)
 
-    def restate(self, status: ua.StatusCode, time: datetime) -> None:
+    def set_status(self, status: ua.StatusCode, time: datetime) -> None:
         """Replace the status and keep the last value; do nothing where the status is the same."""
         data = self.data
         if data.StatusCode != status:
             self.write(ua.DataValue(data.Value, status, time, datetime.now(UTC)))
 
 
-class Values:
+class VariableStore:
     """The one way a variable is written once the server runs.
 
     asyncua sets the value of a variable with a Bad status to null. Here it is kept: an operator wants to
@@ -97,21 +97,21 @@ class Values:
 
     def __init__(self, space: AddressSpace) -> None:
         self._space = space
-        self._variables: dict[ua.NodeId, Variable] = {}
+        self._variables: dict[ua.NodeId, StoredVariable] = {}
 
-    def variable(self, node: ua.NodeId) -> Variable:
+    def variable(self, node: ua.NodeId) -> StoredVariable:
         """Find a variable."""
-        found = self._variables.get(node)
-        if found is None:
-            found = Variable(self._space[node].attributes[ua.AttributeIds.Value])
-            self._variables[node] = found
-        return found
+        stored = self._variables.get(node)
+        if stored is None:
+            stored = StoredVariable(self._space[node].attributes[ua.AttributeIds.Value])
+            self._variables[node] = stored
+        return stored
 
     def write(self, node: ua.NodeId, data: ua.DataValue) -> None:
         """Replace the value and tell all who watch it."""
         self.variable(node).write(data)
 
-    def put(
+    def set_value(
         self,
         node: ua.NodeId,
         value: object,
@@ -122,12 +122,12 @@ class Values:
         """Replace value, status and source timestamp."""
         self.write(node, ua.DataValue(ua.Variant(value, kind), status, time, datetime.now(UTC)))
 
-    def watch(self, node: ua.NodeId, watcher: Watcher) -> None:
+    def add_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:
         """Call `watcher` with every value written from now on."""
-        self.variable(node).watchers.append(watcher)
+        self.variable(node).observers.append(observer)
 
-    def unwatch(self, node: ua.NodeId, watcher: Watcher) -> None:
+    def remove_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:
         """Undo `watch`."""
-        watchers = self.variable(node).watchers
-        if watcher in watchers:
-            watchers.remove(watcher)
+        observers = self.variable(node).observers
+        if observer in observers:
+            observers.remove(observer)

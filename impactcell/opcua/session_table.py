@@ -15,14 +15,16 @@ from typing import Any, Final
 
 from asyncua import ua
 
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import Actor, ServerLimits
-from impactcell.opcua.tcp_connection import Connection
+from impactcell.opcua.tcp_connection import TcpConnection
 
 _log = logging.getLogger(__name__)
 
 MIN_TIMEOUT_S: Final = 10.0
-MAX_CONTINUATIONS: Final = 20
+"""Shortest timeout of a session, seconds."""
+MAX_CONTINUATION_POINTS: Final = 20
+"""Continuation points of each kind kept for one session; shown among the capabilities."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,18 +37,18 @@ class PublishRequest:
     expires: float
 
 
-class Continuations:
+class ContinuationPoints:
     """Continuation points of one session; the oldest gives way when there are too many."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[bytes, Any] = OrderedDict()
+        self._states: OrderedDict[bytes, Any] = OrderedDict()
 
     def keep(self, state: object) -> bytes:
         """Keep what is needed to read on, and name it."""
-        while len(self._kept) >= MAX_CONTINUATIONS:
-            self._kept.popitem(last=False)
+        while len(self._states) >= MAX_CONTINUATION_POINTS:
+            self._states.popitem(last=False)
         point = os.urandom(16)
-        self._kept[point] = state
+        self._states[point] = state
         return point
 
     def take(self, point: bytes) -> Any:
@@ -57,9 +59,9 @@ class Continuations:
         FaultError
             BadContinuationPointInvalid.
         """
-        if point not in self._kept:
-            raise FaultError(ua.StatusCodes.BadContinuationPointInvalid)
-        return self._kept.pop(point)
+        if point not in self._states:
+            raise StatusCodeError(ua.StatusCodes.BadContinuationPointInvalid)
+        return self._states.pop(point)
 
 
 @dataclass(eq=False, slots=True)
@@ -69,7 +71,7 @@ class Session:
     session_id: ua.NodeId
     token: ua.NodeId
     name: str
-    connection: Connection | None
+    connection: TcpConnection | None
     policy_uri: str
     certificate: bytes | None
     client_nonce: bytes
@@ -78,8 +80,8 @@ class Session:
     actor: Actor | None = None
     last_seen: float = field(default_factory=time.monotonic)
     publish_requests: deque[PublishRequest] = field(default_factory=deque)
-    browse: Continuations = field(default_factory=Continuations)
-    history: Continuations = field(default_factory=Continuations)
+    browse: ContinuationPoints = field(default_factory=ContinuationPoints)
+    history: ContinuationPoints = field(default_factory=ContinuationPoints)
     closed: bool = False
 
     @property
@@ -93,7 +95,7 @@ class Session:
         return self.nonce
 
 
-class Sessions:
+class SessionTable:
     """All sessions of the server."""
 
     def __init__(self, limits: ServerLimits) -> None:
@@ -113,7 +115,7 @@ class Sessions:
         return list(self._sessions.values())
 
     def create(
-        self, connection: Connection, name: str, timeout_ms: float, nonce: bytes, certificate: bytes | None
+        self, connection: TcpConnection, name: str, timeout_ms: float, nonce: bytes, certificate: bytes | None
     ) -> Session:
         """Make a session.
 
@@ -125,7 +127,7 @@ class Sessions:
         if len(self._sessions) >= self._limits.sessions:
             self._make_room()
         longest = self._limits.session_timeout_s
-        wanted = timeout_ms / 1e3 if timeout_ms > 0 else longest
+        requested_s = timeout_ms / 1e3 if timeout_ms > 0 else longest
         session = Session(
             session_id=ua.NodeId(os.urandom(16), 1, ua.NodeIdType.ByteString),
             token=ua.NodeId(os.urandom(32), 0, ua.NodeIdType.ByteString),
@@ -134,7 +136,7 @@ class Sessions:
             policy_uri=connection.channel.policy_uri,
             certificate=certificate,
             client_nonce=nonce,
-            timeout_s=min(max(wanted, MIN_TIMEOUT_S), longest),
+            timeout_s=min(max(requested_s, MIN_TIMEOUT_S), longest),
         )
         session.renew_nonce()
         self._sessions[session.token] = session
@@ -145,10 +147,10 @@ class Sessions:
         # clients that only create sessions.
         idle = [session for session in self._sessions.values() if not session.is_activated]
         if not idle:
-            raise FaultError(ua.StatusCodes.BadTooManySessions)
+            raise StatusCodeError(ua.StatusCodes.BadTooManySessions)
         oldest = min(idle, key=lambda session: session.last_seen)
         if time.monotonic() - oldest.last_seen < 1.0:
-            raise FaultError(ua.StatusCodes.BadTooManySessions)
+            raise StatusCodeError(ua.StatusCodes.BadTooManySessions)
         self.remove(oldest)
 
     def find(self, token: ua.NodeId) -> Session:
@@ -161,10 +163,10 @@ class Sessions:
         """
         session = self._sessions.get(token)
         if session is None:
-            raise FaultError(ua.StatusCodes.BadSessionIdInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadSessionIdInvalid)
         return session
 
-    def resolve(self, token: ua.NodeId, connection: Connection) -> Session:
+    def resolve(self, token: ua.NodeId, connection: TcpConnection) -> Session:
         """Find the session a request belongs to; it must be active and bound to the channel of the request.
 
         Raises
@@ -174,10 +176,10 @@ class Sessions:
         """
         session = self.find(token)
         if session.connection is not connection:
-            raise FaultError(ua.StatusCodes.BadSecureChannelIdInvalid)
+            raise StatusCodeError(ua.StatusCodes.BadSecureChannelIdInvalid)
         if not session.is_activated:
             self.remove(session)
-            raise FaultError(ua.StatusCodes.BadSessionNotActivated)
+            raise StatusCodeError(ua.StatusCodes.BadSessionNotActivated)
         session.last_seen = time.monotonic()
         return session
 
@@ -187,15 +189,15 @@ class Sessions:
         session.publish_requests.clear()
         self._sessions.pop(session.token, None)
 
-    def detach(self, connection: Connection) -> list[Session]:
+    def detach(self, connection: TcpConnection) -> list[Session]:
         """Take a lost connection off its sessions; those that no user had logged in to are forgotten."""
-        lost = [session for session in self._sessions.values() if session.connection is connection]
-        for session in lost:
+        detached = [session for session in self._sessions.values() if session.connection is connection]
+        for session in detached:
             session.connection = None
             session.publish_requests.clear()
             if not session.is_activated:
                 self.remove(session)
-        return [session for session in lost if session.is_activated]
+        return [session for session in detached if session.is_activated]
 
     def expired(self) -> list[Session]:
         """Sessions that have not been heard of for longer than their timeout."""

@@ -1,4 +1,4 @@
-"""Endpoints: what the server offers, under the name by which the client reached it."""
+"""Discovery (Part 4, 5.5): what the server offers, under the name by which the client reached it."""
 
 from typing import Any, Final
 from urllib.parse import urlsplit
@@ -7,6 +7,7 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import SECURITY_POLICIES, SecurityPolicyNone
 from impactcell.opcua.host_interface import Product, SecurityPolicy, ServerSettings
+from impactcell.opcua.request_dispatch import RequestContext, Service
 
 TRANSPORT: Final = "http://opcfoundation.org/UA-Profile/Transport/uatcp-uasc-uabinary"
 
@@ -18,8 +19,8 @@ POLICIES: Final = {
 """asyncua's class of each policy, and how much it is preferred."""
 
 
-class Endpoints:
-    """Answers discovery."""
+class DiscoveryService:
+    """Answers GetEndpoints and FindServers, which need no session."""
 
     def __init__(self, settings: ServerSettings, product: Product, certificate: bytes) -> None:
         self._settings = settings
@@ -27,17 +28,17 @@ class Endpoints:
         self._certificate = certificate
         self.port = 0
 
-    def _url(self, asked: str | None, local: tuple[str, int] | None) -> str:
+    def _url(self, endpoint_url: str | None, local_address: tuple[str, int] | None) -> str:
         """Answer with the host and port the client used, so that it works through NAT and name aliases."""
-        wanted = urlsplit(self._settings.endpoint)
+        configured = urlsplit(self._settings.endpoint)
         try:
-            used = urlsplit(asked or "")
-            if used.scheme == wanted.scheme and used.hostname:
-                return wanted._replace(netloc=f"{used.netloc.rpartition('@')[2]}").geturl()
+            requested = urlsplit(endpoint_url or "")
+            if requested.scheme == configured.scheme and requested.hostname:
+                return configured._replace(netloc=f"{requested.netloc.rpartition('@')[2]}").geturl()
         except ValueError:
             pass
-        host = local[0] if local else (wanted.hostname or "localhost")
-        return wanted._replace(netloc=f"{f'[{host}]' if ':' in host else host}:{self.port}").geturl()
+        host = local_address[0] if local_address else (configured.hostname or "localhost")
+        return configured._replace(netloc=f"{f'[{host}]' if ':' in host else host}:{self.port}").geturl()
 
     def _server(self, url: str) -> ua.ApplicationDescription:
         description = ua.ApplicationDescription()
@@ -48,20 +49,45 @@ class Endpoints:
         description.DiscoveryUrls = [url]
         return description
 
-    def get_endpoints(
-        self, wanted: ua.GetEndpointsParameters, local: tuple[str, int] | None
+    def services(self) -> dict[str, Service]:
+        """Give the services of this set."""
+        return {
+            "GetEndpoints": Service(ua.GetEndpointsParameters, self.get_endpoints, needs_session=False),
+            "FindServers": Service(ua.FindServersParameters, self.find_servers, needs_session=False),
+        }
+
+    async def get_endpoints(
+        self, context: RequestContext, parameters: ua.GetEndpointsParameters
+    ) -> ua.GetEndpointsResponse:
+        """List the endpoints."""
+        response = ua.GetEndpointsResponse()
+        response.Endpoints = self.endpoints(parameters, context.connection.local_address)
+        return response
+
+    async def find_servers(
+        self, context: RequestContext, parameters: ua.FindServersParameters
+    ) -> ua.FindServersResponse:
+        """Describe this server, if it is asked for."""
+        response = ua.FindServersResponse()
+        if not parameters.ServerUris or self._settings.application_uri in parameters.ServerUris:
+            url = self._url(parameters.EndpointUrl, context.connection.local_address)
+            response.Servers = [self._server(url)]
+        return response
+
+    def endpoints(
+        self, parameters: ua.GetEndpointsParameters, local_address: tuple[str, int] | None
     ) -> list[ua.EndpointDescription]:
-        """List endpoints."""
-        if wanted.ProfileUris and TRANSPORT not in wanted.ProfileUris:
+        """List the endpoints that a client asks for."""
+        if parameters.ProfileUris and TRANSPORT not in parameters.ProfileUris:
             return []
-        url = self._url(wanted.EndpointUrl, local)
-        found = [
+        url = self._url(parameters.EndpointUrl, local_address)
+        endpoints = [
             self._endpoint(url, *POLICIES[policy], ua.MessageSecurityMode.SignAndEncrypt)
             for policy in self._settings.policies
         ]
         if self._settings.allow_none:
-            found.append(self._endpoint(url, SecurityPolicyNone, 0, ua.MessageSecurityMode.None_))
-        return found
+            endpoints.append(self._endpoint(url, SecurityPolicyNone, 0, ua.MessageSecurityMode.None_))
+        return endpoints
 
     def _endpoint(
         self,
@@ -93,11 +119,3 @@ class Endpoints:
         token.TokenType = kind
         token.SecurityPolicyUri = policy_uri
         return token
-
-    def find_servers(
-        self, wanted: ua.FindServersParameters, local: tuple[str, int] | None
-    ) -> list[ua.ApplicationDescription]:
-        """Describe this server, if it is asked for."""
-        if wanted.ServerUris and self._settings.application_uri not in wanted.ServerUris:
-            return []
-        return [self._server(self._url(wanted.EndpointUrl, local))]

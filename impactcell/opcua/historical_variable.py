@@ -7,17 +7,19 @@ from typing import Final
 
 from asyncua import ua
 
-from impactcell.opcua.binary_codec import FaultError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import HistoricalValue, HistoricalValues, HistoryProvider, HistoryRequest
-from impactcell.opcua.node_values import moment, nanoseconds
+from impactcell.opcua.variable_store import moment, nanoseconds
 
-PAGE: Final = 1_000
+VALUES_PER_PAGE: Final = 1_000
+"""Values, events or aggregates in one answer; more come by continuation point."""
 BEGINNING: Final = ua.get_win_epoch()
+"""Times up to here mean that none was given (Part 6, 5.2.2.5)."""
 NO_BOUND: Final = ua.StatusCode(ua.StatusCodes.BadBoundNotFound)
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class ReadRange:
     """A question about a span of time, both ends included.
 
     Attributes
@@ -31,25 +33,27 @@ class Span:
     start_ns: int | None
     end_ns: int | None
     newest_first: bool
-    left: int | None
+    remaining: int | None
     resume: bytes | None = None
     bounds: tuple[int, int] | None = None
 
     def request(self) -> HistoryRequest:
         """Ask for the next page."""
-        limit = PAGE if self.left is None else min(PAGE, self.left)
+        limit = VALUES_PER_PAGE if self.remaining is None else min(VALUES_PER_PAGE, self.remaining)
         return HistoryRequest(self.start_ns, self.end_ns, limit, self.newest_first, self.resume)
 
 
-def rest(span: Span, given: int, resume: bytes | None) -> Span | None:
+def remaining_range(current: ReadRange, returned: int, resume: bytes | None) -> ReadRange | None:
     """Say what is left to ask after a page; None at the end."""
-    left = None if span.left is None else span.left - given
-    if resume is None or left == 0:
+    remaining = None if current.remaining is None else current.remaining - returned
+    if resume is None or remaining == 0:
         return None
-    return replace(span, left=left, resume=resume)
+    return replace(current, remaining=remaining, resume=resume)
 
 
-def span(start: datetime | None, end: datetime | None, most: int, *, bounds: bool = False) -> Span:
+def read_range(
+    start: datetime | None, end: datetime | None, max_values: int, *, bounds: bool = False
+) -> ReadRange:
     """Read the bounds of a question: two of start, end and number are needed.
 
     The start belongs to the span and the end does not, in whichever direction time runs.
@@ -59,33 +63,35 @@ def span(start: datetime | None, end: datetime | None, most: int, *, bounds: boo
     FaultError
         BadInvalidTimestampArgument.
     """
-    begin = nanoseconds(start) if start is not None and start > BEGINNING else None
-    finish = nanoseconds(end) if end is not None and end > BEGINNING else None
-    left = most or None
-    if (begin is None) + (finish is None) + (left is None) > 1:
-        raise FaultError(ua.StatusCodes.BadInvalidTimestampArgument)
-    if begin is None:
+    start_ns = nanoseconds(start) if start is not None and start > BEGINNING else None
+    end_ns = nanoseconds(end) if end is not None and end > BEGINNING else None
+    remaining = max_values or None
+    if (start_ns is None) + (end_ns is None) + (remaining is None) > 1:
+        raise StatusCodeError(ua.StatusCodes.BadInvalidTimestampArgument)
+    if start_ns is None:
         # Backwards from the end, which is where the question begins and so belongs to it.
-        return Span(None, finish, newest_first=True, left=left)
-    if finish is None:
-        return Span(begin, None, newest_first=False, left=left)
-    ends = (begin, finish) if bounds else None
-    if begin > finish:
-        return Span(finish + 1, begin, newest_first=True, left=left, bounds=ends)
-    return Span(begin, max(finish - 1, begin), newest_first=False, left=left, bounds=ends)
+        return ReadRange(None, end_ns, newest_first=True, remaining=remaining)
+    if end_ns is None:
+        return ReadRange(start_ns, None, newest_first=False, remaining=remaining)
+    ends = (start_ns, end_ns) if bounds else None
+    if start_ns > end_ns:
+        return ReadRange(end_ns + 1, start_ns, newest_first=True, remaining=remaining, bounds=ends)
+    return ReadRange(
+        start_ns, max(end_ns - 1, start_ns), newest_first=False, remaining=remaining, bounds=ends
+    )
 
 
-class Series:
+class HistoricalVariable:
     """One stored variable."""
 
     def __init__(self, history: HistoryProvider, node: ua.NodeId) -> None:
         self._history = history
         self._node = node
 
-    async def page(self, asked: Span) -> tuple[Sequence[HistoricalValue], Span | None]:
+    async def page(self, current: ReadRange) -> tuple[Sequence[HistoricalValue], ReadRange | None]:
         """Read a page, and say what is left."""
-        page = await self._history.read_values(self._node, asked.request())
-        return page.values, rest(asked, len(page.values), page.resume)
+        page = await self._history.read_values(self._node, current.request())
+        return page.values, remaining_range(current, len(page.values), page.resume)
 
     async def ends(self) -> tuple[int, int] | None:
         """Find the times of the first and the last stored value."""
