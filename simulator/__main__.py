@@ -8,8 +8,11 @@ from pathlib import Path
 from impactcell.errors import CampaignError, ImpactCellError, MapError, SettingsError
 
 BAD_INPUT = 2
+"""Exit code: a file or an option that cannot be used."""
 INTERRUPTED = 130
+"""Exit code: ended by Ctrl-C."""
 MOST_PORT = 65_535
+"""Largest TCP port."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -22,6 +22,7 @@ from simulator.plant import Motion, Plant, Shot, TapInput, simulate_driven, simu
 
 Samples = NDArray[np.float64]
 MM_PER_MIN = 1e-3 / 60.0
+"""Metres a second of one millimetre a minute."""
 COLUMNS = {"force": "force_n", "position": "position_m", "actuator": "actuator_m"}
 
 

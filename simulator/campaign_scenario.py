@@ -9,8 +9,11 @@ from simulator.effects import LIBRARY, UNLISTED, check
 from simulator.scenario_file import ScenarioModel
 
 Positive = Annotated[float, Field(gt=0)]
+"""A number above 0."""
 NotNegative = Annotated[float, Field(ge=0)]
+"""A number of at least 0."""
 Share = Annotated[float, Field(ge=0, lt=1)]
+"""A number from 0 to below 1."""
 Strength = float | list[float]
 
 

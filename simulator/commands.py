@@ -9,6 +9,7 @@ from simulator.scenario import Positioning
 from simulator.tasks import PartSequence
 
 MM_PER_MIN: Final = 1e-3 / 60.0
+"""Metres a second of one millimetre a minute."""
 SINGLE_PRECISION: Final = 1.0 + 1e-6
 """The registers are single precision: a limit itself must not be refused for its last bit."""
 

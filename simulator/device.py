@@ -31,10 +31,12 @@ from simulator.scenario import Scenario
 from simulator.tasks import PartSequence
 
 NO_SLOT: Final = 0xFFFF
+"""What `newest_slot` shows before the first cycle."""
 COMMAND_REGISTERS: Final = (
     "command_accepted", "command_cycle", "command_result", "command_sequence", "command_abort"
 )  # fmt: skip
 MOST_STEPS_PER_UPDATE: Final = 4
+"""Events of the plant between two looks at the registers."""
 
 Truth = Mapping[str, Any]
 

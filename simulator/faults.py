@@ -39,6 +39,7 @@ class FaultKind(enum.StrEnum):
 
 
 BUSY_CODE: Final = 6
+"""Exception code of a device that asks to be asked again later."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from impactcell.fieldbus.registers import RegisterMap, Words
 from simulator.scripted import ScriptedDevice
 
 LAST_CYCLE: Final = 2**32 - 1
+"""Largest cycle number: 32 bits."""
 
 
 class RegisterImage:

@@ -18,12 +18,14 @@ from impactcell.fieldbus.registers import WIRE, Words
 from simulator.faults import Fault, FaultInjector, FaultKind, corrupt
 
 ILLEGAL_FUNCTION: Final = 1
+"""Exception codes of the Modbus Application Protocol V1.1b3, section 7."""
 ILLEGAL_ADDRESS: Final = 2
 ILLEGAL_VALUE: Final = 3
 DEVICE_BUSY: Final = 6
 GATEWAY_NO_RESPONSE: Final = 11
 
 _TABLES: Final = {3: "holding", 4: "input"}
+"""Which table a reading function shows."""
 _HEADER: Final = struct.Struct(">HHHB")
 _READ: Final = struct.Struct(">BHH")
 _TWO: Final = struct.Struct(">HH")

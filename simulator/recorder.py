@@ -11,8 +11,11 @@ from simulator.scenario import Scenario, Sensor
 
 Samples = NDArray[np.float64]
 AFTER_SEPARATION_S = 0.001
+"""The force is recorded so long after loss of contact, seconds."""
 AFTER_STOP_S = 0.002
+"""All channels are recorded so long after the part has come to rest, seconds."""
 FULL_SCALE_N = 1e6
+"""What a saturated force channel shows: beyond the code range of any map."""
 
 
 def record(

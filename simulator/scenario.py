@@ -11,9 +11,13 @@ from simulator.fault_schedule import ScheduledFault
 from simulator.scenario_file import ScenarioModel, load
 
 Positive = Annotated[float, Field(gt=0)]
+"""A number above 0."""
 NotNegative = Annotated[float, Field(ge=0)]
+"""A number of at least 0."""
 Cycle = Annotated[int, Field(ge=1)]
+"""Number of a cycle, from 1."""
 Rate = Annotated[int, Field(ge=1, le=1_000_000)]
+"""Samples a second, a whole number."""
 Effects = dict[str, dict[str, float | list[float]]]
 
 

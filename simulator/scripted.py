@@ -11,6 +11,7 @@ from impactcell.fieldbus.registers import REGISTER_SPACE, WIRE, RegisterMap, Wor
 
 _ARRAYS: Final = ("force", "position", "actuator")
 _LAST_CYCLE: Final = 2**32 - 1
+"""Largest cycle number: 32 bits."""
 
 
 @dataclass(slots=True)

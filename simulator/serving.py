@@ -22,6 +22,7 @@ from simulator.scenario import Scenario
 from simulator.scenario_file import read_yaml
 
 LONGEST_NAP_S = 0.5
+"""The module is brought up to date at least so often, seconds."""
 
 
 def read_register_map(file: Path) -> RegisterMap:

@@ -14,6 +14,7 @@ from impactcell.scada.rights import matrix_table
 from impactcell.scada.users import User, read_users, with_password, write_users
 
 MIN_PASSWORD = 8
+"""Characters of a password, at least (NIST SP 800-63B, 5.1.1.2)."""
 
 
 def add_user(file: Path, name: str, role: str = "observer", certificate: Path | None = None) -> None:

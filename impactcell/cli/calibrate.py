@@ -19,8 +19,11 @@ from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.model_file import write_model
 
 VELOCITIES = 17
+"""Velocities swept, evenly from slowest to fastest."""
 FRICTIONS = 17
+"""Values of mu_s swept, evenly over the span."""
 MASSES = 13
+"""Masses swept, in equal ratios."""
 SLOWEST = 1 / 3
 """Of the cell's fastest tap. Below it stiction decides, which equations (4) and (5) do not describe."""
 FRICTION_SPAN = 0.25

@@ -12,6 +12,7 @@ from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, 
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
 FEWEST_CYCLES = 2
+"""Cycles that a rate of change takes."""
 
 
 def track(

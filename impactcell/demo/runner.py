@@ -26,6 +26,7 @@ from impactcell.records import ModuleStatus, Snapshot
 from impactcell.service import Service
 
 SHOWN_CYCLES = 400
+"""Cycles that the view remembers: more than a wide terminal has columns."""
 PATIENCE_S = 60.0
 """Without a cycle for so long, the demo has failed."""
 QUIET_S = 4.0

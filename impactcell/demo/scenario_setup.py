@@ -23,10 +23,12 @@ from impactcell.service.warmup import warm_up
 from impactcell.settings import CellConfig, read_cell
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
+"""Where a checkout keeps its cells and scenarios."""
 SCENARIOS = ("demo", "new-effect", "positioning")
 USER = "demo"
 EVENT_SECTIONS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
 PREFERRED_PORT = 4840
+"""Registered port of OPC UA (IANA)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,9 @@ import random
 from typing import Final
 
 FIRST_S: Final = 0.02
+"""Longest first delay, seconds: a module that restarts is back within some tens of milliseconds."""
 CEILING_S: Final = 0.5
+"""Longest delay, seconds: what a first cycle may cost after the link is back."""
 
 
 class Backoff:

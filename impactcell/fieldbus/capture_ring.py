@@ -10,6 +10,7 @@ from typing import Final
 from impactcell.records import CycleId
 
 CYCLE_PERIOD: Final = 2**32 - 1
+"""Cycle numbers before the first comes again: 32 bits, 0 being none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,9 @@ HEADER: Final = struct.Struct(">HHHB")
 MAX_LENGTH: Final = 254
 """Unit and PDU; a PDU has at most 253 bytes."""
 MAX_READ: Final = 125
+"""Registers that one request can read (Modbus Application Protocol V1.1b3, 6.3)."""
 MAX_WRITE: Final = 123
+"""Registers that one request can write (same, 6.12)."""
 
 
 class FunctionCode(enum.IntEnum):
@@ -58,6 +60,7 @@ EXCEPTION_NAMES: Final = {
 """Exception codes by their names in section 7 of the specification."""
 
 BUSY: Final = 6
+"""Exception code of a server that asks to be asked again later."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ BUSY_PAUSE_S: Final = 0.02
 """How long a device that said busy is left alone; it is asked again until the timeout has passed."""
 _QUICKACK: Final[int | None] = getattr(socket, "TCP_QUICKACK", None)
 _RECEIVED_AT_ONCE: Final = 65_536
+"""Bytes taken from the socket at a time: some 250 frames of full length."""
 
 
 class Connection(asyncio.BufferedProtocol):

@@ -71,6 +71,7 @@ LATEST_NS = 2**63 - 1
 
 _BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
 _POSITIONING = STATUS_REGISTERS[7:]
+"""Those of a positioning cell."""
 
 
 def _code_name(register: Register, value: Value) -> str:

@@ -17,6 +17,7 @@ IDLE_S: Final = 0.1
 _IRREGULAR: Final = 0.02
 """Where cycles come quite irregularly, polls may be so much of the variation apart."""
 _GAIN: Final = 0.25
+"""Share of the newest cycle in the period and its variation: followed within some four cycles."""
 _SOMEWHAT_LATE: Final = 4.0
 """So many margins beyond when it was due a cycle is still looked for as if it were."""
 _LONGEST: Final = 3.0

@@ -14,6 +14,7 @@ from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.fieldbus.transport import ModbusClient
 
 _STABLE_READ_ATTEMPTS: Final = 8
+"""Readings of a block of several requests until two agree, before it counts as restless."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

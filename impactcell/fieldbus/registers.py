@@ -19,6 +19,7 @@ from impactcell.fieldbus.register import KINDS, SI_FACTOR, WIRE, Register, Value
 __all__ = ["REGISTER_SPACE", "REQUIRED", "WIRE", "Register", "RegisterMap", "Value", "Words", "capture_crc32"]
 
 REGISTER_SPACE: Final = 65_536
+"""Addresses of a table: 16 bits."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.decoding import PositioningStatus
 
 _POLL_S: Final = 0.005
+"""Between two looks at the outcome of a tap, seconds: a tenth of the shortest tap and slide."""
 _PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
 
 

@@ -5,6 +5,7 @@ from functools import cache
 from typing import Final
 
 ID_COUNT: Final = 65_536
+"""Different ids: 16 bits."""
 _STRIDE: Final = 40_503
 """Odd, so that it visits all 16-bit numbers; 2^16 over the golden ratio, so that neighbours lie far apart."""
 

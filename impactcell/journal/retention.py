@@ -4,7 +4,9 @@ import sqlite3
 from dataclasses import dataclass
 
 _CHUNK = 64
+"""Rows dropped at a time when room is needed: a few megabytes of captures."""
 _NS_PER_DAY = 86_400 * 10**9
+"""Nanoseconds of a day."""
 PRUNE_LIMIT = 512
 """Captures, and cycles, dropped at once: after a long rest, or with a shorter retention, gigabytes may have
 to go, and neither a cycle nor the end of the service is to wait for that."""

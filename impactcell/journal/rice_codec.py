@@ -17,7 +17,9 @@ Shifts = NDArray[np.uint8]
 Words = NDArray[np.uint32]
 
 BLOCK = 128
+"""Samples that share one k: short enough to follow a contact, long enough that k costs little."""
 WORD = 32
+"""Bits of a word."""
 LONGEST_CODE = 31
 """Bits that a difference may take: what is left in a word, and one more, then fit into 63 bits."""
 

@@ -31,8 +31,11 @@ from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig, read_cell
 
 TICK_S = 1.0
+"""Between two looks at shelved alarms, the journal's backlog and the model file, seconds."""
 STALE_PERIODS = 10.0
+"""So many periods without a cycle, and values count as stale ..."""
 STALE_AT_LEAST_S = 5.0
+"""... but not before so many seconds."""
 _LOGGED_ELSEWHERE = (AlarmName.MODULE_CONNECTION, AlarmName.JOURNAL_FAULT)
 
 SnapshotCallback = Callable[[str, Snapshot], None]

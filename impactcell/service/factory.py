@@ -24,6 +24,7 @@ from impactcell.tracking.signature.tracker import SignatureSettings
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 
 MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
+"""SI units of what a cell file is written in."""
 
 _CYCLE_RULES = (AlarmName.WEAR_LIMIT, AlarmName.BATCH_SHIFT, AlarmName.DEVIANT_CYCLE, AlarmName.MODEL_GAP)
 

@@ -14,7 +14,9 @@ from impactcell.physics import TapInput, simulate_tap
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
 
 CYCLES = 8
+"""Cycles of warm-up: enough to learn a shortened signature and judge by it."""
 FORCE_HZ, POSITION_HZ = 100_000.0, 10_000.0
+"""Sampling rates of the cycles of warm-up; any that show contact and slide."""
 
 _lock = threading.Lock()
 _warm: set[tuple[object, ...]] = set()

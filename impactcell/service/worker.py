@@ -34,6 +34,7 @@ from impactcell.service.warmup import warm_up
 T = TypeVar("T")
 
 _CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+"""Cores that this process may use."""
 _computing = threading.BoundedSemaphore(_CORES)
 """As many cells compute at a time as there are cores, in the order in which they came: more would finish
 later, all of them, and keep the event loop waiting for the interpreter."""

@@ -16,8 +16,11 @@ from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predicto
 from impactcell.settings import yaml_loader
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
+"""A finite number above 0."""
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+"""A finite number of at least 0."""
 Interval = tuple[FiniteFloat, FiniteFloat]
+"""Lower and upper end."""
 
 HEADER = """\
 # A model of impactcell: plant, how well it is known, and the predictors calibrated to it.

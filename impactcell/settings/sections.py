@@ -45,8 +45,11 @@ AnyPath = Annotated[Path, BeforeValidator(_resolved)]
 InputFile = Annotated[AnyPath, AfterValidator(_existing_file)]
 OutputFile = Annotated[AnyPath, AfterValidator(_existing_parent)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+"""A finite number above 0."""
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+"""A finite number of at least 0."""
 Probability = Annotated[float, Field(gt=0, lt=1)]
+"""A number between 0 and 1, both excluded."""
 
 
 def _endpoint(value: str) -> str:

@@ -138,13 +138,13 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
             with pytest.raises(RefusedError, match="does not run"):
                 await actions.start_batch("press-1", "B", expected=True, actor=actor)
             with pytest.raises(RefusedError, match="cannot be opened"):
-                await history.values("press-1", "Friction/StaticFriction", None, None, 1)
+                await history.values("press-1", "Friction/StaticFriction", HistoryRequest(None, None, 1))
             obstacle.rmdir()
             await watched.until("press-1", 3)
             with await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz") as answer:
                 assert json.load(answer) == {"press-1": True}
             await actions.start_batch("press-1", "B", expected=True, actor=actor)
-            assert (await history.values("press-1", "Friction/StaticFriction", None, None, 1)).values
+            assert (await history.values("press-1", "Friction/StaticFriction", HistoryRequest(None, None, 1))).values
     with Journal(tmp_path / "press-1.sqlite", "press-1") as journal:
         assert journal.count() >= 3
     for said in ("cell=press-1 waits until its journal can be opened", "opened now; the cell runs"):

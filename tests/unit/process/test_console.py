@@ -45,9 +45,9 @@ def test_discrepancy(
     options: tuple[str, ...],
     said: str,
 ) -> None:
-    for name, made in (("_read", ("name", None)), ("investigate", None), ("_write", None)):
+    for name, made in (("_read", ("name", None)), ("investigate", None), ("write_findings", None)):
         monkeypatch.setattr(command, name, lambda *_, made=made, **__: made)
-    monkeypatch.setattr(command, "sentence", lambda _: "Missing: x")
+    monkeypatch.setattr(command, "verdict_sentence", lambda _: "Missing: x")
     assert run(capsys, "discrepancy", "shots", "-o", "out", *options) == said
 
 
