@@ -5,12 +5,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from impactcell.errors import CampaignError, ImpactCellError, MapError, SettingsError
+from impactcell.errors import SettingsError
+from impactcell.process.exit_codes import exit_code_of
 
-BAD_INPUT = 2
-"""Exit code: a file or an option that cannot be used."""
-INTERRUPTED = 130
-"""Exit code: ended by Ctrl-C."""
 MOST_PORT = 65_535
 """Largest TCP port."""
 
@@ -18,16 +15,7 @@ MOST_PORT = 65_535
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit code: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     options = _parser().parse_args(arguments)
-    try:
-        return int(options.run(options))
-    except (SettingsError, CampaignError, MapError) as error:
-        print(error, file=sys.stderr)  # noqa: T201
-        return BAD_INPUT
-    except ImpactCellError as error:
-        print(error, file=sys.stderr)  # noqa: T201
-        return 1
-    except KeyboardInterrupt:
-        return INTERRUPTED
+    return exit_code_of("simulator", lambda: int(options.run(options)))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -6,6 +6,7 @@ several clients are served. The device is a plain object that knows nothing of s
 
 import asyncio
 import contextlib
+import enum
 import ssl
 import struct
 from collections.abc import Callable
@@ -17,12 +18,16 @@ import numpy as np
 from impactcell.fieldbus.registers import WIRE, Words
 from simulator.faults import Fault, FaultInjector, FaultKind, corrupt
 
-ILLEGAL_FUNCTION: Final = 1
-"""Exception codes of the Modbus Application Protocol V1.1b3, section 7."""
-ILLEGAL_ADDRESS: Final = 2
-ILLEGAL_VALUE: Final = 3
-DEVICE_BUSY: Final = 6
-GATEWAY_NO_RESPONSE: Final = 11
+
+class ExceptionCode(enum.IntEnum):
+    """Exception codes of the Modbus Application Protocol V1.1b3, section 7."""
+
+    ILLEGAL_FUNCTION = 1
+    ILLEGAL_ADDRESS = 2
+    ILLEGAL_VALUE = 3
+    DEVICE_BUSY = 6
+    GATEWAY_NO_RESPONSE = 11
+
 
 _TABLES: Final = {3: "holding", 4: "input"}
 """Which table a reading function shows."""
@@ -122,15 +127,15 @@ class ModbusServer:
         self.requests += 1
         function = pdu[0]
         if unit != self.device_id:
-            return bytes((function | 0x80, GATEWAY_NO_RESPONSE))
+            return bytes((function | 0x80, ExceptionCode.GATEWAY_NO_RESPONSE))
         try:
             return self._answer(function, pdu)
         except LookupError:
-            return bytes((function | 0x80, ILLEGAL_ADDRESS))
+            return bytes((function | 0x80, ExceptionCode.ILLEGAL_ADDRESS))
         except BlockingIOError:
-            return bytes((function | 0x80, DEVICE_BUSY))
+            return bytes((function | 0x80, ExceptionCode.DEVICE_BUSY))
         except (ValueError, struct.error):
-            return bytes((function | 0x80, ILLEGAL_VALUE))
+            return bytes((function | 0x80, ExceptionCode.ILLEGAL_VALUE))
 
     def _answer(self, function: int, pdu: bytes) -> bytes:
         table = _TABLES.get(function)
@@ -156,7 +161,7 @@ class ModbusServer:
                 raise LookupError(address)
             self.device.write(address, np.frombuffer(pdu, dtype=WIRE, offset=6))
             return pdu[:5]
-        return bytes((function | 0x80, ILLEGAL_FUNCTION))
+        return bytes((function | 0x80, ExceptionCode.ILLEGAL_FUNCTION))
 
 
 class _ClientConnection(asyncio.Protocol):

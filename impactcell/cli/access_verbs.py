@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from impactcell.cli.options import Quiet, Verbose
+from impactcell.cli.options import verb
 
 UsersFile = Annotated[Path, typer.Argument(metavar="FILE", help="The cell's users file.")]
 PkiDirectory = Annotated[Path, typer.Argument(metavar="DIR", help="The cell's certificates directory.")]
@@ -14,7 +14,7 @@ users = typer.Typer(no_args_is_help=True, help="Users of the OPC UA server.")
 certs = typer.Typer(no_args_is_help=True, help="Certificates of the OPC UA server.")
 
 
-@users.command("add")
+@verb(users, "add")
 def users_add(
     file: UsersFile,
     name: Annotated[str, typer.Argument(help="As typed at login.")],
@@ -23,43 +23,34 @@ def users_add(
     certificate: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Log in by this certificate instead of a password.")
     ] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Add a user or change one; the password is asked for, or read from standard input."""
-    del quiet, verbose
     from impactcell.cli.access import add_user
 
     add_user(file, name, role, certificate)
 
 
-@users.command("remove")
-def users_remove(
-    file: UsersFile, name: Annotated[str, typer.Argument()], *, quiet: Quiet = False, verbose: Verbose = False
-) -> None:
+@verb(users, "remove")
+def users_remove(file: UsersFile, name: Annotated[str, typer.Argument()]) -> None:
     """Remove a user; sessions that are open end within a second."""
-    del quiet, verbose
     from impactcell.cli.access import remove_user
 
     remove_user(file, name)
 
 
-@users.command("list")
+@verb(users, "list")
 def users_list(
     file: UsersFile,
     *,
     rights: Annotated[bool, typer.Option("--rights", help="Show what each role may.")] = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """List users with their roles."""
-    del quiet, verbose
     from impactcell.cli.access import list_users
 
     list_users(file, rights=rights)
 
 
-@certs.command("make")
+@verb(certs, "make")
 def certs_make(
     pki: PkiDirectory,
     *,
@@ -67,35 +58,28 @@ def certs_make(
     host: Annotated[
         list[str] | None, typer.Option(help="A name or address of the server; repeatable.")
     ] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Make the server's certificate and the folders of the trust list."""
-    del quiet, verbose
     from impactcell.cli.access import make_certs
 
     make_certs(pki, application_uri, host)
 
 
-@certs.command("trust")
+@verb(certs, "trust")
 def certs_trust(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A certificate, as from the rejected folder.")],
     *,
     pki: Annotated[Path | None, typer.Option(metavar="DIR", help="Where FILE is not inside one.")] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Trust a client's certificate; takes effect without a restart."""
-    del quiet, verbose
     from impactcell.cli.access import trust_cert
 
     trust_cert(file, pki)
 
 
-@certs.command("list")
-def certs_list(pki: PkiDirectory, *, quiet: Quiet = False, verbose: Verbose = False) -> None:
+@verb(certs, "list")
+def certs_list(pki: PkiDirectory) -> None:
     """List certificates: own, trusted, rejected."""
-    del quiet, verbose
     from impactcell.cli.access import list_certs
 
     list_certs(pki)

@@ -5,7 +5,7 @@ left out (nan, None), so that nothing wrong is ever passed on as measured.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -155,8 +155,9 @@ def capture_from_words(
     """
     faults = excessive_counts(registers, header)
     excessive = {fault.split("_count", 1)[0].removeprefix("register ") for fault in faults}
-    velocity = _checked(registers, header, "velocity", faults, math.nan)
-    mass = _checked(registers, header, "mass", faults, math.nan, missing=True)
+    checked = _CheckedHeader(registers, header, faults)
+    velocity = checked.positive("velocity", math.nan)
+    mass = checked.positive("mass", math.nan, also=math.isnan)
     if not math.isnan(mass) and not LIGHTEST_KG <= mass <= HEAVIEST_KG:
         faults.append(f"register mass ({registers['mass'].address}): {mass:g} kg cannot be")
         mass = math.nan
@@ -164,8 +165,8 @@ def capture_from_words(
     if time_ns > LATEST_NS:
         faults.append(f"register cycle_time ({registers['cycle_time'].address}): {time_ns} ns is no date")
         time_ns = 0
-    stroke = _checked(registers, header, "stroke", faults, math.inf, infinite=True)
-    dwell = _checked(registers, header, "dwell", faults, math.nan, missing=True, zero=True)
+    stroke = checked.positive("stroke", math.inf, also=lambda value: value == math.inf)
+    dwell = checked.positive("dwell", math.nan, also=lambda value: value == 0.0 or math.isnan(value))
     direction = _integer(header.get("direction", 1))
     if direction not in (-1, 1):
         faults.append(
@@ -200,29 +201,29 @@ def capture_from_words(
     ), faults
 
 
-def _checked(
-    registers: RegisterMap,
-    header: Mapping[str, Value],
-    name: str,
-    faults: list[str],
-    absent: float,
-    *,
-    missing: bool = False,
-    infinite: bool = False,
-    zero: bool = False,
-) -> float:
-    """Return a value that must be positive; `absent` where the map or the module has none."""
-    if name not in header:
-        return absent
-    value = _number(header[name])
-    if (missing and math.isnan(value)) or (infinite and value == math.inf) or (zero and value == 0.0):
-        return value
-    if math.isfinite(value) and value > 0.0:
-        return value
-    register = registers[name]
-    raw = value / register.si_factor
-    faults.append(f"register {name} ({register.address}): {raw:g} {register.unit} cannot be")
-    return math.nan
+def _never(_: float) -> bool:
+    return False
+
+
+@dataclass(frozen=True, slots=True)
+class _CheckedHeader:
+    """Values of a header that must be positive; what is wrong with one is added to `faults`."""
+
+    registers: RegisterMap
+    header: Mapping[str, Value]
+    faults: list[str]
+
+    def positive(self, name: str, absent: float, also: Callable[[float], bool] = _never) -> float:
+        """Return a value; `absent` where there is none, nan where it is neither above 0 nor `also`."""
+        if name not in self.header:
+            return absent
+        value = _number(self.header[name])
+        if also(value) or (math.isfinite(value) and value > 0.0):
+            return value
+        register = self.registers[name]
+        raw = value / register.si_factor
+        self.faults.append(f"register {name} ({register.address}): {raw:g} {register.unit} cannot be")
+        return math.nan
 
 
 def _channel(

@@ -15,7 +15,7 @@ import pytest
 from impactcell.errors import JournalError
 from impactcell.journal.store import Journal
 from impactcell.records import AlarmName, Quality
-from impactcell.scada import Actor, RefusedError, Role
+from impactcell.scada import Actor, HistoryRequest, RefusedError, Role
 from impactcell.service.history_source import JournalHistory
 from impactcell.service.operator_commands import OperatorCommands
 from tests.integration.processes import CONFIG, simulator, write_cell
@@ -144,7 +144,9 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
             with await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz") as answer:
                 assert json.load(answer) == {"press-1": True}
             await actions.start_batch("press-1", "B", expected=True, actor=actor)
-            assert (await history.values("press-1", "Friction/StaticFriction", HistoryRequest(None, None, 1))).values
+            assert (
+                await history.values("press-1", "Friction/StaticFriction", HistoryRequest(None, None, 1))
+            ).values
     with Journal(tmp_path / "press-1.sqlite", "press-1") as journal:
         assert journal.count() >= 3
     for said in ("cell=press-1 waits until its journal can be opened", "opened now; the cell runs"):
