@@ -6,7 +6,6 @@ import numpy as np
 
 from impactcell.alarms import AlarmSettings, RuleSettings
 from impactcell.records import AlarmName
-from impactcell.tracking.wear_batch import run_length_bank
 from tests.benchmarks import _charts, _classical, _steps, _streams
 from tests.benchmarks.table import Table
 
@@ -63,7 +62,7 @@ def wear_table(*, quick: bool) -> list[Table]:
         level = np.zeros((len(truth.values), 2))
         level[0] = truth.values[0], 1.0
         found = run.follow(truth.values[1:], level=level)
-        mean, covariance = run_length_bank.moments(run.table[: run.count])
+        mean, covariance = run.moments()
         best, best_std = _streams.oracle_slope(truth)
         errors.append((mean[1] - _streams.SLOPE, covariance[1, 1] ** 0.5, best - _streams.SLOPE, best_std))
         for kind, outcome in wear_alarms(seed, truth, level).items():

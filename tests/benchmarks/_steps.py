@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from impactcell.tracking.wear_batch import TrackerSettings, run_length_bank
+from impactcell.tracking.wear_batch.run_length_model import OFFSET, TOTAL, BankModel, Measurement
 from tests.benchmarks import _charts, _streams
 from tests.benchmarks.table import Table
 
@@ -23,24 +24,22 @@ NO_LEVEL = np.zeros((1, 2))
 def _follow(
     z: np.ndarray,
     first: int,
-    table: np.ndarray,
+    bank: np.ndarray,
     count: int,
     outliers: np.ndarray,
     accepted: float,
-    design: np.ndarray,
+    model: BankModel,
     limit: float,
     found: np.ndarray,
     level: np.ndarray,
 ) -> tuple[int, int, float]:
-    reading = np.zeros(6)
-    reading[1], reading[2] = 1.0, 1.0
     n = 0
     for k in range(len(z)):
         t = first + k
-        reading[0], reading[4] = z[k], t
-        count, _, statistic = run_length_bank.update(table, count, design, reading, outliers, accepted)
+        measurement = Measurement(z[k], 1.0, 1.0, 0.0, float(t), 0.0)
+        count, _, statistic = run_length_bank.update(bank, count, model, measurement, outliers, accepted)
         if statistic > limit:
-            accepted = t
+            accepted = float(t)
             found[n] = t
             n += 1
             if n == len(found):
@@ -48,11 +47,14 @@ def _follow(
         if len(level) > 1:
             mean = square = inside = 0.0
             for i in range(count):
-                share = math.exp(table[i, 0])
-                own = table[i, 2] - table[i, 4]
+                share = math.exp(bank[i].log_weight)
+                own = bank[i].mean[TOTAL] - bank[i].mean[OFFSET]
                 mean += share * own
                 square += share * own**2
-                inside += share * (table[i, 6] - 2.0 * table[i, 8] + table[i, 16])
+                spread = bank[i].covariance
+                inside += share * (
+                    spread[TOTAL, TOTAL] - 2.0 * spread[TOTAL, OFFSET] + spread[OFFSET, OFFSET]
+                )
             level[t, 0], level[t, 1] = mean, inside + square - mean**2
     return count, n, accepted
 
@@ -61,9 +63,9 @@ def _follow(
 class Run:
     """The bank on a stream, as the tracker uses it, with the scale of the noise given."""
 
-    table: np.ndarray
+    bank: np.ndarray
     count: int
-    design: np.ndarray
+    model: BankModel
     outliers: np.ndarray
     accepted: float
     cycle: int
@@ -72,18 +74,16 @@ class Run:
     def start(cls, value: float) -> "Run":
         settings = TrackerSettings()
         prior = settings.outlier_probability
-        table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
         first = run_length_bank.initial_bank(value, 1.0, settings.slope_std, 0, prior)
-        table[: len(first)] = first
-        made = run_length_bank.design(
-            settings.hazard, settings.step_std**2, 0.0, 0.0, prior, settings.slope_std**2
-        )
-        return cls(table, len(first), made, np.zeros(2), 0.0, 1)
+        model = BankModel(settings.hazard, settings.step_std**2, 0.0, 0.0, prior, settings.slope_std**2)
+        return cls(run_length_bank.workspace(first), len(first), model, np.zeros(2), 0.0, 1)
+
+    def moments(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance of the bank as it is now."""
+        return run_length_bank.moments(run_length_bank.stored(self.bank, self.count))
 
     def copy(self) -> "Run":
-        return Run(
-            self.table.copy(), self.count, self.design, self.outliers.copy(), self.accepted, self.cycle
-        )
+        return Run(self.bank.copy(), self.count, self.model, self.outliers.copy(), self.accepted, self.cycle)
 
     def follow(self, z: np.ndarray, most: int = 1000, level: np.ndarray = NO_LEVEL) -> np.ndarray:
         """Take z in; give back the indices of the alarms and stop after the `most`-th."""
@@ -91,11 +91,11 @@ class Run:
         self.count, n, self.accepted = _follow(
             z,
             self.cycle,
-            self.table,
+            self.bank,
             self.count,
             self.outliers,
             self.accepted,
-            self.design,
+            self.model,
             run_length_bank.threshold(DESIGN),
             found,
             level,

@@ -13,15 +13,39 @@ from scipy.special import ndtri, stdtr
 
 from impactcell.records import Evidence
 
-SLACK = 0.75  # half of the shift that is found fastest, in standard deviations
-LEARNED = 500  # captures from which the usual residual is learned
-FIRST = 10  # captures before anything is said
-WINSOR = 4.0  # a single capture counts at most so many standard deviations
+SLACK = 0.75
+"""Half of the shift that is found fastest, in standard deviations (k of the CUSUM)."""
+LEARNED = 500
+"""Captures from which the usual residual is learned."""
+FIRST = 10
+"""Captures before anything is said."""
+LARGEST_SCORE = 4.0
+"""A single capture counts at most so many standard deviations."""
+CAP = 2.0
+"""The excess stops at so many thresholds, so that a gap that is closed is seen to be closed within a few
+captures."""
+SIEGMUND = 1.166
+"""Siegmund's correction of the threshold for the overshoot of normal scores, in standard deviations (1985,
+Sequential Analysis, ch. 10: 2 x 0.583)."""
+SECONDS_A_DAY = 86_400.0
+"""Seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class GapState:
-    """Usual logarithm of the residual and the cumulated excess over it."""
+    """Usual logarithm of the residual, and the cumulated excess over it.
+
+    Attributes
+    ----------
+    count : int
+        Captures that mean and squares are learned from.
+    mean, squares : float
+        Mean of the logarithms, and the sum of their squared deviations from it (Welford).
+    excess : float
+        Detection statistic of the CUSUM.
+    since : int
+        Cycle at which the excess last left zero.
+    """
 
     count: int = 0
     mean: float = 0.0
@@ -41,21 +65,20 @@ class GapResult:
 
 
 def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, period_s: float) -> GapResult:
-    """Take one capture's normalised residual (1 = noise floor) into the state."""
+    """Take one capture's normalised residual (1 = noise floor) into the state.
+
+    Parameters
+    ----------
+    false_alarm_cycles : float
+        Designed mean number of captures between false alarms.
+    period_s : float
+        Time between them.
+    """
     limit = threshold(false_alarm_cycles)
     if not (math.isfinite(gap) and gap > 0.0):
         return GapResult(state, None, Evidence(), "the capture has no normalised residual")
     value = math.log(gap)
-    score = 0.0
-    if state.count >= 2 and state.squares > 0.0:
-        n = state.count
-        std = math.sqrt(state.squares / (n - 1))
-        t = math.sqrt(n / (n + 1.0)) * (value - state.mean) / std
-        score = _normal_score(t, n - 1)
-    score = max(-WINSOR, min(score, WINSOR))
-    excess = max(0.0, state.excess + score - SLACK)
-    # capped, so that a gap that is closed is seen to be closed within a few captures
-    excess = min(excess, 2.0 * limit)
+    excess = min(max(0.0, state.excess + _score(state, value) - SLACK), CAP * limit)
     since = cycle if state.excess == 0.0 else state.since
     count, mean, squares = state.count, state.mean, state.squares
     if count < LEARNED and state.excess <= limit:
@@ -63,9 +86,9 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         step = value - mean
         mean += step / count
         squares += step * (value - mean)
-    fresh = GapState(count, mean, squares, excess, since)
+    updated = GapState(count, mean, squares, excess, since)
     if count < FIRST:
-        return GapResult(fresh, None, Evidence(), "the usual residual is being learned")
+        return GapResult(updated, None, Evidence(), "the usual residual is being learned")
     usual = math.exp(mean)
     evidence = Evidence(
         excess,
@@ -74,9 +97,9 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         gap - usual,
         usual * math.sqrt(squares / max(count - 1, 1)),
         false_alarm_cycles,
-        false_alarm_cycles * period_s / 86_400.0,
+        false_alarm_cycles * period_s / SECONDS_A_DAY,
     )
-    return GapResult(fresh, excess > limit, evidence)
+    return GapResult(updated, excess > limit, evidence)
 
 
 @functools.cache
@@ -92,11 +115,15 @@ def threshold(false_alarm_cycles: float) -> float:
         b -= step
         if abs(step) < 1e-12 * b:
             break
-    return b - 1.166
+    return b - SIEGMUND
 
 
-def _normal_score(t: float, freedom: int) -> float:
-    """Give the standard normal score of the same tail probability, from the small tail for its digits."""
-    tail = float(stdtr(freedom, -abs(t)))
-    score = WINSOR if tail <= 0.0 else float(-ndtri(tail))
+def _score(state: GapState, value: float) -> float:
+    """Give the standard normal score of a logarithm after those before, by the small tail for its digits."""
+    n = state.count
+    if n < 2 or state.squares <= 0.0:
+        return 0.0
+    t = math.sqrt(n / (n + 1.0)) * (value - state.mean) / math.sqrt(state.squares / (n - 1))
+    tail = float(stdtr(n - 1, -abs(t)))
+    score = LARGEST_SCORE if tail <= 0.0 else min(float(-ndtri(tail)), LARGEST_SCORE)
     return math.copysign(score, t)

@@ -1,107 +1,107 @@
-"""Friction over batches: shifts found by the bank where the PLC says nothing, tested where it does."""
+"""Friction over batches: changes found by the bank where the PLC says nothing, tested where it does."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from impactcell.records import Samples
-from impactcell.tracking.wear_batch import run_length_bank as banks
-from impactcell.tracking.wear_batch import wear_filter
-from impactcell.tracking.wear_batch.input_validation import CycleTiming
+from impactcell.tracking.wear_batch import run_length_bank, wear_filter
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale, scale_change
+from impactcell.tracking.wear_batch.run_length_model import SLOPE, TOTAL, BankModel, Measurement
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
-from impactcell.tracking.wear_batch.state import ChangePoint, FrictionObservation, TrackerState
+from impactcell.tracking.wear_batch.state import ChangePoint, TrackerState, UsableCycle
 
-FEWEST_DIFFERENCES = 18.0  # the scale of the noise must rest on so many before a shift is believed
-LEARNING_DIFFERENCES = 100.0  # before so many,
-BOTH = 2.0  # ways to a false alarm where batches are known: within one, and between two
-SETTLED = 1.15  # it must not have moved by such a factor since the first cycles were gone over with it
+FEWEST_DIFFERENCES = 18.0
+"""Differences that the scale of the noise must rest on before a change is believed."""
+LEARNING_DIFFERENCES = 100.0
+"""Differences before which a scale that still moves is waited for."""
+SETTLED = 1.15
+"""Factor by which the scale may have moved since the first cycles were gone over with it."""
+WAYS_KNOWN = 2.0
+"""Ways to a false alarm where batches are known, within one and between two; they share the rate."""
+SMALLEST_ODDS = 20.0
+"""Bayes factor below which no two batches are said to differ, however long they are (Kass & Raftery 1995:
+strong evidence)."""
 
 
-def update_bank(
-    settings: TrackerSettings,
-    state: TrackerState,
-    reading: FrictionObservation,
-    variance: float,
-    where: CycleTiming,
-    announced: float,
-) -> tuple[Samples, tuple[float, float], float]:
-    """Take a reading into the bank.
+@dataclass(frozen=True, slots=True, eq=False)
+class BankUpdate:
+    """The bank after a cycle.
 
-    Parameters
+    Attributes
     ----------
-    announced : float
-        1: a batch change came with this cycle, -1: surely none, 0: nobody says.
-
-    Returns
-    -------
     bank : ndarray, shape (k, 22)
     outliers : tuple of float
+        See `TrackerState`.
     statistic : float
         Of a change since the last one that was reported.
     """
-    table = np.empty((banks.ROWS, banks.WIDTH))
-    table[: len(state.bank)] = state.bank
-    design = banks.design(
-        settings.hazard,
-        settings.step_std**2 * variance,
-        state.level_variance,
-        state.slope_variance,
-        settings.outlier_probability,
-        settings.slope_std**2 * variance,
+
+    bank: Samples
+    outliers: tuple[float, float]
+    statistic: float
+
+
+def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCycle) -> BankUpdate:
+    """Take a cycle into the bank."""
+    bank = run_length_bank.workspace(state.bank)
+    model = BankModel(
+        hazard=settings.hazard,
+        step_variance=settings.step_std**2 * cycle.variance,
+        level_variance=state.level_variance,
+        slope_variance=state.slope_variance,
+        outlier_probability=settings.outlier_probability,
+        slope_prior=settings.slope_std**2 * cycle.variance,
     )
-    values = np.array([reading.mu_s, variance, where.passed, where.lag, where.index, announced])
+    timing = cycle.timing
+    measurement = Measurement(
+        value=cycle.observation.mu_s,
+        variance=cycle.variance,
+        cycles=float(timing.passed),
+        lag=float(timing.lag),
+        cycle=float(timing.index),
+        announced=cycle.announced,
+    )
     outliers = np.array(state.outliers)
-    count, _, statistic = banks.update(
-        table, len(state.bank), design, values, outliers, float(state.accepted)
+    result = run_length_bank.update(
+        bank, len(state.bank), model, measurement, outliers, float(state.accepted)
     )
-    return table[:count].copy(), (float(outliers[0]), float(outliers[1])), statistic
+    counts = float(outliers[0]), float(outliers[1])
+    return BankUpdate(run_length_bank.stored(bank, result.hypotheses), counts, result.statistic)
 
 
 def detect_change(
-    settings: TrackerSettings,
-    state: TrackerState,
-    reading: FrictionObservation,
-    noise: NoiseScale,
-    bank: Samples,
-    statistic: float,
-    where: CycleTiming,
-    announced: float,
+    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, updated: BankUpdate
 ) -> tuple[TrackerState, ChangePoint | None]:
-    """Report the shift that a reading, in `bank` by now, makes certain enough."""
-    if announced > 0.0:
-        # an announced change is no finding, and what came before it has been settled by it
-        return replace(state, accepted_before=where.index - 1, accepted=where.index), None
-    # with known batches, false alarms are shared out to changes within a batch and between batches
-    known = settings.batch is BatchKnowledge.KNOWN and reading.batch_id is not None
-    ways = BOTH if known else 1.0
-    threshold = banks.threshold(ways * settings.false_alarm_cycles)
-    if announced < 0.0 or where.lag > 0 or statistic <= threshold or not _scale_is_known(state, noise):
+    """Report the change that a cycle, in the bank by now, makes certain enough."""
+    index = cycle.timing.index
+    if cycle.announced > 0.0:
+        # an announced change is no detection, and what came before it has been settled by it
+        return replace(state, accepted_before=index - 1, accepted=index), None
+    is_known = settings.batch is BatchKnowledge.KNOWN and cycle.observation.batch_id is not None
+    ways = WAYS_KNOWN if is_known else 1.0
+    threshold = run_length_bank.threshold(ways * settings.false_alarm_cycles)
+    is_quiet = cycle.announced < 0.0 or cycle.timing.lag > 0 or updated.statistic <= threshold
+    if is_quiet or not _scale_is_known(state, cycle.noise):
         return state, None
-    cycle, size, std = banks.locate_change_point(bank, state.accepted, where.index)
-    shift = ChangePoint(cycle, size, std, where.index, statistic, threshold)
-    return replace(state, accepted_before=state.accepted, accepted=where.index, shift=shift), shift
+    first, size, std = run_length_bank.locate_change_point(updated.bank, state.accepted, index)
+    change = ChangePoint(first, size, std, index, updated.statistic, threshold)
+    return replace(state, accepted_before=state.accepted, accepted=index, shift=change), change
 
 
-def innovation(
-    state: TrackerState, reading: FrictionObservation, variance: float, where: CycleTiming
-) -> float:
-    """Give the reading minus what the bank predicts before it is taken in, in standard deviations."""
-    mean, spread = banks.moments(state.bank)
-    ahead = where.passed - where.lag
-    predicted = mean[0] + ahead * mean[1]
-    width = spread[0, 0] + 2.0 * ahead * spread[0, 1] + ahead**2 * spread[1, 1] + variance
-    return float((reading.mu_s - predicted) / math.sqrt(width))
+def innovation(state: TrackerState, cycle: UsableCycle) -> float:
+    """Give the estimate minus what the bank predicts before it is taken in, in standard deviations."""
+    mean, covariance = run_length_bank.moments(state.bank)
+    ahead = cycle.timing.passed - cycle.timing.lag
+    predicted = mean[TOTAL] + ahead * mean[SLOPE]
+    variance = covariance[TOTAL, TOTAL] + 2.0 * ahead * covariance[TOTAL, SLOPE]
+    variance = variance + ahead**2 * covariance[SLOPE, SLOPE] + cycle.variance
+    return float((cycle.observation.mu_s - predicted) / math.sqrt(variance))
 
 
 def compare_with_previous_batch(
-    settings: TrackerSettings,
-    state: TrackerState,
-    current: wear_filter.WearFilter,
-    noise: NoiseScale,
-    variance: float,
-    index: int,
+    settings: TrackerSettings, state: TrackerState, current: wear_filter.WearFilter, cycle: UsableCycle
 ) -> tuple[TrackerState, ChangePoint | None]:
     """Test whether the PLC's present batch differs from the one before.
 
@@ -113,17 +113,17 @@ def compare_with_previous_batch(
     if previous is None or previous not in current.batches:
         return state, None
     size, std = wear_filter.contrast(current, current.current, previous)
-    prior = settings.step_std * math.sqrt(variance)
+    prior = settings.step_std * math.sqrt(cycle.variance)
     statistic = 0.5 * (size / std) ** 2 + math.log(std / prior)
     length = max(1.0, (state.batch_start - state.first) / max(state.batch_count - 1, 1))
-    threshold = math.log(max(BOTH * settings.false_alarm_cycles / length, 20.0))
-    shift = ChangePoint(state.batch_start, size, std, index, statistic, threshold)
+    threshold = math.log(max(WAYS_KNOWN * settings.false_alarm_cycles / length, SMALLEST_ODDS))
+    change = ChangePoint(state.batch_start, size, std, cycle.timing.index, statistic, threshold)
     if state.tested:
-        reported = state.shift is not None and state.shift.cycle == state.batch_start
-        return (replace(state, shift=shift) if reported else state), None
-    if statistic <= threshold or not _scale_is_known(state, noise):
+        is_reported = state.shift is not None and state.shift.cycle == state.batch_start
+        return (replace(state, shift=change) if is_reported else state), None
+    if statistic <= threshold or not _scale_is_known(state, cycle.noise):
         return state, None
-    return replace(state, shift=shift, tested=True), shift
+    return replace(state, shift=change, tested=True), change
 
 
 def reason_not_ready(state: TrackerState) -> str:
@@ -134,7 +134,7 @@ def reason_not_ready(state: TrackerState) -> str:
 
 
 def _scale_is_known(state: TrackerState, noise: NoiseScale) -> bool:
-    """Whether the scale of the noise is known well enough to tell a shift from noise."""
+    """Whether the scale of the noise is known well enough to tell a change from noise."""
     if noise.weight < FEWEST_DIFFERENCES:
         return False
     if state.history is None or noise.weight >= LEARNING_DIFFERENCES:

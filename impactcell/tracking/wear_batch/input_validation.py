@@ -1,10 +1,16 @@
-"""Is a reading usable, and where in time does it belong? Says why where something is wrong."""
+"""Is an estimate usable, and where in time does its cycle belong? Says why where something is wrong."""
 
 import math
 from dataclasses import dataclass
 
-LARGEST_FRICTION = 10.0  # a friction coefficient beyond this is a fault of the measurement
+LARGEST_FRICTION = 10.0
+"""mu_s beyond this is a fault of the measurement: no dry pair of materials comes near."""
 SMALLEST_STD = 1e-9
+"""A declared standard deviation below this, in mu_s, is none: no sensor is so good."""
+PERIOD_GAIN = 0.05
+"""Share of each new period in the mean one."""
+LONGEST_PERIOD = 2.0
+"""A period counts at most as so many of the usual one: a pause is not a slower rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +56,7 @@ class CycleTiming:
 def update_clock(
     clock: CycleClock, cycle: int, time_ns: int, reorder_limit: int
 ) -> tuple[CycleClock, CycleTiming]:
-    """Find the place of a cycle and move the clock there."""
+    """Find where a cycle belongs and move the clock there."""
     index = cycle + clock.base
     if not clock.seen:
         return CycleClock(clock.base, index, (index,), time_ns), CycleTiming(index, 0, 0, repeated=False)
@@ -61,12 +67,12 @@ def update_clock(
     if 0 < lag <= reorder_limit:
         clock = CycleClock(clock.base, clock.last, seen, clock.time_ns, clock.period_s)
         return clock, CycleTiming(index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late")
-    restarted = lag > 0
-    base = clock.last + 1 - cycle if restarted else clock.base
+    has_restarted = lag > 0
+    base = clock.last + 1 - cycle if has_restarted else clock.base
     index = cycle + base
     passed = index - clock.last
     time_ns, period_s, note = _update_period(clock, time_ns, passed)
-    if restarted:
+    if has_restarted:
         seen = (*seen[:-1], index)
         note = "; ".join(filter(None, (f"cycle numbers restarted at {cycle}", note)))
     return CycleClock(base, index, seen, time_ns, period_s), CycleTiming(
@@ -96,9 +102,12 @@ def _update_period(clock: CycleClock, time_ns: int, passed: int) -> tuple[int, f
     """Time and period after `passed` cycles; a clock that goes back is reported and otherwise ignored."""
     if time_ns == 0 or clock.time_ns == 0:
         return time_ns or clock.time_ns, clock.period_s, ""
-    elapsed = (time_ns - clock.time_ns) * 1e-9
-    if elapsed <= 0.0:
-        return time_ns, clock.period_s, f"the clock went back by {-elapsed:g} s"
-    each, usual = elapsed / passed, clock.period_s
-    # a pause is not a slower rate: one period counts at most as twice the usual one
-    return time_ns, each if math.isnan(usual) else usual + 0.05 * (min(each, 2.0 * usual) - usual), ""
+    elapsed_s = (time_ns - clock.time_ns) * 1e-9
+    if elapsed_s <= 0.0:
+        return time_ns, clock.period_s, f"the clock went back by {-elapsed_s:g} s"
+    period, usual = elapsed_s / passed, clock.period_s
+    return (
+        time_ns,
+        period if math.isnan(usual) else usual + PERIOD_GAIN * (min(period, LONGEST_PERIOD * usual) - usual),
+        "",
+    )

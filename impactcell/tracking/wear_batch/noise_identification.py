@@ -8,33 +8,36 @@ adopted by mistake costs a wear rate most of its precision.
 import math
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from impactcell.records import Samples
-from impactcell.tracking.wear_batch import noise_scale as noises
-from impactcell.tracking.wear_batch import run_length_bank as banks
-from impactcell.tracking.wear_batch import wear_filter
+from impactcell.tracking.wear_batch import noise_scale, run_length_bank, wear_filter
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
+from impactcell.tracking.wear_batch.run_length_model import BankModel
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 
-SCHEDULE = (50, 100, 200)  # cycles after which there is a first look, before the end of commissioning
-EARLY = (
-    4,
-    8,
-    12,
-    *range(16, 200, 4),
-    250,
-    300,
-    400,
-)  # cycles after which a wrong scale of the noise is corrected
-RESCALED = 1.07  # factor by which it must have moved
-RESHAPED = 1.5  # the same for variances that move apart: how far declared ones are believed
-LEVEL_WALKS = (0.0, 0.01, 0.03, 0.1, 0.3)  # standard deviations a cycle, of one estimate's
-SLOPE_WALKS = (0.0, 1e-5, 1e-4, 1e-3)
-CLEARLY = 5.0  # nats by which a random walk must be more likely than none
+if TYPE_CHECKING:
+    from impactcell.tracking.wear_batch.state import UsableCycle
 
-INDEX, VALUE, STD, ANNOUNCED, BATCH = range(5)
+IDENTIFIED_AT = (50, 100, 200)
+"""Cycles after which random walks are looked for, before the end of commissioning."""
+REFITTED_AT = (4, 8, 12, *range(16, 200, 4), 250, 300, 400)
+"""Cycles after which a wrong scale of the noise is corrected."""
+RESCALED = 1.07
+"""Factor by which it must have moved for the cycles to be gone over again."""
+RESHAPED = 1.5
+"""The same for variances that move apart: how far declared ones are believed."""
+LEVEL_WALKS = (0.0, 0.01, 0.03, 0.1, 0.3)
+"""Random walks of the level that are tried: standard deviation a cycle, in those of one estimate."""
+SLOPE_WALKS = (0.0, 1e-5, 1e-4, 1e-3)
+"""Random walks of the slope that are tried, in the same unit."""
+CLEARLY = 5.0
+"""Nats by which a random walk must be more likely than none: a Bayes factor of 150 (Kass & Raftery 1995)."""
+
+INDEX, VALUE, STD, BATCH_CHANGE, BATCH = range(5)
+"""Columns of a `CommissioningRecord`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +47,8 @@ class CommissioningRecord:
     Attributes
     ----------
     rows : ndarray, shape (n, 5)
-        Index, value, declared standard deviation, what the bank was told of a batch change (1: one came,
-        -1: surely none, 0: nothing), place of the batch in `batches` (-1 without one).
+        Index, value, declared standard deviation, what the bank was told of a batch change (see
+        `UsableCycle.announced`), place of the batch in `batches` (-1 without one).
     batches : tuple of str
     """
 
@@ -53,112 +56,99 @@ class CommissioningRecord:
     batches: tuple[str, ...] = ()
 
 
+class RandomWalks(NamedTuple):
+    """Standard deviations a cycle of the walks of level and slope, in standard deviations of one estimate."""
+
+    level: float
+    slope: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class ReplayResult:
-    """The bank after the history, outliers among how many readings, and the history's log likelihood."""
+class BankReplay:
+    """The bank after the record, outliers among how many estimates, and the record's log likelihood."""
 
     bank: Samples
     outliers: tuple[float, float]
-    likelihood: float
+    log_likelihood: float
 
 
-def append_cycle(
-    history: CommissioningRecord, index: int, value: float, std: float, announced: float, batch: str | None
-) -> CommissioningRecord:
+def append_cycle(record: CommissioningRecord, cycle: "UsableCycle", batch: str | None) -> CommissioningRecord:
     """Add one cycle."""
-    batches = history.batches
+    batches = record.batches
     if batch is not None and batch not in batches:
         batches = (*batches, batch)
     place = -1.0 if batch is None else float(batches.index(batch))
-    rows = np.vstack([history.rows, [index, value, std, announced, place]])
-    return replace(history, rows=rows, batches=batches)
+    row = [cycle.timing.index, cycle.observation.mu_s, cycle.std, cycle.announced, place]
+    return replace(record, rows=np.vstack([record.rows, row]), batches=batches)
 
 
 def replay_bank(
-    settings: TrackerSettings,
-    history: CommissioningRecord,
-    noise: NoiseScale,
-    level_walk: float,
-    slope_walk: float,
-) -> ReplayResult:
-    """Run the bank over the history.
-
-    Parameters
-    ----------
-    noise : Noise
-        What is known of it by now.
-    level_walk, slope_walk : float
-        Standard deviations a cycle, in standard deviations of one estimate.
-    """
-    rows = history.rows
-    variance = noises.variances(noise, rows[:, STD])
+    settings: TrackerSettings, record: CommissioningRecord, noise: NoiseScale, walks: RandomWalks
+) -> BankReplay:
+    """Run the bank over the record with what is known of the noise by now."""
+    rows = record.rows
+    variance = noise_scale.variances(noise, rows[:, STD])
     unit = float(np.median(variance))
-    readings = np.zeros((len(rows), 6))
-    readings[:, 0], readings[:, 1], readings[:, 4] = rows[:, VALUE], variance, rows[:, INDEX]
-    readings[1:, 2] = np.diff(rows[:, INDEX])
-    readings[:, 5] = rows[:, ANNOUNCED]
-    table = np.zeros((banks.ROWS, banks.WIDTH))
+    # columns as the fields of `Measurement`
+    passed = np.append(0.0, np.diff(rows[:, INDEX]))
+    in_time = np.zeros(len(rows))
+    series = np.column_stack(
+        [rows[:, VALUE], variance, passed, in_time, rows[:, INDEX], rows[:, BATCH_CHANGE]]
+    )
     slope_std = settings.slope_std * float(np.sqrt(variance[0]))
-    first = banks.initial_bank(
+    first = run_length_bank.initial_bank(
         rows[0, VALUE], variance[0], slope_std, int(rows[0, INDEX]), settings.outlier_probability
     )
-    table[: len(first)] = first
-    design = banks.design(
-        settings.hazard,
-        settings.step_std**2 * unit,
-        level_walk**2 * unit,
-        slope_walk**2 * unit,
-        settings.outlier_probability,
-        slope_std**2,
+    bank = run_length_bank.workspace(first)
+    model = BankModel(
+        hazard=settings.hazard,
+        step_variance=settings.step_std**2 * unit,
+        level_variance=walks.level**2 * unit,
+        slope_variance=walks.slope**2 * unit,
+        outlier_probability=settings.outlier_probability,
+        slope_prior=slope_std**2,
     )
     outliers = np.zeros(2)
-    count, likelihood = banks.update_series(table, len(first), design, readings, outliers, rows[0, INDEX])
-    return ReplayResult(table[:count].copy(), (float(outliers[0]), float(outliers[1])), likelihood)
+    accepted = float(rows[0, INDEX])
+    count, likelihood = run_length_bank.update_series(bank, len(first), model, series, outliers, accepted)
+    counts = float(outliers[0]), float(outliers[1])
+    return BankReplay(run_length_bank.stored(bank, count), counts, likelihood)
 
 
 def identify_random_walks(
-    settings: TrackerSettings, history: CommissioningRecord, noise: NoiseScale
-) -> tuple[float, float]:
-    """Find the random walks of level and slope, in standard deviations of one estimate a cycle."""
-    start = (settings.level_noise, settings.slope_noise)
+    settings: TrackerSettings, record: CommissioningRecord, noise: NoiseScale
+) -> RandomWalks:
+    """Find the random walks under which the record is clearly most likely."""
 
     @cache
-    def likelihood(level: float, slope: float) -> float:
-        return replay_bank(settings, history, noise, level, slope).likelihood
+    def likelihood(walks: RandomWalks) -> float:
+        return replay_bank(settings, record, noise, walks).log_likelihood
 
-    none = likelihood(*start)
-    level, best = start[0], none
-    for walk in LEVEL_WALKS:
-        found = likelihood(walk, start[1])
-        if found > max(best, none + CLEARLY):
-            level, best = walk, found
-    slope, base = start[1], best
-    for walk in SLOPE_WALKS:
-        found = likelihood(level, walk)
-        if found > max(best, base + CLEARLY):
-            slope, best = walk, found
-    return level, slope
+    best = RandomWalks(settings.level_noise, settings.slope_noise)
+    for name, scales in (("level", LEVEL_WALKS), ("slope", SLOPE_WALKS)):
+        none = best
+        for scale in scales:
+            tried = none._replace(**{name: scale})
+            if likelihood(tried) > max(likelihood(best), likelihood(none) + CLEARLY):
+                best = tried
+    return best
 
 
 def replay_filter(
-    settings: TrackerSettings,
-    history: CommissioningRecord,
-    noise: NoiseScale,
-    level_walk: float,
-    slope_walk: float,
+    settings: TrackerSettings, record: CommissioningRecord, noise: NoiseScale, walks: RandomWalks
 ) -> wear_filter.WearFilter:
-    """Run the filter of known batches over the history."""
-    rows = history.rows[history.rows[:, BATCH] >= 0.0]
-    variance = noises.variances(noise, rows[:, STD])
-    unit = float(np.median(variance))
-    names = [history.batches[int(place)] for place in rows[:, BATCH]]
+    """Run the filter of known batches over the record."""
+    rows = record.rows[record.rows[:, BATCH] >= 0.0]
+    variances = noise_scale.variances(noise, rows[:, STD])
+    unit = float(np.median(variances))
+    names = [record.batches[int(place)] for place in rows[:, BATCH]]
     state = wear_filter.initial_state(
-        rows[0, VALUE], variance[0], settings.slope_std * math.sqrt(variance[0]), names[0]
+        rows[0, VALUE], variances[0], settings.slope_std * math.sqrt(variances[0]), names[0]
     )
-    for before, row, own, name in zip(rows[:-1], rows[1:], variance[1:], names[1:], strict=True):
+    for before, row, variance, name in zip(rows[:-1], rows[1:], variances[1:], names[1:], strict=True):
         passed = int(row[INDEX] - before[INDEX])
-        state = wear_filter.predict(state, passed, level_walk**2 * unit, slope_walk**2 * unit)
+        state = wear_filter.predict(state, passed, walks.level**2 * unit, walks.slope**2 * unit)
         if name != state.current:
-            state = wear_filter.switch_batch(state, name, settings.step_std**2 * own)
-        state, _ = wear_filter.update(state, row[VALUE], own, settings.outlier_threshold)
+            state = wear_filter.switch_batch(state, name, settings.step_std**2 * variance)
+        state, _ = wear_filter.update(state, row[VALUE], variance, settings.outlier_threshold)
     return state

@@ -1,13 +1,21 @@
-"""Keeps the process noise honest: innovations of a right filter are uncorrelated (Mehra 1970)."""
+"""Process noise that follows the data: innovations of a right filter are uncorrelated (Mehra 1970)."""
 
 import math
 from dataclasses import dataclass
 
-MEMORY = 1000.0  # cycles
-CERTAIN = 5.0  # standard deviations of the lag-one correlation at which the process noise is changed
+MEMORY = 1000.0
+"""Cycles after which an innovation is forgotten."""
+CERTAIN = 5.0
+"""Standard deviations of the lag-one correlation at which the process noise is changed: 1 in 1.7 million."""
 FEWEST = 200.0
-CLIP = 3.0  # an outlier counts at most as much as this
-SMALLEST = 1e-6  # of one estimate's variance a cycle: where raising starts, and lowering ends at none
+"""Cycles before which nothing is changed: the correlation of fewer is not normal enough to say `CERTAIN`."""
+CLIP = 3.0
+"""Normalised innovations count at most as this, outliers too."""
+STEP = 4.0
+"""Factor by which the process variance is raised or lowered at a time: its standard deviation by two."""
+SMALLEST = 1e-6
+"""Process variance a cycle where raising starts, and below which lowering ends at none, in the variance of
+one estimate: a random walk that takes a million cycles to be as large as the noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,24 +28,24 @@ class InnovationCorrelation:
     square: float = 0.0
 
 
-def update(monitor: InnovationCorrelation, innovation: float) -> tuple[InnovationCorrelation, float]:
-    """Take one normalised innovation; also say by what the process variance is to be multiplied."""
+def update(state: InnovationCorrelation, innovation: float) -> tuple[InnovationCorrelation, float]:
+    """Take one normalised innovation; also give the factor of the process variance that it makes certain."""
     if not math.isfinite(innovation):
-        return monitor, 1.0
+        return state, 1.0
     clipped = max(-CLIP, min(innovation, CLIP))
-    if math.isnan(monitor.last):
+    if math.isnan(state.last):
         return InnovationCorrelation(clipped), 1.0
     kept = 1.0 - 1.0 / MEMORY
-    weight = kept * monitor.weight + 1.0
-    product = kept * monitor.product + clipped * monitor.last
-    square = kept * monitor.square + clipped**2
-    fresh = InnovationCorrelation(clipped, weight, product, square)
+    weight = kept * state.weight + 1.0
+    product = kept * state.product + clipped * state.last
+    square = kept * state.square + clipped**2
+    updated = InnovationCorrelation(clipped, weight, product, square)
     if weight < FEWEST or square <= 0.0:
-        return fresh, 1.0
+        return updated, 1.0
     score = product / square * math.sqrt(weight)
     if abs(score) < CERTAIN:
-        return fresh, 1.0
-    return InnovationCorrelation(clipped), 4.0 if score > 0.0 else 0.25
+        return updated, 1.0
+    return InnovationCorrelation(clipped), STEP if score > 0.0 else 1.0 / STEP
 
 
 def adapt_process_noise(variance: float, factor: float, unit: float) -> float:

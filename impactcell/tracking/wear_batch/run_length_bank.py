@@ -6,29 +6,69 @@ Bayesian online change-point detection (Adams & MacKay 2007, arXiv:0710.3742) wi
 batches, a prior of steps up and down, small and large, and measurements from a contaminated normal
 (Huber 1964).
 
-The bank is one array, a row a hypothesis, oldest change first::
+Between cycles the bank is an array of floats, a row a hypothesis, oldest change first; compiled functions see
+the same numbers as records with names, see `run_length_model.HYPOTHESIS`::
 
-    column  0            1             2 .. 5                          6 .. 21
-            log weight   change cycle  total, slope, offset, shift     4 x 4 covariance, by rows
+    column  0           1             2 .. 5                          6 .. 21
+            log weight  change cycle  mean: total, slope, ...         4 x 4 covariance, by rows
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import run_length_update
+from impactcell.tracking.wear_batch.run_length_model import (
+    HYPOTHESIS,
+    OUTLIER_SCALE,
+    SHIFT,
+    SLOPE,
+    STATES,
+    STEPS,
+    Bank,
+    BankModel,
+    Measurement,
+)
+from impactcell.tracking.wear_batch.run_length_update import CAPACITY
 
-WEIGHT, CHANGE, MEAN, COVARIANCE, WIDTH = 0, 1, 2, 6, 22
-CAPACITY = 100
-ROWS = CAPACITY + len(run_length_update.STEPS) + 1
+WIDTH = HYPOTHESIS.itemsize // 8
+"""Numbers of one hypothesis."""
+MEAN, COVARIANCE = slice(2, 2 + STATES), slice(2 + STATES, WIDTH)
+"""Columns of a stored hypothesis."""
+ROWS = CAPACITY + len(STEPS) + 1
+"""Hypotheses that there can be within a cycle, before the bank is pruned."""
 CALIBRATION = 0.60
-WINDOW = 1000.0  # cycles within which a change must be to be reported
-RECENT = 10  # change cycles this recent are each kept
-EXPECTED_CYCLES = 100.0  # cycles that the prior probability of an outlier counts for
-MEMORY = 5000.0  # cycles after which outliers are forgotten
-MOST_OUTLIERS = 0.1  # where there seem to be more, they are no outliers
+"""What the overshoot over the threshold, and `WINDOW`, take off it; nats, measured without outliers."""
+WINDOW = 1000.0
+"""Cycles within which a change must be to be reported: over very long spans some tiny change is all but
+certain."""
+EXPECTED_CYCLES = 100.0
+"""Cycles that the prior probability of an outlier counts for (beta prior)."""
+MEMORY = 5000.0
+"""Cycles after which outliers are forgotten."""
+MOST_OUTLIERS = 0.1
+"""Where there seem to be more than this share, they are no outliers."""
+
+
+class BankResult(NamedTuple):
+    """Outcome of one measurement.
+
+    Attributes
+    ----------
+    hypotheses : int
+        How many there are now.
+    log_density : float
+        Log predictive density of the value.
+    statistic : float
+        Shiryaev-Roberts log statistic of a change after the last that was accepted.
+    """
+
+    hypotheses: int
+    log_density: float
+    statistic: float
 
 
 @compiled
@@ -39,60 +79,63 @@ def outlier_probability(prior: float, seen: float, cycles: float) -> float:
 
 @compiled
 def update(
-    bank: Samples, count: int, design: Samples, reading: Samples, outliers: Samples, accepted: float
-) -> tuple[int, float, float]:
-    """Take one reading into the first `count` rows of `bank`, in place.
+    bank: Bank, count: int, model: BankModel, measurement: Measurement, outliers: Samples, accepted: float
+) -> BankResult:
+    """Take one measurement into the first `count` hypotheses of `bank`, in place.
 
     Parameters
     ----------
-    bank : ndarray, shape (ROWS, 22)
-    design : ndarray
-        hazard a cycle, step variance, level and slope process variance a cycle, prior probability of
-        an outlier, prior variance of the slope.
-    reading : ndarray
-        value, variance, cycles passed (0 for one that came late), lag of a late one, its own cycle,
-        1 if a batch change was announced just before it (0 if not, -1 if there is surely none).
+    bank : array of HYPOTHESIS, shape (ROWS,)
+    model : BankModel
+    measurement : Measurement
     outliers : ndarray, shape (2,)
         Outliers seen so far, in how many cycles; changed in place.
     accepted : float
         Changes up to this cycle have been reported.
-
-    Returns
-    -------
-    count : int
-    log_density : float
-        Log predictive density of the value.
-    statistic : float
-        Shiryaev-Roberts log statistic of a change after `accepted`.
     """
-    hazard, step, level_q, slope_q, prior, slope = design
-    value, variance, cycles, lag, cycle, announced = reading
+    cycles, announced = measurement.cycles, measurement.announced
     if cycles > 0.0:
-        run_length_update.predict(bank, count, cycles, level_q, slope_q)
+        run_length_update.predict(bank, count, cycles, model)
+        step, cycle = model.step_variance, measurement.cycle
         if announced > 0.0:
             count = run_length_update.spawn(bank, count, cycle, 1.0, step)
         elif announced == 0.0:
-            count = run_length_update.spawn(bank, count, cycle, min(hazard * cycles, 0.5), step)
-    probability = outlier_probability(prior, outliers[0], outliers[1])
-    density, odd = run_length_update.update(bank, count, value, variance, lag, cycle, probability)
+            hazard = min(model.hazard * cycles, 0.5)
+            count = run_length_update.spawn(bank, count, cycle, hazard, step)
+    probability = outlier_probability(model.outlier_probability, outliers[0], outliers[1])
+    density, outlier_share = run_length_update.update(bank, count, measurement, probability)
     kept = 1.0 - 1.0 / MEMORY
-    outliers[0], outliers[1] = kept * outliers[0] + odd, kept * outliers[1] + 1.0
-    count = run_length_update.prune(bank, count, CAPACITY, RECENT, cycle + lag, accepted)
-    # only changes within the window count: over very long spans some tiny change is all but certain
-    since = max(accepted, cycle + lag - WINDOW)
-    return count, density, run_length_update.shiryaev_roberts(bank, count, since, hazard, slope)
+    outliers[0], outliers[1] = kept * outliers[0] + outlier_share, kept * outliers[1] + 1.0
+    newest = measurement.cycle + measurement.lag
+    count = run_length_update.prune(bank, count, newest, accepted)
+    since = max(accepted, newest - WINDOW)
+    statistic = run_length_update.shiryaev_roberts(bank, count, since, model.hazard, model.slope_prior)
+    return BankResult(count, density, statistic)
 
 
 @compiled
 def update_series(
-    bank: Samples, count: int, design: Samples, readings: Samples, outliers: Samples, accepted: float
+    bank: Bank, count: int, model: BankModel, series: Samples, outliers: Samples, accepted: float
 ) -> tuple[int, float]:
-    """Take readings, shape (n, 6), one after another, after that of `initial_bank`; sum log densities."""
+    """Take in the rows of a series, shape (n, 6), but for the first; sum log densities."""
     total = 0.0
-    for reading in readings[1:]:
-        count, density, _ = update(bank, count, design, reading, outliers, accepted)
-        total += density
+    for row in series[1:]:
+        measurement = Measurement(row[0], row[1], row[2], row[3], row[4], row[5])
+        count, log_density, _ = update(bank, count, model, measurement, outliers, accepted)
+        total += log_density
     return count, total
+
+
+def workspace(rows: Samples) -> Bank:
+    """Give the hypotheses of a stored bank, shape (k, 22), with room for more, shape (ROWS,)."""
+    table = np.empty((ROWS, WIDTH))  # copied as floats: numpy copies records field by field
+    table[: len(rows)] = rows
+    return _records(table)
+
+
+def stored(bank: Bank, count: int) -> Samples:
+    """Give the first `count` hypotheses as rows to be kept, shape (count, 22)."""
+    return bank.view(np.float64).reshape(len(bank), WIDTH)[:count].copy()
 
 
 def initial_bank(value: float, variance: float, slope_std: float, cycle: int, outliers: float) -> Samples:
@@ -102,50 +145,41 @@ def initial_bank(value: float, variance: float, slope_std: float, cycle: int, ou
     -------
     ndarray, shape (2, 22)
     """
-    bank = np.zeros((2, WIDTH))
-    for row, (probability, scale) in zip(
-        bank, ((1.0 - outliers, 1.0), (outliers, run_length_update.OUTLIER_SCALE**2)), strict=True
-    ):
-        row[WEIGHT], row[CHANGE], row[MEAN] = math.log(probability), cycle, value
-        row[COVARIANCE] = variance * scale
-        row[COVARIANCE + 5] = slope_std**2
-    return bank
+    bank = np.zeros(2, HYPOTHESIS)
+    bank["log_weight"] = math.log(1.0 - outliers), math.log(outliers)
+    bank["change_cycle"], bank["mean"][:, 0] = cycle, value
+    bank["covariance"][:, 0, 0] = variance, variance * OUTLIER_SCALE**2
+    bank["covariance"][:, SLOPE, SLOPE] = slope_std**2
+    return stored(bank, 2)
 
 
-def moments(bank: Samples) -> tuple[Samples, Samples]:
+def moments(rows: Samples) -> tuple[Samples, Samples]:
     """Mean, shape (4,), and covariance, shape (4, 4), of the whole mixture."""
-    into = np.empty(WIDTH)
-    run_length_update.merge(bank.copy(), 0, len(bank), into)
-    return into[MEAN:COVARIANCE].copy(), into[COVARIANCE:].reshape(4, 4).copy()
-
-
-def design(
-    hazard: float,
-    step_variance: float,
-    level_variance: float,
-    slope_variance: float,
-    outliers: float,
-    slope_prior: float,
-) -> Samples:
-    """Make the `design` of `update`."""
-    return np.array([hazard, step_variance, level_variance, slope_variance, outliers, slope_prior])
+    mixture = np.empty((1, WIDTH))
+    run_length_update.merge(_records(rows), 0, len(rows), _records(mixture))
+    return mixture[0, MEAN], mixture[0, COVARIANCE].reshape(STATES, STATES)
 
 
 def threshold(false_alarm_cycles: float) -> float:
     """Threshold of the log statistic for a mean number of cycles between false alarms.
 
     Without a change the statistic's exponential minus the number of cycles is a martingale (Pollak
-    1985), so that the mean time to cross A is at least A; CALIBRATION takes back what the overshoot
-    and the window give, measured without outliers.
+    1985), so that the mean time to cross A is at least A; `CALIBRATION` is what is measured beyond.
     """
     return math.log(false_alarm_cycles) - CALIBRATION
 
 
-def locate_change_point(bank: Samples, after: float, until: float) -> tuple[int, float, float]:
+def locate_change_point(rows: Samples, after: float, until: float) -> tuple[int, float, float]:
     """Most probable first cycle of the change in (after, until], its size and standard deviation."""
-    rows = bank[(bank[:, CHANGE] > after) & (bank[:, CHANGE] <= until)]
-    if len(rows) == 0:
-        rows = bank
-    best = int(rows[int(np.argmax(rows[:, WEIGHT])), CHANGE])
+    cycles = _records(rows)["change_cycle"]
+    within = (cycles > after) & (cycles <= until)
+    if np.any(within):
+        rows = rows[within]
+    bank = _records(rows)
+    likeliest = int(bank["change_cycle"][int(np.argmax(bank["log_weight"]))])
     mean, covariance = moments(rows)
-    return best, float(mean[3]), math.sqrt(max(float(covariance[3, 3]), 0.0))
+    return likeliest, float(mean[SHIFT]), math.sqrt(max(float(covariance[SHIFT, SHIFT]), 0.0))
+
+
+def _records(rows: Samples) -> Bank:
+    return rows.view(HYPOTHESIS)[:, 0]

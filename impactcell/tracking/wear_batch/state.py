@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from impactcell.records import BatchState, Evidence, FrictionEstimate, Samples, WearState
-from impactcell.tracking.wear_batch.input_validation import CycleClock
+from impactcell.tracking.wear_batch.input_validation import CycleClock, CycleTiming
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
 from impactcell.tracking.wear_batch.process_noise_adaptation import InnovationCorrelation
@@ -39,9 +39,47 @@ class FrictionObservation:
         return cls(cycle, estimate.mu_s.value, estimate.mu_s.std, time_ns, batch_id, expected)
 
 
+ANNOUNCED, UNSAID, RULED_OUT = 1.0, 0.0, -1.0
+"""What is known of a batch change with a cycle: one came, nobody says, surely none."""
+
+
+@dataclass(frozen=True, slots=True)
+class UsableCycle:
+    """One cycle that can be used, with what was settled about it before anything is estimated.
+
+    Attributes
+    ----------
+    timing : CycleTiming
+        Where it belongs in the order of cycles.
+    noise : NoiseScale
+        With this cycle in it.
+    std, variance : float
+        Standard deviation that it declares (or the usual one), and its variance as the noise makes it.
+    announced : float
+        `ANNOUNCED`, `UNSAID` or `RULED_OUT`.
+    """
+
+    observation: FrictionObservation
+    timing: CycleTiming
+    noise: NoiseScale
+    std: float
+    variance: float
+    announced: float = UNSAID
+
+
 @dataclass(frozen=True, slots=True)
 class ChangePoint:
-    """The last batch shift: index of its first cycle, size in mu_s, and how it was found."""
+    """The last batch shift: index of its first cycle, size in mu_s, and how it was found.
+
+    Attributes
+    ----------
+    cycle, found_at : int
+        Indices of the first cycle after it, and of the one at which it was certain enough.
+    size, size_std : float
+        mu_s after it minus mu_s before, and its standard deviation.
+    statistic, threshold : float
+        Detection statistic and what it had to pass; nats.
+    """
 
     cycle: int
     size: float
@@ -64,7 +102,7 @@ class TrackerState:
     bank : ndarray, shape (k, 22)
         Run-length hypotheses, see `impactcell.tracking.wear_batch.run_length_bank`.
     outliers : tuple of float
-        Outliers among the bank's readings, and how many readings, both fading.
+        Outliers among the bank's estimates, and how many estimates, both fading.
     accepted, accepted_before : int
         Indices of the last two cycles at which the bank's shift was reported.
     batch_start, batch_count : int
@@ -103,15 +141,15 @@ class TrackingResult:
     Attributes
     ----------
     shift : Evidence or None
-        Set at the one cycle at which a batch shift is found.
+        Set at the one cycle at which a batch shift is detected.
     expected : bool
         The PLC announced a batch change with this cycle: the alarm is to stay silent.
     innovation : float
         Measurement minus prediction in standard deviations; nan if not used.
     used : bool
-        Whether the reading went into the state.
+        Whether the estimate went into the state.
     notes : tuple of str
-        What was wrong with the reading, and what was done about it.
+        What was wrong with the estimate, and what was done about it.
     """
 
     state: TrackerState

@@ -1,12 +1,11 @@
 """The tracker's state in the words of `impactcell.records`."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from impactcell.records import BatchState, Evidence, Quality, WearState
-from impactcell.tracking.wear_batch import batch_filter as batches
-from impactcell.tracking.wear_batch import run_length_bank as banks
-from impactcell.tracking.wear_batch import wear_filter, wear_report
+from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
+from impactcell.tracking.wear_batch import batch_filter, run_length_bank, wear_filter, wear_report
+from impactcell.tracking.wear_batch.run_length_model import OFFSET, SLOPE, TOTAL
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import (
     ChangePoint,
@@ -14,93 +13,117 @@ from impactcell.tracking.wear_batch.state import (
     TrackerState,
     TrackingResult,
 )
+from impactcell.tracking.wear_batch.wear_report import WearMoments
+
+SECONDS_A_DAY = 86_400.0
+"""Seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class CycleOutcome:
+    """What became of one cycle; `notes`, `used`, `innovation` and `expected` as in `TrackingResult`."""
+
+    notes: list[str]
+    used: bool
+    change: ChangePoint | None = None
+    innovation: float = math.nan
+    expected: bool = False
 
 
 def empty_result(
-    settings: TrackerSettings, state: TrackerState, reading: FrictionObservation, notes: list[str]
+    settings: TrackerSettings, state: TrackerState, observation: FrictionObservation, outcome: CycleOutcome
 ) -> TrackingResult:
-    """Outcome of a cycle before the first usable one."""
-    nan, reason = math.nan, "; ".join(notes)
-    none = WearState(nan, nan, nan, nan, settings.wear_limit, nan, nan, nan, nan, Quality.BAD, reason)
-    batch = BatchState(reading.batch_id or "", nan, nan, nan, nan, 0, Quality.BAD, reason)
+    """Report a cycle before the first usable one."""
+    nan, reason = math.nan, "; ".join(outcome.notes)
+    wear = WearState(nan, nan, nan, nan, settings.wear_limit, nan, nan, nan, nan, Quality.BAD, reason)
+    batch = BatchState(observation.batch_id or "", nan, nan, nan, nan, 0, Quality.BAD, reason)
     return TrackingResult(
-        state, none, batch, None, expected=False, innovation=nan, used=False, notes=tuple(notes)
+        state, wear, batch, None, expected=False, innovation=nan, used=False, notes=tuple(outcome.notes)
     )
 
 
 def tracking_result(
-    settings: TrackerSettings,
-    state: TrackerState,
-    reading: FrictionObservation,
-    notes: list[str],
-    *,
-    used: bool,
-    shift: ChangePoint | None = None,
-    innovation: float = math.nan,
-    expected: bool = False,
+    settings: TrackerSettings, state: TrackerState, observation: FrictionObservation, outcome: CycleOutcome
 ) -> TrackingResult:
-    """Outcome of a cycle: by the filter where the batch is known, else by the bank."""
-    reason = "; ".join(notes)
-    quality = Quality.GOOD if used and not notes else Quality.UNCERTAIN
-    if state.filter is not None and settings.batch is BatchKnowledge.KNOWN and reading.batch_id is not None:
-        level, slope, covariance, offset, offset_std = _filter_moments(state.filter)
+    """Report a cycle: by the filter where the batch is known, else by the bank."""
+    notes = outcome.notes
+    quality = Quality.GOOD if outcome.used and not notes else Quality.UNCERTAIN
+    if (
+        state.filter is not None
+        and settings.batch is BatchKnowledge.KNOWN
+        and observation.batch_id is not None
+    ):
+        moments, offset, offset_std = _filter_moments(state.filter)
     else:
-        level, slope, covariance, offset, offset_std = _bank_moments(state)
+        moments, offset, offset_std = _bank_moments(state.bank)
     state = _refine_change_point(state)
     walks = (state.level_variance, state.slope_variance)
-    published = wear_report.wear_state(level, slope, covariance, walks, settings.wear_limit, quality, reason)
-    last = state.shift
-    learning = batches.reason_not_ready(state)
+    wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes))
+    change = state.shift
+    not_ready = batch_filter.reason_not_ready(state)
     batch = BatchState(
-        reading.batch_id or state.batch_id or "",
+        observation.batch_id or state.batch_id or "",
         offset,
         offset_std,
-        math.nan if last is None else last.size,
-        math.nan if last is None else last.size_std,
-        0 if last is None else state.clock.number(last.cycle),
-        Quality.UNCERTAIN if learning else quality,
-        "; ".join([*notes, *([learning] if learning else [])]),
+        math.nan if change is None else change.size,
+        math.nan if change is None else change.size_std,
+        0 if change is None else state.clock.number(change.cycle),
+        Quality.UNCERTAIN if not_ready else quality,
+        "; ".join([*notes, *([not_ready] if not_ready else [])]),
     )
-    evidence = None if shift is None else _evidence(settings, state, shift)
-    return TrackingResult(state, published, batch, evidence, expected, innovation, used, tuple(notes))
+    return TrackingResult(
+        state,
+        wear,
+        batch,
+        None if outcome.change is None else _evidence(settings, state, outcome.change),
+        outcome.expected,
+        outcome.innovation,
+        outcome.used,
+        tuple(notes),
+    )
 
 
-def _filter_moments(
-    known: wear_filter.WearFilter,
-) -> tuple[float, float, tuple[float, float, float], float, float]:
-    spread = known.covariance
-    offset, offset_std = wear_filter.offset(known, known.current)
-    covariance = (float(spread[0, 0]), float(spread[0, 1]), float(spread[1, 1]))
-    return float(known.mean[0]), float(known.mean[1]), covariance, offset, offset_std
+def _filter_moments(known: wear_filter.WearFilter) -> tuple[WearMoments, float, float]:
+    mean, covariance = known.mean, known.covariance
+    moments = WearMoments(
+        float(mean[0]),
+        float(mean[1]),
+        float(covariance[0, 0]),
+        float(covariance[0, 1]),
+        float(covariance[1, 1]),
+    )
+    return moments, *wear_filter.offset(known, known.current)
 
 
-def _bank_moments(state: TrackerState) -> tuple[float, float, tuple[float, float, float], float, float]:
+def _bank_moments(bank: Samples) -> tuple[WearMoments, float, float]:
     """Level is total minus offset: friction as if the first batch were still there."""
-    mean, full = banks.moments(state.bank)
-    covariance = (
-        float(full[0, 0] - 2.0 * full[0, 2] + full[2, 2]),
-        float(full[0, 1] - full[2, 1]),
-        float(full[1, 1]),
+    mean, covariance = run_length_bank.moments(bank)
+    level_variance = covariance[TOTAL, TOTAL] - 2.0 * covariance[TOTAL, OFFSET] + covariance[OFFSET, OFFSET]
+    moments = WearMoments(
+        float(mean[TOTAL] - mean[OFFSET]),
+        float(mean[SLOPE]),
+        float(level_variance),
+        float(covariance[TOTAL, SLOPE] - covariance[SLOPE, OFFSET]),
+        float(covariance[SLOPE, SLOPE]),
     )
-    offset_std = math.sqrt(max(float(full[2, 2]), 0.0))
-    return float(mean[0] - mean[2]), float(mean[1]), covariance, float(mean[2]), offset_std
+    return moments, float(mean[OFFSET]), math.sqrt(max(float(covariance[OFFSET, OFFSET]), 0.0))
 
 
 def _refine_change_point(state: TrackerState) -> TrackerState:
-    """Let the cycles since say more of the bank's last shift: when it was and how large."""
+    """Let the cycles since say more of the bank's last change: when it was and how large."""
     if state.shift is None or state.shift.found_at != state.accepted:
         return state
-    cycle, size, std = banks.locate_change_point(state.bank, state.accepted_before, state.accepted)
+    cycle, size, std = run_length_bank.locate_change_point(state.bank, state.accepted_before, state.accepted)
     return replace(state, shift=replace(state.shift, cycle=cycle, size=size, size_std=std))
 
 
-def _evidence(settings: TrackerSettings, state: TrackerState, shift: ChangePoint) -> Evidence:
+def _evidence(settings: TrackerSettings, state: TrackerState, change: ChangePoint) -> Evidence:
     return Evidence(
-        shift.statistic,
-        shift.threshold,
-        state.clock.number(shift.cycle),
-        shift.size,
-        shift.size_std,
+        change.statistic,
+        change.threshold,
+        state.clock.number(change.cycle),
+        change.size,
+        change.size_std,
         settings.false_alarm_cycles,
-        settings.false_alarm_cycles * state.clock.period_s / 86_400.0,
+        settings.false_alarm_cycles * state.clock.period_s / SECONDS_A_DAY,
     )

@@ -1,245 +1,203 @@
-"""One cycle of tracking: screen the reading, follow wear and batch, say what is believed afterwards."""
+"""One cycle of tracking: validate the estimate, update wear and batch, report what is known afterwards."""
 
 import math
 from dataclasses import replace
 
-from impactcell.records import Samples
-from impactcell.tracking.wear_batch import batch_filter as batches
 from impactcell.tracking.wear_batch import (
+    batch_filter,
     input_validation,
     noise_identification,
+    noise_scale,
     process_noise_adaptation,
+    run_length_bank,
     wear_filter,
 )
-from impactcell.tracking.wear_batch import noise_scale as noises
-from impactcell.tracking.wear_batch import run_length_bank as banks
+from impactcell.tracking.wear_batch.batch_filter import BankUpdate
+from impactcell.tracking.wear_batch.input_validation import CycleTiming
+from impactcell.tracking.wear_batch.process_noise import update_process_noise
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import (
+    ANNOUNCED,
+    RULED_OUT,
+    UNSAID,
     ChangePoint,
     FrictionObservation,
     TrackerState,
     TrackingResult,
+    UsableCycle,
 )
-from impactcell.tracking.wear_batch.state_reports import empty_result, tracking_result
+from impactcell.tracking.wear_batch.state_reports import CycleOutcome, empty_result, tracking_result
+from impactcell.tracking.wear_batch.wear_filter import WearFilter
 
-EARLIEST_CHANGE = 3  # no unannounced batch change is believed to be before
-SHORTEST_BATCH = 4.0  # a batch id that lasts fewer cycles than this on average says nothing about batches
+EARLIEST_CHANGE = 3
+"""Cycles before which no unannounced batch change is believed: an odd first value is no batch."""
+SHORTEST_BATCH = 4.0
+"""Mean cycles a batch id must last to say anything about batches."""
+JUDGED_BATCHES = 10
+"""Batch ids after which their mean length is judged."""
 
 
-def update(settings: TrackerSettings, state: TrackerState, reading: FrictionObservation) -> TrackingResult:
+def update(
+    settings: TrackerSettings, state: TrackerState, observation: FrictionObservation
+) -> TrackingResult:
     """Take one cycle into the state.
 
-    A reading that cannot be used leaves wear and batch as they were, says why, and the next good one
+    An estimate that cannot be used leaves wear and batch as they were, says why, and the next good one
     is used. Cycle numbers may be missing, late, repeated or restart; the clock may go back.
     """
-    clock, where = input_validation.update_clock(
-        state.clock, reading.cycle, reading.time_ns, settings.reorder_limit
+    clock, timing = input_validation.update_clock(
+        state.clock, observation.cycle, observation.time_ns, settings.reorder_limit
     )
-    problem, unusable = input_validation.validate_estimate(reading.mu_s, reading.mu_s_std)
-    notes = [note for note in (where.note, problem) if note]
+    fault, is_unusable = input_validation.validate_estimate(observation.mu_s, observation.mu_s_std)
+    notes = [note for note in (timing.note, fault) if note]
     noise = state.noise
-    if not (unusable or where.repeated):
-        identical = noises.identical_run(noise, reading.mu_s)
+    if not (is_unusable or timing.repeated):
+        identical = noise_scale.identical_run(noise, observation.mu_s)
         if identical >= settings.identical_limit:
             notes.append(f"mu_s has been the same {identical} times in a row, not used")
-            noise, unusable = replace(noise, identical=identical), True
-    if unusable or where.repeated:
+            noise, is_unusable = replace(noise, identical=identical), True
+    if is_unusable or timing.repeated:
         # the clock must not pass a cycle that was not taken in: its time passes with the next one
         clock = replace(clock, last=state.clock.last) if state.clock.seen else state.clock
-        kept = replace(state, clock=clock, noise=noise)
-        if len(state.bank) == 0:
-            return empty_result(settings, kept, reading, notes)
-        return tracking_result(settings, kept, reading, notes, used=False)
-    noise, std = noises.update(
-        noise, reading.mu_s, input_validation.valid_std(reading.mu_s_std), late=where.lag > 0
+        return _report(
+            settings, replace(state, clock=clock, noise=noise), observation, CycleOutcome(notes, used=False)
+        )
+    noise, std = noise_scale.update(
+        noise, observation.mu_s, input_validation.valid_std(observation.mu_s_std), late=timing.lag > 0
     )
-    variance = noises.variance(noise, std)
+    variance = noise_scale.variance(noise, std)
     if len(state.bank) == 0:
-        fresh = replace(state, clock=clock, noise=noise)
-        fresh = _first_cycle(settings, fresh, reading, variance, std, where.index)
-        return tracking_result(settings, fresh, reading, notes, used=True)
-    before, announced = _follow_batch_id(settings, state, reading, where)
-    if before.batch_count > 10 and where.index - before.first < SHORTEST_BATCH * before.batch_count:
+        cycle = UsableCycle(observation, timing, noise, std, variance, RULED_OUT)
+        first = _first_state(settings, replace(state, clock=clock, noise=noise), cycle)
+        return _report(settings, first, observation, CycleOutcome(notes, used=True))
+    state, announced = _follow_batch_id(settings, state, observation, timing)
+    if state.batch_count > JUDGED_BATCHES and timing.index - state.first < SHORTEST_BATCH * state.batch_count:
         notes.append("the batch id changes too often to say anything of batches")
-    bank, outliers, statistic = batches.update_bank(settings, before, reading, variance, where, announced)
-    fresh, shift = batches.detect_change(settings, before, reading, noise, bank, statistic, where, announced)
-    fresh, known, shift, innovation = _update_filter(
-        settings, fresh, reading, noise, bank, variance, where, shift
+    cycle = UsableCycle(observation, timing, noise, std, variance, announced)
+    updated = batch_filter.update_bank(settings, state, cycle)
+    before, change = batch_filter.detect_change(settings, state, cycle, updated)
+    state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
+    correlation, factor = state.monitor, 1.0
+    if timing.lag == 0:
+        correlation, factor = process_noise_adaptation.update(correlation, innovation)
+    state = replace(
+        state,
+        clock=clock,
+        noise=noise,
+        filter=known,
+        bank=updated.bank,
+        outliers=updated.outliers,
+        monitor=correlation,
     )
-    monitor, factor = fresh.monitor, 1.0
-    if where.lag == 0:
-        monitor, factor = process_noise_adaptation.update(monitor, innovation)
-    fresh = replace(
-        fresh, clock=clock, noise=noise, bank=bank, outliers=outliers, filter=known, monitor=monitor
-    )
-    if where.lag == 0:
-        fresh, added = _update_process_noise(settings, fresh, reading, std, where.index, announced, factor)
-        notes.extend(added)
-    expected = announced > 0.0 and reading.expected_change
-    return tracking_result(
-        settings, fresh, reading, notes, used=True, shift=shift, innovation=innovation, expected=expected
-    )
+    if timing.lag == 0:
+        state, raised = update_process_noise(settings, state, cycle, factor)
+        notes.extend(raised)
+    is_expected = announced > 0.0 and observation.expected_change
+    outcome = CycleOutcome(notes, used=True, change=change, innovation=innovation, expected=is_expected)
+    return _report(settings, state, observation, outcome)
 
 
-def _first_cycle(
-    settings: TrackerSettings,
-    state: TrackerState,
-    reading: FrictionObservation,
-    variance: float,
-    std: float,
-    index: int,
-) -> TrackerState:
+def _report(
+    settings: TrackerSettings, state: TrackerState, observation: FrictionObservation, outcome: CycleOutcome
+) -> TrackingResult:
+    if len(state.bank) == 0:
+        return empty_result(settings, state, observation, outcome)
+    return tracking_result(settings, state, observation, outcome)
+
+
+def _first_state(settings: TrackerSettings, state: TrackerState, cycle: UsableCycle) -> TrackerState:
+    """Begin with the first usable cycle: its batch is the reference."""
+    observation, index, variance = cycle.observation, cycle.timing.index, cycle.variance
     slope_std = settings.slope_std * math.sqrt(variance)
-    first = reading.batch_id if settings.batch is BatchKnowledge.KNOWN else None
-    history = noise_identification.append_cycle(
-        noise_identification.CommissioningRecord(), index, reading.mu_s, std, -1.0, first
-    )
+    batch = observation.batch_id if settings.batch is BatchKnowledge.KNOWN else None
     return replace(
         state,
-        bank=banks.initial_bank(reading.mu_s, variance, slope_std, index, settings.outlier_probability),
-        filter=None if first is None else wear_filter.initial_state(reading.mu_s, variance, slope_std, first),
+        bank=run_length_bank.initial_bank(
+            observation.mu_s, variance, slope_std, index, settings.outlier_probability
+        ),
+        filter=None
+        if batch is None
+        else wear_filter.initial_state(observation.mu_s, variance, slope_std, batch),
         accepted=index,
         accepted_before=index,
         first=index,
         replayed=state.noise,
         level_variance=settings.level_noise**2 * variance,
         slope_variance=settings.slope_noise**2 * variance,
-        batch_id=reading.batch_id,
+        batch_id=observation.batch_id,
         batch_start=index,
         batch_count=1,
-        history=history,
+        history=noise_identification.append_cycle(noise_identification.CommissioningRecord(), cycle, batch),
     )
 
 
 def _follow_batch_id(
-    settings: TrackerSettings,
-    state: TrackerState,
-    reading: FrictionObservation,
-    where: input_validation.CycleTiming,
+    settings: TrackerSettings, state: TrackerState, observation: FrictionObservation, timing: CycleTiming
 ) -> tuple[TrackerState, float]:
-    """Follow the PLC's batch id; 1: the batch changes with this cycle, -1: surely not, 0: nobody says."""
-    said = reading.batch_id
-    believed = settings.batch is BatchKnowledge.KNOWN and said is not None
-    if where.lag > 0:
-        return state, 0.0
-    if said is None or said == state.batch_id:
-        # an odd first value must not pass for a batch of one cycle
-        sure = where.index < state.first + EARLIEST_CHANGE
-        return state, 1.0 if reading.expected_change else -1.0 if sure else 0.0
-    fresh = replace(
+    """Follow the PLC's batch id; also say whether the batch changes with this cycle."""
+    batch_id, index = observation.batch_id, timing.index
+    if timing.lag > 0:
+        return state, UNSAID
+    is_expected = observation.expected_change
+    if batch_id is None or batch_id == state.batch_id:
+        otherwise = RULED_OUT if index < state.first + EARLIEST_CHANGE else UNSAID
+        return state, ANNOUNCED if is_expected else otherwise
+    state = replace(
         state,
-        batch_id=said,
+        batch_id=batch_id,
         previous_batch=state.batch_id,
-        batch_start=where.index,
+        batch_start=index,
         batch_count=state.batch_count + 1,
-        tested=reading.expected_change,
+        tested=is_expected,
     )
-    return fresh, 1.0 if believed or reading.expected_change else 0.0
+    is_believed = settings.batch is BatchKnowledge.KNOWN or is_expected
+    return state, ANNOUNCED if is_believed else UNSAID
 
 
 def _update_filter(
     settings: TrackerSettings,
     state: TrackerState,
-    reading: FrictionObservation,
-    noise: noises.NoiseScale,
-    bank: Samples,
-    variance: float,
-    where: input_validation.CycleTiming,
-    shift: ChangePoint | None,
-) -> tuple[TrackerState, wear_filter.WearFilter | None, ChangePoint | None, float]:
-    """Take the reading, in `bank` by now, into the filter where the batch is known; its innovation."""
-    said, current = reading.batch_id, state.filter
-    known = settings.batch is BatchKnowledge.KNOWN
-    forgotten = where.lag > 0 and current is not None and said not in current.batches
-    if known and said is not None and current is not None and shift is None and not forgotten:
-        return _update_known_batch(settings, state, reading, noise, said, current, variance, where)
-    innovation = batches.innovation(state, reading, variance, where)
-    if known and said is None:
-        if current is not None and where.lag == 0:
+    cycle: UsableCycle,
+    updated: BankUpdate,
+    change: ChangePoint | None,
+) -> tuple[TrackerState, WearFilter | None, ChangePoint | None, float]:
+    """Take a cycle, in the bank by now, into the filter where the batch is known; also its innovation."""
+    batch_id, current, timing = cycle.observation.batch_id, state.filter, cycle.timing
+    is_in_bank_only = timing.lag > 0 and current is not None and batch_id not in current.batches
+    is_known = settings.batch is BatchKnowledge.KNOWN and batch_id is not None
+    if is_known and current is not None and change is None and not is_in_bank_only:
+        return _update_known_batch(settings, state, cycle, current)
+    innovation = batch_filter.innovation(state, cycle)
+    if settings.batch is BatchKnowledge.UNKNOWN:
+        return state, current, change, innovation
+    if batch_id is None:
+        if current is not None and timing.lag == 0:
             # nobody says of which batch the cycle was: its time passes; after a change the bank knows better
-            passed = wear_filter.predict(current, where.passed, state.level_variance, state.slope_variance)
-            current = passed if shift is None else None
-    elif known and said is not None and current is None:
-        current = wear_filter.from_bank(*banks.moments(bank), said)
-    elif known and current is not None and shift is not None:
-        current = wear_filter.restart_after_change(current, *banks.moments(bank))
+            current = _pass_time(state, current, cycle) if change is None else None
+    elif current is None:
+        current = wear_filter.from_bank(*run_length_bank.moments(updated.bank), batch_id)
+    elif change is not None:
+        current = wear_filter.restart_after_change(current, *run_length_bank.moments(updated.bank))
         # what was learned of the noise from here on would be learned from a mix of two materials
         state = replace(state, tested=True, history=None)
-    # else a late cycle of a batch that the filter has forgotten is in the bank only
-    return state, current, shift, innovation
+    return state, current, change, innovation
 
 
 def _update_known_batch(
-    settings: TrackerSettings,
-    state: TrackerState,
-    reading: FrictionObservation,
-    noise: noises.NoiseScale,
-    said: str,
-    current: wear_filter.WearFilter,
-    variance: float,
-    where: input_validation.CycleTiming,
-) -> tuple[TrackerState, wear_filter.WearFilter, ChangePoint | None, float]:
-    """Take a reading of a known batch into the filter, and test the batch against the one before."""
-    if where.lag == 0:
-        current = wear_filter.predict(current, where.passed, state.level_variance, state.slope_variance)
-        if said != current.current:
-            current = wear_filter.switch_batch(current, said, settings.step_std**2 * variance)
+    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, current: WearFilter
+) -> tuple[TrackerState, WearFilter, ChangePoint | None, float]:
+    """Take a cycle of a known batch into the filter, and test the batch against the one before."""
+    lag, variance, batch_id = cycle.timing.lag, cycle.variance, cycle.observation.batch_id
+    if lag == 0:
+        current = _pass_time(state, current, cycle)
+        if batch_id is not None and batch_id != current.current:
+            current = wear_filter.switch_batch(current, batch_id, settings.step_std**2 * variance)
     current, error = wear_filter.update(
-        current, reading.mu_s, variance, settings.outlier_threshold, where.lag, said
+        current, cycle.observation.mu_s, variance, settings.outlier_threshold, lag, batch_id
     )
-    state, shift = batches.compare_with_previous_batch(settings, state, current, noise, variance, where.index)
-    return state, current, shift, error.value / error.std
+    state, change = batch_filter.compare_with_previous_batch(settings, state, current, cycle)
+    return state, current, change, error.value / error.std
 
 
-def _update_process_noise(
-    settings: TrackerSettings,
-    state: TrackerState,
-    reading: FrictionObservation,
-    std: float,
-    index: int,
-    announced: float,
-    factor: float,
-) -> tuple[TrackerState, list[str]]:
-    """Commission the process noise from the first cycles, later keep it honest by `factor`."""
-    notes: list[str] = []
-    unit = state.noise.factor * state.noise.usual_std**2
-    if factor != 1.0:
-        level = process_noise_adaptation.adapt_process_noise(state.level_variance, factor, unit)
-        if level != state.level_variance:
-            notes.append(
-                f"innovations are correlated: process noise {'raised' if factor > 1.0 else 'lowered'}"
-            )
-        state = replace(state, level_variance=level)
-    if state.history is None:
-        return state, notes
-    history = noise_identification.append_cycle(
-        state.history, index, reading.mu_s, std, announced, reading.batch_id
-    )
-    n = len(history.rows)
-    ended = n >= settings.commissioning_cycles
-    looked = ended or n in noise_identification.SCHEDULE
-    state = replace(state, history=None if ended else history)
-    if not (looked or n in noise_identification.EARLY):
-        return state, notes
-    values, stds = history.rows[:, noise_identification.VALUE], history.rows[:, noise_identification.STD]
-    if n in noise_identification.EARLY:
-        state = replace(state, noise=noises.refit(state.noise, values, stds))
-        unit = state.noise.factor * state.noise.usual_std**2
-    together, apart = noises.scale_change(state.noise, state.replayed, stds)
-    rescaled = together > noise_identification.RESCALED or apart > noise_identification.RESHAPED
-    if not (looked or rescaled):
-        return state, notes
-    level_walk, slope_walk = settings.level_noise, settings.slope_noise
-    if looked:
-        level_walk, slope_walk = noise_identification.identify_random_walks(settings, history, state.noise)
-    level, slope = level_walk**2 * unit, slope_walk**2 * unit
-    unchanged = level == state.level_variance and slope == state.slope_variance
-    if unchanged and not rescaled:
-        return state, notes
-    again = noise_identification.replay_bank(settings, history, state.noise, level_walk, slope_walk)
-    filtered = state.filter and noise_identification.replay_filter(
-        settings, history, state.noise, level_walk, slope_walk
-    )
-    fresh = replace(state, bank=again.bank, outliers=again.outliers, filter=filtered)
-    fresh = replace(fresh, level_variance=level, slope_variance=slope)
-    return replace(fresh, replayed=state.noise), notes
+def _pass_time(state: TrackerState, current: WearFilter, cycle: UsableCycle) -> WearFilter:
+    return wear_filter.predict(current, cycle.timing.passed, state.level_variance, state.slope_variance)

@@ -19,7 +19,9 @@ from filterpy import kalman
 
 from impactcell.records import Samples
 
-KEPT_BATCHES = 12  # more are forgotten, the longest unseen first; their uncertainty stays in level and slope
+KEPT_BATCHES = 12
+"""Batches with an offset in the state; more are forgotten, the longest unseen first, and what they leave
+unknown stays in level and slope."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,14 +127,14 @@ def update(
     if place := _offset_index(state.batches, state.current if batch is None else batch):
         design[0, place] = 1.0
     row = design[0]
-    own = float(row @ state.covariance @ row)
-    innovation, std = value - float(row @ state.mean), math.sqrt(own + variance)
+    predicted = float(row @ state.covariance @ row)
+    innovation, std = value - float(row @ state.mean), math.sqrt(predicted + variance)
     ratio = abs(innovation) / std / threshold
     if ratio > 1.0:
         # beyond twice the threshold it is no measurement of this quantity: it counts less the farther it is
         ratio *= max(1.0, 0.5 * ratio)
-        # gain x innovation as if the innovation were at the threshold: own / (own + R) shrinks by 1 / ratio
-        variance = (own + variance) * ratio - own
+        # gain x innovation as if the innovation were at the threshold: P / (P + R) shrinks by 1 / ratio
+        variance = (predicted + variance) * ratio - predicted
     mean, covariance = kalman.update(
         state.mean, state.covariance, np.array([value]), np.array([[variance]]), design
     )

@@ -1,6 +1,7 @@
-"""What is believed of wear: probability above the limit, and cycles until it is reached."""
+"""What is known of wear: the probability that the limit is passed, and the cycles until it is."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -8,80 +9,107 @@ from scipy.special import ndtr, ndtri
 from impactcell.numerics.jit import compiled
 from impactcell.records import Quality, WearState
 
-INTERVAL = 0.95  # coverage of cycles_to_limit_low .. high
-SPREAD = float(ndtri(0.5 + INTERVAL / 2.0))
-FARTHEST = 1e9  # cycles; a limit farther off than this is not reached
+INTERVAL = 0.95
+"""Coverage of cycles_to_limit_low .. high."""
+INTERVAL_STDS = float(ndtri(0.5 + INTERVAL / 2.0))
+"""Half of that interval, in standard deviations."""
+FARTHEST = 1e9
+"""Cycles; a limit farther off than this is not reached: thirty years at one a second."""
+BISECTION = 1e-10
+"""Relative width at which a crossing is found."""
 
 
-def wear_state(
-    level: float,
-    slope: float,
-    covariance: tuple[float, float, float],
-    noise: tuple[float, float],
+class WearMoments(NamedTuple):
+    """Level and slope of friction, as if the first batch were there: means, variances and covariance."""
+
+    level: float
+    slope: float
+    level_variance: float
+    level_slope_covariance: float
+    slope_variance: float
+
+
+class Extrapolation(NamedTuple):
+    """Level minus limit and how it goes on: `WearMoments`, and variances of the random walks, a cycle."""
+
+    excess: float
+    slope: float
+    level_variance: float
+    level_slope_covariance: float
+    slope_variance: float
+    level_walk: float
+    slope_walk: float
+
+
+def forecast(
+    moments: WearMoments,
+    walks: tuple[float, float],
     limit: float,
-    quality: Quality,
-    reason: str,
+    quality: Quality = Quality.GOOD,
+    reason: str = "",
 ) -> WearState:
-    """Make the published state of wear.
+    """Say how level and slope stand to the limit.
 
     Parameters
     ----------
-    covariance : tuple
-        Variance of the level, its covariance with the slope, variance of the slope.
-    noise : tuple
+    walks : tuple of float
         Process variances of level and slope a cycle: they widen what is to come.
     """
-    level_var, cross, slope_var = (max(covariance[0], 0.0), covariance[1], max(covariance[2], 0.0))
-    std = math.sqrt(level_var)
+    level_variance, slope_variance = max(moments.level_variance, 0.0), max(moments.slope_variance, 0.0)
+    std, excess = math.sqrt(level_variance), moments.level - limit
     if not math.isfinite(limit):
         above, expected, low, high = 0.0, math.inf, math.inf, math.inf
     else:
-        above = float(ndtr((level - limit) / std)) if std > 0.0 else float(level > limit)
-        spreads = (level_var, cross, slope_var, *noise)
-        expected, low, high = _cycles_to_limit(level - limit, slope, spreads)
+        above = float(ndtr(excess / std)) if std > 0.0 else float(excess > 0.0)
+        ahead = Extrapolation(
+            excess,
+            moments.slope,
+            level_variance,
+            moments.level_slope_covariance,
+            slope_variance,
+            float(walks[0]),
+            float(walks[1]),
+        )
+        expected, low, high = _cycles_to_limit(ahead)
+    slope_std = math.sqrt(slope_variance)
     return WearState(
-        level, std, slope, math.sqrt(slope_var), limit, above, expected, low, high, quality, reason
+        moments.level, std, moments.slope, slope_std, limit, above, expected, low, high, quality, reason
     )
 
 
 @compiled
-def _level_above_limit(
-    above: float, slope: float, spreads: tuple[float, float, float, float, float], z: float, cycles: float
-) -> float:
-    """Return level minus limit after so many cycles, plus z standard deviations of it."""
-    level_var, cross, slope_var, level_noise, slope_noise = spreads
-    variance = level_var + cycles * (2.0 * cross + cycles * slope_var)
-    variance += level_noise * cycles + slope_noise * cycles**3 / 3.0
-    return above + slope * cycles + z * math.sqrt(max(variance, 0.0))
+def _quantile_above_limit(ahead: Extrapolation, stds: float, cycles: float) -> float:
+    """Return level minus limit after so many cycles, plus so many standard deviations of it."""
+    variance = ahead.level_variance + cycles * (
+        2.0 * ahead.level_slope_covariance + cycles * ahead.slope_variance
+    )
+    variance += ahead.level_walk * cycles + ahead.slope_walk * cycles**3 / 3.0
+    return ahead.excess + ahead.slope * cycles + stds * math.sqrt(max(variance, 0.0))
 
 
 @compiled
-def _cycles_to_limit(
-    above: float, slope: float, spreads: tuple[float, float, float, float, float]
-) -> tuple[float, float, float]:
+def _cycles_to_limit(ahead: Extrapolation) -> tuple[float, float, float]:
     """Cycles until the limit is reached, and both ends of their interval."""
     return (
-        _first_crossing(above, slope, spreads, 0.0),
-        _first_crossing(above, slope, spreads, SPREAD),
-        _first_crossing(above, slope, spreads, -SPREAD),
+        _first_crossing(ahead, 0.0),
+        _first_crossing(ahead, INTERVAL_STDS),
+        _first_crossing(ahead, -INTERVAL_STDS),
     )
 
 
 @compiled
-def _first_crossing(
-    above: float, slope: float, spreads: tuple[float, float, float, float, float], z: float
-) -> float:
-    """First cycle at which `_level_above_limit` is positive, by bisection; inf if beyond `FARTHEST`."""
-    if _level_above_limit(above, slope, spreads, z, 0.0) >= 0.0:
+def _first_crossing(ahead: Extrapolation, stds: float) -> float:
+    """Cycles until that quantile is above the limit, by bisection; inf if beyond `FARTHEST`."""
+    if _quantile_above_limit(ahead, stds, 0.0) >= 0.0:
         return 0.0
     near, far = 0.0, 1.0
-    while _level_above_limit(above, slope, spreads, z, far) < 0.0:
+    while _quantile_above_limit(ahead, stds, far) < 0.0:
         near, far = far, far * 2.0
         if far > FARTHEST:
             return np.inf
-    while far - near > 1e-10 * far:
+    while far - near > BISECTION * far:
         middle = 0.5 * (near + far)
-        if _level_above_limit(above, slope, spreads, z, middle) < 0.0:
+        if _quantile_above_limit(ahead, stds, middle) < 0.0:
             near = middle
         else:
             far = middle

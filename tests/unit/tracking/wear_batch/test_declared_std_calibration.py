@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.tracking.wear_batch import declared_std_calibration as beliefs
-from impactcell.tracking.wear_batch import noise_scale as noises
+from impactcell.tracking.wear_batch import declared_std_calibration, noise_scale
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import FrictionObservation, TrackerState, initial_state
 from impactcell.tracking.wear_batch.tracker import update
@@ -40,7 +39,7 @@ def test_the_variance_is_that_of_the_estimates_and_no_shift_is_invented(spread, 
     for seed in range(8):
         state, found = followed(spread, seed, knowledge)
         shifts += found
-        ratios.append([noises.variance(state.noise, std) for std in DECLARED] / spread**2)
+        ratios.append([noise_scale.variance(state.noise, std) for std in DECLARED] / spread**2)
     # of 300 squared differences, whose mean scatters by 10 %, and of exponents a quarter apart
     assert np.mean(ratios, axis=0) == pytest.approx(1.0, rel=0.25)
     assert shifts == 0  # 10 (known) and 9 (unknown) of "nothing" where what is declared is believed
@@ -48,13 +47,15 @@ def test_the_variance_is_that_of_the_estimates_and_no_shift_is_invented(spread, 
 
 def test_velocities_that_change_late_change_the_belief_late():
     """For 600 cycles all declare the same, which says nothing; then it turns out to be no guide."""
-    noise, draw = noises.NoiseScale(), np.random.default_rng(2)
+    noise, draw = noise_scale.NoiseScale(), np.random.default_rng(2)
     for cycle in range(1200):
         std = float(DECLARED[cycle % 4]) if cycle >= 600 else float(DECLARED[2])
-        noise, _ = noises.update(noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False)
+        noise, _ = noise_scale.update(noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False)
         if cycle == 599:
-            assert np.exp(noise.belief[:, beliefs.WEIGHT]) == pytest.approx(beliefs.PRIOR)
-    used = [noises.variance(noise, std) for std in DECLARED]
+            assert np.exp(noise.belief[:, declared_std_calibration.LOG_PROBABILITY]) == pytest.approx(
+                declared_std_calibration.PRIOR
+            )
+    used = [noise_scale.variance(noise, std) for std in DECLARED]
     assert used == pytest.approx([0.0028**2] * 4, rel=0.3)
 
 
@@ -64,12 +65,15 @@ def test_velocities_that_change_late_change_the_belief_late():
     std=st.floats(1e-9, 10.0),
 )
 def test_a_belief_stays_one_and_leaves_the_usual_estimate_alone(differences, ratios, std):
-    belief = beliefs.prior_posterior()
+    belief = declared_std_calibration.prior_posterior()
     for place, (squared, ratio) in enumerate(zip(differences, ratios, strict=False)):
-        belief = beliefs.update(belief, squared, ratio * std, std, std, place + 1.0)
-    assert math.fsum(np.exp(belief[:, beliefs.WEIGHT])) == pytest.approx(1.0)
-    assert np.all(belief[:, beliefs.SCALE] > 0.0)
-    assert beliefs.calibrated_std(belief, std, std) == std
-    wide = [beliefs.calibrated_std(belief, factor * std, std) for factor in (0.5, 0.9, 1.1, 2.0, 5.0, 10.0)]
+        belief = declared_std_calibration.update(belief, squared, ratio * std, std, std, place + 1.0)
+    assert math.fsum(np.exp(belief[:, declared_std_calibration.LOG_PROBABILITY])) == pytest.approx(1.0)
+    assert np.all(belief[:, declared_std_calibration.SCALE] > 0.0)
+    assert declared_std_calibration.calibrated_std(belief, std, std) == std
+    wide = [
+        declared_std_calibration.calibrated_std(belief, factor * std, std)
+        for factor in (0.5, 0.9, 1.1, 2.0, 5.0, 10.0)
+    ]
     assert wide == sorted(wide)
     assert wide[-1] == pytest.approx(2.0 * wide[-2])  # far off: in proportion

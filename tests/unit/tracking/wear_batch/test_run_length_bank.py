@@ -15,30 +15,32 @@ from impactcell.tracking.wear_batch import (
     TrackerSettings,
     initial_state,
     run_length_bank,
-    run_length_update,
+    run_length_model,
 )
+from impactcell.tracking.wear_batch.run_length_model import BankModel, Measurement
 
 
-def run(values, design, announced=None, variance=1.0, slope_std=0.1, accepted=0.0):
-    table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-    first = run_length_bank.initial_bank(values[0], variance, slope_std, 0, design[4])
-    table[: len(first)] = first
+def run(values, model, announced=None, variance=1.0, slope_std=0.1, accepted=0.0):
+    first = run_length_bank.initial_bank(values[0], variance, slope_std, 0, model.outlier_probability)
+    bank = run_length_bank.workspace(first)
     count, densities, statistics = len(first), [], []
     outliers = np.zeros(2)
     for t, value in enumerate(values[1:], start=1):
         told = 0.0 if announced is None else announced[t]
-        reading = np.array([value, variance, 1.0, 0.0, t, told])
-        count, density, statistic = run_length_bank.update(table, count, design, reading, outliers, accepted)
+        measurement = Measurement(float(value), variance, 1.0, 0.0, float(t), float(told))
+        count, density, statistic = run_length_bank.update(
+            bank, count, model, measurement, outliers, accepted
+        )
         densities.append(density)
         statistics.append(statistic)
-    return table[:count], np.array(densities), np.array(statistics)
+    return run_length_bank.stored(bank, count), np.array(densities), np.array(statistics)
 
 
 def exact_posterior(values, hazard, step_std, slope_std):
     """Every set of change cycles and kinds of step, each a linear Gaussian model solved in one piece."""
     n = len(values)
     weights, means, lasts = [], [], []
-    for kinds in itertools.product([None, *run_length_update.STEPS], repeat=n - 1):
+    for kinds in itertools.product([None, *run_length_model.STEPS], repeat=n - 1):
         at = [(t, kind) for t, kind in enumerate(kinds, start=1) if kind]
         # unknowns: level at cycle 0 (known from the first value), slope, one shift a change
         design = np.zeros((n, 2 + len(at)))
@@ -70,12 +72,12 @@ def test_last_change_and_slope_against_enumeration(shift):
     values = 0.03 * np.arange(6) + rng.normal(size=6)
     values[3:] += shift
     hazard, step_std, slope_std = 0.02, 3.0, 0.1
-    design = run_length_bank.design(hazard, step_std**2, 0.0, 0.0, 1e-12, slope_std**2)
-    table, densities, _ = run(values, design, slope_std=slope_std)
+    model = BankModel(hazard, step_std**2, 0.0, 0.0, 1e-12, slope_std**2)
+    table, densities, _ = run(values, model, slope_std=slope_std)
     last, slope, total = exact_posterior(values, hazard, step_std, slope_std)
     ours = np.zeros(6)
-    for row in table:
-        ours[int(row[run_length_bank.CHANGE])] += math.exp(row[run_length_bank.WEIGHT])
+    for hypothesis in run_length_bank.workspace(table)[: len(table)]:
+        ours[int(hypothesis["change_cycle"])] += math.exp(hypothesis["log_weight"])
     # histories before the last change are merged by moments: near, not equal
     assert ours == pytest.approx(last, abs=0.01)
     assert run_length_bank.moments(table)[0][1] == pytest.approx(slope, abs=4e-3)
@@ -88,10 +90,10 @@ def test_the_statistic_against_enumeration_over_every_scale_of_the_wear(shift):
     values = 0.2 * np.arange(6) + rng.normal(size=6)
     values[3:] += shift
     hazard, step_std, slope_std = 0.02, 3.0, 2.0
-    design = run_length_bank.design(hazard, step_std**2, 0.0, 0.0, 1e-12, slope_std**2)
-    _, _, statistics = run(values, design, slope_std=slope_std)
+    model = BankModel(hazard, step_std**2, 0.0, 0.0, 1e-12, slope_std**2)
+    _, _, statistics = run(values, model, slope_std=slope_std)
     changed, unchanged = [], []
-    for scale in run_length_update.SLOPES:
+    for scale in run_length_model.SLOPES:
         last, _, total = exact_posterior(values, hazard, step_std, scale * slope_std)
         changed.append(math.exp(total) * last[1:].sum())
         unchanged.append(math.exp(total) * last[0])
@@ -105,10 +107,9 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
     rng = np.random.default_rng(1)
     values = 0.2 + 0.002 * rng.normal(size=300) + 1e-5 * np.arange(300)
     variance, level_q, slope_q = 4e-6, 1e-9, 1e-13
-    design = run_length_bank.design(1e-3, 1e-4, level_q, slope_q, 0.0, 1e-8)
-    table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-    table[0] = run_length_bank.initial_bank(values[0], variance, 1e-4, 0, 0.01)[0]
-    table[0, run_length_bank.WEIGHT] = 0.0
+    model = BankModel(1e-3, 1e-4, level_q, slope_q, 0.0, 1e-8)
+    bank = run_length_bank.workspace(run_length_bank.initial_bank(values[0], variance, 1e-4, 0, 0.01)[:1])
+    bank[0]["log_weight"] = 0.0
     oracle = KalmanFilter(2, 1)
     oracle.x = np.array([[values[0]], [0.0]])
     oracle.P = np.diag([variance, 1e-8])
@@ -117,13 +118,13 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
     oracle.Q = np.array([[level_q + slope_q / 3.0, slope_q / 2.0], [slope_q / 2.0, slope_q]])
     oracle.R *= variance
     for t, value in enumerate(values[1:], start=1):
-        reading = np.array([value, variance, 1.0, 0.0, t, -1.0])
-        count, density, _ = run_length_bank.update(table, 1, design, reading, np.zeros(2), 0.0)
+        measurement = Measurement(float(value), variance, 1.0, 0.0, float(t), -1.0)
+        count, density, _ = run_length_bank.update(bank, 1, model, measurement, np.zeros(2), 0.0)
         oracle.predict()
         oracle.update(value)
         assert count == 1
         assert density == pytest.approx(oracle.log_likelihood, abs=1e-6)
-    mean, covariance = run_length_bank.moments(table[:1])
+    mean, covariance = run_length_bank.moments(run_length_bank.stored(bank, 1))
     assert mean[:2] == pytest.approx(oracle.x[:, 0], rel=1e-9)
     assert covariance[:2, :2] == pytest.approx(oracle.P, rel=1e-9)
 
@@ -131,18 +132,17 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
 def test_a_late_reading_gives_the_same_state_as_in_time():
     rng = np.random.default_rng(2)
     values = rng.normal(size=60)
-    design = run_length_bank.design(1e-3, 16.0, 0.0, 0.0, 1e-12, 0.01)
+    model = BankModel(1e-3, 16.0, 0.0, 0.0, 1e-12, 0.01)
 
     def take(order):
-        table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-        table[0] = run_length_bank.initial_bank(values[0], 1.0, 0.1, 0, 0.01)[0]
+        bank = run_length_bank.workspace(run_length_bank.initial_bank(values[0], 1.0, 0.1, 0, 0.01)[:1])
         count, newest, outliers = 1, 0, np.zeros(2)
         for t in order:
-            passed, lag = max(t - newest, 0), max(newest - t, 0)
-            reading = np.array([values[t], 1.0, passed, lag, t, -1.0])
-            count, _, _ = run_length_bank.update(table, count, design, reading, outliers, 0.0)
+            passed, lag = float(max(t - newest, 0)), float(max(newest - t, 0))
+            measurement = Measurement(float(values[t]), 1.0, passed, lag, float(t), -1.0)
+            count, _, _ = run_length_bank.update(bank, count, model, measurement, outliers, 0.0)
             newest = max(newest, t)
-        return run_length_bank.moments(table[:count])
+        return run_length_bank.moments(run_length_bank.stored(bank, count))
 
     in_time = take(range(1, 60))
     shuffled = take([*range(1, 20), 25, 20, 22, 21, 24, 23, *range(26, 60)])
@@ -155,8 +155,8 @@ def test_an_announced_change_leaves_one_history_and_knows_its_size():
     values = rng.normal(size=400)
     values[200:] += 2.0
     told = np.where(np.arange(400) == 200, 1.0, -1.0)
-    table, _, _ = run(values, run_length_bank.design(1e-3, 16.0, 0.0, 0.0, 0.003, 0.01), announced=told)
-    assert {int(row[run_length_bank.CHANGE]) for row in table} == {200}
+    table, _, _ = run(values, BankModel(1e-3, 16.0, 0.0, 0.0, 0.003, 0.01), announced=told)
+    assert set(run_length_bank.workspace(table)[: len(table)]["change_cycle"].tolist()) == {200}
     cycle, size, std = run_length_bank.locate_change_point(table, 199, 200)
     assert cycle == 200
     # two lines of 200 points with a common slope, known level and slope to within their data
@@ -168,10 +168,11 @@ def test_the_bank_stays_small_and_normalised_over_a_long_run():
     rng = np.random.default_rng(5)
     values = rng.normal(size=3000)
     values[::97] += 12.0
-    table, _, statistics = run(values, run_length_bank.design(3e-3, 16.0, 0.0, 0.0, 0.003, 0.01))
+    table, _, statistics = run(values, BankModel(3e-3, 16.0, 0.0, 0.0, 0.003, 0.01))
     assert len(table) <= run_length_bank.CAPACITY
-    assert np.exp(table[:, run_length_bank.WEIGHT]).sum() == pytest.approx(1.0, abs=1e-9)
-    assert np.all(np.diff(table[:, run_length_bank.CHANGE]) >= 0)
+    bank = run_length_bank.workspace(table)[: len(table)]
+    assert np.exp(bank["log_weight"]).sum() == pytest.approx(1.0, abs=1e-9)
+    assert np.all(np.diff(bank["change_cycle"]) >= 0)
     assert np.isfinite(table).all()
     # outliers alone, however regular, are no batch change
     assert statistics[20:].max() < run_length_bank.threshold(1e5)
@@ -188,13 +189,11 @@ def test_how_many_outliers_there_are_is_learned(share):
     odd = rng.random(3000) < share
     values[odd] += 10.0 * rng.normal(size=int(odd.sum()))
     prior = 0.005
-    table = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH))
-    first = run_length_bank.initial_bank(values[0], 1.0, 0.1, 0, prior)
-    table[: len(first)] = first
-    count, outliers, made = len(first), np.zeros(2), run_length_bank.design(3e-3, 16.0, 0.0, 0.0, prior, 0.01)
+    bank = run_length_bank.workspace(run_length_bank.initial_bank(values[0], 1.0, 0.1, 0, prior))
+    count, outliers, model = 2, np.zeros(2), BankModel(3e-3, 16.0, 0.0, 0.0, prior, 0.01)
     for t, value in enumerate(values[1:], start=1):
-        reading = np.array([value, 1.0, 1.0, 0.0, t, 0.0])
-        count, _, _ = run_length_bank.update(table, count, made, reading, outliers, 0.0)
+        measurement = Measurement(float(value), 1.0, 1.0, 0.0, float(t), 0.0)
+        count, _, _ = run_length_bank.update(bank, count, model, measurement, outliers, 0.0)
     learned = run_length_bank.outlier_probability(prior, *outliers)
     # a quarter of the outliers are too small to be told from good values
     assert 0.6 * share <= learned <= 1.2 * share + 0.2 * prior
@@ -214,19 +213,20 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
         if done.shift is not None:
             ours.append((i, done.shift.change_cycle, done.shift.size / std))
     # the bank, told what the tracker has to learn: the scale of the noise
-    made = run_length_bank.design(
+    model = BankModel(
         config.hazard, config.step_std**2, 0.0, 0.0, config.outlier_probability, config.slope_std**2
     )
-    table, outliers = np.zeros((run_length_bank.ROWS, run_length_bank.WIDTH)), np.zeros(2)
     first = run_length_bank.initial_bank(z[0], 1.0, config.slope_std, 0, config.outlier_probability)
-    table[: len(first)] = first
+    bank, outliers = run_length_bank.workspace(first), np.zeros(2)
     count, accepted, its = len(first), 0.0, []
     for t in range(1, len(z)):
-        reading = np.array([z[t], 1.0, 1.0, 0.0, t, 0.0])
-        count, _, statistic = run_length_bank.update(table, count, made, reading, outliers, accepted)
+        measurement = Measurement(float(z[t]), 1.0, 1.0, 0.0, float(t), 0.0)
+        count, _, statistic = run_length_bank.update(bank, count, model, measurement, outliers, accepted)
         if statistic > run_length_bank.threshold(config.false_alarm_cycles):
             before, accepted = accepted, float(t)
-            change, size, _ = run_length_bank.locate_change_point(table[:count], before, accepted)
+            change, size, _ = run_length_bank.locate_change_point(
+                run_length_bank.stored(bank, count), before, accepted
+            )
             its.append((t, change, size))
     assert len(its) == 2
     assert len(ours) == len(its)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from impactcell.records import Quality
 from impactcell.tracking.wear_batch import wear_filter, wear_report
+from impactcell.tracking.wear_batch.wear_report import WearMoments
 
 
 def run(values, batches, variance=1.0, slope_std=1.0, step_variance=1e6):
@@ -88,7 +88,7 @@ def test_a_late_measurement_at_its_own_place():
 
 
 def test_cycles_to_limit_and_its_interval():
-    published = wear_report.wear_state(0.2, 1e-5, (1e-8, 0.0, 1e-14), (0.0, 0.0), 0.21, Quality.GOOD, "")
+    published = wear_report.forecast(WearMoments(0.2, 1e-5, 1e-8, 0.0, 1e-14), (0.0, 0.0), 0.21)
     assert published.cycles_to_limit == pytest.approx(1000.0)
     for cycles, share in (
         (published.cycles_to_limit_low, 0.025),
@@ -100,10 +100,10 @@ def test_cycles_to_limit_and_its_interval():
 
 
 def test_a_limit_that_is_not_reached():
-    falling = wear_report.wear_state(0.2, -1e-5, (1e-8, 0.0, 1e-16), (0.0, 0.0), 0.21, Quality.GOOD, "")
+    falling = wear_report.forecast(WearMoments(0.2, -1e-5, 1e-8, 0.0, 1e-16), (0.0, 0.0), 0.21)
     assert falling.cycles_to_limit == math.inf
     assert falling.cycles_to_limit_high == math.inf
-    worn = wear_report.wear_state(0.3, 1e-5, (1e-8, 0.0, 1e-16), (0.0, 0.0), 0.21, Quality.GOOD, "")
+    worn = wear_report.forecast(WearMoments(0.3, 1e-5, 1e-8, 0.0, 1e-16), (0.0, 0.0), 0.21)
     assert (worn.cycles_to_limit, worn.cycles_to_limit_high) == (0.0, 0.0)
-    none = wear_report.wear_state(0.3, 1e-5, (1e-8, 0.0, 1e-16), (0.0, 0.0), math.inf, Quality.GOOD, "")
+    none = wear_report.forecast(WearMoments(0.3, 1e-5, 1e-8, 0.0, 1e-16), (0.0, 0.0), math.inf)
     assert none.probability_above_limit == 0.0
