@@ -1,7 +1,7 @@
 """All alarms of one cell: results of the rules and events go in, transitions come out."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from impactcell.alarms.lifecycle import AlarmEvent, EventKind, Transition, expire, transition
@@ -14,6 +14,7 @@ from impactcell.alarms.rules import (
     debounce,
 )
 from impactcell.records import Alarm, AlarmName, Shelving
+from impactcell.serialization import stored
 
 T = TypeVar("T")
 _INDEX = {name: index for index, name in enumerate(AlarmName)}
@@ -29,8 +30,8 @@ class AlarmSetState:
         Cycles for which BatchShift stays suppressed.
     """
 
-    alarms: tuple[Alarm, ...]
-    delays: tuple[DebounceCounters, ...]
+    alarms: tuple[Alarm, ...] = field(metadata=stored(by=AlarmName))
+    delays: tuple[DebounceCounters, ...] = field(metadata=stored(by=AlarmName))
     announced: int = 0
 
     def alarm(self, name: AlarmName) -> Alarm:

@@ -7,7 +7,7 @@
 
 `step` takes a cycle; `apply_rule_result` what happens beside the cycles (link, journal); `apply_event` what
 people do to a condition; `start_batch` and `reset_wear_level` what they do to the tracker. Each gives a new
-`CellState`, which `impactcell.serialization.message_pack` writes and reads back bit for bit.
+`CellState`, which `impactcell.serialization` writes and reads back bit for bit.
 """
 
 import math

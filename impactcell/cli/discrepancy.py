@@ -91,15 +91,13 @@ def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> t
 
 def _recording_model(journal: Path) -> Model | None:
     """Model that the recording cell ran with; None in a journal that has none yet."""
-    from impactcell.serialization import json_text
+    from impactcell.journal.stored_forms import MODEL
 
     with open_journal(journal) as store:
         try:
-            return json_text.loads(Model, store.model.encode()) if store.model else None
+            return MODEL.loads(store.model) if store.model else None
         except ValueError as error:
-            raise CampaignError(
-                f"{journal}: its model is of another version ({error}); name the model with --cell"
-            ) from error
+            raise CampaignError(f"{journal}: {error}; name the model with --cell") from error
 
 
 @contextmanager

@@ -3,18 +3,21 @@
 import errno
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
-from impactcell.journal.schema import APPLICATION_ID, FORMAT, TABLES
+from impactcell.journal.schema import APPLICATION_ID, FORMAT, OLDEST, TABLES, UPGRADES
 
+WAY_OUT: Final = "run the version that wrote it, or name another file to begin anew"
 _NO_ROOM: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 _MAGIC: Final = b"SQLite format 3\0"
 _APPLICATION_ID_AT: Final = 68
 """Where a database's header has it (The SQLite Database File Format, section 1.3)."""
+
+Upgrade = Callable[[bytes], bytes | None]
 
 
 @contextmanager
@@ -39,8 +42,19 @@ def _for_now(path: Path, reason: object, *, full: bool) -> JournalFullError:
     return JournalFullError(f"{path}: cannot be used now ({reason}); check its disk, directory and owner")
 
 
-def open_database(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.Connection:
+def open_database(
+    path: Path, cell: str | None, *, read_only: bool, upgrade: Upgrade | None = None
+) -> sqlite3.Connection:
     """Open a journal's file, made anew where it is empty and may be written.
+
+    A file of an earlier version that may be written is brought up to this one, in one transaction: whatever
+    interrupts it leaves the file as it was.
+
+    Parameters
+    ----------
+    upgrade : callable, optional
+        Gives the stored state as this version writes it, None where it is so already, and a ValueError where
+        it cannot be read; without it the state is left as it is.
 
     Raises
     ------
@@ -66,8 +80,9 @@ def open_database(path: Path, cell: str | None, *, read_only: bool) -> sqlite3.C
                 _create(database, cell or "")
             _check(database, path, cell)
             if not read_only:
-                database.execute("PRAGMA journal_mode = WAL")
                 database.execute("PRAGMA synchronous = FULL")
+                _bring_up(database, path, upgrade)  # what is refused is left as it is
+                database.execute("PRAGMA journal_mode = WAL")
     except BaseException:
         database.close()
         raise
@@ -139,14 +154,48 @@ def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
     application_id, version = _pragma(database, "application_id"), _pragma(database, "user_version")
     if application_id != APPLICATION_ID:
         raise ForeignJournalError(f"{path}: a database, but no journal of impactcell; it is left as it is")
-    if version != FORMAT:
+    if not OLDEST <= version <= FORMAT:
+        of = "" if cell is None else f" of cell '{cell}'"
         raise ForeignJournalError(
-            f"{path}: journal format {version}, this program writes {FORMAT}; it is left as it is: "
-            "name another file"
+            f"{path}: the journal{of} has format {version}, this version of the program knows {OLDEST} to "
+            f"{FORMAT}; it is left as it is: {WAY_OUT}"
         )
+    kept = _named_cell(database)
+    if cell is not None and kept != cell:
+        raise ForeignJournalError(f"{path}: the journal of cell '{kept}', not of '{cell}'; name another file")
+
+
+def _named_cell(database: sqlite3.Connection) -> str:
     named = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
-    named_cell = named[0] if named else ""
-    if cell is not None and named_cell != cell:
-        raise ForeignJournalError(
-            f"{path}: the journal of cell '{named_cell}', not of '{cell}'; name another file"
-        )
+    return str(named[0]) if named else ""
+
+
+def unreadable_state(path: Path, cell: str, why: ValueError) -> ForeignJournalError:
+    """Say that a journal's state is of a later version, or damaged."""
+    return ForeignJournalError(f"{path}: the journal of cell '{cell}' is left as it is, {why}: {WAY_OUT}")
+
+
+def _bring_up(database: sqlite3.Connection, path: Path, upgrade: Upgrade | None) -> None:
+    """Bring a file of an earlier version up to this one, all or nothing."""
+    version = _pragma(database, "user_version")
+    row = database.execute("SELECT blob FROM state").fetchone()
+    try:
+        state = None if row is None or upgrade is None else upgrade(bytes(row[0]))
+    except ValueError as error:
+        raise unreadable_state(path, _named_cell(database), error) from error
+    if version == FORMAT and state is None:
+        return
+    database.execute("BEGIN IMMEDIATE")
+    try:
+        for earlier in range(version, FORMAT):
+            for statement in UPGRADES[earlier]:
+                database.execute(statement)
+        if state is not None:
+            database.execute("INSERT INTO earlier_states (seq, blob) SELECT seq, blob FROM state")
+            database.execute("UPDATE state SET blob = ?", (state,))
+        database.execute(f"PRAGMA user_version = {FORMAT}")
+        database.execute("COMMIT")
+    except BaseException:
+        if database.in_transaction:
+            database.execute("ROLLBACK")
+        raise

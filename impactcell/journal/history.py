@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
 from impactcell.errors import JournalError
+from impactcell.journal.stored_forms import load_alarm
 from impactcell.records import Alarm, Quality
-from impactcell.serialization import json_text
 
 T = TypeVar("T")
 
@@ -89,7 +89,7 @@ def stored_values(database: sqlite3.Connection, variable: str, query: HistoryQue
 
 
 def stored_alarms(database: sqlite3.Connection, query: HistoryQuery) -> Page[Alarm]:
-    """Read the states that each transition of an alarm led to.
+    """Read the states that each transition of an alarm led to; those of conditions not known are left out.
 
     Raises
     ------
@@ -98,9 +98,10 @@ def stored_alarms(database: sqlite3.Connection, query: HistoryQuery) -> Page[Ala
     """
     rows, resume = _page(database, query, "id, time_ns, record", "alarms", "id")
     try:
-        return Page(tuple(json_text.loads(Alarm, record.encode()) for _, _, record in rows), resume)
+        alarms = [load_alarm(record) for _, _, record in rows]
     except ValueError as error:
-        raise JournalError(f"an alarm in the journal cannot be read: {error}") from error
+        raise JournalError(f"the journal's alarms cannot be shown: {error}") from error
+    return Page(tuple(alarm for alarm in alarms if alarm is not None), resume)
 
 
 def _page(

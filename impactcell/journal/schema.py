@@ -2,17 +2,22 @@
 
 One SQLite file a cell. `PRAGMA application_id` and `user_version` say that it is ours and of which
 format. `cycles` grows by one row a cycle; `captures` holds what was measured, and is thinned first;
-`state` is a single row, written in the same transaction as the cycle that made it. `seq` alone tells cycles
-apart: a module that keeps its session over a restart, or wraps its counter, makes the same numbers again.
+`state` is a single row, written in the same transaction as the cycle that made it; what an earlier version
+wrote there is kept in `earlier_states`. State, alarms and model are stored as `stored_forms` says. `seq`
+alone tells cycles apart: a module that keeps its session over a restart, or wraps its counter, makes the same
+numbers again.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from impactcell.records import Capture, Coefficient, Snapshot
 
 APPLICATION_ID = 0x49435243  # "ICRC"
-FORMAT = 3
+FORMAT = 4
+"""From 4 on, state, alarms and model say of which format they are."""
+OLDEST = 3
+"""Oldest format that can be read."""
 
 Value = float | int | str
 
@@ -69,6 +74,11 @@ COLUMNS: tuple[Column, ...] = (
     Column("model_name", "TEXT", lambda _, s: s.model_name),
 )
 
+EARLIER_STATES = """
+CREATE TABLE earlier_states (id INTEGER PRIMARY KEY, seq INTEGER NOT NULL, blob BLOB NOT NULL) STRICT
+"""
+"""States as earlier versions wrote them, from before they were written anew by a later one."""
+
 TABLES = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE cycles (
@@ -84,4 +94,7 @@ CREATE TABLE audit (
     action TEXT NOT NULL, arguments TEXT NOT NULL, result TEXT NOT NULL
 ) STRICT;
 CREATE TABLE state (id INTEGER PRIMARY KEY CHECK (id = 1), seq INTEGER NOT NULL, blob BLOB NOT NULL) STRICT;
-"""
+{EARLIER_STATES}"""
+
+UPGRADES: Mapping[int, tuple[str, ...]] = {3: (EARLIER_STATES,)}
+"""Statements that lead from each earlier format to the next."""

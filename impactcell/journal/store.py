@@ -16,13 +16,13 @@ from typing import Self
 
 from impactcell.errors import JournalError
 from impactcell.journal.capture_codec import decode_capture, encode_capture
-from impactcell.journal.database import errors, open_database
+from impactcell.journal.database import Upgrade, errors, open_database
 from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
 from impactcell.journal.lock import lock_journal
 from impactcell.journal.retention import Retention, prune
 from impactcell.journal.schema import COLUMNS
+from impactcell.journal.stored_forms import ALARM
 from impactcell.records import Alarm, Capture, CycleId, Snapshot
-from impactcell.serialization import json_text
 
 _INSERT_CYCLE = (
     f"INSERT INTO cycles ({', '.join(c.name for c in COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"  # noqa: S608
@@ -51,6 +51,9 @@ class Journal:
         The journal of another cell is refused.
     read_only : bool
         Open an existing file without writing to it.
+    upgrade : callable, optional
+        Gives a state that an earlier version stored as this one does, as `upgraded_state` of
+        `impactcell.journal.stored_forms`; see `impactcell.journal.database.open_database`.
 
     Raises
     ------
@@ -62,7 +65,9 @@ class Journal:
         If it never can: another service writes it, or it is damaged.
     """
 
-    def __init__(self, path: Path, cell: str | None, *, read_only: bool = False) -> None:
+    def __init__(
+        self, path: Path, cell: str | None, *, read_only: bool = False, upgrade: Upgrade | None = None
+    ) -> None:
         self.path = path
         self._last_stored: CycleId | None = None
         with self._errors():
@@ -70,7 +75,7 @@ class Journal:
                 raise JournalError(f"{path}: there is no such journal")
             self._lock = None if read_only else lock_journal(path)
         try:
-            self._db = open_database(path, cell, read_only=read_only)
+            self._db = open_database(path, cell, read_only=read_only, upgrade=upgrade)
         except BaseException:
             if self._lock is not None:
                 self._lock.close()
@@ -207,7 +212,7 @@ class Journal:
     def _put_alarms(self, changed: Sequence[Alarm]) -> None:
         self._db.executemany(
             "INSERT INTO alarms (time_ns, record) VALUES (?, ?)",
-            [(alarm.time_ns, json_text.dumps(alarm).decode()) for alarm in changed],
+            [(alarm.time_ns, ALARM.dumps(alarm)) for alarm in changed],
         )
 
     @contextmanager

@@ -1,14 +1,11 @@
-"""Frozen dataclasses as few bytes and fast, and back to the same bits: for a state, written every cycle.
+"""Trees as few bytes, fast, and back to the same bits: MessagePack; an array is its shape and its bytes."""
 
-MessagePack with the names of the fields; arrays of floats are their shape and their bytes.
-`impactcell.serialization.json_text` writes the same to be read by people.
-"""
-
-from functools import cache
 from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
+
+from impactcell.serialization.tree import Tree, from_tree, to_tree
 
 T = TypeVar("T")
 
@@ -21,7 +18,7 @@ def pack(value: object) -> bytes:
     TypeError
         It holds what cannot be written.
     """
-    return _ENCODER.encode(value)
+    return pack_tree(to_tree(value))
 
 
 def unpack(kind: type[T], data: bytes) -> T:
@@ -32,43 +29,65 @@ def unpack(kind: type[T], data: bytes) -> T:
     ValueError
         The bytes are not a `kind`, or of another version of it.
     """
-    wanted: Any = kind
+    return from_tree(kind, unpack_tree(data))
+
+
+def pack_tree(tree: Tree) -> bytes:
+    """Write a tree.
+
+    Raises
+    ------
+    TypeError
+        It holds what cannot be written.
+    """
+    return _ENCODER.encode(tree)
+
+
+def unpack_tree(data: bytes) -> Tree:
+    """Read a tree.
+
+    Raises
+    ------
+    ValueError
+        The bytes are not what `pack_tree` wrote.
+    """
     try:
-        value: T = _decoder(wanted).decode(data)
-    except msgspec.DecodeError as error:
-        raise ValueError(f"not a stored {kind.__name__}: {error}") from error
-    # a field that is not there would get its default, and one that is not known be passed over
-    if _names(msgspec.msgpack.decode(data)) != _names(msgspec.msgpack.decode(pack(value))):
-        raise ValueError(f"not a stored {kind.__name__}: its fields are others")
-    return value
+        return _with_arrays(_DECODER.decode(data))
+    except (msgspec.DecodeError, TypeError) as error:
+        raise ValueError(f"damaged: {error}") from error
 
 
-def _plain(value: Any) -> Any:
-    """Give what msgspec does not know as something that it does."""
+def plain_number(value: Any) -> Any:
+    """Give a number of numpy as one of Python; for the encoders, of what they do not know.
+
+    Raises
+    ------
+    TypeError
+        It is none.
+    """
     if isinstance(value, np.generic):
         return value.item()
+    raise TypeError(f"{getattr(value, 'dtype', '')} {type(value).__name__} has no stored form".lstrip())
+
+
+def _encoded(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
-        return value.shape, value.astype("<f8", copy=False).tobytes()
-    raise TypeError(f"{getattr(value, 'dtype', '')} {type(value).__name__} has no packed form".lstrip())
+        stored = value if value.dtype is _STORED else value.astype(_STORED)  # identity is the faster question
+        return value.shape, stored.tobytes()
+    return plain_number(value)
 
 
-def _array(_: Any, plain: Any) -> Any:
-    shape, data = plain
-    return np.frombuffer(data, "<f8").astype(np.float64).reshape(shape)
+def _with_arrays(tree: Tree) -> Tree:
+    """Make arrays of what they were written as; nothing else in a tree has bytes."""
+    if isinstance(tree, dict):
+        return {key: _with_arrays(value) for key, value in tree.items()}
+    if not isinstance(tree, list):
+        return tree
+    if len(tree) == 2 and isinstance(tree[1], bytes):
+        return np.frombuffer(tree[1], _STORED).astype(np.float64).reshape(tree[0])
+    return [_with_arrays(value) for value in tree]
 
 
-_ENCODER = msgspec.msgpack.Encoder(enc_hook=_plain)
-
-
-@cache
-def _decoder(kind: Any) -> msgspec.msgpack.Decoder[Any]:
-    return msgspec.msgpack.Decoder(kind, dec_hook=_array)
-
-
-def _names(plain: Any) -> Any:
-    """Names of all fields as they are nested, without what they hold."""
-    if isinstance(plain, dict):
-        return {name: _names(value) for name, value in plain.items()}
-    if isinstance(plain, list):
-        return [_names(value) for value in plain]
-    return None
+_STORED = np.dtype("<f8")
+_ENCODER = msgspec.msgpack.Encoder(enc_hook=_encoded)
+_DECODER = msgspec.msgpack.Decoder()

@@ -13,6 +13,7 @@ from impactcell.errors import ImpactCellError, JournalError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
+from impactcell.journal.stored_forms import upgraded_state
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
     Alarm,
@@ -60,7 +61,7 @@ class CellTask:
         self.cell = cell
         self.log = CellLogger(logging.getLogger(__name__), cell.name)
         settings = cell.settings.journal
-        journal = None if settings is None else Journal(settings.file, cell.name)
+        journal = None if settings is None else Journal(settings.file, cell.name, upgrade=upgraded_state)
         keep = Retention() if settings is None else retention_policy(settings)
         try:
             self.worker = CellWorker(cell_design(cell), journal, keep)

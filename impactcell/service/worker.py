@@ -12,9 +12,10 @@ from typing import TypeVar
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, RuleResult, Transition
 from impactcell.cell import CellDesign, CellState, StepResult
+from impactcell.journal.database import unreadable_state
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
-from impactcell.positioning import PlannerPosterior
+from impactcell.journal.stored_forms import MODEL, StoredState, pack_state, unpack_state
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
     Alarm,
@@ -26,8 +27,7 @@ from impactcell.records import (
     Shelving,
     Snapshot,
 )
-from impactcell.serialization import json_text
-from impactcell.serialization.message_pack import pack, unpack
+from impactcell.serialization.tree import Unknown
 from impactcell.service.journal_writer import JournalWriter
 from impactcell.service.warmup import warm_up
 
@@ -38,15 +38,6 @@ _CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else o
 _computing = threading.BoundedSemaphore(_CORES)
 """As many cells compute at a time as there are cores, in the order in which they came: more would finish
 later, all of them, and keep the event loop waiting for the interpreter."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DurableState:
-    """What a restart goes on from: the state, the last snapshot, what the planner has learned."""
-
-    state: CellState
-    snapshot: Snapshot | None = None
-    belief: PlannerPosterior | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +59,11 @@ class CellWorker:
     journal : Journal or None
         None keeps nothing over a restart.
     keep : Retention
+
+    Raises
+    ------
+    ForeignJournalError
+        The journal's state is of another version, or damaged; it is left as it is.
     """
 
     def __init__(self, design: CellDesign, journal: Journal | None, keep: Retention) -> None:
@@ -78,10 +74,12 @@ class CellWorker:
         self._closing = threading.Event()
         self.last: CycleId | None = None
         """The last cycle taken in since the start, durable or not."""
+        self._unknown = Unknown()
+        """Alarms of another version that are kept for it."""
         restored = self._restore()
-        self._state = restored.state
+        self._state = core.migrate_state(design, restored.cell)
         self._snapshot = restored.snapshot
-        self.belief = restored.belief
+        self.belief = restored.planner
         self._store_model()
 
     @property
@@ -195,22 +193,23 @@ class CellWorker:
 
     def _store_model(self) -> None:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
-        model = json_text.dumps(self._design.model).decode()
+        model = MODEL.dumps(self._design.model)
         self._journal_writer.store(lambda journal: journal.store_model(model))
 
-    def _restore(self) -> DurableState:
-        journal = self._journal_writer.journal
+    def _restore(self) -> StoredState:
+        initial, journal = core.initial_state(self._design), self._journal_writer.journal
         blob = None if journal is None else journal.state()
-        if blob is None:
-            return DurableState(core.initial_state(self._design))
+        if journal is None or blob is None:
+            return StoredState(initial)
         try:
-            stored = unpack(DurableState, blob)
-            return replace(stored, state=core.migrate_state(self._design, stored.state))
+            stored = unpack_state(blob, initial, self._unknown)
         except ValueError as error:
+            raise unreadable_state(journal.path, self._design.name, error) from error
+        for alarms in self._unknown.values():
             self.log.warning(
-                "the journal's state is of another version (%s); tracking begins anew, cycles go on", error
+                "the journal has alarms of another version; they are kept: %s", ", ".join(alarms)
             )
-            return DurableState(core.initial_state(self._design))
+        return stored
 
     def _process(
         self,
@@ -255,7 +254,7 @@ class CellWorker:
             return core.step(self._design, self._state, empty, positioning, announcement, (*faults, fault))
 
     def _blob(self) -> bytes:
-        return pack(DurableState(self._state, self._snapshot, self.belief))
+        return pack_state(StoredState(self._state, self._snapshot, self.belief), self._unknown)
 
     def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
         self._state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)

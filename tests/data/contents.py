@@ -5,22 +5,28 @@ from typing import Any
 
 import numpy as np
 
+from impactcell import alarms
+from impactcell.cell import CellState
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
+from impactcell.journal.stored_forms import StoredState, unpack_state
 from impactcell.records import Alarm
-from impactcell.serialization.message_pack import unpack
-from impactcell.service.worker import DurableState
+from impactcell.tracking.model_gap.gap_cusum import GapState
+from impactcell.tracking.signature.tracker import SignatureState
+from impactcell.tracking.wear_batch import TrackerState
 
 
-def stored(journal: Journal) -> DurableState:
+def stored(journal: Journal) -> StoredState:
     """The state as it is stored."""
-    return unpack(DurableState, journal.state() or b"")
+    initial = alarms.initial_state(alarms.AlarmSettings())
+    nothing = CellState(TrackerState(), SignatureState(), GapState(), initial)
+    return unpack_state(journal.state() or b"", nothing)
 
 
-def described(durable: DurableState, journal: Journal) -> dict[str, Any]:
+def described(durable: StoredState, journal: Journal) -> dict[str, Any]:
     """All that an installed cell has learned and been told; floats exactly, as `float.hex`."""
     assert durable.snapshot is not None
-    assert durable.belief is not None
+    assert durable.planner is not None
     position = journal.last_cycle_id()
     assert position is not None
     return {
@@ -42,8 +48,8 @@ def described(durable: DurableState, journal: Journal) -> dict[str, Any]:
     }
 
 
-def _cycle(durable: DurableState) -> dict[str, Any]:
-    state = durable.state
+def _cycle(durable: StoredState) -> dict[str, Any]:
+    state = durable.cell
     person = state.batch.by_person
     assert person is not None
     return {
@@ -61,8 +67,8 @@ def _cycle(durable: DurableState) -> dict[str, Any]:
     }
 
 
-def _wear_and_batch(durable: DurableState) -> dict[str, Any]:
-    state = durable.state.tracker
+def _wear_and_batch(durable: StoredState) -> dict[str, Any]:
+    state = durable.cell.tracker
     known, shift = state.filter, state.shift
     assert known is not None
     assert shift is not None
@@ -105,8 +111,8 @@ def _wear_and_batch(durable: DurableState) -> dict[str, Any]:
     }
 
 
-def _signature(durable: DurableState) -> dict[str, Any]:
-    state = durable.state.signature
+def _signature(durable: StoredState) -> dict[str, Any]:
+    state = durable.cell.signature
     reference, variation = state.reference, state.reference.variation
     return {
         "batch": state.batch_id,
@@ -122,8 +128,8 @@ def _signature(durable: DurableState) -> dict[str, Any]:
     }
 
 
-def _model_gap(durable: DurableState) -> dict[str, Any]:
-    gap = durable.state.gap
+def _model_gap(durable: StoredState) -> dict[str, Any]:
+    gap = durable.cell.gap
     return {
         "count": gap.count,
         "mean": gap.mean.hex(),
@@ -133,10 +139,10 @@ def _model_gap(durable: DurableState) -> dict[str, Any]:
     }
 
 
-def _alarms(durable: DurableState) -> dict[str, Any]:
-    book = durable.state.alarms
+def _alarms(durable: StoredState) -> dict[str, Any]:
+    book = durable.cell.alarms
     counters = dict(zip((alarm.name for alarm in book.alarms), book.delays, strict=True))
-    alarms = {
+    conditions = {
         alarm.name.value: {
             **_alarm(alarm),
             "cycles the rule held, missed, called": [
@@ -147,7 +153,7 @@ def _alarms(durable: DurableState) -> dict[str, Any]:
         }
         for alarm in book.alarms
     }
-    return {"conditions": alarms, "cycles for which a batch change stays announced": book.announced}
+    return {"conditions": conditions, "cycles for which a batch change stays announced": book.announced}
 
 
 def _alarm(alarm: Alarm) -> dict[str, Any]:
@@ -180,8 +186,8 @@ def _alarm(alarm: Alarm) -> dict[str, Any]:
     }
 
 
-def _planner(durable: DurableState) -> dict[str, Any]:
-    belief = durable.belief
+def _planner(durable: StoredState) -> dict[str, Any]:
+    belief = durable.planner
     assert belief is not None
     return {
         "weights": _floats(belief.weights),
@@ -193,7 +199,7 @@ def _planner(durable: DurableState) -> dict[str, Any]:
     }
 
 
-def _snapshot(durable: DurableState) -> dict[str, Any]:
+def _snapshot(durable: StoredState) -> dict[str, Any]:
     snapshot = durable.snapshot
     assert snapshot is not None
     friction, wear, batch = snapshot.friction, snapshot.wear, snapshot.batch

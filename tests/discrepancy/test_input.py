@@ -18,8 +18,8 @@ from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
 from impactcell.journal.store import Journal
+from impactcell.journal.stored_forms import MODEL
 from impactcell.records import Capture, Channel
-from impactcell.serialization import json_text
 from impactcell.settings.model_file import read_model
 from tests.discrepancy.study import strengths
 from tests.discrepancy.test_workflow import make
@@ -68,7 +68,7 @@ def test_captures_of_a_journal_are_as_good_as_a_campaign(tmp_path: Path) -> None
 def test_the_model_that_a_journal_was_recorded_with_is_the_nominal_one(tmp_path: Path) -> None:
     model = read_model(Path("config/models/prototype.yaml"))
     with Journal(tmp_path / "j", "press-1") as journal:
-        journal.store_model(json_text.dumps(model).decode())
+        journal.store_model(MODEL.dumps(model))
         for capture in make("viscous_friction", shots=18).shots:
             journal.append(capture, make_snapshot(capture), b"state")
     discrepancy(None, tmp_path / "out", journal=tmp_path / "j")

@@ -8,13 +8,13 @@ from itertools import pairwise
 from pathlib import Path
 
 from impactcell import cell as core
+from impactcell.alarms import AlarmSettings, initial_state
 from impactcell.cell.preprocessing import BatchNaming
 from impactcell.journal.store import Journal
+from impactcell.journal.stored_forms import unpack_state
 from impactcell.records import PositioningState
-from impactcell.serialization import json_text
-from impactcell.serialization.message_pack import unpack
+from impactcell.serialization import pack
 from impactcell.service.factory import cell_design
-from impactcell.service.worker import DurableState
 from impactcell.settings import read_cell
 from tests.integration.processes import simulator, started, write_cell
 
@@ -80,12 +80,12 @@ def judged(cell_file: Path, journal_file: Path, told: list[str]) -> Outcome:
     design = cell_design(read_cell(cell_file))
     state, cycles = core.initial_state(design), []
     with Journal(journal_file, "press-1", read_only=True) as journal:
-        stored = unpack(DurableState, journal.state() or b"")
+        stored = unpack_state(journal.state() or b"", state)
         for capture in journal.captures():
             state = core.step(design, state, capture, PositioningState()).state
             cycles.append(capture.cycle)
     # Alarms of the link come between the cycles and are not in the captures.
-    same = _without_alarms(stored.state) == _without_alarms(state)
+    same = _without_alarms(stored.cell) == _without_alarms(state)
     said = {int(m[1]): int(m[2]) for line in told if (m := re.search(OVERWRITTEN, line))}
     gaps = {after: after - before - 1 for before, after in pairwise(cycles) if after > before + 1}
     lost = sum(size for cycle, size in gaps.items() if said.get(cycle) != size)
@@ -93,4 +93,4 @@ def judged(cell_file: Path, journal_file: Path, told: list[str]) -> Outcome:
 
 
 def _without_alarms(state: core.CellState) -> bytes:
-    return json_text.dumps(replace(state, alarms=None, batch=BatchNaming()))  # type: ignore[arg-type]
+    return pack(replace(state, alarms=initial_state(AlarmSettings()), batch=BatchNaming()))

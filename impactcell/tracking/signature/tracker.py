@@ -57,7 +57,7 @@ class SignatureSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SignatureState:
-    """What is kept between cycles; `impactcell.serialization.message_pack` writes it bit for bit."""
+    """What is kept between cycles; `impactcell.serialization` writes it bit for bit."""
 
     reference: Reference = field(default_factory=Reference)
     batch_id: str = ""

@@ -91,7 +91,7 @@ class ChangePoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackerState:
-    """All that is kept between cycles; `impactcell.serialization.message_pack` writes it bit for bit.
+    """All that is kept between cycles; `impactcell.serialization` writes it bit for bit.
 
     Attributes
     ----------

@@ -5,7 +5,7 @@ import math
 from impactcell import alarms
 from impactcell.alarms import AlarmEvent, AlarmSettings, EventKind, RuleResult, RuleSettings
 from impactcell.records import AlarmName, Evidence, Quality, Shelving, WearState
-from impactcell.serialization import json_text
+from impactcell.serialization import pack, unpack
 
 WEAR = AlarmName.WEAR_LIMIT
 BATCH = AlarmName.BATCH_SHIFT
@@ -160,5 +160,5 @@ def test_the_state_is_restored_bit_for_bit():
     settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state, _ = run(settings, alarms.initial_state(settings), WEAR, [True, True, False])
     state, _ = alarms.apply_event(state, WEAR, AlarmEvent(EventKind.SHELVE_ONE_SHOT, comment="ä"))
-    data = json_text.dumps(state)
-    assert json_text.dumps(json_text.loads(alarms.AlarmSetState, data)) == data
+    data = pack(state)
+    assert pack(unpack(alarms.AlarmSetState, data)) == data

@@ -71,30 +71,22 @@ def test_it_takes_little_more_room_than_the_numbers():
     assert len(pack(Inner(np.zeros(500), ()))) < 500 * 8 + 60
 
 
+SAME = [("table", Samples), ("counts", tuple[int, ...]), ("names", tuple[str | None, ...])]
+
+
 @pytest.mark.parametrize(
-    "fields",
+    ("fields", "why"),
     [
-        [
-            ("table", Samples),
-            ("counts", tuple[int, ...]),
-            ("names", tuple[str | None, ...]),
-            ("other", float),
-        ],
-        [("table", Samples), ("counts", tuple[int, ...]), ("names", tuple[str | None, ...])],
-        [("table", Samples), ("counts", tuple[str, ...]), ("names", tuple[str | None, ...]), ("only", float)],
-        [
-            ("table", Samples),
-            ("counts", tuple[int, ...]),
-            ("names", tuple[str | None, ...]),
-            ("only", float),
-            ("more", float, 0.0),
-        ],
+        ([*SAME, ("other", float)], "it holds 'only', which this version does not know; lacks other"),
+        (SAME, "it holds 'only', which this version does not know$"),
+        ([SAME[0], ("counts", tuple[str, ...]), SAME[2], ("only", float)], "counts.0 needs text, holds 1"),
+        ([*SAME, ("only", float), ("more", float, 0.0)], "it lacks more"),
     ],
     ids=["another name", "one less", "another type", "one more with a default"],
 )
-def test_another_version_is_refused(fields):
+def test_another_version_is_refused(fields, why):
     older = dataclasses.make_dataclass("Inner", fields, frozen=True, slots=True)
-    with pytest.raises(ValueError, match="not a stored Inner: "):
+    with pytest.raises(ValueError, match=why):
         unpack(older, pack(Inner(np.zeros(3), (1,))))
 
 
@@ -105,9 +97,9 @@ def test_damaged_bytes_are_refused():
             unpack(Inner, data[:end])
     with pytest.raises(ValueError, match="trailing"):
         unpack(Inner, data + struct.pack("<d", 1.0))
-    with pytest.raises(ValueError, match="not a stored Inner"):
+    with pytest.raises(ValueError, match="only needs a number, holds 'x'"):
         unpack(Inner, pack(Inner(np.zeros(3), (1,), (), "x")))
-    with pytest.raises(ValueError, match="not a stored Inner"):
+    with pytest.raises(ValueError, match=r".+"):
         unpack(Inner, data.replace(data[data.index(b"table") + 5 :][:3], b"\xc3\xc3\xc3", 1))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from impactcell import cell as core
-from impactcell.errors import JournalFullError
+from impactcell.errors import ForeignJournalError, JournalFullError
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.records import Capture, Channel, CycleId, PositioningState, Quality
@@ -184,8 +184,8 @@ async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, desig
     await again.close()
 
 
-async def test_a_state_of_other_fields_is_refused_with_a_message_and_learned_anew(
-    tmp_path: Path, design: core.CellDesign, caplog: pytest.LogCaptureFixture
+async def test_a_state_of_other_fields_is_refused_with_a_message_and_left_as_it_is(
+    tmp_path: Path, design: core.CellDesign
 ) -> None:
     worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     await process(worker, make_capture(1))
@@ -194,16 +194,16 @@ async def test_a_state_of_other_fields_is_refused_with_a_message_and_learned_ane
         stored = journal.state()
         assert stored is not None
         assert b"deviant_run" in stored
-        older = stored.replace(b"deviant_run", b"deviant_fun")
+        other = stored.replace(b"deviant_run", b"deviant_fun")
         assert worker.snapshot is not None
-        journal.append(make_capture(2), replace(worker.snapshot, cycle=2), older)
-    again = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
-    assert "not a stored Durable" in caplog.text
-    assert "tracking begins anew" in caplog.text
-    assert again.durable == CycleId(1, 2)  # cycles go on
-    await process(again, make_capture(3))
-    await again.close()
-    assert cycles(tmp_path / "j") == [1, 2, 3]
+        journal.append(make_capture(2), replace(worker.snapshot, cycle=2), other)
+    with Journal(tmp_path / "j", "c") as journal:
+        with pytest.raises(ForeignJournalError) as told:
+            CellWorker(design, journal, Retention())
+        assert journal.state() == other
+    for words in ("/j: the journal of cell 'prototype'", "holds 'deviant_fun'", "lacks deviant_run"):
+        assert words in str(told.value)
+    assert cycles(tmp_path / "j") == [1, 2]
 
 
 async def test_no_more_cells_compute_at_a_time_than_there_are_cores(

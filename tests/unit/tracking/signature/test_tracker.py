@@ -9,7 +9,7 @@ import pytest
 
 from impactcell.physics import Plant, TapInput, free_motion
 from impactcell.records import Channel, Quality
-from impactcell.serialization import json_text
+from impactcell.serialization import pack, unpack
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import friction_profile, tracker
 from impactcell.tracking.signature.slide_segment import extract_segment
@@ -128,7 +128,7 @@ def test_normal_cycles_are_not_deviant_and_a_bump_is_with_its_place(learned):
     assert odd.deviation.statistic > odd.deviation.threshold == 5.0
     assert odd.signature.deviates_at_m == pytest.approx(1e-3, abs=0.3e-3)
     # a deviant cycle is not learned from
-    assert json_text.dumps(odd.state.reference) == json_text.dumps(state.reference)
+    assert pack(odd.state.reference) == pack(state.reference)
 
 
 @pytest.mark.parametrize("bump", [0.05, 0.1, 0.2, 0.4, 0.8])
@@ -251,15 +251,15 @@ def test_a_capture_without_a_slide_says_why(learned, position, why):
     assert why in done.signature.reason
     assert done.signature.quality is Quality.BAD
     assert not done.judged
-    assert json_text.dumps(done.state) == json_text.dumps(state)
+    assert pack(done.state) == pack(state)
 
 
 def test_a_restored_state_replays_to_the_same_bits(learned):
     state, _ = learned
     capture, _ = slide(textured(7), 0.09, 1e4, NOISE, 7)
-    restored = json_text.loads(tracker.SignatureState, json_text.dumps(state))
+    restored = unpack(tracker.SignatureState, pack(state))
     ours, theirs = (tracker.update(SETTINGS, s, capture) for s in (state, restored))
-    assert json_text.dumps(ours.state) == json_text.dumps(theirs.state)
+    assert pack(ours.state) == pack(theirs.state)
     assert ours.signature.friction.tobytes() == theirs.signature.friction.tobytes()
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from impactcell.records import Quality
-from impactcell.serialization import json_text
+from impactcell.serialization import pack, unpack
 from impactcell.tracking import wear_batch
 from impactcell.tracking.wear_batch import (
     BatchKnowledge,
@@ -268,16 +268,16 @@ def test_a_restored_state_replays_to_the_same_bits(config):
     straight = run(config, readings)
     state = initial_state()
     for reading in readings:
-        data = json_text.dumps(state)
-        state = wear_batch.update(config, json_text.loads(TrackerState, data), reading).state
-    assert json_text.dumps(state) == json_text.dumps(straight[-1].state)
+        data = pack(state)
+        state = wear_batch.update(config, unpack(TrackerState, data), reading).state
+    assert pack(state) == pack(straight[-1].state)
 
 
 def test_the_input_state_is_not_written_to():
     before = run(UNKNOWN, series(120))[-1].state
-    data = json_text.dumps(before)
+    data = pack(before)
     run(UNKNOWN, [FrictionObservation(120 + i, 0.25, STD) for i in range(20)], before)
-    assert json_text.dumps(before) == data
+    assert pack(before) == data
 
 
 readings_of_any_kind = st.builds(
@@ -301,4 +301,4 @@ def test_no_readings_whatever_break_the_state(readings, config):
         assert np.isfinite(state.bank[:, 1:]).all()
         assert tracked.wear.quality is Quality.BAD or finite(tracked)
         assert tracked.used or tracked.wear.reason
-    assert json_text.dumps(json_text.loads(TrackerState, json_text.dumps(state))) == json_text.dumps(state)
+    assert pack(unpack(TrackerState, pack(state))) == pack(state)

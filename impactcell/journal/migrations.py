@@ -1,0 +1,89 @@
+"""From each stored form of an earlier version to the next: of a cell's state, of an alarm, of a model.
+
+A field that is renamed gets a row here, its place in the form before (see `Migration`) and its new key;
+nothing else refers to the old name. Format 2 is the first that has a number. Rows may be added to the last
+migration as long as no version that writes its result has been released; the change after that begins a
+migration of its own.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from impactcell.serialization import Migration
+from impactcell.serialization.tree import Tree
+
+ALARM_NAMES_1: Final[Mapping[str, str]] = {
+    "WEAR_LIMIT": "WearLimit",
+    "BATCH_SHIFT": "BatchShift",
+    "DEVIANT_CYCLE": "DeviantCycle",
+    "MODULE_CONNECTION": "ModuleConnection",
+    "MODEL_GAP": "ModelGap",
+    "POSITIONING_FAULT": "PositioningFault",
+    "JOURNAL_FAULT": "JournalFault",
+}
+"""Conditions of format 1, in the order in which its state has their alarms and delays."""
+FLOATS_OF_EVIDENCE_1: Final = (
+    "statistic", "threshold", "size", "size_std", "false_alarm_cycles", "false_alarm_days",
+)  # fmt: skip
+
+
+def _state_2(content: dict[str, Tree]) -> dict[str, Tree]:
+    """Alarms and delays by name instead of by place; those of the snapshot are the state's."""
+    state, snapshot = content["state"], content["snapshot"]
+    of_cell = state["alarms"]
+    names = [alarm["name"] for alarm in of_cell["alarms"]]
+    by_name = {
+        "alarms": dict(zip(names, of_cell["alarms"], strict=True)),
+        "delays": dict(zip(names, of_cell["delays"], strict=True)),
+    }
+    return {
+        **content,
+        "state": {**state, "alarms": {**of_cell, **by_name}},
+        "snapshot": None if snapshot is None else {**snapshot, "alarms": []},
+    }
+
+
+def _alarm_2(content: dict[str, Tree]) -> dict[str, Tree]:
+    """Numbers as such instead of in hexadecimal, members of enums by their values."""
+    evidence = content["evidence"]
+    floats = {name: float.fromhex(evidence[name]) for name in FLOATS_OF_EVIDENCE_1}
+    return {
+        **content,
+        "name": ALARM_NAMES_1[content["name"]],
+        "shelving": content["shelving"].lower(),
+        "evidence": {**evidence, **floats},
+    }
+
+
+def _model_2(content: dict[str, Tree]) -> dict[str, Tree]:
+    """Numbers as such instead of in hexadecimal; only its name and its provenance are text."""
+    text = {name: content[name] for name in ("name", "provenance")}
+    return {name: text[name] if name in text else _numbers(content[name]) for name in content}
+
+
+def _numbers(tree: Tree) -> Tree:
+    if isinstance(tree, dict):
+        return {key: _numbers(value) for key, value in tree.items()}
+    if isinstance(tree, list):
+        return [_numbers(value) for value in tree]
+    return float.fromhex(tree)
+
+
+def _under(place: str, rows: Mapping[str, str]) -> dict[str, str]:
+    return {f"{place}.{row}": key for row, key in rows.items()}
+
+
+_ALARM_2_RENAMED: Final[Mapping[str, str]] = {}
+"""Of `impactcell.records.Alarm`, as "evidence.size": "magnitude"; they hold for the state too."""
+_STATE_2_RENAMED: Final[Mapping[str, str]] = {
+    "state": "cell",
+    "belief": "planner",
+    **_under("state.alarms.alarms.*", _ALARM_2_RENAMED),
+}
+"""Of all that `StoredState` holds, as "state.tracker.noise.belief": "posterior"."""
+_MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
+"""Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
+
+STATE_MIGRATIONS: Final = (Migration(_state_2, renamed=_STATE_2_RENAMED),)
+ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED),)
+MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)
