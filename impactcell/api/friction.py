@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from impactcell.errors import CaptureError, PhysicsError, PredictionError
+from impactcell.features import Features, extract, noise_std
 from impactcell.physics import TapInput
-from impactcell.prediction import Model, calibrate
-from impactcell.prediction import estimate as estimate_capture
-from impactcell.prediction.feature_extraction import noise_std
+from impactcell.prediction import Model, calibrate, estimate_from_features
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
-from impactcell.prediction.slide_features import extract_slide
 from impactcell.process.console import print_note
 from impactcell.process.progress import progress
 from impactcell.records import Capture, Channel, FrictionEstimate, Samples
@@ -100,12 +98,13 @@ def estimate(
         position=_channel(time, position),
         stroke_m=stroke_m,
     )
+    features = extract(capture)
     if model is not None:
         from impactcell.settings.model_file import read_model
 
-        return estimate_capture(capture, read_model(Path(model)))
-    fit = fit_plant([capture], GRAVITY_M_S2)
-    return estimate_capture(capture, calibrated(fit.model, [capture]), fit.gap)
+        return estimate_from_features(features, read_model(Path(model)))
+    fit = fit_plant([features], GRAVITY_M_S2)
+    return estimate_from_features(features, calibrated(fit.model, [capture]), fit.gap)
 
 
 def _channel(time_s: Samples, values: Samples) -> Channel:
@@ -115,17 +114,17 @@ def _channel(time_s: Samples, values: Samples) -> Channel:
     return replace(channel, noise_std=max(noise_std(channel), least))
 
 
-def weighed(shots: Sequence[Capture]) -> tuple[Capture, ...]:
-    """Give a mass to the shots that lack one, by their momentum balance."""
+def with_masses(taps: Sequence[Features]) -> tuple[Features, ...]:
+    """Give a mass to the taps that lack one, by their momentum balance."""
     complete = []
-    for shot in shots:
-        if math.isnan(shot.mass_kg):
+    for tap in taps:
+        capture = tap.capture
+        if math.isnan(capture.mass_kg):
             try:
-                complete.append(replace(shot, mass_kg=estimate_mass(shot, extract_slide(shot))))
-                continue
+                capture = replace(capture, mass_kg=estimate_mass(tap))
             except (PredictionError, PhysicsError) as error:
-                print_note(f"shot {shot.cycle}: mass_kg is empty and cannot be fitted: {error}")
-        complete.append(shot)
+                print_note(f"shot {capture.cycle}: mass_kg is empty and cannot be fitted: {error}")
+        complete.append(replace(tap, capture=capture))
     return tuple(complete)
 
 

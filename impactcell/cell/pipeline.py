@@ -26,8 +26,9 @@ from impactcell.cell.preprocessing import (
     fill_defaults,
     update_period,
 )
+from impactcell.features import Features, extract
 from impactcell.physics import Plant, TapInput, free_motion
-from impactcell.prediction import Model, estimate
+from impactcell.prediction import Model, estimate_from_features
 from impactcell.records import (
     Alarm,
     AlarmName,
@@ -43,7 +44,12 @@ from impactcell.records import (
 from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker as signature
-from impactcell.tracking.signature.tracker import SignatureResult, SignatureSettings, SignatureState
+from impactcell.tracking.signature.tracker import (
+    CycleConditions,
+    SignatureResult,
+    SignatureSettings,
+    SignatureState,
+)
 from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings, TrackerState, TrackingResult
 
 
@@ -133,8 +139,9 @@ def step(
 ) -> StepResult:
     """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
     capture = fill_defaults(design.known, capture)
+    features = extract(capture)
     named = assign_batch(state.batch, capture, announcement)
-    friction = degrade_quality(estimate(capture, design.model), faults)
+    friction = degrade_quality(estimate_from_features(features, design.model), faults)
     period_s = update_period(state.period_s, (state.cycle, state.time_ns), capture)
     tracked = wear_batch.update(
         design.tracker,
@@ -143,7 +150,7 @@ def step(
             capture.cycle, capture.time_ns, friction, named.batch_id, expected=named.expected
         ),
     )
-    signed = _sign(design, state, capture, tracked, period_s)
+    signed = _sign(design, state, features, tracked, period_s)
     gapped = gap_cusum.update(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
     results = _findings(design, state, capture, tracked, signed, gapped, period_s)
     alarm_state, moved = alarms.update(
@@ -210,22 +217,24 @@ def reset_wear_level(state: CellState) -> CellState:
 
 
 def _sign(
-    design: CellDesign, state: CellState, capture: Capture, tracked: TrackingResult, period_s: float
+    design: CellDesign, state: CellState, features: Features, tracked: TrackingResult, period_s: float
 ) -> SignatureResult:
     """Friction along the stroke, with what the model knows to depend on the speed taken out."""
-    plant = design.model.plant
+    plant, capture = design.model.plant, features.capture
     viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
     slope = viscous / capture.mass_kg if isinstance(viscous, float) and capture.mass_kg > 0.0 else 0.0
     return signature.update(
         design.signature,
         state.signature,
-        capture,
-        batch_id=tracked.batch.batch_id,
-        restart=tracked.shift is not None,
-        viscous_per_mass=slope,
-        acceleration=_known(plant, capture),
-        gravity_m_s2=plant.gravity_m_s2,
-        period_s=period_s,
+        features,
+        CycleConditions(
+            batch_id=tracked.batch.batch_id,
+            restart=tracked.shift is not None,
+            viscous_per_mass=slope,
+            acceleration=_known(plant, capture),
+            gravity_m_s2=plant.gravity_m_s2,
+            period_s=period_s,
+        ),
     )
 
 

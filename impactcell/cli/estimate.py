@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TextIO
 
-from impactcell.api.friction import calibrated, weighed
+from impactcell.api.friction import calibrated, with_masses
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.cli.paths import check_output
 from impactcell.errors import CampaignError, PredictionError
-from impactcell.prediction import Model
-from impactcell.prediction import estimate as estimate_tap
+from impactcell.features import Features, extract
+from impactcell.prediction import Model, estimate_from_features
 from impactcell.prediction.free_slide import free_slide_friction
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import print_note, print_result
@@ -55,13 +55,13 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
             (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots
         ]
     else:
-        shots = weighed(campaign_data.shots)
-        plant, misfit = _model(campaign_data, shots, cell)
-        model = calibrated(plant, shots)
-        with progress("estimating", len(shots)) as done:
+        taps = with_masses([extract(shot) for shot in campaign_data.shots])
+        plant, misfit = _model(campaign_data, taps, cell)
+        model = calibrated(plant, [tap.capture for tap in taps])
+        with progress("estimating", len(taps)) as done:
             rows = []
-            for shot in shots:
-                rows.append((shot.cycle, estimate_tap(shot, model, misfit)))
+            for tap in taps:
+                rows.append((tap.capture.cycle, estimate_from_features(tap, model, misfit)))
                 done()
     if output is None:
         _write(rows, sys.stdout)
@@ -74,17 +74,17 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
     print_result(f"{len(rows)} shots in {output}")
 
 
-def _model(campaign: Campaign, shots: Sequence[Capture], cell: Path | None) -> tuple[Model, float]:
+def _model(campaign: Campaign, taps: Sequence[Features], cell: Path | None) -> tuple[Model, float]:
     """Give the cell's model, or one fitted to the campaign with what it leaves unexplained."""
     if cell is not None:
         from impactcell.settings import read_cell
 
         return read_cell(cell).model, 1.0
     with progress("fitting the plant", 1):
-        fitted = fit_plant(shots, campaign.gravity_m_s2)
+        fitted = fit_plant(taps, campaign.gravity_m_s2)
     plant, prior = fitted.model.plant, fitted.model.prior
     print_note(
-        f"plant fitted to {len(fitted.used)} of {len(shots)} shots: k {plant.stiffness_n_per_m:.6g} ± "
+        f"plant fitted to {len(fitted.used)} of {len(taps)} shots: k {plant.stiffness_n_per_m:.6g} ± "
         f"{prior.stiffness_std_n_per_m:.2g} N/m, b {plant.damping_n_s_per_m:.5g} ± "
         f"{prior.damping_std_n_s_per_m:.2g} N s/m, "
         f"mu_k/mu_s {fitted.model.ratio:.4f} ± {prior.ratio_std:.2g}; "

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from impactcell.features import extract
 from impactcell.figures.friction import COLOURS, GREY, STYLE
 from impactcell.records import Capture, Channel, Samples
 from impactcell.tracking import wear_batch
@@ -125,7 +126,7 @@ def along_stroke(figure: "Figure") -> None:
     for cycle in range(120):
         rng = np.random.default_rng([8, cycle])
         capture = _slide(rng, cycle, bump=0.12 if cycle == 100 else 0.0)
-        done = tracker.update(settings, state, capture)
+        done = tracker.update(settings, state, extract(capture))
         state = done.state
         if cycle == 100:
             deviant = done

@@ -83,23 +83,25 @@ def median(values: Samples) -> float:
 
 
 @compiled
-def middle_second_difference(values: Samples) -> float:
-    """Median of the absolute second differences of three values and more, by quickselect (Hoare 1961)."""
-    n = len(values) - 2
-    found = np.empty(n)
+def median_third_difference(values: Samples) -> float:
+    """Median of the absolute third differences of four values and more, by quickselect (Hoare 1961)."""
+    n = len(values) - 3
+    absolute = np.empty(n)
     for i in range(n):
-        found[i] = abs((values[i + 2] - values[i + 1]) - (values[i + 1] - values[i]))
+        first, second = values[i + 1] - values[i], values[i + 2] - values[i + 1]
+        third = values[i + 3] - values[i + 2]
+        absolute[i] = abs((third - second) - (second - first))
     half, low, high = n // 2, 0, n - 1
     while low < high:
-        pivot = found[(low + high) // 2]
+        pivot = absolute[(low + high) // 2]
         i, j = low, high
         while i <= j:
-            while found[i] < pivot:
+            while absolute[i] < pivot:
                 i += 1
-            while found[j] > pivot:
+            while absolute[j] > pivot:
                 j -= 1
             if i <= j:
-                found[i], found[j] = found[j], found[i]
+                absolute[i], absolute[j] = absolute[j], absolute[i]
                 i += 1
                 j -= 1
         if half <= j:
@@ -109,8 +111,8 @@ def middle_second_difference(values: Samples) -> float:
         else:
             break
     if n % 2:
-        return float(found[half])
-    return float(0.5 * (np.max(found[:half]) + found[half]))
+        return float(absolute[half])
+    return float(0.5 * (np.max(absolute[:half]) + absolute[half]))
 
 
 @compiled

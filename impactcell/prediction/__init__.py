@@ -1,7 +1,7 @@
 """mu_s and mu_k of a tap: by peak force (4), sliding distance (5), both (6), and from the whole waveform."""
 
 from impactcell.prediction.calibration import calibrate
-from impactcell.prediction.estimate import estimate
+from impactcell.prediction.estimate import estimate, estimate_from_features
 from impactcell.prediction.model import (
     DistanceForm,
     ForceForm,
@@ -21,5 +21,6 @@ __all__ = [
     "Sensitivity",
     "calibrate",
     "estimate",
+    "estimate_from_features",
     "printed_predictor",
 ]

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.features import CheckedChannel
 from impactcell.numerics.jit import compiled
-from impactcell.prediction.feature_extraction import noise_std
-from impactcell.records import Channel, Samples
+from impactcell.records import Samples
 
 FORCE_BLOCK_S = 1e-4
 FINE_FORCE_BLOCK_S = 1e-5
@@ -42,10 +42,6 @@ class WithinBlockSums:
     noise_std: float
 
 
-EMPTY = np.empty(0)
-NO_SUMS = WithinBlockSums(EMPTY, EMPTY, EMPTY, EMPTY, 1.0)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class BlockMeans:
     """Means of consecutive samples of one channel.
@@ -61,39 +57,29 @@ class BlockMeans:
     time_s: Samples
     values: Samples
     std: Samples
-    scatter: WithinBlockSums = NO_SUMS
-
-
-NO_BLOCKS = BlockMeans(EMPTY, EMPTY, EMPTY)
+    scatter: WithinBlockSums
 
 
 def average_blocks(
-    channel: Channel,
+    channel: CheckedChannel,
     coarse_s: float,
     fine_s: float,
     fine: Sequence[tuple[float, float]],
     edges: Sequence[float] = (),
-    until_s: float = np.inf,
 ) -> BlockMeans:
     """Average a channel over blocks.
 
     Parameters
     ----------
-    channel : Channel
+    channel : CheckedChannel
     coarse_s, fine_s : float
         Longest block, and the longest within the spans of `fine`.
     fine : sequence of (float, float)
         Spans of time, s, in which the model may have a kink.
     edges : sequence of float
         Times no block may straddle: known jumps.
-    until_s : float
-        Samples after this are left out.
     """
-    times = channel.time_s
-    count = len(times) if until_s >= times[-1] else int(np.searchsorted(times, until_s, "right"))
-    if count == 0:
-        return NO_BLOCKS
-    times, values = times[:count], channel.values[:count]
+    times, values = channel.time_s, channel.values
     begin, end = float(times[0]), float(times[-1])
     rulers = [_ruler(min(0.0, begin), end + coarse_s, coarse_s)]
     for first, last in fine:
@@ -101,7 +87,7 @@ def average_blocks(
         if high > low:
             rulers.append(_ruler(low, high + fine_s, fine_s))
     rulers += [(edge, 0.0, 1.0) for edge in edges]
-    sigma = noise_std(channel)
+    sigma = channel.sigma
     table = _average(times, values, np.array(rulers), sigma)
     return BlockMeans(
         table[1], table[2], table[6], WithinBlockSums(table[0], table[3], table[4], table[5], sigma)

@@ -12,7 +12,7 @@ from itertools import pairwise
 from scipy.optimize import brentq
 
 from impactcell.errors import NegativeRootError, PredictionError
-from impactcell.prediction.feature_extraction import MeasuredFeature
+from impactcell.features import MeasuredFeature
 from impactcell.prediction.model import REFERENCE_VELOCITY, DistanceForm, Model, Predictor, Sensitivity
 from impactcell.records import Capture, Coefficient, Quality
 

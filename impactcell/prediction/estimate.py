@@ -1,9 +1,10 @@
 """One capture in, one `FrictionEstimate` out: every predictor, and the one that is published."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass
 
-from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
+from impactcell.errors import NotConvergedError, PredictionError
+from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract
 from impactcell.prediction.equations import (
     beyond_calibration,
     by_distance,
@@ -12,17 +13,34 @@ from impactcell.prediction.equations import (
     interpolate_mass,
     out_of_range,
 )
-from impactcell.prediction.feature_extraction import MeasuredFeature, check_if_usable, peak_force
 from impactcell.prediction.model import Model
 from impactcell.prediction.phase_reweighting import MISFIT_THRESHOLD
-from impactcell.prediction.slide_features import SlideFeatures, extract_slide
 from impactcell.prediction.waveform import WaveformFit, deceleration_friction, fit
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
 
 NO_FEATURE = MeasuredFeature(math.nan, math.nan)
+SUMMARY_RELATIVE_STD = 0.01
+"""Relative standard deviation of what the module reports without one: our choice, for it says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Equations:
+    """mu_s by equations (4), (5) and (6)."""
+
+    force: Coefficient
+    distance: Coefficient
+    combined: Coefficient
 
 
 def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEstimate:
+    """Estimate mu_s and mu_k of one tap by equations (4), (5), (6) and by its waveform.
+
+    As `estimate_from_features`, from a capture of which no features have been extracted yet.
+    """
+    return estimate_from_features(extract(capture), model, misfit)
+
+
+def estimate_from_features(features: Features, model: Model, misfit: float = 1.0) -> FrictionEstimate:
     """Estimate mu_s and mu_k of one tap by equations (4), (5), (6) and by its waveform.
 
     Published is the waveform's estimate where it converges, else (6), else (4) or (5) alone where only one
@@ -31,66 +49,30 @@ def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEst
 
     Parameters
     ----------
-    capture : Capture
+    features : Features
     model : Model
     misfit : float
         RMS of the model's residuals over many taps, 1 = noise, where it is known. A model that misses those
         bends mu_s even in a tap that it seems to fit: then mu_s comes from the equations, whose few
         coefficients bend less.
     """
-    capture = replace(
-        capture,
-        force=check_if_usable(capture.force, "force", smoothed=True),
-        position=check_if_usable(capture.position, "position"),
-    )
-    peak, force_fault = _peak_force(capture)
-    slide, slide_fault = _slide(capture)
-    distance = slide.distance if slide is not None else _reported_distance(capture)
-    mu_force = _no_coefficient(force_fault)
-    mu_distance = _no_coefficient(slide_fault)
-    mu_combined = _no_coefficient("; ".join(dict.fromkeys(filter(None, (force_fault, slide_fault)))))
-    warning = ""
-    try:
-        mixed = interpolate_mass(model, capture.mass_kg, capture.velocity_m_s)
-        warning = out_of_range(model, mixed, capture.velocity_m_s, math.nan, capture.stroke_m)
-        try:
-            if math.isfinite(peak.value):
-                mu_force = _with_warnings(
-                    by_force(model, mixed, capture.velocity_m_s, peak), warning, force_fault
-                )
-        except PredictionError as fault:
-            mu_force = _no_coefficient(str(fault))
-        try:
-            if math.isfinite(distance.value):
-                mu_distance = _with_warnings(
-                    by_distance(model, mixed, capture.velocity_m_s, distance), warning, slide_fault
-                )
-        except PredictionError as fault:
-            mu_distance = _no_coefficient(str(fault))
-        if mu_force.quality < Quality.BAD and mu_distance.quality < Quality.BAD:
-            mu_combined = _with_warnings(
-                combined(model, mixed, capture.velocity_m_s, (mu_force, peak), (mu_distance, distance)),
-                warning,
-                "; ".join(filter(None, (force_fault, slide_fault))),
-            )
-        else:
-            faults = [one.reason for one in (mu_force, mu_distance) if one.quality is Quality.BAD]
-            mu_combined = _no_coefficient("; ".join(dict.fromkeys(faults)))
-    except PredictionError as fault:
-        mu_force = mu_distance = mu_combined = _no_coefficient(str(fault))
-    mu_s, estimator = _select_published(capture, mu_combined, mu_force, mu_distance)
+    capture = features.capture
+    peak, force_fault = _peak_force(features)
+    slide, distance, slide_fault = _slide(features)
+    equations = _by_equations(capture, model, (peak, force_fault), (distance, slide_fault))
+    mu_s, estimator = _select_published(capture, equations)
     gap = math.nan
     if force_fault or slide is None:
         mu_k = _mu_k(model, slide, mu_s, capture.mass_kg)
     else:
         try:
-            found = fit(capture, model, slide)
+            waveform = fit(features, model)
         except PredictionError as fault:
             mu_k = _mu_k(model, slide, mu_s, capture.mass_kg)
             mu_s = _with_warnings(mu_s, f"no waveform estimate: {fault}")
             gap = fault.gap if isinstance(fault, NotConvergedError) else math.nan
         else:
-            mu_s_seen, mu_k, gap = _from_waveform(model, capture, found)
+            mu_s_seen, mu_k, gap = _from_waveform(model, capture, waveform)
             if misfit <= MISFIT_THRESHOLD or mu_s.quality is Quality.BAD:
                 mu_s, estimator = mu_s_seen, Estimator.WAVEFORM
             else:
@@ -99,9 +81,9 @@ def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEst
     return FrictionEstimate(
         mu_s=mu_s,
         mu_k=mu_k,
-        by_force=mu_force,
-        by_distance=mu_distance,
-        combined=mu_combined,
+        by_force=equations.force,
+        by_distance=equations.distance,
+        combined=equations.combined,
         estimator=estimator,
         peak_force_n=peak.value,
         sliding_distance_m=distance.value,
@@ -109,41 +91,79 @@ def estimate(capture: Capture, model: Model, misfit: float = 1.0) -> FrictionEst
     )
 
 
+def _by_equations(
+    capture: Capture, model: Model, peak: tuple[MeasuredFeature, str], distance: tuple[MeasuredFeature, str]
+) -> _Equations:
+    """mu_s by (4), (5) and (6) from two features, each with what is wrong with it."""
+    (peak_force, force_fault), (sliding_distance, slide_fault) = peak, distance
+    velocity_m_s = capture.velocity_m_s
+    try:
+        coefficients = interpolate_mass(model, capture.mass_kg, velocity_m_s)
+        warning = out_of_range(model, coefficients, velocity_m_s, math.nan, capture.stroke_m)
+    except PredictionError as fault:
+        return _Equations(*[Coefficient(reason=str(fault))] * 3)
+    mu_force, mu_distance = Coefficient(reason=force_fault), Coefficient(reason=slide_fault)
+    try:
+        if math.isfinite(peak_force.value):
+            mu_force = by_force(model, coefficients, velocity_m_s, peak_force)
+            mu_force = _with_warnings(mu_force, warning, force_fault)
+    except PredictionError as fault:
+        mu_force = Coefficient(reason=str(fault))
+    try:
+        if math.isfinite(sliding_distance.value):
+            mu_distance = by_distance(model, coefficients, velocity_m_s, sliding_distance)
+            mu_distance = _with_warnings(mu_distance, warning, slide_fault)
+    except PredictionError as fault:
+        mu_distance = Coefficient(reason=str(fault))
+    if mu_force.quality is Quality.BAD or mu_distance.quality is Quality.BAD:
+        faults = [mu_s.reason for mu_s in (mu_force, mu_distance) if mu_s.quality is Quality.BAD]
+        return _Equations(mu_force, mu_distance, Coefficient(reason="; ".join(dict.fromkeys(faults))))
+    both = (mu_force, peak_force), (mu_distance, sliding_distance)
+    mu_combined = combined(model, coefficients, velocity_m_s, *both)
+    faults = [fault for fault in (force_fault, slide_fault) if fault]
+    return _Equations(mu_force, mu_distance, _with_warnings(mu_combined, warning, "; ".join(faults)))
+
+
 def _from_waveform(
-    model: Model, capture: Capture, found: WaveformFit
+    model: Model, capture: Capture, waveform: WaveformFit
 ) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
-    warnings = [beyond_calibration(model, capture, found.mu_s)]
-    if found.misfit > MISFIT_THRESHOLD:
-        warnings.append(f"residuals are {found.gap:.3g} times the sensors' noise: the model lacks something")
-    told = "mu_s through mu_k/mu_s of the model: the part moved at once" if found.immediate > 0.5 else ""
-    mu_s = Coefficient(found.mu_s, found.mu_s_std, Quality.GOOD, told)
-    mu_k = Coefficient(found.mu_k, found.mu_k_std, Quality.GOOD)
-    return _with_warnings(mu_s, *warnings), _with_warnings(mu_k, *warnings), found.gap
+    warnings = [beyond_calibration(model, capture, waveform.mu_s)]
+    if waveform.misfit > MISFIT_THRESHOLD:
+        warnings.append(
+            f"residuals are {waveform.gap:.3g} times the sensors' noise: the model lacks something"
+        )
+    at_once = waveform.immediate > 0.5
+    reason = "mu_s through mu_k/mu_s of the model: the part moved at once" if at_once else ""
+    mu_s = Coefficient(waveform.mu_s, waveform.mu_s_std, Quality.GOOD, reason)
+    mu_k = Coefficient(waveform.mu_k, waveform.mu_k_std, Quality.GOOD)
+    return _with_warnings(mu_s, *warnings), _with_warnings(mu_k, *warnings), waveform.gap
 
 
-def _peak_force(capture: Capture) -> tuple[MeasuredFeature, str]:
+def _peak_force(features: Features) -> tuple[MeasuredFeature, str]:
     """Peak force and what is wrong with it; the module's own figure where no force was recorded."""
+    capture = features.capture
     if capture.force is None and capture.summary is not None:
         reported = capture.summary.peak_force_n
         if math.isfinite(reported) and reported > 0.0:
-            return MeasuredFeature(
-                reported, 0.01 * reported
-            ), "from the module's summary: no force was recorded"
+            return _reported(reported), "from the module's summary: no force was recorded"
         return NO_FEATURE, f"the module reports a peak force of {reported} N and no record"
-    try:
-        return peak_force(capture.force), ""  # type: ignore[arg-type]
-    except (PredictionError, PhysicsError) as fault:
-        return NO_FEATURE, str(fault)
+    if isinstance(features.peak_force, Fault):
+        return NO_FEATURE, str(features.peak_force)
+    return features.peak_force, ""
 
 
-def _slide(capture: Capture) -> tuple[SlideFeatures | None, str]:
-    if capture.summary is not None and (lacking := _missing_channel(capture)):
-        return None, f"from the module's summary: {lacking}"
-    try:
-        return extract_slide(capture), ""
-    except (PredictionError, PhysicsError) as fault:
-        return None, str(fault)
+def _slide(features: Features) -> tuple[SlideFeatures | None, MeasuredFeature, str]:
+    """Slide, sliding distance and what is wrong with them; the module's own distance without a channel."""
+    summary, missing = features.capture.summary, _missing_channel(features.capture)
+    if summary is not None and missing:
+        reported = summary.sliding_distance_m
+        is_usable = math.isfinite(reported) and reported > 0.0
+        distance = _reported(reported) if is_usable else NO_FEATURE
+        return None, distance, f"from the module's summary: {missing}"
+    if isinstance(features.slide, Fault):
+        return None, NO_FEATURE, str(features.slide)
+    return features.slide, features.slide.distance, ""
 
 
 def _missing_channel(capture: Capture) -> str:
@@ -153,44 +173,36 @@ def _missing_channel(capture: Capture) -> str:
     return "no force was recorded" if capture.force is None else ""
 
 
-def _reported_distance(capture: Capture) -> MeasuredFeature:
-    if capture.summary is not None and _missing_channel(capture):
-        reported = capture.summary.sliding_distance_m
-        if math.isfinite(reported) and reported > 0.0:
-            return MeasuredFeature(reported, 0.01 * reported)
-    return NO_FEATURE
-
-
-def _no_coefficient(reason: str) -> Coefficient:
-    return Coefficient(reason=reason)
+def _reported(value: float) -> MeasuredFeature:
+    return MeasuredFeature(value, SUMMARY_RELATIVE_STD * value)
 
 
 def _with_warnings(given: Coefficient, *warnings: str) -> Coefficient:
     """Mark a coefficient uncertain for each warning that says something."""
-    said = [text for text in warnings if text]
-    if not said:
+    texts = [text for text in warnings if text]
+    if not texts:
         return given
-    reasons = dict.fromkeys([*filter(None, given.reason.split("; ")), *"; ".join(said).split("; ")])
+    reasons = dict.fromkeys([*filter(None, given.reason.split("; ")), *"; ".join(texts).split("; ")])
     return Coefficient(given.value, given.std, max(given.quality, Quality.UNCERTAIN), "; ".join(reasons))
 
 
-def _select_published(
-    capture: Capture, mu_combined: Coefficient, mu_force: Coefficient, mu_distance: Coefficient
-) -> tuple[Coefficient, Estimator]:
+def _select_published(capture: Capture, equations: _Equations) -> tuple[Coefficient, Estimator]:
     """Choose what is published without a waveform.
 
     One equation alone is published only where the other's channel was not recorded. Where it was and cannot
     be used, the capture is not to be trusted.
     """
-    if mu_combined.quality < Quality.BAD:
-        return mu_combined, Estimator.COMBINED
-    if capture.force is None and mu_distance.quality < Quality.BAD:
+    if equations.combined.quality < Quality.BAD:
+        return equations.combined, Estimator.COMBINED
+    if capture.force is None and equations.distance.quality < Quality.BAD:
         return _with_warnings(
-            mu_distance, "by sliding distance only: no force was recorded"
+            equations.distance, "by sliding distance only: no force was recorded"
         ), Estimator.DISTANCE
-    if capture.position is None and mu_force.quality < Quality.BAD:
-        return _with_warnings(mu_force, "by peak force only: no position was recorded"), Estimator.FORCE
-    return mu_combined, Estimator.NONE
+    if capture.position is None and equations.force.quality < Quality.BAD:
+        return _with_warnings(
+            equations.force, "by peak force only: no position was recorded"
+        ), Estimator.FORCE
+    return equations.combined, Estimator.NONE
 
 
 def _mu_k(model: Model, slide: SlideFeatures | None, mu_s: Coefficient, mass_kg: float) -> Coefficient:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from impactcell.errors import CaptureError
-from impactcell.prediction.feature_extraction import check_channel, noise_std
+from impactcell.features.channels import check_channel
 from impactcell.records import Capture, Coefficient, Quality, Samples
 
 
@@ -24,7 +24,7 @@ def free_slide_friction(capture: Capture, gravity_m_s2: float) -> Coefficient:
     times = position.time_s - position.time_s[0]
     sign = math.copysign(1.0, position.values[-1] - position.values[0])
     moved = sign * (position.values - position.values[0])
-    if moved[-1] < 6.0 * noise_std(position):
+    if moved[-1] < 6.0 * position.sigma:
         raise CaptureError("the part did not slide")
 
     def residual(p: Samples) -> Samples:

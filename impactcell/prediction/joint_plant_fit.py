@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
+from impactcell.features import Features, required
 from impactcell.physics import Plant
-from impactcell.prediction.feature_extraction import check_channel, displacement, peak_force
 from impactcell.prediction.linearised_model import (
     DAMPING,
     MU_K,
@@ -31,11 +31,12 @@ from impactcell.prediction.phase_reweighting import (
     interval_of_blocks,
     std_factors,
 )
-from impactcell.prediction.slide_features import SlideFeatures, extract_slide
 from impactcell.prediction.waveform import fit
-from impactcell.records import Capture, Samples
+from impactcell.records import Samples
 
 SHARED = slice(RATIO, DAMPING + 1)
+MIN_MU_K = 1e-3
+"""mu_k at which a fit starts at least: its logarithm is fitted."""
 INITIAL_RATIO = 0.76
 WEAK_STD = np.array([0.3, 1.0, 1.0])
 """Standard deviations of ln(mu_k/mu_s, k, b) about the start: they only hold what no tap shows."""
@@ -68,38 +69,42 @@ class PlantFit:
     gap: float
 
 
-def fit_plant(captures: Sequence[Capture], gravity_m_s2: float, name: str = "fitted") -> PlantFit:
+def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted") -> PlantFit:
     """Fit k, b and mu_k/mu_s, with k_v = 0, to the taps of a campaign.
 
     Raises
     ------
     PredictionError
-        No tap can be used, or the fit does not settle.
+        No tap can be used, or the fit does not converge.
     """
-    taps, faults = [], []
-    for capture in captures:
+    usable, faults = [], []
+    for tap in taps:
         try:
-            taps.append((capture, extract_slide(capture), peak_force(check_channel(capture.force, "force"))))
+            required(tap.slide)
+            required(tap.peak_force)
         except (PredictionError, PhysicsError) as fault:
-            faults.append(f"shot {capture.cycle}: {fault}")
-    if not taps:
+            faults.append(f"shot {tap.capture.cycle}: {fault}")
+        else:
+            usable.append(tap)
+    if not usable:
         raise PredictionError(
             f"no tap of the campaign can be used; {faults[0] if faults else 'there is none'}"
         )
-    contacts = np.array([contact_constants(capture, slide) for capture, slide, _ in taps])
+    contacts = np.array([contact_constants(tap) for tap in usable])
     stiffness, damping = np.median(contacts, axis=0).tolist()
-    frictions = [max(slide.deceleration.value / gravity_m_s2, 1e-3) for _, slide, _ in taps]
+    frictions = [max(required(tap.slide).deceleration.value / gravity_m_s2, MIN_MU_K) for tap in usable]
     mean = float(np.mean(frictions))
     start = Plant(stiffness, max(damping, 1.0), mean / INITIAL_RATIO, mean, gravity_m_s2)
     responses, thetas, parts = [], [], []
-    for (capture, slide, _), mu_k in zip(taps, frictions, strict=True):
+    for tap, mu_k in zip(usable, frictions, strict=True):
         plant = replace(start, mu_k=mu_k, mu_s=mu_k / INITIAL_RATIO)
         try:
-            responses.append(linearised_model(capture, plant, slide.separation_s))
+            responses.append(linearised_model(tap, plant))
             thetas.append(parameters_of(plant))
+            slide = required(tap.slide)
             parts.append(interval_of_blocks(responses[-1], slide.separation_s, slide.stop_s))
         except PhysicsError as fault:
-            faults.append(f"shot {capture.cycle}: {fault}")
+            faults.append(f"shot {tap.capture.cycle}: {fault}")
     if not responses:
         raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
     found, covariance, chi2 = _fit_shared(responses, np.array(thetas), thetas[0][SHARED], WEAK_STD)
@@ -115,18 +120,19 @@ def fit_plant(captures: Sequence[Capture], gravity_m_s2: float, name: str = "fit
     plant = Plant(stiffness, damping, mu_k / ratio, mu_k, gravity_m_s2)
     prior = Prior(stds[1] * stiffness, stds[2] * damping, max(stds[0] * ratio, MIN_RATIO_STD))
     model = Model(name, plant, prior)
-    scatter = ratio_scatter([capture for capture, _, _ in taps], model)
+    scatter = ratio_scatter(usable, model)
     model = replace(model, prior=replace(prior, ratio_std=math.hypot(prior.ratio_std, scatter)))
-    return PlantFit(model, tuple(capture.cycle for capture, _, _ in taps), misfit)
+    return PlantFit(model, tuple(tap.capture.cycle for tap in usable), misfit)
 
 
-def contact_constants(capture: Capture, slide: SlideFeatures) -> tuple[float, float]:
+def contact_constants(tap: Features) -> tuple[float, float]:
     """K and b by regressing the force of the first contact on indentation and its rate.
 
     The rate comes from a spline-free derivative of the position: a polynomial over the contact, which is
     smooth enough for a start.
     """
-    force, position = check_channel(capture.force, "force"), displacement(capture)
+    capture, slide = tap.capture, required(tap.slide)
+    force, position = required(tap.force), required(tap.position)
     end = min(slide.separation_s, capture.stroke_m / capture.velocity_m_s)
     inside = (position.time_s > 0.0) & (position.time_s < end)
     if inside.sum() < 12:
@@ -143,12 +149,13 @@ def contact_constants(capture: Capture, slide: SlideFeatures) -> tuple[float, fl
     return float(stiffness), float(damping)
 
 
-def estimate_mass(capture: Capture, slide: SlideFeatures) -> float:
+def estimate_mass(tap: Features) -> float:
     """Mass of the part, kg, from its momentum: the force's impulse is m (x'(t_2) - x'(t_1) + a (t_2 - t_1)).
 
     Between the middle of the contact, when the part slips, and its loss; a is the deceleration of the slide.
     """
-    force, position = check_channel(capture.force, "force"), displacement(capture)
+    capture, slide = tap.capture, required(tap.slide)
+    force, position = required(tap.force), required(tap.position)
     end, start = slide.separation_s, 0.4 * slide.separation_s
     inside = (position.time_s > 0.5 * start) & (position.time_s < end + 0.25 * (slide.stop_s - end))
     moved = capture.direction * position.values[inside]
@@ -161,13 +168,13 @@ def estimate_mass(capture: Capture, slide: SlideFeatures) -> float:
     return impulse / float(speed(end) - speed(start) + slide.deceleration.value * (end - start))
 
 
-def ratio_scatter(captures: Sequence[Capture], model: Model) -> float:
+def ratio_scatter(taps: Sequence[Features], model: Model) -> float:
     """Scatter of mu_k/mu_s from tap to tap beyond its estimates' errors, from the taps that show mu_s."""
     wide = replace(model, prior=replace(model.prior, ratio_std=0.2))
     values, variances = [], []
-    for capture in captures:
+    for tap in taps:
         try:
-            found = fit(capture, wide)
+            found = fit(tap, wide)
         except (PredictionError, PhysicsError):
             continue
         std = found.mu_s_std / found.mu_s

@@ -10,18 +10,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import PhysicsError
+from impactcell.features import Features, required
 from impactcell.numerics.jit import compiled
 from impactcell.physics import Ensemble, Plant, TapEventKind, TapInput, simulate_tap
 from impactcell.prediction.block_averaging import (
     FINE_FORCE_BLOCK_S,
     FINE_POSITION_BLOCK_S,
     FORCE_BLOCK_S,
-    NO_BLOCKS,
     POSITION_BLOCK_S,
     BlockMeans,
     average_blocks,
 )
-from impactcell.prediction.feature_extraction import displacement
 from impactcell.records import Capture, Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING = range(4)
@@ -179,33 +178,32 @@ class LinearisedModel:
         return Linearisation(*found)
 
 
-def linearised_model(capture: Capture, plant: Plant, separation_s: float) -> LinearisedModel:
+def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     """Average a capture over blocks, fine where `plant` has its events and contact was lost.
 
     Parameters
     ----------
-    capture : Capture
-        With a position channel, a mass and a velocity; its force may be missing.
+    features : Features
+        Of a capture with force, position, a mass and a velocity.
     plant : Plant
         Near enough for its events to tell where the kinks are.
-    separation_s : float
-        Last loss of contact as read off the force; nan where it was not.
+
+    Raises
+    ------
+    PredictionError, PhysicsError
+        The capture does not show its slide, or the plant has no motion.
     """
-    tap = tap_input(capture)
+    tap = tap_input(features.capture)
     motion = simulate_tap(plant, tap)
-    kinks = [event.time_s for event in motion.events]
-    if math.isfinite(separation_s):
-        kinks.append(separation_s)
+    kinks = [*(event.time_s for event in motion.events), required(features.separation).value]
     spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
     halt = tap.stroke_m / tap.velocity_m_s
     edges = [halt] if math.isfinite(halt) else []
-    force = NO_BLOCKS
-    if capture.force is not None:
-        force = average_blocks(capture.force, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
-        jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
-        if jumps:
-            force = replace(force, std=force.std * _std_factors_at_jumps(force.time_s, jumps))
-    position = average_blocks(displacement(capture), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
+    force = average_blocks(required(features.force), FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
+    jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
+    if jumps:
+        force = replace(force, std=force.std * _std_factors_at_jumps(force.time_s, jumps))
+    position = average_blocks(required(features.position), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return LinearisedModel(plant, tap, force, position)
 
 

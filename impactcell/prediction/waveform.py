@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
+from impactcell.features import Features, SlideFeatures, required
+from impactcell.features.contact import refuse_clipped
 from impactcell.physics import Plant
 from impactcell.prediction import gauss_newton
-from impactcell.prediction.feature_extraction import check_channel, refuse_clipped
 from impactcell.prediction.gauss_newton import GaussianPrior, Minimum
 from impactcell.prediction.linearised_model import (
     DAMPING,
@@ -35,8 +36,7 @@ from impactcell.prediction.phase_reweighting import (
     std_factors,
 )
 from impactcell.prediction.posterior import Posterior, mixture
-from impactcell.prediction.slide_features import SlideFeatures, extract_slide
-from impactcell.records import Capture, Samples
+from impactcell.records import Samples
 
 KINK_DISTANCE_STD = 6.0
 """Standard deviations of z beyond which the other side of the kink has no weight."""
@@ -102,18 +102,14 @@ def prior_of(model: Model, *, fixed_ratio: bool = False) -> GaussianPrior:
     return GaussianPrior(parameters_of(plant), weight, free)
 
 
-def fit(
-    capture: Capture, model: Model, slide: SlideFeatures | None = None, *, fixed_ratio: bool = False
-) -> WaveformFit:
+def fit(features: Features, model: Model, *, fixed_ratio: bool = False) -> WaveformFit:
     """Fit the whole waveform of one tap.
 
     Parameters
     ----------
-    capture : Capture
+    features : Features
         With force and position.
     model : Model
-    slide : SlideFeatures, optional
-        The slide as read off this capture, where that has been done already.
     fixed_ratio : bool
         Take mu_k/mu_s as exactly the plant's, as the paper does.
 
@@ -124,36 +120,34 @@ def fit(
     NotConvergedError
         The fit did not reach a minimum, or the model is not that of this tap.
     """
-    force = check_channel(capture.force, "force")
-    refuse_clipped(force)
-    slide = slide or extract_slide(capture)
+    refuse_clipped(required(features.force))
+    slide, capture = required(features.slide), features.capture
     prior = prior_of(model, fixed_ratio=fixed_ratio)
     theta = prior.mean.copy()
     theta[MU_K] = math.log(max(deceleration_friction(model, capture.mass_kg, slide), 1e-3))
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
         raise CaptureError("the part's mass or the actuator's velocity is not known")
     try:
-        return _fit(capture, model.plant, prior, theta, slide)
+        return _fit(features, model.plant, prior, theta)
     except PhysicsError as fault:
         raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
     except np.linalg.LinAlgError as fault:
         raise NotConvergedError(f"the fit is singular: {fault}") from fault
 
 
-def _fit(
-    capture: Capture, plant: Plant, prior: GaussianPrior, start: Samples, slide: SlideFeatures
-) -> WaveformFit:
-    response = linearised_model(capture, with_parameters(plant, start), slide.separation_s)
+def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples) -> WaveformFit:
+    response = linearised_model(features, with_parameters(plant, start))
     offset = response.kink_coordinate(start) - float(KINK_FORM @ start)
     fits = _fit_both_sides(response, prior, start)
     plain, misfit = _likelier_side(fits, prior, offset)
     if misfit > MISFIT_THRESHOLD:  # perhaps only because the start had its kinks elsewhere
-        response = linearised_model(capture, with_parameters(plant, plain.theta), slide.separation_s)
+        response = linearised_model(features, with_parameters(plant, plain.theta))
         fits = _fit_both_sides(response, prior, plain.theta)
         plain, misfit = _likelier_side(fits, prior, offset)
     widening, best = max(misfit, 1.0), plain
     if misfit > MISFIT_THRESHOLD:
         widening = 1.0
+        slide = required(features.slide)
         phase = interval_of_blocks(response, slide.separation_s, slide.stop_s)
         for _ in range(REWEIGHTING_ROUNDS):
             residual = response.linearise(best.theta, best.side).residual

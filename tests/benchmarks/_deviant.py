@@ -7,9 +7,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 from scipy.stats import f as f_distribution
 
+from impactcell.features import extract, required
 from impactcell.tracking.signature import deviation_shapes, deviation_test, friction_profile, tracker
 from impactcell.tracking.signature import reference as references
-from impactcell.tracking.signature.slide_segment import extract_segment
 from tests.benchmarks._slides import FRICTION, GRAVITY, slide
 from tests.benchmarks.table import Table
 
@@ -64,7 +64,7 @@ class Normality:
         self.grid = settings.grid_m
         self.to_coefficients = np.linalg.pinv(friction_profile.on_grid(settings.points))
         capture, _ = slide(_normal(np.random.default_rng([8, 0])), SPEED, RATE, NOISE, 0)
-        self.seen = friction_profile.information(extract_segment(capture), self.grid, GRAVITY)
+        self.seen = friction_profile.information(required(extract(capture).segment), self.grid, GRAVITY)
         G = self.G = self.seen.matrix
         self.C = self.to_coefficients @ (FRICTION * np.array([m(self.grid) for m in MODES]).T)
         texture = FRICTION * (1.0 + 0.03 * np.sin(2.0 * np.pi * self.grid / 1.3e-3))
@@ -150,7 +150,7 @@ def mixed_table(*, quick: bool) -> Table:
         for cycle in range(MIXED):
             speed = SPEEDS[cycle % len(SPEEDS)]
             capture, _ = slide(_normal(rng), speed, RATE, NOISE, run * MIXED + cycle)
-            seen = friction_profile.information(extract_segment(capture), settings.grid_m, GRAVITY)
+            seen = friction_profile.information(required(extract(capture).segment), settings.grid_m, GRAVITY)
             known, verdict = state.reference, None
             if known.variation.cycles >= settings.learned_cycles:
                 verdict = deviation_test.test_deviation(known, seen, settings.grid_m)
@@ -245,7 +245,7 @@ def power_table(*, quick: bool) -> Table:
     for k in range(learned):
         rng = np.random.default_rng([8, k])
         capture, _ = slide(_normal(rng), SPEED, RATE, NOISE, k)
-        done = tracker.update(settings, state, capture)
+        done = tracker.update(settings, state, extract(capture))
         false += done.deviation is not None
         judged += done.judged
         state = done.state
@@ -324,7 +324,7 @@ def _deviant(truth: Normality, base, size: float, shape, seed: int) -> friction_
         return base(x) + size * FRICTION * shape(np.asarray(x))
 
     capture, _ = slide(friction, SPEED, RATE, NOISE, seed)
-    return friction_profile.information(extract_segment(capture), truth.grid, GRAVITY)
+    return friction_profile.information(required(extract(capture).segment), truth.grid, GRAVITY)
 
 
 def _plain(verdict: deviation_test.DeviationTest, cycles: int) -> float:

@@ -6,6 +6,7 @@ import time
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
+from impactcell.features import extract
 from impactcell.tracking.signature import in_cycle_filter, tracker
 from tests.benchmarks import _deviant
 from tests.benchmarks._slides import FRICTION, slide
@@ -31,7 +32,7 @@ def error_table(*, quick: bool) -> Table:
                 return FRICTION * (1.0 + h * np.exp(-0.5 * ((x - c) / w) ** 2))
 
             capture, distance = slide(friction, SPEED, rate, NOISE, k)
-            found = tracker.update(settings, tracker.initial_state(settings), capture).signature
+            found = tracker.update(settings, tracker.initial_state(settings), extract(capture)).signature
             use = (grid > 0.1 * distance) & (grid < 0.9 * distance)
             off = (found.friction - friction(grid))[use]
             each.setdefault(width, []).append((off**2).mean())

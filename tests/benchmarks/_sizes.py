@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from impactcell.features import extract, required
 from impactcell.tracking.signature import deviation_test, friction_profile, matched_filter_scan, tracker
-from impactcell.tracking.signature.slide_segment import extract_segment
 from tests.benchmarks._deviant import NOISE, RATE, SPEED, Normality, _normal
 from tests.benchmarks._slides import FRICTION, GRAVITY, slide
 from tests.benchmarks.table import Table
@@ -71,7 +71,7 @@ def table(*, quick: bool) -> Table:
             capture, _ = slide(friction, SPEED, RATE, NOISE, 20_000 + k)
             verdict = deviation_test.test_deviation(
                 state.reference,
-                friction_profile.information(extract_segment(capture), truth.grid, GRAVITY),
+                friction_profile.information(required(extract(capture).segment), truth.grid, GRAVITY),
                 truth.grid,
             )
             deviant += verdict.p_value < alpha

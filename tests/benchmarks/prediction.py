@@ -9,11 +9,11 @@ import time
 
 import numpy as np
 
+from impactcell.features import extract
 from impactcell.physics import TapInput
 from impactcell.prediction import Model, calibrate, estimate, printed_predictor
 from impactcell.prediction.calibration import fit_predictor
 from impactcell.prediction.equations import sliding_distance
-from impactcell.prediction.viscous_regression import by_decrement, by_least_squares
 from impactcell.prediction.waveform import fit
 from tests.benchmarks._prediction_shots import (
     FRICTIONS,
@@ -32,6 +32,7 @@ from tests.benchmarks._prediction_shots import (
     motion,
     shot,
 )
+from tests.benchmarks._viscous_regression import by_decrement, by_least_squares
 from tests.benchmarks.table import Table
 
 
@@ -123,7 +124,7 @@ def table_of_waveform(shots_a_velocity: int) -> list[Table]:
                 K * math.exp(0.01 * rng.standard_normal()),
                 B * math.exp(0.02 * rng.standard_normal()),
             )
-            found = fit(shot(truth, rng), model)
+            found = fit(extract(shot(truth, rng)), model)
             mine = information(truth)
             seen.append((truth.mu_k, mine))
             covariance = np.linalg.inv(mine + PRIOR_INFORMATION)
@@ -199,7 +200,7 @@ def table_of_fixed_ratio(shots: int) -> Table:
             K * math.exp(0.01 * rng.standard_normal()),
             B * math.exp(0.02 * rng.standard_normal()),
         )
-        errors.append(abs(fit(shot(truth, rng), model, fixed_ratio=True).mu_s / truth.mu_s - 1.0))
+        errors.append(abs(fit(extract(shot(truth, rng)), model, fixed_ratio=True).mu_s / truth.mu_s - 1.0))
     return Table(
         "Waveform with mu_k/mu_s fixed, as in the paper",
         ("what", "bar", "measured", "largest"),
@@ -219,11 +220,11 @@ def table_of_time(repeats: int) -> Table:
         assert capture.force is not None
         assert capture.position is not None
         sizes = f"{len(capture.force.values)} + {len(capture.position.values)}"
-        fit(capture, model)
+        fit(extract(capture), model)
         took, whole = [], []
         for _ in range(repeats):
             start, cpu = time.perf_counter(), time.process_time()
-            fit(capture, model)
+            fit(extract(capture), model)
             took.append(time.process_time() - cpu)
             whole.append(time.perf_counter() - start)
         rows.append(

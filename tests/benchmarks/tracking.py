@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell import alarms
 from impactcell.alarms import AlarmSettings
+from impactcell.features import extract
 from impactcell.records import AlarmName
 from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
@@ -62,7 +63,7 @@ def cost_table(*, quick: bool) -> Table:
             t0 = time.thread_time()
             tracked = wear_batch.update(config, state, reading)
             t1 = time.thread_time()
-            seen = tracker.update(shape, signed, captures[i % 20])
+            seen = tracker.update(shape, signed, extract(captures[i % 20]))
             t2 = time.thread_time()
             followed = gap_cusum.update(gaps, 1.0 + 0.02 * rng.normal(), i, 1e5, 1.0)
             active = book.alarm(AlarmName.WEAR_LIMIT).active

@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from impactcell.features import white_noise_std
 from impactcell.records import Capture, Channel, Samples
 
 MAX_BLOCKS = 60
@@ -22,8 +23,6 @@ CUT_SPEED_SHARE = 0.25
 """A cut needs this share of the record's RMS speed."""
 VELOCITY_NOISE_SHARE = 0.02
 """Noise of a speed, over the RMS speed."""
-NORMAL_MAD = 1.482602218505602
-THIRD_DIFFERENCE_GAIN = math.sqrt(20.0)
 
 
 def cut_blocks(captures: tuple[Capture, ...]) -> tuple[tuple[Capture, int], ...]:
@@ -94,7 +93,7 @@ def _cut_samples(time: Samples, speed: Samples) -> list[int]:
 def smoothed_velocity(time: Samples, position: Samples) -> Samples:
     """Velocity along +1 by a straight line through as many samples as make it steady, shape (n,)."""
     step = float(np.median(np.diff(time)))
-    noise = float(np.median(np.abs(np.diff(position, 3)))) * NORMAL_MAD / THIRD_DIFFERENCE_GAIN
+    noise = white_noise_std(position)
     half = 1
     while True:
         lever = np.arange(-half, half + 1.0)

@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular, solveh_banded
 
-from impactcell.discrepancy.data.driven_blocks import NORMAL_MAD, smoothed_velocity
+from impactcell.discrepancy.data.driven_blocks import smoothed_velocity
 from impactcell.discrepancy.data.shots import POSITION, IndexArray, PreparedShot
+from impactcell.features import white_noise_std
 from impactcell.records import Channel, Samples
 
 MAX_BLOCK_SAMPLES = 80
@@ -105,7 +106,7 @@ def _noise_density(force: Samples, apart: float) -> tuple[float, float]:
     density = math.nan
     while len(force) // window >= 16:
         means = force[: len(force) // window * window].reshape(-1, window).mean(axis=1)
-        std = float(np.median(np.abs(np.diff(means, 3)))) * NORMAL_MAD / math.sqrt(20.0)
+        std = white_noise_std(means)
         now = std**2 * window * apart
         if window > 1 and now > SIGNAL_GROWTH * density:
             break

@@ -8,11 +8,9 @@ import numpy as np
 from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
 from impactcell.discrepancy.data.shots import CHANNELS, IndexArray, PreparedShot
 from impactcell.errors import CampaignError
+from impactcell.features import white_noise_std
 from impactcell.records import Samples
 
-# Var of the third difference of white noise of unit variance: 1 + 9 + 9 + 1.
-THIRD_DIFFERENCE_GAIN = math.sqrt(20.0)
-NORMAL_MAD = 1.482602218505602
 NOISE_UNIT_FACTOR = 30.0
 MIN_DEGREES_OF_FREEDOM = 3
 MIN_REPLICATE_SPREAD = 1e-9
@@ -88,11 +86,7 @@ def white_noise(shots: tuple[PreparedShot, ...], channel: int) -> float:
         values = shot.values[channel]
         if len(values) < 8:
             continue
-        third = np.diff(values, 3)
-        spread = float(np.median(np.abs(third))) * NORMAL_MAD
-        if spread == 0.0:
-            spread = float(third.std())
-        estimates.append(spread / THIRD_DIFFERENCE_GAIN)
+        estimates.append(white_noise_std(values))
     return float(np.median(estimates)) if estimates else math.nan
 
 

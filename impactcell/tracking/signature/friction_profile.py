@@ -20,10 +20,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from impactcell.features import SlideSegment
 from impactcell.numerics import small_linalg
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
-from impactcell.tracking.signature.slide_segment import SlideSegment
 
 Acceleration = Callable[[Samples], Samples]
 

@@ -6,14 +6,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from impactcell.records import Capture, Evidence, Quality, Samples, Signature
+from impactcell.features import Fault, Features
+from impactcell.records import Evidence, Quality, Samples, Signature
 from impactcell.tracking.signature import deviation_test, friction_profile
 from impactcell.tracking.signature import reference as references
 from impactcell.tracking.signature.reference import Reference
-from impactcell.tracking.signature.slide_segment import NoSlideError, extract_segment
 
-MIN_MATERIAL_CYCLES = 5  # cycles of a new material before its cycles are judged
-MAX_DEVIANT_RUN = 10  # deviant cycles in a row that are rather another material
+MIN_MATERIAL_CYCLES = 5
+"""Cycles of a new material before its cycles are judged."""
+MAX_DEVIANT_RUN = 10
+"""Deviant cycles in a row that are rather another material."""
 
 
 @lru_cache(maxsize=64)
@@ -87,101 +89,115 @@ def initial_state(settings: SignatureSettings) -> SignatureState:
     return SignatureState(references.initial_state(settings.points + 2))
 
 
-def update(
-    settings: SignatureSettings,
-    state: SignatureState,
-    capture: Capture,
-    *,
-    batch_id: str = "",
-    restart: bool = False,
-    separation_s: float | None = None,
-    viscous_per_mass: float = 0.0,
-    acceleration: friction_profile.Acceleration | None = None,
-    gravity_m_s2: float = 9.81,
-    period_s: float = math.nan,
-) -> SignatureResult:
-    """Take one capture into the state.
+@dataclass(frozen=True, slots=True)
+class CycleConditions:
+    """What is known of a cycle beside its capture.
 
-    Parameters
+    Attributes
     ----------
     batch_id : str
         Material; another one restarts the reference.
     restart : bool
         The tracker found a batch shift: restart the reference.
-    separation_s : float or None
-        Last loss of contact, if it is known; else it is found in the capture.
     viscous_per_mass : float
         k_v / m of the model, 1/s: one cycle cannot tell it from mu(x).
     acceleration : callable, optional
-        What else the model knows to depend on the speed, see `profile.information`.
+        What else the model knows to depend on the speed, see `friction_profile.information`.
+    gravity_m_s2 : float
     period_s : float
         Time between cycles.
     """
-    if restart or (batch_id and batch_id != state.batch_id and state.batch_id):
-        state = replace(state, reference=references.restart(state.reference), deviant_run=0)
-    if batch_id and batch_id != state.batch_id:
-        state = replace(state, batch_id=batch_id)
-    grid = settings.grid_m
-    try:
-        slide = extract_segment(capture, separation_s)
-    except NoSlideError as error:
+
+    batch_id: str = ""
+    restart: bool = False
+    viscous_per_mass: float = 0.0
+    acceleration: friction_profile.Acceleration | None = None
+    gravity_m_s2: float = 9.81
+    period_s: float = math.nan
+
+
+def update(
+    settings: SignatureSettings,
+    state: SignatureState,
+    features: Features,
+    conditions: CycleConditions = CycleConditions(),
+) -> SignatureResult:
+    """Take one cycle into the state."""
+    state = _of_material(state, conditions)
+    grid, slide = settings.grid_m, features.segment
+    if isinstance(slide, Fault):
         nothing = np.full(settings.points, math.nan)
-        signature = Signature(grid, nothing, nothing, math.nan, math.nan, math.nan, Quality.BAD, str(error))
+        signature = Signature(grid, nothing, nothing, math.nan, math.nan, math.nan, Quality.BAD, str(slide))
         return SignatureResult(state, signature, None, judged=False)
-    seen = friction_profile.information(slide, grid, gravity_m_s2, viscous_per_mass, acceleration)
-    friction, std = friction_profile.friction(seen, grid)
-    known = state.reference
-    if known.variation.cycles < settings.learned_cycles or known.weight < MIN_MATERIAL_CYCLES:
-        left = settings.learned_cycles - known.variation.cycles
-        left += int(max(settings.settled - known.weight, 0.0)) if left > 0 else 0
-        left = max(left, MIN_MATERIAL_CYCLES - int(known.weight))
-        reason = f"the reference is being learned, {left} more cycles"
-        signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
-        return SignatureResult(update_reference(state, seen, settings, None), signature, None, judged=False)
-    verdict = deviation_test.test_deviation(known, seen, grid)
-    limit = 1.0 / settings.false_alarm_cycles
-    deviant = verdict.p_value < limit
-    signature = Signature(
-        grid,
-        friction,
-        std,
-        verdict.t_squared,
-        verdict.spe,
-        verdict.at_m if deviant else math.nan,
-        Quality.GOOD,
+    information = friction_profile.information(
+        slide, grid, conditions.gravity_m_s2, conditions.viscous_per_mass, conditions.acceleration
     )
-    evidence = _evidence(settings, verdict, capture.cycle, period_s) if deviant else None
-    return SignatureResult(update_reference(state, seen, settings, verdict), signature, evidence, judged=True)
+    friction, std = friction_profile.friction(information, grid)
+    missing = _missing_cycles(settings, state.reference)
+    if missing:
+        reason = f"the reference is being learned, {missing} more cycles"
+        signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
+        return SignatureResult(
+            update_reference(state, information, settings, None), signature, None, judged=False
+        )
+    test = deviation_test.test_deviation(state.reference, information, grid)
+    is_deviant = test.p_value < 1.0 / settings.false_alarm_cycles
+    at_m = test.at_m if is_deviant else math.nan
+    signature = Signature(grid, friction, std, test.t_squared, test.spe, at_m, Quality.GOOD)
+    cycle = features.capture.cycle
+    evidence = _evidence(settings, test, cycle, conditions.period_s) if is_deviant else None
+    return SignatureResult(
+        update_reference(state, information, settings, test), signature, evidence, judged=True
+    )
+
+
+def _of_material(state: SignatureState, conditions: CycleConditions) -> SignatureState:
+    """Restart the reference where the material is another one, and keep its name."""
+    batch_id = conditions.batch_id
+    is_other = bool(batch_id and state.batch_id and batch_id != state.batch_id)
+    if conditions.restart or is_other:
+        state = replace(state, reference=references.restart(state.reference), deviant_run=0)
+    return replace(state, batch_id=batch_id) if batch_id and batch_id != state.batch_id else state
+
+
+def _missing_cycles(settings: SignatureSettings, reference: Reference) -> int:
+    """Cycles that are to be learned before one is judged."""
+    learned = reference.variation.cycles
+    if learned >= settings.learned_cycles and reference.weight >= MIN_MATERIAL_CYCLES:
+        return 0
+    missing = settings.learned_cycles - learned
+    missing += int(max(settings.settled - reference.weight, 0.0)) if missing > 0 else 0
+    return max(missing, MIN_MATERIAL_CYCLES - int(reference.weight))
 
 
 def update_reference(
     state: SignatureState,
-    seen: friction_profile.SplineInformation,
+    information: friction_profile.SplineInformation,
     settings: SignatureSettings,
-    verdict: deviation_test.DeviationTest | None,
+    test: deviation_test.DeviationTest | None,
 ) -> SignatureState:
     """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
-    if verdict is None:
-        fresh = references.update(state.reference, seen, settings.grid_m, settings.settled)
+    if test is None:
+        fresh = references.update(state.reference, information, settings.grid_m, settings.settled)
         return SignatureState(fresh, state.batch_id)
-    if verdict.p_value < 1.0 / settings.false_alarm_cycles:
+    if test.p_value < 1.0 / settings.false_alarm_cycles:
         run = state.deviant_run + 1
         if run < MAX_DEVIANT_RUN:
             return SignatureState(state.reference, state.batch_id, run)
         fresh = references.update(
-            references.restart(state.reference), seen, settings.grid_m, settings.settled
+            references.restart(state.reference), information, settings.grid_m, settings.settled
         )
         return SignatureState(fresh, state.batch_id)
-    spe = verdict.spe / verdict.spe_freedom if verdict.spe_freedom > 0 else None
-    fresh = references.update(state.reference, seen, settings.grid_m, settings.settled, spe)
+    spe = test.spe / test.spe_freedom if test.spe_freedom > 0 else None
+    fresh = references.update(state.reference, information, settings.grid_m, settings.settled, spe)
     return SignatureState(fresh, state.batch_id)
 
 
 def _evidence(
-    settings: SignatureSettings, verdict: deviation_test.DeviationTest, cycle: int, period_s: float
+    settings: SignatureSettings, test: deviation_test.DeviationTest, cycle: int, period_s: float
 ) -> Evidence:
     """Statistic and threshold as -log10 of p-values."""
-    rarity = -math.log10(max(verdict.p_value, 1e-300))
+    rarity = -math.log10(max(test.p_value, 1e-300))
     cycles = settings.false_alarm_cycles
     days = cycles * period_s / 86_400.0
-    return Evidence(rarity, math.log10(cycles), cycle, verdict.size, verdict.size_std, cycles, days)
+    return Evidence(rarity, math.log10(cycles), cycle, test.size, test.size_std, cycles, days)

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from impactcell.features.channels import check_channel
 from impactcell.numerics.local_polynomial import (
     channel_statistics,
     fit_polynomial,
     mean,
     median,
-    middle_second_difference,
+    median_third_difference,
     running_mean,
     value_at,
     value_std,
@@ -99,7 +100,7 @@ def test_scatter_and_means_of_blocks_hold_all_squares() -> None:
     rng = np.random.default_rng(8)
     times = np.cumsum(rng.uniform(0.2, 1.8, 500)) * 1e-5
     values = 1e3 + 2e4 * times + rng.normal(0.0, 0.3, 500)
-    made = average_blocks(Channel(times, values, 0.3), 2e-4, 2e-5, [])
+    made = average_blocks(check_channel(Channel(times, values, 0.3), "position"), 2e-4, 2e-5, [])
     line = 990.0 + 1.5e4 * made.time_s
     direct = float(np.square((values - 990.0 - 1.5e4 * times) / 0.3).sum())
     between = float(np.square((made.values - line) / made.std).sum())
@@ -109,17 +110,17 @@ def test_scatter_and_means_of_blocks_hold_all_squares() -> None:
 
 
 @given(
-    values=st.lists(st.integers(-5, 5) | st.floats(-1e6, 1e6), min_size=3, max_size=60).map(
+    values=st.lists(st.integers(-5, 5) | st.floats(-1e6, 1e6), min_size=4, max_size=60).map(
         lambda drawn: np.array(drawn, dtype=np.float64)
     )
 )
-def test_middle_second_difference_is_numpys_to_the_bit(values: np.ndarray) -> None:
+def test_median_third_difference_is_numpys_to_the_bit(values: np.ndarray) -> None:
     """Few distinct values, as codes give them, and many."""
-    assert middle_second_difference(values) == np.median(np.abs(np.diff(values, 2)))
+    assert median_third_difference(values) == np.median(np.abs(np.diff(values, 3)))
 
 
 @pytest.mark.parametrize("size", [20_000, 20_001])
-def test_middle_second_difference_of_ordered_and_of_equal_values(size: int) -> None:
+def test_median_third_difference_of_ordered_and_of_equal_values(size: int) -> None:
     ordered = np.arange(size, dtype=np.float64) ** 3
     for values in (ordered, -ordered, np.zeros(size)):
-        assert middle_second_difference(values) == np.median(np.abs(np.diff(values, 2)))
+        assert median_third_difference(values) == np.median(np.abs(np.diff(values, 3)))

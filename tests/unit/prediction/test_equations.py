@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import NegativeRootError, PredictionError
+from impactcell.features import MeasuredFeature
 from impactcell.physics import Plant, TapInput
 from impactcell.prediction import Model, Prior, calibrate, printed_predictor
 from impactcell.prediction.calibration import Regime, fit_predictor, regimes, velocity_spans
@@ -20,7 +21,6 @@ from impactcell.prediction.equations import (
     out_of_range,
     sliding_distance,
 )
-from impactcell.prediction.feature_extraction import MeasuredFeature
 from impactcell.records import Quality
 from tests.taps import VISCOUS, Tap
 

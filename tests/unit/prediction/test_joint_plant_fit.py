@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from impactcell.errors import PredictionError
+from impactcell.features import extract
 from impactcell.prediction.joint_plant_fit import contact_constants, estimate_mass, fit_plant
-from impactcell.prediction.slide_features import extract_slide
 from impactcell.records import Capture
 from tests.taps import Tap
 
@@ -29,7 +29,7 @@ def campaign(seed: int, effects: dict[str, dict[str, float]]) -> list[Capture]:
 
 
 def test_the_plant_is_found_within_its_error() -> None:
-    found = fit_plant(campaign(1, {}), 9.81)
+    found = fit_plant([extract(tap) for tap in campaign(1, {})], 9.81)
     plant, prior = found.model.plant, found.model.prior
     assert found.used == tuple(range(1, 17))
     assert 0.95 < found.gap < 1.05
@@ -41,7 +41,7 @@ def test_the_plant_is_found_within_its_error() -> None:
 
 
 def test_a_law_that_the_model_lacks_bends_it_little_and_is_seen() -> None:
-    found = fit_plant(campaign(2, DRAG), 9.81)
+    found = fit_plant([extract(tap) for tap in campaign(2, DRAG)], 9.81)
     assert found.gap > 1.5
     assert found.model.plant.stiffness_n_per_m == pytest.approx(7.1e5, rel=3e-3)
     assert found.model.plant.damping_n_s_per_m == pytest.approx(520.0, rel=0.02)
@@ -52,18 +52,18 @@ def test_a_law_that_the_model_lacks_bends_it_little_and_is_seen() -> None:
 def test_contact_constants_and_mass_need_no_law_of_friction() -> None:
     for effects in ({}, DRAG):
         for capture in campaign(3, effects)[4:]:
-            read = extract_slide(capture)
-            stiffness, damping = contact_constants(capture, read)
+            tap = extract(capture)
+            stiffness, damping = contact_constants(tap)
             assert stiffness == pytest.approx(7.1e5, rel=0.01)
             assert damping == pytest.approx(520.0, rel=0.05)
-            assert estimate_mass(capture, read) == pytest.approx(capture.mass_kg, rel=0.03)
+            assert estimate_mass(tap) == pytest.approx(capture.mass_kg, rel=0.03)
 
 
 def test_bad_shots_are_left_out_and_a_campaign_of_them_is_refused() -> None:
     captures = campaign(4, {})
     captures[2] = replace(captures[2], position=None)
-    assert 3 not in fit_plant(captures, 9.81).used
+    assert 3 not in fit_plant([extract(tap) for tap in captures], 9.81).used
     with pytest.raises(PredictionError, match="no tap of the campaign can be used; shot 3: no position"):
-        fit_plant([captures[2]], 9.81)
+        fit_plant([extract(tap) for tap in [captures[2]]], 9.81)
     with pytest.raises(PredictionError, match="there is none"):
         fit_plant([], 9.81)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from impactcell.features.channels import CheckedChannel
 from impactcell.prediction.block_averaging import average_blocks
 from impactcell.prediction.phase_reweighting import std_factors
 from impactcell.prediction.posterior import TruncatedGaussian, mixture
-from impactcell.records import Channel
 
 FORM, OFFSET = np.array([1.0, -1.0]), 0.3
 ABOVE = TruncatedGaussian(
@@ -70,7 +70,7 @@ def test_blocks_hold_every_sample_once(
 ) -> None:
     rng = np.random.default_rng(count)
     times = np.cumsum(rng.uniform(0.2, 1.8, count)) / rate
-    channel = Channel(times, rng.normal(size=count), 1.0)
+    channel = CheckedChannel(times, rng.normal(size=count), 1.0, sigma=1.0)
     made = average_blocks(channel, 1e-4, 1e-5, [(a, a + width) for a, width in fine], [edge])
     sizes = np.round(made.std**-2.0).astype(int)
     assert sizes.sum() == count

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError, NotConvergedError
+from impactcell.features import extract, noise_std
 from impactcell.physics import Plant, simulate_tap
 from impactcell.prediction import Model, Prior
-from impactcell.prediction.feature_extraction import noise_std
 from impactcell.prediction.linearised_model import tap_input, with_parameters
 from impactcell.prediction.waveform import fit
 from impactcell.records import Channel
@@ -31,7 +31,7 @@ def test_intervals_cover_and_errors_have_the_size_they_claim() -> None:
     pulls, inside = [], []
     for index in range(120):
         tap = drawn(rng, (2000, 3000, 4000, 5000, 6000)[index % 5])
-        found = fit(tap.capture(rng), MODEL)
+        found = fit(extract(tap.capture(rng)), MODEL)
         pulls.append([(found.mu_s - tap.mu_s) / found.mu_s_std, (found.mu_k - tap.mu_k) / found.mu_k_std])
         if index % 3 == 0:
             (low, high), (low_k, high_k) = found.interval()
@@ -45,7 +45,7 @@ def test_intervals_cover_and_errors_have_the_size_they_claim() -> None:
 
 def test_a_tap_that_moves_at_once_shows_mu_s_only_through_the_ratio() -> None:
     rng = np.random.default_rng(2)
-    found = fit(Tap(0.1, 0.16).capture(rng), MODEL)
+    found = fit(extract(Tap(0.1, 0.16).capture(rng)), MODEL)
     assert found.immediate > 0.999
     assert found.mu_s == pytest.approx(found.mu_k / 0.76, rel=2e-3)
     assert found.mu_s_std / found.mu_s == pytest.approx(0.03, rel=0.05)
@@ -55,7 +55,7 @@ def test_a_tap_that_moves_at_once_shows_mu_s_only_through_the_ratio() -> None:
 def test_a_tap_that_sticks_shows_mu_s_itself() -> None:
     rng = np.random.default_rng(3)
     tap = Tap(2000 / 6e4, 0.2, ratio=0.68)  # 12 % from the model's ratio
-    found = fit(tap.capture(rng), replace(MODEL, prior=Prior(6500.0, 9.3, 0.2)))
+    found = fit(extract(tap.capture(rng)), replace(MODEL, prior=Prior(6500.0, 9.3, 0.2)))
     assert found.immediate < 1e-6
     assert found.mu_s == pytest.approx(0.2, rel=0.05)
     assert abs(found.mu_s - 0.2) < 3.5 * found.mu_s_std
@@ -65,7 +65,7 @@ def test_a_tap_that_sticks_shows_mu_s_itself() -> None:
 def test_a_kink_that_passes_samples_to_and_fro_ends_in_an_estimate(seed: int) -> None:
     """Of 700 captures of this tap these are those in which full steps never settle."""
     tap = Tap(0.05, 0.177264, ratio=0.80317, stiffness=653811.5, damping=457.747)
-    found = fit(tap.capture(np.random.default_rng(seed)), MODEL)
+    found = fit(extract(tap.capture(np.random.default_rng(seed))), MODEL)
     assert abs(found.mu_s - tap.mu_s) < 3.5 * found.mu_s_std
     assert abs(found.mu_k - tap.mu_k) < 3.5 * found.mu_k_std
 
@@ -75,20 +75,20 @@ def test_with_the_ratio_fixed_mu_s_follows_mu_k() -> None:
     errors = []
     for velocity in (2000, 4000, 4800, 6000):
         tap = replace(drawn(rng, velocity), ratio=0.76)
-        found = fit(tap.capture(rng), MODEL, fixed_ratio=True)
+        found = fit(extract(tap.capture(rng)), MODEL, fixed_ratio=True)
         assert found.mu_k / found.mu_s == pytest.approx(0.76, rel=1e-4)
         errors.append(abs(found.mu_s / tap.mu_s - 1.0))
     assert np.mean(errors) < 0.003
 
 
 def test_either_direction_and_any_start_give_the_same() -> None:
-    plain = fit(Tap(0.06).capture(), MODEL)
+    plain = fit(extract(Tap(0.06).capture()), MODEL)
     for tap, from_zero in (
         (Tap(0.06, direction=-1), True),
         (Tap(0.06, start_m=0.1), True),
         (Tap(0.06, start_m=-0.1), False),
     ):
-        found = fit(tap.capture(from_table_zero=from_zero), MODEL)
+        found = fit(extract(tap.capture(from_table_zero=from_zero)), MODEL)
         assert found.mu_k == pytest.approx(plain.mu_k, rel=1e-6)
         assert found.mu_s == pytest.approx(plain.mu_s, rel=1e-4)
 
@@ -98,7 +98,7 @@ def test_a_stroke_within_the_contact_and_a_second_contact_are_fitted(stroke_m: f
     rng = np.random.default_rng(5)
     for mass, velocity in ((25.2, 0.1), (18.9, 2000 / 6e4)):
         tap = Tap(velocity, mass_kg=mass, stroke_m=stroke_m)
-        found = fit(tap.capture(rng), MODEL)
+        found = fit(extract(tap.capture(rng)), MODEL)
         assert 0.9 < found.gap < 1.1
         assert abs(found.mu_k - tap.mu_k) < 4.0 * found.mu_k_std
 
@@ -106,7 +106,10 @@ def test_a_stroke_within_the_contact_and_a_second_contact_are_fitted(stroke_m: f
 def test_1_mhz_and_10_khz_agree() -> None:
     rng = np.random.default_rng(6)
     tap = Tap(3000 / 6e4)
-    slow, fast = fit(tap.capture(rng), MODEL), fit(tap.capture(rng, force_hz=1e6, position_hz=4e4), MODEL)
+    slow, fast = (
+        fit(extract(tap.capture(rng)), MODEL),
+        fit(extract(tap.capture(rng, force_hz=1e6, position_hz=4e4)), MODEL),
+    )
     assert fast.mu_s_std < slow.mu_s_std
     assert abs(fast.mu_s - tap.mu_s) < 3.5 * fast.mu_s_std
     assert 0.95 < fast.gap < 1.05
@@ -116,14 +119,14 @@ def test_1_mhz_and_10_khz_agree() -> None:
 def test_noise_above_what_the_sensors_state_widens_the_standard_deviation() -> None:
     rng = np.random.default_rng(7)
     tap = Tap(3000 / 6e4)
-    honest = fit(tap.capture(rng), MODEL)
+    honest = fit(extract(tap.capture(rng)), MODEL)
     loud = tap.capture(rng, force_std_n=0.8, position_std_m=3e-6)
     assert loud.force is not None
     assert loud.position is not None
     loud = replace(
         loud, force=replace(loud.force, noise_std=0.4), position=replace(loud.position, noise_std=1.5e-6)
     )
-    found = fit(loud, MODEL)
+    found = fit(extract(loud), MODEL)
     assert found.gap == pytest.approx(2.0, rel=0.1)
     assert found.mu_k_std > 1.5 * honest.mu_k_std
 
@@ -131,7 +134,7 @@ def test_noise_above_what_the_sensors_state_widens_the_standard_deviation() -> N
 @pytest.mark.parametrize("stroke_m", [1.5e-3, 5e-3])
 def test_the_gap_is_that_of_every_sample(stroke_m: float) -> None:
     capture = Tap(2500 / 6e4, 0.2, stroke_m=stroke_m).capture(np.random.default_rng(7), force_hz=1e5)
-    found = fit(capture, MODEL)
+    found = fit(extract(capture), MODEL)
     motion = simulate_tap(with_parameters(MODEL.plant, found.theta), tap_input(capture))
     squares = []
     for channel, name in ((capture.force, "force_n"), (capture.position, "position_m")):
@@ -146,7 +149,7 @@ def test_an_effect_that_the_model_lacks_shows_in_the_gap_and_in_the_standard_dev
     drag = {**VISCOUS, "quadratic_drag": {"drag_coefficient_n_s2_per_m2": 40.0}}
     for velocity in (4000 / 6e4, 5000 / 6e4):
         tap = Tap(velocity, effects=drag)
-        found = fit(tap.capture(rng), MODEL)
+        found = fit(extract(tap.capture(rng)), MODEL)
         assert found.gap > 1.1
         assert abs(found.mu_k - tap.mu_k) < 4.0 * found.mu_k_std
 
@@ -156,11 +159,11 @@ def test_20_000_force_and_4_000_position_samples_take_milliseconds() -> None:
     assert capture.force is not None
     assert capture.position is not None
     assert len(capture.force.values) + len(capture.position.values) > 23_000
-    fit(capture, MODEL)
+    fit(extract(capture), MODEL)
     took = []
     for _ in range(15):
         start = time.process_time()
-        fit(capture, MODEL)
+        fit(extract(capture), MODEL)
         took.append(time.process_time() - start)
     assert min(took) < 0.02  # 3.5 ms on one quiet core; tests share theirs
 
@@ -170,20 +173,20 @@ def test_captures_that_cannot_be_fitted_are_refused_by_name() -> None:
     force = capture.force
     assert force is not None
     with pytest.raises(CaptureError, match="no force"):
-        fit(replace(capture, force=None), MODEL)
+        fit(extract(replace(capture, force=None)), MODEL)
     with pytest.raises(CaptureError, match="no position"):
-        fit(replace(capture, position=None), MODEL)
+        fit(extract(replace(capture, position=None)), MODEL)
     with pytest.raises(ClippedForceError):
-        fit(replace(capture, force=replace(force, values=np.minimum(force.values, 120.0))), MODEL)
+        fit(extract(replace(capture, force=replace(force, values=np.minimum(force.values, 120.0)))), MODEL)
     with pytest.raises(NoSeparationError):
-        fit(replace(capture, force=Channel(force.time_s[:90], force.values[:90], 0.4)), MODEL)
+        fit(extract(replace(capture, force=Channel(force.time_s[:90], force.values[:90], 0.4))), MODEL)
     for unknown in (replace(capture, mass_kg=math.nan), replace(capture, velocity_m_s=math.nan)):
         with pytest.raises(CaptureError, match="is not known"):
-            fit(unknown, MODEL)
+            fit(extract(unknown), MODEL)
 
 
 def test_a_capture_of_another_part_is_not_believed() -> None:
     capture = Tap(mass_kg=12.6).capture(np.random.default_rng(11))
     with pytest.raises(NotConvergedError) as caught:
-        fit(replace(capture, mass_kg=25.2), MODEL)
+        fit(extract(replace(capture, mass_kg=25.2)), MODEL)
     assert caught.value.gap > 3.0

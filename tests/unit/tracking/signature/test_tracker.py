@@ -7,12 +7,13 @@ from functools import partial
 import numpy as np
 import pytest
 
+from impactcell.features import extract, required
 from impactcell.physics import Plant, TapInput, free_motion
 from impactcell.records import Channel, Quality
 from impactcell.serialization import pack, unpack
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import friction_profile, tracker
-from impactcell.tracking.signature.slide_segment import extract_segment
+from impactcell.tracking.signature.tracker import CycleConditions
 from tests.benchmarks._slides import slide
 
 SETTINGS = tracker.SignatureSettings()
@@ -60,10 +61,12 @@ def test_what_the_model_knows_to_depend_on_the_speed_is_taken_out():
         capture = replace(capture, position=Channel(t, noisy, NOISE), direction=direction)
         known = partial(free_motion.acceleration, plant, TapInput(0.05, mass, direction=direction))
         state = tracker.initial_state(SETTINGS)
-        found = tracker.update(SETTINGS, state, capture, acceleration=known).signature
+        found = tracker.update(
+            SETTINGS, state, extract(capture), CycleConditions(acceleration=known)
+        ).signature
         inner = 0.85 * path.y[0, -1] > GRID
         assert found.friction[inner] == pytest.approx(0.2, abs=0.002)
-        without = tracker.update(SETTINGS, state, capture).signature
+        without = tracker.update(SETTINGS, state, extract(capture)).signature
         assert np.abs(without.friction[inner] - 0.2).max() > 0.008
 
 
@@ -73,7 +76,7 @@ def learned():
     outcomes = []
     for cycle in range(90):
         capture, _ = slide(textured(cycle), 0.09 + 0.001 * (cycle % 3), 1e4, NOISE, cycle)
-        outcomes.append(tracker.update(SETTINGS, state, capture))
+        outcomes.append(tracker.update(SETTINGS, state, extract(capture)))
         state = outcomes[-1].state
     return state, outcomes
 
@@ -84,7 +87,7 @@ def test_friction_against_an_independent_slide(rate, bound):
         return 0.2 * (1.0 + 0.1 * np.exp(-0.5 * ((x - 1e-3) / 0.4e-3) ** 2))
 
     capture, distance = slide(friction, 0.09, rate, NOISE, 3)
-    found = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), capture).signature
+    found = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), extract(capture)).signature
     use = np.abs(GRID / distance - 0.5) < 0.4
     error = found.friction[use] - friction(GRID[use])
     assert math.sqrt((error**2).mean()) < bound
@@ -111,10 +114,12 @@ def test_viscous_friction_of_the_model_is_taken_out():
     capture, _ = slide(textured(0), 0.09, 1e4, NOISE, 0)
     noisy = path.sol(t)[0] + NOISE * np.random.default_rng(0).normal(size=len(t))
     capture = replace(capture, position=Channel(t, noisy, NOISE))
-    with_model = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), capture, viscous_per_mass=4.5)
+    with_model = tracker.update(
+        SETTINGS, tracker.initial_state(SETTINGS), extract(capture), CycleConditions(viscous_per_mass=4.5)
+    )
     inner = slice(2, 13)
     assert with_model.signature.friction[inner] == pytest.approx(0.2, abs=0.002)
-    without = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), capture)
+    without = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), extract(capture))
     assert without.signature.friction[2] - without.signature.friction[12] > 0.01
 
 
@@ -123,7 +128,7 @@ def test_normal_cycles_are_not_deviant_and_a_bump_is_with_its_place(learned):
     assert not any(o.deviation for o in outcomes)
     assert [o.judged for o in outcomes].index(True) == 58  # the first eight show no variation yet, fifty do
     capture, _ = slide(textured(500, bump=0.1), 0.09, 1e4, NOISE, 500)
-    odd = tracker.update(SETTINGS, state, capture)
+    odd = tracker.update(SETTINGS, state, extract(capture))
     assert odd.deviation is not None
     assert odd.deviation.statistic > odd.deviation.threshold == 5.0
     assert odd.signature.deviates_at_m == pytest.approx(1e-3, abs=0.3e-3)
@@ -137,7 +142,7 @@ def test_size_and_place_of_a_bump_are_those_of_the_likeliest_one(learned, bump):
     state, _ = learned
     for cycle in range(500, 504):
         capture, _ = slide(textured(cycle, bump=bump), 0.09, 1e4, NOISE, cycle)
-        odd = tracker.update(SETTINGS, state, capture)
+        odd = tracker.update(SETTINGS, state, extract(capture))
         assert odd.deviation.size == pytest.approx(0.2 * bump, rel=0.25, abs=0.003)
         assert abs(odd.deviation.size - 0.2 * bump) < 3.0 * odd.deviation.size_std < 0.3 * bump
         assert odd.signature.deviates_at_m == pytest.approx(1e-3, abs=0.15e-3)
@@ -159,7 +164,7 @@ def test_another_velocity_is_no_alarm_where_viscous_friction_is_known(speeds):
     state, odd = tracker.initial_state(SETTINGS), []
     for cycle, speed in enumerate(speeds):
         capture, _ = slide(varying(cycle), speed, 2e3, NOISE, cycle, viscous_per_mass=4.5)
-        done = tracker.update(SETTINGS, state, capture, viscous_per_mass=4.5)
+        done = tracker.update(SETTINGS, state, extract(capture), CycleConditions(viscous_per_mass=4.5))
         state = done.state
         if done.deviation is not None:
             odd.append(cycle)
@@ -178,7 +183,7 @@ def test_a_place_is_judged_only_once_its_variation_is_known():
             return 0.2 * (1.0 + 0.03 * np.sin(2.0 * np.pi * x / 1.3e-3 + phase) + shape)
 
         capture, _ = slide(friction, speed, 2e3, NOISE, cycle, viscous_per_mass=4.5)
-        done = tracker.update(SETTINGS, state, capture, viscous_per_mass=4.5)
+        done = tracker.update(SETTINGS, state, extract(capture), CycleConditions(viscous_per_mass=4.5))
         state = done.state
         if done.deviation is not None:
             odd.append(cycle)
@@ -189,7 +194,7 @@ def test_longer_slides_after_another_material_are_no_alarm():
     state, odd = tracker.initial_state(SETTINGS), []
     for cycle, speed in enumerate([0.07] * 70 + [0.07, 0.08, 0.09, 0.1] * 14):
         capture, _ = slide(varying(cycle), speed, 2e3, NOISE, cycle)
-        done = tracker.update(SETTINGS, state, capture, restart=cycle == 70)
+        done = tracker.update(SETTINGS, state, extract(capture), CycleConditions(restart=cycle == 70))
         state = done.state
         if done.deviation is not None:
             odd.append(cycle)
@@ -207,7 +212,9 @@ def test_the_first_cycles_of_another_material_are_judged_by_what_is_known_of_it(
             return usual(x) * (1.0 + step + bump * np.exp(-0.5 * ((x - 1.2e-3) / 0.3e-3) ** 2))
 
         capture, _ = slide(friction, 0.08, 1e4, NOISE, cycle)
-        done = tracker.update(settings, state, capture, batch_id="A" if cycle < 16 else "B")
+        done = tracker.update(
+            settings, state, extract(capture), CycleConditions(batch_id="A" if cycle < 16 else "B")
+        )
         state = done.state
         if done.deviation is not None:
             odd.append(cycle)
@@ -223,15 +230,20 @@ def test_t_squared_is_about_its_three_degrees_of_freedom(learned):
 def test_another_material_is_learned_before_it_is_judged(learned):
     state, _ = learned
     capture, _ = slide(textured(1), 0.09, 1e4, NOISE, 1)
-    first = tracker.update(SETTINGS, replace(state, batch_id="A"), capture, batch_id="B")
+    first = tracker.update(
+        SETTINGS, replace(state, batch_id="A"), extract(capture), CycleConditions(batch_id="B")
+    )
     assert not first.judged
     assert "being learned, 5 more cycles" in first.signature.reason
     after = first.state
     for cycle in range(2, 8):
         after = tracker.update(
-            SETTINGS, after, slide(textured(cycle), 0.09, 1e4, NOISE, cycle)[0], batch_id="B"
+            SETTINGS,
+            after,
+            extract(slide(textured(cycle), 0.09, 1e4, NOISE, cycle)[0]),
+            CycleConditions(batch_id="B"),
         ).state
-    assert tracker.update(SETTINGS, after, capture, batch_id="B").judged
+    assert tracker.update(SETTINGS, after, extract(capture), CycleConditions(batch_id="B")).judged
 
 
 @pytest.mark.parametrize(
@@ -247,7 +259,7 @@ def test_another_material_is_learned_before_it_is_judged(learned):
 def test_a_capture_without_a_slide_says_why(learned, position, why):
     state, _ = learned
     capture, _ = slide(textured(1), 0.09, 1e4, NOISE, 1)
-    done = tracker.update(SETTINGS, state, replace(capture, position=position))
+    done = tracker.update(SETTINGS, state, extract(replace(capture, position=position)))
     assert why in done.signature.reason
     assert done.signature.quality is Quality.BAD
     assert not done.judged
@@ -258,14 +270,14 @@ def test_a_restored_state_replays_to_the_same_bits(learned):
     state, _ = learned
     capture, _ = slide(textured(7), 0.09, 1e4, NOISE, 7)
     restored = unpack(tracker.SignatureState, pack(state))
-    ours, theirs = (tracker.update(SETTINGS, s, capture) for s in (state, restored))
+    ours, theirs = (tracker.update(SETTINGS, s, extract(capture)) for s in (state, restored))
     assert pack(ours.state) == pack(theirs.state)
     assert ours.signature.friction.tobytes() == theirs.signature.friction.tobytes()
 
 
 def test_smoothing_is_the_posterior_averaged_over_its_strength():
     capture, _ = slide(textured(4, bump=0.2), 0.09, 1e4, NOISE, 4)
-    seen = friction_profile.information(extract_segment(capture), GRID, 9.81)
+    seen = friction_profile.information(required(extract(capture).segment), GRID, 9.81)
     n = seen.seen
     G, h, D = seen.matrix[:n, :n], seen.vector[:n], friction_profile.roughness(n)
     strengths = friction_profile.SMOOTHING_STRENGTHS * np.trace(G) / np.trace(D)
@@ -292,7 +304,7 @@ def test_smoothing_is_the_posterior_averaged_over_its_strength():
 
 def test_splines_reproduce_a_straight_line():
     capture, distance = slide(lambda x: 0.2 + 5.0 * x, 0.09, 1e5, 1e-9, 2)
-    found = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), capture).signature
+    found = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), extract(capture)).signature
     use = np.abs(GRID / distance - 0.5) < 0.4
     assert found.friction[use] == pytest.approx(0.2 + 5.0 * GRID[use], abs=2e-4)
     assert friction_profile.roughness(5) @ np.arange(5.0) == pytest.approx(0.0)

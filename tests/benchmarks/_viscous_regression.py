@@ -16,9 +16,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from impactcell.errors import CaptureError, PhysicsError, PredictionError
-from impactcell.prediction.block_averaging import BlockMeans, average_blocks
-from impactcell.prediction.feature_extraction import displacement
-from impactcell.prediction.slide_features import extract_slide
+from impactcell.features import extract, required
+from impactcell.prediction.block_averaging import average_blocks
 from impactcell.records import Capture, Samples
 
 BLOCK_S = 5e-4
@@ -47,6 +46,15 @@ class ViscousFit:
     std: float
     mu_k: Samples
     used: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """Block means of one slide: times, s, positions, m, and the standard deviations of these."""
+
+    time_s: Samples
+    values: Samples
+    std: Samples
 
 
 def by_least_squares(captures: Sequence[Capture], gravity_m_s2: float = 9.81) -> ViscousFit:
@@ -115,13 +123,13 @@ def by_decrement(captures: Sequence[Capture], gravity_m_s2: float = 9.81) -> Vis
     return ViscousFit(mean, std, np.array(mu_k), tuple(cycle for cycle, _, _ in slides))
 
 
-def _slides(captures: Sequence[Capture]) -> list[tuple[int, float, BlockMeans]]:
+def _slides(captures: Sequence[Capture]) -> list[tuple[int, float, Path]]:
     """Cycle, mass and blocks of position of each free slide, time counted from its beginning."""
     found, fault = [], "there is none"
     for capture in captures:
         try:
-            read = extract_slide(capture)
-            path = displacement(capture)
+            features = extract(capture)
+            read, path = required(features.slide), required(features.position)
         except (PredictionError, PhysicsError) as error:
             fault = f"cycle {capture.cycle}: {error}"
             continue
@@ -138,13 +146,13 @@ def _slides(captures: Sequence[Capture]) -> list[tuple[int, float, BlockMeans]]:
             continue
         moved = capture.direction * inside.values[kept]
         times = inside.time_s[kept] - (read.separation_s + margin)
-        found.append((capture.cycle, capture.mass_kg, BlockMeans(times, moved, inside.std[kept])))
+        found.append((capture.cycle, capture.mass_kg, Path(times, moved, inside.std[kept])))
     if not found:
         raise CaptureError(f"no slide can be used; {fault}")
     return found
 
 
-def _fit_slide(path: BlockMeans, rate: float) -> tuple[tuple[float, float, float], float]:
+def _fit_slide(path: Path, rate: float) -> tuple[tuple[float, float, float], float]:
     """x_0, x'_0 and the coefficient of phi, and the sum of squares, for k_v / m = `rate`."""
     t, weight = path.time_s, 1.0 / path.std
     x = rate * t
@@ -159,7 +167,7 @@ def _fit_slide(path: BlockMeans, rate: float) -> tuple[tuple[float, float, float
     return (start, speed, bend), float(residual @ residual)
 
 
-def _at(path: BlockMeans, time_s: float, half_s: float) -> float:
+def _at(path: Path, time_s: float, half_s: float) -> float:
     """Position at a time, from a parabola through its neighbourhood."""
     near = np.flatnonzero(np.abs(path.time_s - time_s) <= half_s)
     if len(near) < 4:

@@ -1,4 +1,4 @@
-"""The free slide as read off a capture: distance from the last loss of contact to rest, and deceleration."""
+"""The free slide of a capture: distance from the last loss of contact to rest, and deceleration."""
 
 import cmath
 import math
@@ -6,27 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError
+from impactcell.errors import NoSeparationError, NoStopError
+from impactcell.features.channels import CheckedChannel, rest_samples
+from impactcell.features.measured import MeasuredFeature
 from impactcell.numerics.local_polynomial import fit_polynomial, mean, median, value_at, value_std
-from impactcell.prediction.feature_extraction import (
-    MeasuredFeature,
-    check_channel,
-    displacement,
-    loss_of_contact,
-    noise_std,
-)
-from impactcell.records import Capture, Samples
+from impactcell.records import Samples
 
 
 @dataclass(frozen=True, slots=True)
 class SlideFeatures:
-    """The free slide as read off a capture.
+    """The free slide of a tap.
 
     Attributes
     ----------
     distance : Reading
         From the last loss of contact to rest, m, positive along the tap.
     separation_s, stop_s : float
+        Times of the last loss of contact and of rest.
     deceleration : Reading
         Mean deceleration of the slide, m/s².
     """
@@ -37,26 +33,24 @@ class SlideFeatures:
     deceleration: MeasuredFeature
 
 
-def extract_slide(capture: Capture) -> SlideFeatures:
-    """Read the free slide: where contact was last lost, where the part came to rest, and how it braked.
+def extract_slide(path: CheckedChannel, separation: MeasuredFeature) -> SlideFeatures:
+    """Extract the free slide: from the last loss of contact to rest, and how the part braked.
+
+    Parameters
+    ----------
+    path : CheckedChannel
+        Displacement, positive along the tap.
+    separation : MeasuredFeature
+        Time at which contact was last lost, s.
 
     Raises
     ------
-    CaptureError
-        A channel cannot be used.
-    NoBreakawayError, NoSeparationError, NoStopError
-        The part did not move, did not leave the actuator, or had not come to rest when the record ended.
+    NoSeparationError, NoStopError
+        The part did not leave the actuator, or had not come to rest, when the record ended.
     """
-    position = displacement(capture)
-    sigma = noise_std(position)
-    times = position.time_s
-    moved = capture.direction * position.values
-    tail = max(5, len(moved) // 50)
-    if abs(mean(moved[-tail:]) - mean(moved[:tail])) < 6.0 * sigma:
-        raise NoBreakawayError(f"the part moved less than {6.0 * sigma:.3g} m")
-    separation = loss_of_contact(check_channel(capture.force, "force"))
+    times, moved, sigma = path.time_s, path.values, path.sigma
     separation_s = separation.value
-    if separation_s >= times[-tail]:
+    if separation_s >= times[-rest_samples(len(moved))]:
         raise NoSeparationError("contact was lost only when the position record ended")
     start = _value_at_separation(times, moved, separation_s, sigma)
     rest, stop_s, deceleration = _rest_and_deceleration(times, moved, separation_s, sigma)
@@ -69,8 +63,7 @@ def _rest_and_deceleration(
     times: Samples, moved: Samples, separation_s: float, sigma: float
 ) -> tuple[MeasuredFeature, float, MeasuredFeature]:
     """Level at rest, time of rest, mean deceleration; a parabola through the slide tells when it stopped."""
-    tail = max(5, len(moved) // 50)
-    final = median(moved[-tail:])
+    final = median(moved[-rest_samples(len(moved)) :])
     first = int(times.searchsorted(separation_s, "right"))
     sliding = final - moved[first:] > 8.0 * sigma
     if np.count_nonzero(sliding) < 8:

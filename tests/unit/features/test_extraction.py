@@ -15,15 +15,9 @@ from impactcell.errors import (
     PhysicsError,
     PredictionError,
 )
-from impactcell.prediction.feature_extraction import (
-    check_channel,
-    check_if_usable,
-    displacement,
-    loss_of_contact,
-    noise_std,
-    peak_force,
-)
-from impactcell.prediction.slide_features import extract_slide
+from impactcell.features import extract, noise_std, required, white_noise_std
+from impactcell.features.channels import check_channel, check_force, displacement
+from impactcell.features.contact import loss_of_contact, peak_force
 from impactcell.records import Channel
 from tests.taps import Tap
 
@@ -46,7 +40,7 @@ def test_the_peak_is_unbiased_where_the_raw_maximum_is_not(tap: Tap, rate_hz: fl
     highest = clean.values.max()
     for _ in range(20):
         noisy = replace(clean, values=clean.values + rng.normal(0.0, 0.4, len(clean.values)))
-        readings.append(peak_force(noisy))
+        readings.append(peak_force(check_force(noisy)))
         raw.append(noisy.values.max())
     values = np.array([reading.value for reading in readings])
     assert abs(values.mean() / true - 1.0) < 1e-3
@@ -60,7 +54,7 @@ def test_the_peak_is_unbiased_where_the_raw_maximum_is_not(tap: Tap, rate_hz: fl
 def test_sliding_distance_and_loss_of_contact_are_those_of_the_motion(tap: Tap) -> None:
     rng = np.random.default_rng(2)
     motion = tap.motion()
-    found = [extract_slide(tap.capture(rng)) for _ in range(20)]
+    found = [required(extract(tap.capture(rng)).slide) for _ in range(20)]
     distances = np.array([one.distance.value for one in found])
     assert abs(distances.mean() - motion.sliding_distance_m) < 1e-6
     assert distances.std() < 3e-6
@@ -73,13 +67,13 @@ def test_the_last_of_two_contacts_counts() -> None:
     tap = Tap(2000 / 6e4, stroke_m=5e-3)
     motion = tap.motion()
     assert [event.kind for event in motion.events].count("separation") > 1
-    found = extract_slide(tap.capture(np.random.default_rng(3)))
+    found = required(extract(tap.capture(np.random.default_rng(3))).slide)
     assert found.separation_s == pytest.approx(motion.separation_s, abs=1e-4)
     assert found.distance.value == pytest.approx(motion.sliding_distance_m, abs=1e-5)
 
 
 def test_the_deceleration_of_a_slide_without_viscous_friction_is_mu_k_g() -> None:
-    found = extract_slide(Tap(0.08, effects={}).capture(np.random.default_rng(4)))
+    found = required(extract(Tap(0.08, effects={}).capture(np.random.default_rng(4))).slide)
     assert found.deceleration.value == pytest.approx(0.152 * 9.81, rel=1e-3)
 
 
@@ -96,7 +90,7 @@ def test_a_coarse_raster_does_not_hide_the_peak() -> None:
     capture = Tap().capture(np.random.default_rng(6))
     assert capture.force is not None
     coarse = replace(capture.force, values=np.round(capture.force.values), resolution=1.0)
-    assert peak_force(coarse).value == pytest.approx(Tap().motion().peak_force_n, abs=0.5)
+    assert peak_force(check_force(coarse)).value == pytest.approx(Tap().motion().peak_force_n, abs=0.5)
 
 
 def channel(values: object) -> Channel:
@@ -126,7 +120,7 @@ def test_a_force_without_contact_is_named() -> None:
     noise = channel(np.random.default_rng(7).normal(0.0, 0.4, 400))
     for read in (peak_force, loss_of_contact):
         with pytest.raises(CaptureError, match="no contact"):
-            read(noise)
+            read(check_force(noise))
 
 
 def test_clipped_force_is_named_by_full_scale_and_by_its_plateau() -> None:
@@ -134,10 +128,10 @@ def test_clipped_force_is_named_by_full_scale_and_by_its_plateau() -> None:
     assert force is not None
     clipped = replace(force, values=np.minimum(force.values, 150.0))
     with pytest.raises(ClippedForceError, match="samples in a row stand at 150 N"):
-        peak_force(clipped)
+        peak_force(check_force(clipped))
     with pytest.raises(ClippedForceError, match="at full scale, 150 N"):
-        peak_force(replace(clipped, full_scale=(-10.0, 150.0)))
-    peak_force(replace(force, full_scale=(-10.0, 500.0)))
+        peak_force(check_force(replace(clipped, full_scale=(-10.0, 150.0))))
+    peak_force(check_force(replace(force, full_scale=(-10.0, 500.0))))
 
 
 def test_a_record_that_ends_in_contact_or_in_motion_is_named() -> None:
@@ -147,14 +141,18 @@ def test_a_record_that_ends_in_contact_or_in_motion_is_named() -> None:
     assert position is not None
     short = Channel(force.time_s[:100], force.values[:100], 0.4)
     with pytest.raises(NoSeparationError, match="when its record ended"):
-        extract_slide(replace(capture, force=short))
+        required(extract(replace(capture, force=short)).slide)
     with pytest.raises(NoStopError, match="still moving"):
-        extract_slide(
-            replace(capture, position=Channel(position.time_s[:300], position.values[:300], 1.5e-6))
+        required(
+            extract(
+                replace(capture, position=Channel(position.time_s[:300], position.values[:300], 1.5e-6))
+            ).slide
         )
     with pytest.raises(NoSeparationError):
-        extract_slide(
-            replace(capture, position=Channel(position.time_s[:150], position.values[:150], 1.5e-6))
+        required(
+            extract(
+                replace(capture, position=Channel(position.time_s[:150], position.values[:150], 1.5e-6))
+            ).slide
         )
 
 
@@ -162,7 +160,7 @@ def test_a_part_that_does_not_move_is_named() -> None:
     capture = Tap().capture(np.random.default_rng(10))
     still = channel(np.random.default_rng(11).normal(0.0, 1.5e-6, 600))
     with pytest.raises(NoBreakawayError, match="moved less than"):
-        extract_slide(replace(capture, position=replace(still, noise_std=1.5e-6)))
+        required(extract(replace(capture, position=replace(still, noise_std=1.5e-6))).slide)
 
 
 def test_any_part_of_a_capture_is_read_or_refused_by_name() -> None:
@@ -176,8 +174,8 @@ def test_any_part_of_a_capture_is_read_or_refused_by_name() -> None:
                 capture.position.time_s[first:last], capture.position.values[first:last], 1.5e-6
             )
             try:
-                peak_force(force)
-                found = extract_slide(replace(capture, force=force, position=position))
+                peak_force(check_force(force))
+                found = required(extract(replace(capture, force=force, position=position)).slide)
             except (PredictionError, PhysicsError):
                 continue
             assert math.isfinite(found.distance.value)
@@ -190,24 +188,41 @@ def test_positions_are_counted_from_where_the_part_lay() -> None:
         assert displacement(capture).values[0] == pytest.approx(0.0, abs=1e-5)
 
 
-@pytest.mark.parametrize("known_n", [None, 0.4])
-def test_a_channel_whose_noise_was_found_before_is_read_alike(known_n: float | None) -> None:
-    force = Tap(0.07).capture(force_hz=1e5).force
-    assert force is not None
-    noisy = replace(
-        force,
-        values=force.values + np.random.default_rng(3).normal(0.0, 0.4, len(force.values)),
-        noise_std=known_n,
-    )
-    once = check_if_usable(noisy, "force")
-    assert once is not None
-    assert noise_std(once) == noise_std(noisy)
-    assert peak_force(once) == peak_force(noisy)
-    assert loss_of_contact(once) == loss_of_contact(noisy)
-
-
-def test_a_channel_that_cannot_be_used_is_still_refused_after_its_noise_was_asked_for() -> None:
+def test_a_channel_that_cannot_be_used_is_named_in_the_place_of_its_features() -> None:
     flat = Channel(np.arange(20) * 1e-3, np.ones(20))
-    with pytest.raises(CaptureError, match="constant"):
-        check_channel(check_if_usable(flat, "force"), "force")
-    assert check_if_usable(None, "force") is None
+    features = extract(replace(Tap().capture(np.random.default_rng(13)), force=flat))
+    for feature in (
+        features.force,
+        features.peak_force,
+        features.separation,
+        features.slide,
+        features.segment,
+    ):
+        with pytest.raises(CaptureError, match="the force is constant"):
+            required(feature)
+    assert required(features.position).sigma == 1.5e-6
+
+
+def test_the_segment_is_the_slide_from_separation_to_just_before_rest() -> None:
+    tap = Tap(0.06, direction=-1, start_m=0.01, effects={})
+    motion = tap.motion()
+    features = extract(tap.capture(np.random.default_rng(14)))
+    segment, slide = required(features.segment), required(features.slide)
+    assert segment.distance_m[-1] == pytest.approx(slide.distance.value, abs=3e-5)
+    assert slide.separation_s + segment.time_s[-1] < motion.stop_s
+    true = motion.position_m(slide.separation_s + segment.time_s) - motion.position_m(
+        np.array([motion.separation_s])
+    )
+    assert segment.distance_m == pytest.approx(-true, abs=5e-6)
+    fitted = np.polyfit(segment.time_s, segment.distance_m, 2)
+    assert -2.0 * fitted[0] == pytest.approx(0.152 * 9.81, rel=5e-3)
+
+
+def test_noise_is_found_beside_a_motion_and_beside_jumps() -> None:
+    rng = np.random.default_rng(15)
+    times = np.linspace(0.0, 1.0, 2000)
+    values = 3.0 + 40.0 * times**2 + np.where(times > 0.5, 10.0, 0.0) + rng.normal(0.0, 0.02, 2000)
+    assert white_noise_std(values) == pytest.approx(0.02, rel=0.1)
+    coarse = np.round(values[:900] * 0.5) / 0.5  # more than half of the differences are zero
+    assert 0.0 < white_noise_std(coarse) < 2.0
+    assert math.isnan(white_noise_std(values[:3]))

@@ -1,0 +1,22 @@
+"""What is extracted from a capture, once: peak force, separation, slide, rest, noise of each channel."""
+
+from impactcell.features.channels import CheckedChannel, CheckedForce
+from impactcell.features.extraction import Fault, Features, extract, required
+from impactcell.features.measured import MeasuredFeature
+from impactcell.features.noise import noise_std, white_noise_std
+from impactcell.features.segment import SlideSegment
+from impactcell.features.slide import SlideFeatures
+
+__all__ = [
+    "CheckedChannel",
+    "CheckedForce",
+    "Fault",
+    "Features",
+    "MeasuredFeature",
+    "SlideFeatures",
+    "SlideSegment",
+    "extract",
+    "noise_std",
+    "required",
+    "white_noise_std",
+]
