@@ -18,12 +18,11 @@ from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader
 from impactcell.fieldbus.capture_ring import cycles_after, next_capture
 from impactcell.fieldbus.decoding import StatusBlock
-from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.poll_schedule import PollSchedule
 from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import RegisterMap, Value
-from impactcell.fieldbus.transport import ModbusClient
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId, ModuleStatus
 
@@ -43,8 +42,8 @@ class ModuleAcquisition:
     ----------
     cell : str
         The cell's name, for messages.
-    link : ModuleLink
-        How to reach the module.
+    client : ModbusClient
+        Reaches the module, over whatever transport.
     registers : RegisterMap
         Its layout.
     on_change : callable, optional
@@ -54,19 +53,19 @@ class ModuleAcquisition:
     def __init__(
         self,
         cell: str,
-        link: ModuleLink,
+        client: ModbusClient,
         registers: RegisterMap,
         on_change: Callable[[ModuleStatus], None] | None = None,
     ) -> None:
         self.cell = cell
-        self.link = link
+        self.link = client.link
         self.registers = registers
         self._log = CellLogger(logging.getLogger(__name__), cell)
         self.status_block: StatusBlock | None = None
         """What the module said at the last poll; None before the first."""
         self._status_values: Mapping[str, Value] = {}
-        self._client = ModbusClient(link)
-        self.device = RegisterClient(self._client, registers)
+        self._client = client
+        self.device = RegisterClient(client, registers)
         self._reader = CaptureReader(cell, self.device)
         self._status = ModuleStatus()
         self._on_change = on_change

@@ -1,19 +1,12 @@
-"""Modbus TCP frames and the four functions used, without any input or output.
+"""Requests and replies of the functions used, as protocol data units: without a frame, a transport or a wait.
 
-Layout (Modbus Messaging on TCP/IP V1.0b, section 3.1)::
-
-    [ transaction 2 ][ protocol = 0 2 ][ length 2 ][ unit 1 ][ function 1 ][ data ]
-                                        length = unit + function + data, 2..254
-
-Requests are pymodbus's PDUs. Framing and replies are read here, for pymodbus's do not hold up: its framer
-waits for ever behind a frame of another protocol, knows no largest length, takes nine bytes where a header
-says eight, and its reply to a read is neither compared with the request nor fast (31 µs for 125 registers,
-against 0.3 µs here). Should that change, `tests/unit/fieldbus/test_codec.py` says so.
+A PDU is a function code and its data, at most 253 bytes (Modbus Application Protocol V1.1b3, section 4.1);
+what frames it, and which unit it is for, is the transport's to say. Requests are encoded by pymodbus. Replies
+are read here, for pymodbus's are neither compared with the request nor fast (31 µs for 125 registers, against
+0.3 µs here). Should that change, `tests/unit/fieldbus/test_codec.py` says so.
 """
 
 import enum
-import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -28,9 +21,6 @@ from pymodbus.pdu.register_message import (
 from impactcell.errors import ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.registers import Words
 
-HEADER: Final = struct.Struct(">HHHB")
-MAX_LENGTH: Final = 254
-"""Unit and PDU; a PDU has at most 253 bytes."""
 MAX_READ: Final = 125
 """Registers that one request can read (Modbus Application Protocol V1.1b3, 6.3)."""
 MAX_WRITE: Final = 123
@@ -77,32 +67,21 @@ class Request:
         How it must begin: function and byte count of a read, the whole echo of a write.
     description : str
         The request in words, for messages.
-    frame_tail : bytes
-        The request's frame after its transaction.
-    reply_head : bytes
-        A good reply's frame after its transaction, as far as it is known beforehand: up to its data.
-    data_length : int
-        Bytes of data of a good reply.
     """
 
     pdu: bytes
     reply_length: int
     reply_prefix: bytes
     description: str
-    frame_tail: bytes
-    reply_head: bytes
-    data_length: int
 
-
-def _request(unit: int, pdu: bytes, reply_length: int, reply_prefix: bytes, description: str) -> Request:
-    frame_tail, head = frame(0, unit, pdu)[2:], HEADER.pack(0, 0, reply_length + 1, unit)[2:] + reply_prefix
-    return Request(
-        pdu, reply_length, reply_prefix, description, frame_tail, head, reply_length - len(reply_prefix)
-    )
+    @property
+    def data_length(self) -> int:
+        """Bytes of data of a good reply."""
+        return self.reply_length - len(self.reply_prefix)
 
 
 @lru_cache(maxsize=4096)
-def read_request(function: FunctionCode, address: int, count: int, unit: int = 1) -> Request:
+def read_request(function: FunctionCode, address: int, count: int) -> Request:
     """Request for `count` registers from `address` on (cached: the same blocks are read every cycle).
 
     Raises
@@ -117,10 +96,10 @@ def read_request(function: FunctionCode, address: int, count: int, unit: int = 1
     description = (
         f"{count} {'holding' if function == FunctionCode.READ_HOLDING else 'input'} registers from {address}"
     )
-    return _request(unit, pdu, 2 + 2 * count, bytes([function, 2 * count]), description)
+    return Request(pdu, 2 + 2 * count, bytes([function, 2 * count]), description)
 
 
-def write_request(address: int, words: Words, unit: int = 1) -> Request:
+def write_request(address: int, words: Words) -> Request:
     """Request that writes `words` from `address` on: function 6 for one register, 16 for more.
 
     Raises
@@ -136,15 +115,10 @@ def write_request(address: int, words: Words, unit: int = 1) -> Request:
     if count == 1:
         single = WriteSingleRegisterRequest(address=address, registers=values)
         pdu = bytes([FunctionCode.WRITE_SINGLE]) + single.encode()
-        return _request(unit, pdu, 5, pdu, description)
+        return Request(pdu, 5, pdu, description)
     multiple = WriteMultipleRegistersRequest(address=address, registers=values)
     pdu = bytes([FunctionCode.WRITE_MULTIPLE]) + multiple.encode()
-    return _request(unit, pdu, 5, pdu[:5], description)
-
-
-def frame(transaction: int, unit: int, pdu: bytes) -> bytes:
-    """Put a PDU into a frame."""
-    return HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
+    return Request(pdu, 5, pdu[:5], description)
 
 
 def check_reply(request: Request, pdu: bytes) -> bytes:
@@ -171,49 +145,3 @@ def check_reply(request: Request, pdu: bytes) -> bytes:
             f"{request.description}: answered with {len(pdu)} bytes instead of {request.reply_length}"
         )
     raise ProtocolError(f"{request.description}: the answer is for another request")
-
-
-class FrameReader:
-    """Cuts a stream of bytes into frames, however it arrives: in pieces, or several at once."""
-
-    __slots__ = ("_buffer",)
-
-    def __init__(self) -> None:
-        self._buffer = b""
-
-    @property
-    def pending(self) -> int:
-        """Bytes that are held back because their frame is not complete."""
-        return len(self._buffer)
-
-    def take(self, data: bytes) -> bytes:
-        """Hand over what is held back, and `data` behind it, to be fed again where it is not used."""
-        buffer, self._buffer = self._buffer, b""
-        return buffer + data if buffer else data
-
-    def feed(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
-        """Take in `data`; yield transaction, unit and PDU of each complete frame.
-
-        Raises
-        ------
-        ProtocolError
-            At a header that is not Modbus TCP; what follows it cannot be trusted, the connection has to go.
-        """
-        buffer = self._buffer + data if self._buffer else data
-        at, size = 0, len(buffer)
-        unpack, header = HEADER.unpack_from, HEADER.size
-        try:
-            while size - at >= header:
-                transaction, protocol, length, unit = unpack(buffer, at)
-                if protocol or not 2 <= length <= MAX_LENGTH:
-                    raise ProtocolError(
-                        f"not a Modbus TCP frame: protocol {protocol}, length {length} (2..{MAX_LENGTH})"
-                    )
-                end = at + 6 + length
-                if end > size:
-                    break
-                pdu = buffer[at + header : end]
-                at = end
-                yield transaction, unit, pdu
-        finally:
-            self._buffer = buffer[at:]

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from impactcell.errors import ProtocolError
 from impactcell.fieldbus.codec import MAX_WRITE
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Words
 from impactcell.fieldbus.request_batching import PartialBlock
-from impactcell.fieldbus.transport import ModbusClient
 
 _STABLE_READ_ATTEMPTS: Final = 8
 """Readings of a block of several requests until two agree, before it counts as restless."""

@@ -1,16 +1,13 @@
-"""What is asked for and what is in flight: requests alike and side by side go through together.
+"""What is asked for, whatever carries it: requests alike and side by side are kept together.
 
-Of a good reply everything but its data is known beforehand, and nearly all replies are good and come in
-order. So the replies to a flight of requests are compared with what they must be, and their data copied, in
-one go.
+A transport takes `RequestBatch`es, puts the data of the replies into their blocks, and ends their `Exchange`.
 """
 
 import asyncio
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from operator import add
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -48,11 +45,10 @@ class Exchange:
 
 
 @lru_cache(maxsize=256)
-def _requests(table: str, address: int, count: int, step: int, unit: int) -> tuple[Request, ...]:
+def _requests(table: str, address: int, count: int, step: int) -> tuple[Request, ...]:
     function = _READ_FUNCTION[table]
     return tuple(
-        read_request(function, address + first, min(step, count - first), unit)
-        for first in range(0, count, step)
+        read_request(function, address + first, min(step, count - first)) for first in range(0, count, step)
     )
 
 
@@ -78,9 +74,9 @@ class PartialBlock:
         """Return the registers, shape (count,), dtype `WIRE`; zero where they are missing."""
         return np.frombuffer(self._data, dtype=WIRE)
 
-    def batches(self, exchange: Exchange, unit: int) -> Iterator["RequestBatch"]:
+    def batches(self, exchange: Exchange) -> Iterator["RequestBatch"]:
         """Yield the requests that have not been answered, those together that are alike and side by side."""
-        requests = _requests(self.table, self.address, self.count, self.step, unit)
+        requests = _requests(self.table, self.address, self.count, self.step)
         alike = self.count // self.step
         end = 0
         while (first := self._answered.find(0, end)) >= 0:
@@ -110,55 +106,4 @@ class RequestBatch:
         front = RequestBatch(self.exchange, self.block, self.first, self.requests[:count])
         self.first += count
         self.requests = self.requests[count:]
-        return front
-
-
-@lru_cache(maxsize=512)
-def _layout(head: int, data: int) -> np.dtype[Any]:
-    """Layout of a reply: as many bytes that are known beforehand, and of data."""
-    return np.dtype([("head", f"V{head}"), ("data", f"V{data}")])
-
-
-@dataclass(slots=True, eq=False)
-class BatchInFlight:
-    """A batch in flight, or what is left of it, sent at `sent_s` under `transactions`."""
-
-    batch: RequestBatch
-    transactions: tuple[bytes, ...]
-    sent_s: float
-
-    def frames(self) -> Iterator[bytes]:
-        """Yield the requests as they go out."""
-        return map(add, self.transactions, [request.frame_tail for request in self.batch.requests])
-
-    def match_replies(self, stream: bytes, at: int) -> tuple[int, int, bytes]:
-        """Look whether `stream` goes on, from `at`, with good replies to the first requests.
-
-        Returns
-        -------
-        int
-            How many; none at all if there is anything unusual among as many as are there.
-        int
-            Where they end.
-        bytes
-            Their data.
-        """
-        request = self.batch.requests[0]
-        head = request.reply_head
-        size = 2 + len(head) + request.data_length
-        count = min(len(self.transactions), (len(stream) - at) // size)
-        end = at + count * size
-        if count == 1:
-            if stream.startswith(self.transactions[0] + head, at):
-                return 1, end, stream[end - request.data_length : end]
-        elif count:
-            replies = np.frombuffer(stream, _layout(2 + len(head), request.data_length), count, at)
-            if replies["head"].tobytes() == head.join(self.transactions[:count]) + head:
-                return count, end, replies["data"].tobytes()
-        return 0, at, b""
-
-    def split(self, count: int) -> "BatchInFlight":
-        """Keep all but the first `count` requests, and return those."""
-        front = BatchInFlight(self.batch.split(count), self.transactions[:count], self.sent_s)
-        self.transactions = self.transactions[count:]
         return front

@@ -11,6 +11,8 @@ from functools import partial
 from impactcell.alarms import RuleResult
 from impactcell.errors import ImpactCellError, JournalError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
+from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
 from impactcell.journal.stored_forms import upgraded_state
@@ -73,7 +75,9 @@ class CellTask:
         self._notes: tuple[str, ...] = ()
         self._active = {alarm.name for alarm in self.worker.alarms if alarm.active}
         self._on_snapshot = on_snapshot
-        self._module = ModuleAcquisition(cell.name, module_link(cell), cell.register_map, self._link_changed)
+        self._module = ModuleAcquisition(
+            cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map, self._link_changed
+        )
         self._positioning: PositioningTask | None = None
         if cell.settings.positioning is not None:
             self._positioning = PositioningTask(

@@ -15,7 +15,9 @@ import yaml
 
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.transports import transport_for
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 from tests.benchmarks._fieldbus_faults import MAP
@@ -65,7 +67,9 @@ async def follow(port: int, layout: RegisterMap, seconds: float) -> tuple[list[f
     """Delays of the cycles received, their number, and how many were missed."""
     delays_s = []
     async with (
-        ModuleAcquisition(f"port {port}", ModuleLink(port=port, window=16), layout) as module,
+        ModuleAcquisition(
+            f"port {port}", ModbusClient(transport_for(ModuleLink(port=port, window=16))), layout
+        ) as module,
         contextlib.aclosing(module.captures()) as receptions,
     ):
         with contextlib.suppress(TimeoutError):

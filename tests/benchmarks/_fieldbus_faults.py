@@ -13,8 +13,9 @@ import yaml
 from impactcell.errors import FieldbusError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.transport import ModbusClient
+from impactcell.fieldbus.transports import transport_for
 from simulator.faults import Fault, FaultInjector, FaultKind
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
@@ -45,7 +46,7 @@ async def faulty(
     """Read at random from a peer that has every fault; three readers share the link."""
     faults, draw, seen = FaultInjector(seed), np.random.default_rng(seed), Counter[str]()
     async with ModbusServer(Image(), faults=faults) as server:
-        client = ModbusClient(ModuleLink(port=server.port, window=window, timeout_s=0.05))
+        client = ModbusClient(transport_for(ModuleLink(port=server.port, window=window, timeout_s=0.05)))
         for kind in FaultKind:
             faults.inject(Fault(kind, probability=probability, seconds=0.07))
         while sum(faults.happened.values()) < faults_wanted:
@@ -118,7 +119,9 @@ async def outage(registers: RegisterMap, seed: int) -> tuple[float, bool, bool]:
     loop = asyncio.get_running_loop()
     async with (
         ModbusServer(device) as server,
-        ModuleAcquisition(f"cell-{seed}", ModuleLink(port=server.port, window=16), registers) as module,
+        ModuleAcquisition(
+            f"cell-{seed}", ModbusClient(transport_for(ModuleLink(port=server.port, window=16))), registers
+        ) as module,
         contextlib.aclosing(module.captures()) as receptions,
     ):
         await anext(receptions)

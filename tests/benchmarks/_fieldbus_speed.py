@@ -11,7 +11,8 @@ import numpy as np
 from pymodbus.client import AsyncModbusTcpClient
 
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.transport import ModbusClient
+from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.transports import transport_for
 from tests.benchmarks._modbus_peer import REPLY
 from tests.benchmarks.table import Table
 
@@ -64,7 +65,7 @@ class BareExchange(asyncio.Protocol):
 
 
 async def ours(port: int, window: int) -> tuple[Run, Callable[[], Awaitable[None]]]:
-    client = ModbusClient(ModuleLink(port=port, window=window, timeout_s=30.0))
+    client = ModbusClient(transport_for(ModuleLink(port=port, window=window, timeout_s=30.0)))
     await client.connect()
 
     async def run() -> None:

@@ -10,7 +10,9 @@ import yaml
 
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.transports import transport_for
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 from tests.benchmarks._fieldbus_cells import cells
@@ -28,7 +30,9 @@ async def _captures(number: int) -> tuple[float, float]:
     taken: list[float] = []
     async with (
         ModbusServer(device) as server,
-        ModuleAcquisition("cell", ModuleLink(port=server.port, window=16), registers) as module,
+        ModuleAcquisition(
+            "cell", ModbusClient(transport_for(ModuleLink(port=server.port, window=16))), registers
+        ) as module,
         contextlib.aclosing(module.captures()) as receptions,
     ):
         for _ in range(number):

@@ -13,7 +13,9 @@ import yaml
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.fieldbus.capture_ring import CYCLE_PERIOD
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.transports import transport_for
 from simulator.device import Device
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
@@ -74,7 +76,9 @@ async def running(window: int = 16, timeout_s: float = 10.0) -> AsyncIterator[Ce
     async with (
         ModbusServer(device) as server,
         ModuleAcquisition(
-            "cell-1", ModuleLink(port=server.port, window=window, timeout_s=timeout_s), registers
+            "cell-1",
+            ModbusClient(transport_for(ModuleLink(port=server.port, window=window, timeout_s=timeout_s))),
+            registers,
         ) as module,
         contextlib.aclosing(module.captures()) as receptions,
     ):

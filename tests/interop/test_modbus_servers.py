@@ -12,8 +12,9 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from impactcell.errors import LinkError, ModbusExceptionError
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE
-from impactcell.fieldbus.transport import ModbusClient
+from impactcell.fieldbus.transports import transport_for
 
 pytestmark = pytest.mark.interop
 TIMEOUT_S = 10.0
@@ -33,7 +34,9 @@ async def pymodbus_server() -> AsyncIterator[int]:
 
 @asynccontextmanager
 async def connected(port: int, window: int = 1, device_id: int = 1) -> AsyncIterator[ModbusClient]:
-    client = ModbusClient(ModuleLink(port=port, window=window, device_id=device_id, timeout_s=TIMEOUT_S))
+    client = ModbusClient(
+        transport_for(ModuleLink(port=port, window=window, device_id=device_id, timeout_s=TIMEOUT_S))
+    )
     await client.connect()
     try:
         yield client

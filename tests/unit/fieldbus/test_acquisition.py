@@ -13,7 +13,9 @@ import pytest
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.fieldbus.capture_ring import CYCLE_PERIOD
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap, Words
+from impactcell.fieldbus.transports import transport_for
 from impactcell.records import CycleId, ModuleStatus
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
@@ -71,7 +73,10 @@ async def running(
     async with (
         ModbusServer(device) as server,
         ModuleAcquisition(
-            "cell-1", ModuleLink(port=server.port, **link), fpga, statuses and statuses.append
+            "cell-1",
+            ModbusClient(transport_for(ModuleLink(port=server.port, **link))),
+            fpga,
+            statuses and statuses.append,
         ) as module,
         contextlib.aclosing(module.captures(after)) as receptions,
     ):

@@ -12,14 +12,13 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersResponse
 
 from impactcell.errors import ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import (
-    FrameReader,
     FunctionCode,
     check_reply,
-    frame,
     read_request,
     write_request,
 )
 from impactcell.fieldbus.registers import WIRE
+from impactcell.fieldbus.transports.mbap import FrameReader, frame
 
 PDU = st.binary(min_size=1, max_size=253)
 FRAMES = st.lists(st.tuples(st.integers(0, 65_535), st.integers(0, 255), PDU), max_size=6)

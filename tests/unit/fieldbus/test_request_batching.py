@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 from impactcell.errors import LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import FunctionCode, read_request
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.request_batching import BatchInFlight, Exchange, PartialBlock, RequestBatch
-from impactcell.fieldbus.transactions import ID_COUNT, TransactionIds
-from impactcell.fieldbus.transport import ModbusClient
+from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.request_batching import Exchange, PartialBlock, RequestBatch
+from impactcell.fieldbus.transports import transport_for
+from impactcell.fieldbus.transports.batch_in_flight import BatchInFlight
+from impactcell.fieldbus.transports.transaction_ids import ID_COUNT, TransactionIds
 
 HEAD = struct.Struct(">HHHBBB")
 """Transaction, protocol, length, unit, function and byte count of a reply to a read."""
@@ -48,10 +50,10 @@ def test_replies_are_good_together_if_each_is_by_itself(
     transactions: list[int], count: int, flips: list[tuple[int, int]], length: int, at: int
 ) -> None:
     requests = tuple(
-        read_request(FunctionCode.READ_HOLDING, i * count, count, 7) for i in range(len(transactions))
+        read_request(FunctionCode.READ_HOLDING, i * count, count) for i in range(len(transactions))
     )
     ids = tuple(each.to_bytes(2, "big") for each in transactions)
-    flight = BatchInFlight(RequestBatch(EXCHANGE, None, 0, requests), ids, 0.0)
+    flight = BatchInFlight(RequestBatch(EXCHANGE, None, 0, requests), 7, ids, 0.0)
     replies = bytearray(b"".join(good_reply(each, [each] * count, 7) for each in transactions))
     for where, bits in flips:
         replies[where % len(replies)] ^= bits
@@ -79,7 +81,7 @@ def test_what_is_missing_of_a_block_is_asked_for_in_batches_alike(
         block.fill(i, 1, wire[2 * step * i : 2 * step * (i + 1)])
     assert block.missing == number - len(answered)
     asked = []
-    for batch in block.batches(EXCHANGE, 1):
+    for batch in block.batches(EXCHANGE):
         assert len({request.data_length for request in batch.requests}) == 1
         first = 2 * step * batch.first
         size = sum(request.data_length for request in batch.requests)
@@ -115,7 +117,7 @@ async def answered(window: int, blocks: list[PartialBlock], replies: list[bytes]
 
     async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
-        client = ModbusClient(ModuleLink(port=port, window=window, timeout_s=0.2))
+        client = ModbusClient(transport_for(ModuleLink(port=port, window=window, timeout_s=0.2)))
         await client.connect()
         try:
             await client.complete(*blocks)
@@ -162,8 +164,8 @@ async def test_a_transaction_in_flight_is_not_given_to_another_request() -> None
 
     drawn: list[tuple[bytes, ...]] = []
     async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
-        client = ModbusClient(ModuleLink(port=server.sockets[0].getsockname()[1], window=2))
-        client._transactions = Repeating()
+        client = ModbusClient(transport_for(ModuleLink(port=server.sockets[0].getsockname()[1], window=2)))
+        client._transport._transaction_ids = Repeating()
         await client.connect()
         reads = await asyncio.gather(client.read(0, 1), client.read(9, 1), return_exceptions=True)
         await client.close()
@@ -186,7 +188,9 @@ async def test_a_peer_that_holds_back_small_replies_is_not_waited_for() -> None:
 
         thread = threading.Thread(target=serve)
         thread.start()
-        client = ModbusClient(ModuleLink(port=server.getsockname()[1], window=4, timeout_s=5.0))
+        client = ModbusClient(
+            transport_for(ModuleLink(port=server.getsockname()[1], window=4, timeout_s=5.0))
+        )
         await client.connect()
         loop, taken_s = asyncio.get_running_loop(), []
         for _ in range(30):

@@ -12,8 +12,10 @@ import pytest
 from impactcell.errors import PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap, Words
 from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
+from impactcell.fieldbus.transports import transport_for
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 
@@ -55,7 +57,9 @@ async def ready(
     """A module whose captures are being taken, as the service does."""
     async with (
         ModbusServer(device) as server,
-        ModuleAcquisition("cell-1", ModuleLink(port=server.port, timeout_s=5.0), fpga) as module,
+        ModuleAcquisition(
+            "cell-1", ModbusClient(transport_for(ModuleLink(port=server.port, timeout_s=5.0))), fpga
+        ) as module,
     ):
 
         async def follow() -> None:

@@ -14,8 +14,9 @@ from cryptography.x509.oid import NameOID
 
 from impactcell.errors import LinkError
 from impactcell.fieldbus.link import ModuleLink, TlsFiles
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE, Words
-from impactcell.fieldbus.transport import ModbusClient
+from impactcell.fieldbus.transports import transport_for
 from simulator.modbus_server import ModbusServer
 
 
@@ -96,7 +97,9 @@ async def test_blocks_come_over_tls(tmp_path: Path, window: int, server_name: st
     authority = Authority(tmp_path, "plant")
     tls = TlsFiles(authority.file, *authority.issue("service"), server_name=server_name)
     async with serving(authority) as server:
-        client = ModbusClient(ModuleLink(port=server.port, window=window, timeout_s=5.0, tls=tls))
+        client = ModbusClient(
+            transport_for(ModuleLink(port=server.port, window=window, timeout_s=5.0, tls=tls))
+        )
         await client.connect()
         assert np.array_equal(await client.read(5, 20_000), np.arange(5, 20_005))
         await client.close()
@@ -106,7 +109,7 @@ async def test_a_module_of_another_authority_is_refused(tmp_path: Path) -> None:
     authority, other = Authority(tmp_path, "plant"), Authority(tmp_path, "other")
     tls = TlsFiles(other.file, *authority.issue("service"))
     async with serving(authority) as server:
-        client = ModbusClient(ModuleLink(port=server.port, timeout_s=5.0, tls=tls))
+        client = ModbusClient(transport_for(ModuleLink(port=server.port, timeout_s=5.0, tls=tls)))
         with pytest.raises(LinkError, match=r"(?i)certificate verify failed"):
             await client.connect()
         await client.close()
@@ -116,7 +119,7 @@ async def test_a_module_of_another_name_is_refused(tmp_path: Path) -> None:
     authority = Authority(tmp_path, "plant")
     tls = TlsFiles(authority.file, *authority.issue("service"), server_name="pump.test")
     async with serving(authority) as server:
-        client = ModbusClient(ModuleLink(port=server.port, timeout_s=5.0, tls=tls))
+        client = ModbusClient(transport_for(ModuleLink(port=server.port, timeout_s=5.0, tls=tls)))
         with pytest.raises(LinkError, match=r"(?i)certificate verify failed"):
             await client.connect()
         await client.close()
@@ -125,7 +128,9 @@ async def test_a_module_of_another_name_is_refused(tmp_path: Path) -> None:
 async def test_without_our_certificate_the_module_says_nothing(tmp_path: Path) -> None:
     authority = Authority(tmp_path, "plant")
     async with serving(authority) as server:
-        client = ModbusClient(ModuleLink(port=server.port, timeout_s=5.0, tls=TlsFiles(authority.file)))
+        client = ModbusClient(
+            transport_for(ModuleLink(port=server.port, timeout_s=5.0, tls=TlsFiles(authority.file)))
+        )
 
         async def ask() -> None:
             await client.connect()  # TLS 1.3: the refusal comes with the first answer
@@ -139,7 +144,7 @@ async def test_without_our_certificate_the_module_says_nothing(tmp_path: Path) -
 async def test_plain_text_to_a_tls_module_is_a_link_error(tmp_path: Path) -> None:
     authority = Authority(tmp_path, "plant")
     async with serving(authority) as server:
-        client = ModbusClient(ModuleLink(port=server.port, timeout_s=5.0))
+        client = ModbusClient(transport_for(ModuleLink(port=server.port, timeout_s=5.0)))
         await client.connect()
         with pytest.raises(LinkError):
             await client.read(0, 1)

@@ -10,8 +10,9 @@ import pytest
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE, Words
-from impactcell.fieldbus.transport import ModbusClient
+from impactcell.fieldbus.transports import transport_for
 from simulator.faults import Fault, FaultInjector, FaultKind
 from simulator.modbus_server import ModbusServer
 
@@ -43,7 +44,9 @@ async def linked(
     server: ModbusServer, window: int = 1, timeout_s: float = SILENT_S, **link: float
 ) -> AsyncIterator[ModbusClient]:
     client = ModbusClient(
-        ModuleLink(port=server.port, window=window, timeout_s=timeout_s, **link)  # type: ignore[arg-type]
+        transport_for(
+            ModuleLink(port=server.port, window=window, timeout_s=timeout_s, **link)  # type: ignore[arg-type]
+        )
     )
     await client.connect()
     try:
@@ -135,7 +138,9 @@ async def test_no_more_requests_in_flight_than_the_window() -> None:
             writer.write(request[:4] + b"\0\x05" + request[6:8] + b"\x02" + request[8:10])
 
     async with peer(count) as port:
-        client = ModbusClient(ModuleLink(port=port, window=1, max_registers=1, timeout_s=SILENT_S))
+        client = ModbusClient(
+            transport_for(ModuleLink(port=port, window=1, max_registers=1, timeout_s=SILENT_S))
+        )
         await client.connect()
         assert (await client.read(40, 5)).tolist() == [40, 41, 42, 43, 44]
         await client.close()
@@ -241,7 +246,7 @@ async def test_a_reply_filled_up_by_the_whole_of_the_next_one_is_not_used() -> N
         writer.write(frames[0][: -len(frames[1])] + frames[1])
 
     async with peer(lose_bytes) as port:
-        client = ModbusClient(ModuleLink(port=port, window=4, timeout_s=0.05))
+        client = ModbusClient(transport_for(ModuleLink(port=port, window=4, timeout_s=0.05)))
         await client.connect()
         long, short = await asyncio.gather(client.read(100, 60), client.read(7, 3), return_exceptions=True)
         assert isinstance(long, LinkError)
@@ -286,7 +291,7 @@ async def test_every_attempt_has_a_fresh_transaction_id() -> None:
         seen.append(struct.unpack(">H", (await reader.readexactly(12))[:2])[0])
 
     async with peer(never) as port:
-        client = ModbusClient(ModuleLink(port=port, timeout_s=0.02))
+        client = ModbusClient(transport_for(ModuleLink(port=port, timeout_s=0.02)))
         for _ in range(3):
             await client.connect()
             with pytest.raises(LinkError):
@@ -306,7 +311,7 @@ async def test_a_pause_between_requests_is_kept() -> None:
 async def test_nobody_there_is_a_link_error() -> None:
     async with ModbusServer(Image()) as server:
         port = server.port
-    client = ModbusClient(ModuleLink(port=port))
+    client = ModbusClient(transport_for(ModuleLink(port=port)))
     with pytest.raises(LinkError, match=f"127.0.0.1:{port} device 1: no connection"):
         await client.connect()
     await client.close()
@@ -337,7 +342,7 @@ async def test_no_fault_gets_a_wrong_value_through(window: int) -> None:
     faults = FaultInjector(seed=window)
     accepted = 0
     async with ModbusServer(Image(), faults=faults) as server:
-        client = ModbusClient(ModuleLink(port=server.port, window=window, timeout_s=0.1))
+        client = ModbusClient(transport_for(ModuleLink(port=server.port, window=window, timeout_s=0.1)))
         for kind in FaultKind:
             faults.inject(Fault(kind, probability=0.02, seconds=0.15))
         draw = np.random.default_rng(window)

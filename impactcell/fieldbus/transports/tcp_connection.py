@@ -12,10 +12,12 @@ from collections.abc import Sequence
 from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
-from impactcell.fieldbus.codec import BUSY, FrameReader, check_reply
+from impactcell.fieldbus.codec import BUSY, check_reply
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.request_batching import BatchInFlight, Exchange, RequestBatch
-from impactcell.fieldbus.transactions import TransactionIds
+from impactcell.fieldbus.request_batching import Exchange, RequestBatch
+from impactcell.fieldbus.transports.batch_in_flight import BatchInFlight
+from impactcell.fieldbus.transports.mbap import FrameReader
+from impactcell.fieldbus.transports.transaction_ids import TransactionIds
 
 BUSY_PAUSE_S: Final = 0.02
 """How long a device that said busy is left alone; it is asked again until the timeout has passed."""
@@ -24,7 +26,7 @@ _RECEIVED_AT_ONCE: Final = 65_536
 """Bytes taken from the socket at a time: some 250 frames of full length."""
 
 
-class Connection(asyncio.BufferedProtocol):
+class TcpConnection(asyncio.BufferedProtocol):
     """One connection, from its making to its loss; it is never used again after that.
 
     Attributes
@@ -149,7 +151,9 @@ class Connection(asyncio.BufferedProtocol):
                 batch = batch.split(room)
             else:
                 self._waiting.popleft()
-            flight = BatchInFlight(batch, self._fresh_transactions(len(batch.requests)), now)
+            flight = BatchInFlight(
+                batch, self.link.device_id, self._fresh_transactions(len(batch.requests)), now
+            )
             self._in_flight.append(flight)
             self._requests_in_flight += len(batch.requests)
             frames += flight.frames()
