@@ -77,7 +77,7 @@ class CellWorker:
         self._unknown = Unknown()
         """Alarms of another version that are kept for it."""
         restored = self._restore()
-        self._state = core.migrate_state(design, restored.cell)
+        self._state = self._fitted(design, restored.cell)
         self._snapshot = restored.snapshot
         self.belief = restored.planner
         self._store_model()
@@ -171,7 +171,7 @@ class CellWorker:
 
         def swap() -> None:
             self._design = design
-            self._state = core.migrate_state(design, self._state)
+            self._state = self._fitted(design, self._state)
             self._store_model()
 
         await self.run(swap)
@@ -195,6 +195,13 @@ class CellWorker:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
         model = MODEL.dumps(self._design.model)
         self._journal_writer.store(lambda journal: journal.store_model(model))
+
+    def _fitted(self, design: CellDesign, state: CellState) -> CellState:
+        """Make the state fit the design; what that costs is told, here and by the signature's quality."""
+        fitted = core.migrate_state(design, state)
+        if fitted is not state:
+            self.log.warning("the grid of the signature was changed: the signature is learned anew")
+        return fitted
 
     def _restore(self) -> StoredState:
         initial, journal = core.initial_state(self._design), self._journal_writer.journal

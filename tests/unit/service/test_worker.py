@@ -15,6 +15,7 @@ from impactcell.errors import ForeignJournalError, JournalFullError
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.records import Capture, Channel, CycleId, PositioningState, Quality
+from impactcell.serialization.message_pack import pack_tree, unpack_tree
 from impactcell.service.factory import cell_design
 from impactcell.service.journal_writer import JournalWriter
 from impactcell.service.worker import CellWorker
@@ -171,7 +172,9 @@ async def test_odd_captures_are_survived(design: core.CellDesign) -> None:
     await worker.close()
 
 
-async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, design: core.CellDesign) -> None:
+async def test_a_signature_on_another_grid_is_learned_anew(
+    tmp_path: Path, design: core.CellDesign, caplog: pytest.LogCaptureFixture
+) -> None:
     worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     await process(worker, make_capture(1))
     finer = replace(design, signature=replace(design.signature, points=50))
@@ -180,8 +183,30 @@ async def test_a_signature_on_another_grid_is_learned_anew(tmp_path: Path, desig
     await worker.close()
     again = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
     assert again.durable == CycleId(1, 2)
+    assert caplog.text.count("the signature is learned anew") == 2
     await process(again, make_capture(3))
     await again.close()
+
+
+async def test_alarms_of_another_version_are_told_and_kept_for_it(
+    tmp_path: Path, design: core.CellDesign, caplog: pytest.LogCaptureFixture
+) -> None:
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
+    await process(worker, make_capture(1))
+    await worker.close()
+    theirs = {"its": "own", "since": 5}
+    with Journal(tmp_path / "j", "c") as journal:
+        envelope = unpack_tree(journal.state() or b"")
+        envelope["content"]["cell"]["alarms"]["alarms"]["FrictionJump"] = theirs
+        journal.record(pack_tree(envelope))
+    again = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
+    assert "the journal has alarms of another version; they are kept: FrictionJump" in caplog.text
+    await process(again, make_capture(2))
+    await again.close()
+    with Journal(tmp_path / "j", "c") as journal:
+        kept = unpack_tree(journal.state() or b"")["content"]["cell"]
+    assert kept["cycle"] == 2
+    assert kept["alarms"]["alarms"]["FrictionJump"] == theirs
 
 
 async def test_a_state_of_other_fields_is_refused_with_a_message_and_left_as_it_is(

@@ -1,0 +1,105 @@
+"""The service goes on from what an earlier version has learned, and says what it cannot go on from."""
+
+import asyncio
+import json
+import shutil
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from impactcell.errors import JournalError
+from impactcell.journal.store import Journal
+from impactcell.journal.stored_forms import STATE
+from impactcell.records import Alarm, AlarmName
+from impactcell.scada import Server
+from impactcell.serialization.message_pack import pack_tree, unpack_tree
+from tests.data.contents import described, stored
+from tests.data.make_journal import CELL, CELL_FILE
+from tests.integration.processes import write_cell
+from tests.integration.watched import serving
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+@pytest.fixture
+def older(tmp_path: Path) -> Path:
+    """Journal of `CELL`, as format 3 left it."""
+    path = tmp_path / f"{CELL}.sqlite"
+    shutil.copy(DATA / "journal-format-3.sqlite", path)
+    return path
+
+
+def content(file: Path) -> bytes:
+    return file.read_bytes()
+
+
+def learned(read: dict[str, Any]) -> dict[str, Any]:
+    """What a journal holds, but for the link, of which the service says something itself."""
+    conditions = read["alarms"]["conditions"]
+    kept = {name: alarm for name, alarm in conditions.items() if name != AlarmName.MODULE_CONNECTION.value}
+    told = [a for a in read["transitions of alarms"] if a["condition"] != AlarmName.MODULE_CONNECTION.value]
+    return {**read, "alarms": {**read["alarms"], "conditions": kept}, "transitions of alarms": told}
+
+
+@pytest.mark.timeout(240)
+async def test_the_service_goes_on_from_an_older_journal(tmp_path: Path, older: Path) -> None:
+    async with serving(write_cell(tmp_path, 1, CELL, **CELL_FILE)) as watched:
+        running = watched.service.running[CELL]
+        await watched.alarm(CELL, AlarmName.MODULE_CONNECTION, active=True)
+        shown = {alarm.name: alarm for alarm in running.worker.alarms}
+        assert shown[AlarmName.WEAR_LIMIT].active
+        assert not shown[AlarmName.JOURNAL_FAULT].active
+        assert running.worker.journal_fault == ""
+        assert running.worker.snapshot is not None
+    with Journal(older, CELL, read_only=True) as journal:
+        read = described(stored(journal), journal)
+        assert not STATE.is_older(journal.state() or b"")
+    expected = json.loads((DATA / "journal-format-3.json").read_text(encoding="utf-8"))
+    assert learned(read) == learned(expected)
+
+
+@pytest.fixture
+def later(older: Path) -> Path:
+    """Journal of `CELL` with a state of a later version."""
+    database = sqlite3.connect(older)
+    with database:
+        (blob,) = database.execute("SELECT blob FROM state").fetchone()
+        state = pack_tree({"format": STATE.format + 1, "content": unpack_tree(blob)})
+        database.execute("UPDATE state SET blob = ?", (state,))
+    database.close()
+    return older
+
+
+@pytest.mark.timeout(240)
+async def test_a_later_state_is_left_alone_with_an_alarm_and_the_others_run(
+    tmp_path: Path, later: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = content(later)
+    shown: list[tuple[str, Alarm]] = []
+    show = Server.alarm
+
+    def seen(server: Server, cell: str, alarm: Alarm) -> None:
+        shown.append((cell, alarm))
+        show(server, cell, alarm)
+
+    monkeypatch.setattr(Server, "alarm", seen)
+    odd, well = write_cell(tmp_path, 1, CELL, **CELL_FILE), write_cell(tmp_path, 2, "well")
+    async with serving(odd, well) as watched:
+        await watched.alarm("well", AlarmName.MODULE_CONNECTION, active=True)
+        async with asyncio.timeout(60):
+            while not any(cell == CELL for cell, _ in shown):
+                await asyncio.sleep(0.02)
+        assert CELL not in watched.service.running
+    ((_, alarm),) = [entry for entry in shown if entry[0] == CELL]
+    assert (alarm.name, alarm.active, alarm.acknowledged) == (AlarmName.JOURNAL_FAULT, True, False)
+    known = f"the state is of format {STATE.format + 1}, this version knows up to {STATE.format}"
+    for words in (str(later), f"cell '{CELL}' is left as it is", known, "name another file"):
+        assert words in alarm.message
+        assert words in caplog.text
+    assert content(later) == before
+    with pytest.raises(JournalError, match=known):
+        async with serving(odd):
+            pass
+    assert content(later) == before
