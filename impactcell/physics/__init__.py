@@ -1,6 +1,6 @@
 """The plant: one tap of an actuator on a part that slides and stops, integrated from event to event.
 
-One tap, with its events, figures and samples::
+One tap, with its events, outputs and samples::
 
     plant = Plant(6.5e5, 465.0, mu_s=0.2, mu_k=0.152, effects={"surface_tilt": {"tilt_rad": 0.002}})
     motion = simulate_tap(plant, TapInput(velocity_m_s=0.05, mass_kg=18.9, stroke_m=1.5e-3))
@@ -26,7 +26,7 @@ some tens of microseconds a tap:
 (7194,)
 >>> ensemble.sensitivities(theta, ["mu_k", "friction_factor"], factors).position_m.shape
 (2, 7194)
->>> ensemble.figures(theta).peak_force_n.round(1)  # no sampling: planners, calibration
+>>> ensemble.outputs(theta).peak_force_n.round(1)  # no sampling: planners, calibration
 array([156.1, 156.1, 219.8, 219.8, 315.6, 315.6])
 
 Parameters may also be one vector a tap, shape (n, len(names)); `ensemble.parameters(plant)` makes a vector of

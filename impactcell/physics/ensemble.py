@@ -1,4 +1,4 @@
-"""Many taps at once: arrays of parameters in, samples and figures out, without objects for each tap."""
+"""Many taps at once: arrays of parameters in, samples and outputs out, without objects for each tap."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,16 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.numerics.jit import IntArray
 from impactcell.physics import memory_layout as at
-from impactcell.physics.integrator import integrate_all
+from impactcell.physics.batch_integration import (
+    MAX_DURATION_S,
+    NO_SAMPLES,
+    integrate_to_rest,
+    sample_taps,
+    undriven,
+)
 from impactcell.physics.law_table import build_law_table, parameter_range, parameter_vector, tap_columns
+from impactcell.physics.memory_layout import TapArrays
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
-
-LONGEST_S = 600.0
-NONE = np.empty(0)
-NO_KINDS = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +38,7 @@ class Traces:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TapOutputs:
-    """Figures of every tap, each of shape (n,); nan where a tap has no such figure.
+    """Outputs of every tap, each of shape (n,); nan where a tap has no such output.
 
     Attributes
     ----------
@@ -105,33 +107,33 @@ class Ensemble:
         if initial_speed_m_s is not None:
             self._columns["initial_speed_m_s"] = np.asarray(initial_speed_m_s, dtype=np.float64)
         self.batches = 1 + max((tap.batch for tap in taps), default=0)
-        self._program = build_law_table(tuple(effects), self.batches)
-        self.names = self._program.names
+        self._table = build_law_table(tuple(effects), self.batches)
+        self.names = self._table.names
         self.gravity_m_s2 = gravity_m_s2
         self._count = len(taps)
-        self._cursors = np.zeros((len(taps), at.CURSORS), dtype=np.int64)
+        self._sample_index = np.zeros((len(taps), at.SAMPLE_INDEX_COUNT), dtype=np.int64)
         pieces: list[Samples] = []
         self._channels: list[slice] = []
         total = 0
         for channel, given in enumerate((force_time_s, position_time_s, actuator_time_s, velocity_time_s)):
-            begin, checked = total, NONE
+            begin, checked = total, NO_SAMPLES
             for i in range(len(taps)):
-                times = NONE if given is None else np.asarray(given[i], dtype=np.float64)
+                times = NO_SAMPLES if given is None else np.asarray(given[i], dtype=np.float64)
                 if times is not checked:  # taps may share theirs
                     if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
                         raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
                     checked = times
                 pieces.append(times)
-                self._cursors[i, channel] = total
+                self._sample_index[i, channel] = total
                 total += times.size
-                self._cursors[i, at.CHANNELS + channel] = total
+                self._sample_index[i, at.CHANNEL_COUNT + channel] = total
             self._channels.append(slice(begin, total))
-        self._times = np.concatenate(pieces) if pieces else NONE
-        self._drives, self._drive_ends = NONE, np.zeros(len(taps) + 1, dtype=np.int64)
+        self._times = np.concatenate(pieces) if pieces else NO_SAMPLES
+        self._drives, self._drive_ends = NO_SAMPLES, np.zeros(len(taps) + 1, dtype=np.int64)
         if drives is not None:
-            self._take_drives(drives, given_speed=initial_speed_m_s is not None)
+            self._set_drives(drives, given_speed=initial_speed_m_s is not None)
 
-    def _take_drives(self, drives: Sequence[tuple[Samples, Samples]], *, given_speed: bool) -> None:
+    def _set_drives(self, drives: Sequence[tuple[Samples, Samples]], *, given_speed: bool) -> None:
         for i, (time_s, force_n) in enumerate(drives):
             if len(time_s) < 2 or len(time_s) != len(force_n) or not (np.diff(time_s) > 0.0).all():
                 raise PhysicsError(f"drive {i}: needs two samples or more, at ascending times")
@@ -142,14 +144,14 @@ class Ensemble:
 
     def parameters(self, plant: Plant) -> Samples:
         """Parameter vector of `plant`, shape (len(names),); its effects must be among the ensemble's."""
-        foreign = set(plant.effects) - set(self._program.effects)
+        foreign = set(plant.effects) - set(self._table.effects)
         if foreign:
             raise PhysicsError(f"the ensemble was made without {', '.join(sorted(foreign))}")
-        return parameter_vector(plant, self._program, self.batches)
+        return parameter_vector(plant, self._table, self.batches)
 
-    def _rows(
+    def _tap_parameters(
         self,
-        parameters: Samples,
+        values: Samples,
         friction_factor: Samples | float,
         mass_kg: Samples | None,
         initial_speed_m_s: Samples | None,
@@ -159,17 +161,17 @@ class Ensemble:
             taps = {**taps, "mass_kg": mass_kg}
         if initial_speed_m_s is not None:
             taps = {**taps, "initial_speed_m_s": initial_speed_m_s}
-        table, shape = np.asarray(parameters, np.float64), (self._count, len(self.names))
-        if table.shape != shape:
-            table = np.broadcast_to(table, shape)
-        rows = self._program.rows(table, self.gravity_m_s2, taps)
-        rows[:, at.MU_S] *= friction_factor
-        rows[:, at.MU_K] *= friction_factor
-        return rows
+        rows, shape = np.asarray(values, np.float64), (self._count, len(self.names))
+        if rows.shape != shape:
+            rows = np.broadcast_to(rows, shape)
+        parameters = self._table.tap_parameters(rows, self.gravity_m_s2, taps)
+        parameters[:, at.MU_S] *= friction_factor
+        parameters[:, at.MU_K] *= friction_factor
+        return parameters
 
     def traces(
         self,
-        parameters: Samples,
+        values: Samples,
         friction_factor: Samples | float = 1.0,
         *,
         mass_kg: Samples | None = None,
@@ -179,34 +181,19 @@ class Ensemble:
 
         Parameters
         ----------
-        parameters : ndarray
+        values : ndarray
             Shape (len(names),), or (n, len(names)) for a vector a tap. No ranges are checked.
         friction_factor : float or ndarray of shape (n,)
             Multiplies mu_s and mu_k of each shot.
         mass_kg, initial_speed_m_s : ndarray of shape (n,), optional
             Instead of the taps' own.
         """
-        rows = self._rows(parameters, friction_factor, mass_kg, initial_speed_m_s)
-        return self._split(self._sampled(rows))
+        taps = self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s)
+        return self._split(self._sample(taps))
 
-    def _sampled(self, rows: Samples) -> Samples:
-        out = np.empty(self._times.size)
-        figures = np.empty((self._count, at.FIGURES))
-        integrate_all(
-            rows,
-            self._program.laws,
-            self._drives,
-            self._drive_ends,
-            LONGEST_S,
-            at.TO_LAST_SAMPLE,
-            self._cursors.copy(),
-            self._times,
-            out,
-            NO_KINDS,
-            NONE,
-            figures,
-        )
-        return out
+    def _sample(self, parameters: Samples) -> Samples:
+        taps = TapArrays(parameters, self._table.laws, self._drives, self._drive_ends)
+        return sample_taps(taps, self._sample_index, self._times)
 
     def _split(self, out: Samples) -> Traces:
         force, position, actuator, velocity = (out[..., channel] for channel in self._channels)
@@ -214,7 +201,7 @@ class Ensemble:
 
     def sensitivities(
         self,
-        parameters: Samples,
+        values: Samples,
         wrt: Sequence[str],
         friction_factor: Samples | float = 1.0,
         *,
@@ -227,7 +214,7 @@ class Ensemble:
         "friction_factor" and "initial_speed_m_s" are also possible: each shot's own samples with respect
         to its own value. Central differences; one-sided where a step would leave the parameter's range.
         """
-        table = np.array(np.broadcast_to(np.asarray(parameters, np.float64), (self._count, len(self.names))))
+        table = np.array(np.broadcast_to(np.asarray(values, np.float64), (self._count, len(self.names))))
         made = np.empty((len(wrt), self._times.size))
         for q, name in enumerate(wrt):
             ends: list[Samples] = []
@@ -240,7 +227,7 @@ class Ensemble:
                         factor = friction_factor * (1.0 + step)
                     else:
                         moved = speed * (1.0 + step)
-                    ends.append(self._sampled(self._rows(table, factor, mass_kg, moved)))
+                    ends.append(self._sample(self._tap_parameters(table, factor, mass_kg, moved)))
                 base = friction_factor if name == "friction_factor" else speed
                 width = 2.0 * relative_step * np.broadcast_to(np.asarray(base, np.float64), self._count)
                 made[q] = (ends[0] - ends[1]) / self._each_sample(width)
@@ -254,47 +241,41 @@ class Ensemble:
                 moved_table = table.copy()
                 moved_table[:, column] += change
                 ends.append(
-                    self._sampled(self._rows(moved_table, friction_factor, mass_kg, initial_speed_m_s))
+                    self._sample(
+                        self._tap_parameters(moved_table, friction_factor, mass_kg, initial_speed_m_s)
+                    )
                 )
             made[q] = (ends[0] - ends[1]) / (above + below)
         return self._split(made)
 
     def _each_sample(self, values: Samples) -> Samples:
         spread = np.empty(self._times.size)
-        for channel in range(at.CHANNELS):
+        for channel in range(at.CHANNEL_COUNT):
             for i in range(self._count):
-                spread[self._cursors[i, channel] : self._cursors[i, at.CHANNELS + channel]] = values[i]
+                spread[self._sample_index[i, channel] : self._sample_index[i, at.CHANNEL_COUNT + channel]] = (
+                    values[i]
+                )
         return spread
 
-    def figures(
+    def outputs(
         self,
-        parameters: Samples,
+        values: Samples,
         friction_factor: Samples | float = 1.0,
         *,
         mass_kg: Samples | None = None,
-        horizon_s: float = LONGEST_S,
+        horizon_s: float = MAX_DURATION_S,
     ) -> TapOutputs:
         """Peak force, displacement, sliding distance and times of events, without any samples."""
-        rows = self._rows(parameters, friction_factor, mass_kg, None)
-        return compute_outputs(rows, self._program.laws, horizon_s)
-
-
-def compute_outputs(rows: Samples, laws: IntArray, horizon_s: float = LONGEST_S) -> TapOutputs:
-    """Figures of taps given by `rows`, shape (n, width)."""
-    table = np.empty((rows.shape[0], at.FIGURES))
-    cursors = np.zeros((rows.shape[0], at.CURSORS), dtype=np.int64)
-    undriven = np.zeros(rows.shape[0] + 1, dtype=np.int64)
-    integrate_all(
-        rows, laws, NONE, undriven, horizon_s, at.TO_REST, cursors, NONE, NONE, NO_KINDS, NONE, table
-    )
-    return TapOutputs(
-        peak_force_n=table[:, at.PEAK_FORCE],
-        displacement_m=table[:, at.DISPLACEMENT],
-        sliding_distance_m=table[:, at.DISTANCE],
-        breakaway_s=table[:, at.BREAKAWAY_TIME],
-        peak_s=table[:, at.PEAK_TIME],
-        separation_s=table[:, at.SEPARATION_TIME],
-        halt_s=table[:, at.HALT_TIME],
-        stop_s=table[:, at.STOP_TIME],
-        at_rest=table[:, at.STATUS] == at.AT_REST,
-    )
+        parameters = self._tap_parameters(values, friction_factor, mass_kg, None)
+        outputs = integrate_to_rest(undriven(parameters, self._table.laws), horizon_s)
+        return TapOutputs(
+            peak_force_n=outputs[:, at.PEAK_FORCE],
+            displacement_m=outputs[:, at.DISPLACEMENT],
+            sliding_distance_m=outputs[:, at.DISTANCE],
+            breakaway_s=outputs[:, at.BREAKAWAY_TIME],
+            peak_s=outputs[:, at.PEAK_TIME],
+            separation_s=outputs[:, at.SEPARATION_TIME],
+            halt_s=outputs[:, at.HALT_TIME],
+            stop_s=outputs[:, at.STOP_TIME],
+            at_rest=outputs[:, at.STATUS] == at.AT_REST,
+        )

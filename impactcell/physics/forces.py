@@ -1,142 +1,136 @@
 """Forces on the part and motion of the actuator within one smooth phase.
 
-Every law is evaluated by its smooth continuation: what is switched on is said by `mode`, never by the sign
-of the state, so that a step that runs past an event is still a step of a smooth equation. All arrays are
-bare pointers (`impactcell.numerics.jit.pointer`) laid out as in `impactcell.physics.memory_layout`.
+Every law is evaluated by its smooth continuation: what is switched on is said by the contact mode, never by
+the sign of the state, so that a step that runs past an event is still a step of a smooth equation.
 """
 
-from impactcell.numerics.jit import FloatPointer, IntPointer, compiled, invoke
+from impactcell.numerics.jit import FloatPointer, compiled, invoke
 from impactcell.physics import memory_layout as at
+from impactcell.physics.memory_layout import SmoothPhase
 
 
 @compiled
-def actuator_speed(
-    t: float, z: FloatPointer, mode: IntPointer, row: FloatPointer, program: IntPointer
-) -> float:
+def evaluate_law(place: int, a: float, b: float, c: float, d: float, phase: SmoothPhase) -> float:
+    """Value of the law listed at this place of `laws` for its four numbers, as `LawKind` has them."""
+    return invoke(phase.laws[place], a, b, c, d, phase.parameters, phase.laws[place + 1])
+
+
+@compiled
+def actuator_speed(t: float, state: FloatPointer, phase: SmoothPhase) -> float:
     """Y' = v times the laws of its run-up, less the speed the laws of its load take away [m/s]."""
-    if mode[at.RUNNING] == 0:
+    if phase.contact_mode[at.RUNNING] == 0:
         return 0.0
-    speed = row[at.VELOCITY]
-    for i in range(program[at.SPEED], program[at.SPEED + 1], 2):
-        speed *= invoke(program[i], t, 0.0, 0.0, 0.0, row, program[i + 1])
-    for i in range(at.EXTRA, mode[at.STATES]):
-        speed -= z[i]
+    speed = phase.parameters[at.VELOCITY]
+    for i in range(phase.laws[at.SPEED], phase.laws[at.SPEED + 1], 2):
+        speed *= evaluate_law(i, t, 0.0, 0.0, 0.0, phase)
+    for i in range(at.FIRST_EXTRA_STATE, phase.contact_mode[at.STATE_COUNT]):
+        speed -= state[i]
     return speed
 
 
 @compiled
-def compression(
-    z: FloatPointer, speed: float, mode: IntPointer, row: FloatPointer, program: IntPointer
-) -> float:
+def compression(state: FloatPointer, speed: float, phase: SmoothPhase) -> float:
     """Contact force while touching, before it is clipped at zero [N]."""
-    d = z[at.TRAVEL] - z[at.U]
-    rate = speed - z[at.SPEED_OF_PART]
-    force = row[at.STIFFNESS] * d
-    if mode[at.DAMPER] == 1:
-        force += row[at.DAMPING] * rate
-    for i in range(program[at.CONTACT], program[at.CONTACT + 1], 2):
-        force += invoke(program[i], d, rate, row[at.STIFFNESS], row[at.DAMPING], row, program[i + 1])
+    d = state[at.TRAVEL] - state[at.ADVANCE]
+    rate = speed - state[at.PART_SPEED]
+    force = phase.parameters[at.STIFFNESS] * d
+    if phase.contact_mode[at.DAMPER] == 1:
+        force += phase.parameters[at.DAMPING] * rate
+    for i in range(phase.laws[at.CONTACT], phase.laws[at.CONTACT + 1], 2):
+        force += evaluate_law(i, d, rate, phase.parameters[at.STIFFNESS], phase.parameters[at.DAMPING], phase)
     return force
 
 
 @compiled
-def contact_force(
-    z: FloatPointer, speed: float, mode: IntPointer, row: FloatPointer, program: IntPointer
-) -> float:
+def contact_force(state: FloatPointer, speed: float, phase: SmoothPhase) -> float:
     """Force of the actuator on the part, positive in compression, negative in adhesion [N]."""
-    if mode[at.ZONE] == at.TOUCHING:
-        return 0.0 if mode[at.CLIPPED] == 1 else compression(z, speed, mode, row, program)
+    if phase.contact_mode[at.ZONE] == at.TOUCHING:
+        return 0.0 if phase.contact_mode[at.CLIPPED] == 1 else compression(state, speed, phase)
     force = 0.0
-    if mode[at.ZONE] == at.NEAR:
-        for i in range(program[at.PULL], program[at.PULL + 1], 2):
-            force -= invoke(program[i], z[at.U] - z[at.TRAVEL], 0.0, 0.0, 0.0, row, program[i + 1])
+    if phase.contact_mode[at.ZONE] == at.NEAR:
+        for i in range(phase.laws[at.PULL], phase.laws[at.PULL + 1], 2):
+            force -= evaluate_law(i, state[at.ADVANCE] - state[at.TRAVEL], 0.0, 0.0, 0.0, phase)
     return force
 
 
 @compiled
-def body_force(
-    t: float, z: FloatPointer, memo: FloatPointer, row: FloatPointer, program: IntPointer
-) -> float:
+def body_force(t: float, state: FloatPointer, phase: SmoothPhase) -> float:
     """Sum up the forces on the part other than contact and Coulomb friction, along the tap [N]."""
-    direction = row[at.DIRECTION]
-    force = memo[at.DRIVE] + memo[at.DRIVE_SLOPE] * (t - memo[at.DRIVE_TIME])
-    if program[at.BODY + 1] > program[at.BODY]:
-        x = row[at.START] + direction * z[at.U]
-        velocity = direction * z[at.SPEED_OF_PART]
-        for i in range(program[at.BODY], program[at.BODY + 1], 2):
-            force += invoke(program[i], x, velocity, row[at.MASS], row[at.GRAVITY], row, program[i + 1])
+    direction = phase.parameters[at.DIRECTION]
+    force = phase.cache[at.DRIVE] + phase.cache[at.DRIVE_SLOPE] * (t - phase.cache[at.DRIVE_TIME])
+    if phase.laws[at.BODY + 1] > phase.laws[at.BODY]:
+        x = phase.parameters[at.START] + direction * state[at.ADVANCE]
+        velocity = direction * state[at.PART_SPEED]
+        for i in range(phase.laws[at.BODY], phase.laws[at.BODY + 1], 2):
+            force += evaluate_law(
+                i, x, velocity, phase.parameters[at.MASS], phase.parameters[at.GRAVITY], phase
+            )
     return direction * force
 
 
 @compiled
-def friction_scale(u: float, row: FloatPointer, program: IntPointer) -> float:
+def friction_scale(advance: float, phase: SmoothPhase) -> float:
     """Product of the laws by which friction varies along the table [1]."""
     scale = 1.0
-    x = row[at.START] + row[at.DIRECTION] * u
-    for i in range(program[at.SCALE], program[at.SCALE + 1], 2):
-        scale *= invoke(program[i], x, 0.0, 0.0, 0.0, row, program[i + 1])
+    x = phase.parameters[at.START] + phase.parameters[at.DIRECTION] * advance
+    for i in range(phase.laws[at.SCALE], phase.laws[at.SCALE + 1], 2):
+        scale *= evaluate_law(i, x, 0.0, 0.0, 0.0, phase)
     return scale
 
 
 @compiled
-def kinetic_friction(u: float, speed: float, row: FloatPointer, program: IntPointer) -> float:
+def kinetic_friction(advance: float, speed: float, phase: SmoothPhase) -> float:
     """Magnitude of Coulomb friction in slip at `speed` >= 0 [N]."""
-    mu = row[at.MU_K]
-    for i in range(program[at.KINETIC], program[at.KINETIC + 1], 2):
-        mu += invoke(program[i], speed, 0.0, 0.0, 0.0, row, program[i + 1])
-    return mu * friction_scale(u, row, program) * row[at.MASS] * row[at.GRAVITY]
+    mu = phase.parameters[at.MU_K]
+    for i in range(phase.laws[at.KINETIC], phase.laws[at.KINETIC + 1], 2):
+        mu += evaluate_law(i, speed, 0.0, 0.0, 0.0, phase)
+    return mu * friction_scale(advance, phase) * phase.parameters[at.MASS] * phase.parameters[at.GRAVITY]
 
 
 @compiled
-def breakaway_force(u: float, row: FloatPointer, program: IntPointer) -> float:
+def breakaway_force(advance: float, phase: SmoothPhase) -> float:
     """Force that stick can hold [N].
 
     mu_s m g; where the friction of slow slip is larger than that, the part only moves once it is exceeded.
     """
-    static = row[at.MU_S] * friction_scale(u, row, program) * row[at.MASS] * row[at.GRAVITY]
-    return max(static, kinetic_friction(u, 0.0, row, program))
+    parameters = phase.parameters
+    static = (
+        parameters[at.MU_S] * friction_scale(advance, phase) * parameters[at.MASS] * parameters[at.GRAVITY]
+    )
+    return max(static, kinetic_friction(advance, 0.0, phase))
 
 
 @compiled
-def derivative(
-    t: float,
-    z: FloatPointer,
-    mode: IntPointer,
-    memo: FloatPointer,
-    row: FloatPointer,
-    program: IntPointer,
-    out: FloatPointer,
-    begin: int,
-) -> None:
+def derivative(t: float, state: FloatPointer, phase: SmoothPhase, out: FloatPointer, begin: int) -> None:
     """Equations of motion (1)-(3) of the present phase, into `out` from index `begin` on."""
-    speed = actuator_speed(t, z, mode, row, program)
-    slip = mode[at.SLIP]
+    speed = actuator_speed(t, state, phase)
+    slip = phase.contact_mode[at.SLIP]
     force = 0.0
-    if mode[at.ZONE] >= at.NEAR:
-        force = contact_force(z, speed, mode, row, program)
+    if phase.contact_mode[at.ZONE] >= at.NEAR:
+        force = contact_force(state, speed, phase)
     if slip == 0:
-        out[begin + at.U] = 0.0
-        out[begin + at.SPEED_OF_PART] = 0.0
+        out[begin + at.ADVANCE] = 0.0
+        out[begin + at.PART_SPEED] = 0.0
     else:
-        total = force + body_force(t, z, memo, row, program)
+        total = force + body_force(t, state, phase)
         if slip == at.ELASTIC:
-            total -= memo[at.STICK_STIFFNESS] * (z[at.U] - memo[at.ANCHOR])
+            total -= phase.cache[at.STICK_STIFFNESS] * (state[at.ADVANCE] - phase.cache[at.ANCHOR])
         else:
-            total -= slip * kinetic_friction(z[at.U], slip * z[at.SPEED_OF_PART], row, program)
-        out[begin + at.U] = z[at.SPEED_OF_PART]
-        out[begin + at.SPEED_OF_PART] = total / row[at.MASS]
+            total -= slip * kinetic_friction(state[at.ADVANCE], slip * state[at.PART_SPEED], phase)
+        out[begin + at.ADVANCE] = state[at.PART_SPEED]
+        out[begin + at.PART_SPEED] = total / phase.parameters[at.MASS]
     out[begin + at.TRAVEL] = speed
-    for i in range(at.EXTRA, mode[at.STATES]):
-        law = program[at.LOSS] + 2 * (i - at.EXTRA)
+    for i in range(at.FIRST_EXTRA_STATE, phase.contact_mode[at.STATE_COUNT]):
+        law = phase.laws[at.LOSS] + 2 * (i - at.FIRST_EXTRA_STATE)
         lost = 0.0
-        if mode[at.RUNNING] == 1:
-            lost = invoke(program[law], z[i], force, 0.0, 0.0, row, program[law + 1])
+        if phase.contact_mode[at.RUNNING] == 1:
+            lost = evaluate_law(law, state[i], force, 0.0, 0.0, phase)
         out[begin + i] = lost
 
 
 @compiled
-def reading(force: float, row: FloatPointer, program: IntPointer) -> float:
+def sensor_reading(force: float, phase: SmoothPhase) -> float:
     """Apply the sensor's laws to a contact force that has been through its lag [N]."""
-    for i in range(program[at.READING], program[at.READING + 1], 2):
-        force = invoke(program[i], force, 0.0, 0.0, 0.0, row, program[i + 1])
+    for i in range(phase.laws[at.READING], phase.laws[at.READING + 1], 2):
+        force = evaluate_law(i, force, 0.0, 0.0, 0.0, phase)
     return force

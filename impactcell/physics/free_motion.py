@@ -38,7 +38,7 @@ def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
     values = parameter_vector(plant, program)
     mass, g, sign = tap.mass_kg, plant.gravity_m_s2, tap.direction
     total = np.zeros(len(speed_m_s))
-    for identifier, spans in zip(program.effects, program.spans, strict=True):
+    for identifier, spans in zip(program.effects, program.parameter_spans, strict=True):
         laws, p = LIBRARY[identifier].laws, [values[first] for first, _ in spans]
         body, kinetic = laws.get(LawKind.BODY), laws.get(LawKind.KINETIC)
         if body is not None:

@@ -16,7 +16,7 @@ from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
 NOMINAL_NAMES = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
-MOST_STATES = at.WIDTH - at.EXTRA
+MOST_STATES = at.STATE_WIDTH - at.FIRST_EXTRA_STATE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,13 +31,13 @@ class LawTable:
     laws : ndarray
         See `impactcell.physics.memory_layout`.
     width : int
-        Length of a row.
+        Numbers of a tap.
     """
 
     effects: tuple[str, ...]
     batches: int
     names: tuple[str, ...]
-    spans: tuple[tuple[tuple[int, int], ...], ...]
+    parameter_spans: tuple[tuple[tuple[int, int], ...], ...]
     laws: IntArray
     width: int
 
@@ -45,36 +45,36 @@ class LawTable:
         """Travel to another process by name: addresses of laws mean nothing there."""
         return build_law_table, (self.effects, self.batches)
 
-    def rows(self, parameters: Samples, gravity_m_s2: float, taps: Mapping[str, Samples]) -> Samples:
-        """One row a tap, shape (n, width), from parameters of shape (n, len(names)) and the taps' columns."""
-        n = parameters.shape[0]
-        rows = np.empty((n, self.width))
-        rows[:, at.STIFFNESS : at.MU_K + 1] = parameters[:, :4]
-        rows[:, at.MASS] = taps["mass_kg"]
-        rows[:, at.GRAVITY] = gravity_m_s2
-        rows[:, at.VELOCITY] = taps["velocity_m_s"]
-        rows[:, at.STROKE] = taps["stroke_m"]
-        rows[:, at.DIRECTION] = taps["direction"]
-        rows[:, at.START] = taps["start_m"]
-        rows[:, at.HALTS_AT_SEPARATION] = taps["halts_at_separation"]
-        rows[:, at.INITIAL_SPEED] = taps["initial_speed_m_s"]
-        rows[:, at.NOMINAL :] = parameters[:, 4:]
+    def tap_parameters(self, values: Samples, gravity_m_s2: float, taps: Mapping[str, Samples]) -> Samples:
+        """Parameters of taps, shape (n, width), of values, shape (n, len(names)), and the taps' columns."""
+        n = values.shape[0]
+        parameters = np.empty((n, self.width))
+        parameters[:, at.STIFFNESS : at.MU_K + 1] = values[:, :4]
+        parameters[:, at.MASS] = taps["mass_kg"]
+        parameters[:, at.GRAVITY] = gravity_m_s2
+        parameters[:, at.VELOCITY] = taps["velocity_m_s"]
+        parameters[:, at.STROKE] = taps["stroke_m"]
+        parameters[:, at.DIRECTION] = taps["direction"]
+        parameters[:, at.START] = taps["start_m"]
+        parameters[:, at.HALTS_AT_SEPARATION] = taps["halts_at_separation"]
+        parameters[:, at.INITIAL_SPEED] = taps["initial_speed_m_s"]
+        parameters[:, at.FIRST_EFFECT_PARAMETER :] = values[:, 4:]
         shots: Covariates | None = None
-        for identifier, spans in zip(self.effects, self.spans, strict=True):
+        for identifier, spans in zip(self.effects, self.parameter_spans, strict=True):
             effect = LIBRARY[identifier]
             if effect.between is None:
                 continue
             if shots is None:
                 shots = Covariates(*(taps[name] for name in Covariates._fields))
             columns = [
-                parameters[:, begin:end] if parameter.per_batch else parameters[:, begin]
+                values[:, begin:end] if parameter.per_batch else values[:, begin]
                 for (begin, end), parameter in zip(spans, effect.parameters, strict=True)
             ]
             factors = effect.between(columns, shots)
-            rows[:, at.MU_S] *= factors.mu_s
-            rows[:, at.MU_K] *= factors.mu_k
-            rows[:, at.MASS] *= factors.mass
-        return rows
+            parameters[:, at.MU_S] *= factors.mu_s
+            parameters[:, at.MU_K] *= factors.mu_k
+            parameters[:, at.MASS] *= factors.mass
+        return parameters
 
 
 @lru_cache(maxsize=256)
@@ -88,7 +88,7 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
     """
     names = list(NOMINAL_NAMES)
     spans: list[tuple[tuple[int, int], ...]] = []
-    lists: dict[int, list[tuple[int, int, int]]] = {kind: [] for kind in range(at.KINDS)}
+    lists: dict[int, list[tuple[int, int, int]]] = {kind: [] for kind in range(at.LAW_KINDS)}
     if len(set(effects)) != len(effects):
         raise PhysicsError(f"an effect is named twice among {', '.join(effects)}")
     for identifier in effects:
@@ -103,7 +103,7 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
             mine.append((begin, len(names)))
         spans.append(tuple(mine))
         for place, law in effect.laws.items():
-            first = mine[0][0] - len(NOMINAL_NAMES) + at.NOMINAL
+            first = mine[0][0] - len(NOMINAL_NAMES) + at.FIRST_EFFECT_PARAMETER
             lists[int(place)].append((effect.order, address(law), first))
     for single in (LawKind.REACH, LawKind.LAG, LawKind.DELAY, LawKind.STICK):
         if len(lists[single]) > 1:
@@ -112,18 +112,18 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
         raise PhysicsError(f"at most {MOST_STATES} effects with a state of their own")
     starts: list[int] = []
     entries: list[int] = []
-    for kind in range(at.KINDS):
-        starts.append(at.KINDS + 1 + len(entries))
+    for kind in range(at.LAW_KINDS):
+        starts.append(at.LAW_KINDS + 1 + len(entries))
         for _, where, first in sorted(lists[kind], key=lambda entry: entry[0]):
             entries += [where, first]
-    starts.append(at.KINDS + 1 + len(entries))
+    starts.append(at.LAW_KINDS + 1 + len(entries))
     return LawTable(
         effects=effects,
         batches=batches,
         names=tuple(names),
-        spans=tuple(spans),
+        parameter_spans=tuple(spans),
         laws=np.array(starts + entries, dtype=np.int64),
-        width=at.NOMINAL + len(names) - len(NOMINAL_NAMES),
+        width=at.FIRST_EFFECT_PARAMETER + len(names) - len(NOMINAL_NAMES),
     )
 
 
@@ -170,7 +170,7 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
 
 
 def tap_columns(taps: Sequence[TapInput]) -> dict[str, Samples]:
-    """Columns of `rows` from taps, each of shape (n,); they strike, so there is no initial speed."""
+    """Columns of `LawTable.tap_parameters`, each of shape (n,), of taps that strike: no initial speed."""
     made = {
         name: np.array([getattr(tap, name) for tap in taps], dtype=np.float64)
         for name in (

@@ -62,7 +62,7 @@ class Motion:
         When the part came to rest for good; 0 if it never moved.
     first_breakaway_s, last_separation_s, distance_after_separation_m : float
         nan where there was none; the properties raise instead.
-    course : callable
+    sampler : callable
         Samples at ascending or any other times.
     """
 
@@ -73,7 +73,7 @@ class Motion:
     first_breakaway_s: float
     last_separation_s: float
     distance_after_separation_m: float
-    course: Sampler
+    sampler: Sampler
 
     @property
     def breakaway_s(self) -> float:
@@ -112,4 +112,4 @@ class Motion:
 
     def sample(self, time_s: ArrayLike) -> ChannelSamples:
         """Channels at `time_s`, shape (n,), in any order; 0 is first contact, before it all is at rest."""
-        return self.course(np.atleast_1d(np.asarray(time_s, dtype=np.float64)))
+        return self.sampler(np.atleast_1d(np.asarray(time_s, dtype=np.float64)))

@@ -6,68 +6,75 @@ with them are our own, compiled.
 """
 
 import math
+from typing import Final
 
 import numpy as np
 from scipy.integrate import DOP853
 
-from impactcell.numerics.jit import FloatPointer, IntPointer, compiled
+from impactcell.numerics.jit import FloatPointer, compiled
 from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import derivative
+from impactcell.physics.memory_layout import SmoothPhase, StepBuffers
 
-STAGES = 12
-EXTENDED = 16
-INTERPOLANT = 7
+STAGES: Final = 12  # of the step; the next one is the first of the step after it
+EXTENDED: Final = 16  # stages, with those that only the interpolant needs
+INTERPOLANT: Final = 8  # coefficients of the interpolant for each component of the state
 
-_A = np.zeros((EXTENDED, EXTENDED))
-_A[:STAGES, :STAGES] = DOP853.A
-_A[STAGES, :STAGES] = DOP853.B
-_A[STAGES + 1 :] = DOP853.A_EXTRA
-_C = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
-_D = np.ascontiguousarray(DOP853.D)
-_E3 = np.ascontiguousarray(DOP853.E3)
-_E5 = np.ascontiguousarray(DOP853.E5)
+A = np.zeros((EXTENDED, EXTENDED))
+"""Runge-Kutta matrix of Dormand and Prince's tableau, the weights of the step as its row STAGES."""
+A[:STAGES, :STAGES] = DOP853.A
+A[STAGES, :STAGES] = DOP853.B
+A[STAGES + 1 :] = DOP853.A_EXTRA
+C = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
+"""Nodes of the tableau, in fractions of the step."""
+D = np.ascontiguousarray(DOP853.D)
+"""Weights of the stages in the last four coefficients of the interpolant."""
+E3 = np.ascontiguousarray(DOP853.E3)
+"""Weights of the stages in the error estimate of order 3."""
+E5 = np.ascontiguousarray(DOP853.E5)
+"""Weights of the stages in the error estimate of order 5."""
 
 RELATIVE = 1e-10
+"""Error allowed in a step, of the state: what keeps a trace within 1e-9 of the exact one."""
 ABSOLUTE = np.array([1e-13, 1e-11, 1e-13, 1e-11, 1e-11, 1e-11, 1e-11, 1e-11])
+"""The same near zero: m, m/s, m, and m/s of the effects' own states; far below what any encoder tells."""
 
 
 @compiled
-def stages(
-    first: int,
-    last: int,
-    t: float,
-    h: float,
-    z: FloatPointer,
-    mode: IntPointer,
-    memo: FloatPointer,
-    row: FloatPointer,
-    program: IntPointer,
-    K: FloatPointer,
-    scratch: FloatPointer,
-) -> None:
-    """Evaluate stages `first` to `last` - 1 of the step h from (t, z) into the rows of K."""
-    n = mode[at.STATES]
+def evaluate_stages(first: int, last: int, t: float, h: float, phase: SmoothPhase, step: StepBuffers) -> None:
+    """Evaluate stages `first` to `last` - 1 of the step h; the last one's state stays in `trial_state`."""
+    state, trial, K = step.state, step.trial_state, step.stages
     for s in range(first, last):
-        for i in range(n):
+        # The three components that every plant has are summed side by side, which is faster.
+        advance, speed, travel = 0.0, 0.0, 0.0
+        for j in range(s):
+            weight = A[s, j]
+            advance += weight * K[j * at.STATE_WIDTH + at.ADVANCE]
+            speed += weight * K[j * at.STATE_WIDTH + at.PART_SPEED]
+            travel += weight * K[j * at.STATE_WIDTH + at.TRAVEL]
+        trial[at.ADVANCE] = state[at.ADVANCE] + h * advance
+        trial[at.PART_SPEED] = state[at.PART_SPEED] + h * speed
+        trial[at.TRAVEL] = state[at.TRAVEL] + h * travel
+        for i in range(at.FIRST_EXTRA_STATE, phase.contact_mode[at.STATE_COUNT]):
             total = 0.0
             for j in range(s):
-                total += _A[s, j] * K[j * at.WIDTH + i]
-            scratch[i] = z[i] + h * total
-        derivative(t + _C[s] * h, scratch, mode, memo, row, program, K, s * at.WIDTH)
+                total += A[s, j] * K[j * at.STATE_WIDTH + i]
+            trial[i] = state[i] + h * total
+        derivative(t + C[s] * h, trial, phase, K, s * at.STATE_WIDTH)
 
 
 @compiled
-def error(n: int, h: float, z: FloatPointer, new: FloatPointer, K: FloatPointer) -> float:
+def step_error(n: int, h: float, step: StepBuffers) -> float:
     """Estimated error of the step in units of the tolerance (Hairer's combination of orders 5 and 3)."""
     fifth = 0.0
     third = 0.0
     for i in range(n):
-        scale = ABSOLUTE[i] + RELATIVE * max(abs(z[i]), abs(new[i]))
+        scale = ABSOLUTE[i] + RELATIVE * max(abs(step.state[i]), abs(step.next_state[i]))
         e5 = 0.0
         e3 = 0.0
         for j in range(STAGES + 1):
-            e5 += _E5[j] * K[j * at.WIDTH + i]
-            e3 += _E3[j] * K[j * at.WIDTH + i]
+            e5 += E5[j] * step.stages[j * at.STATE_WIDTH + i]
+            e3 += E3[j] * step.stages[j * at.STATE_WIDTH + i]
         fifth += (e5 / scale) ** 2
         third += (e3 / scale) ** 2
     if fifth == 0.0:
@@ -76,32 +83,38 @@ def error(n: int, h: float, z: FloatPointer, new: FloatPointer, K: FloatPointer)
 
 
 @compiled
-def interpolant(
-    n: int, h: float, z: FloatPointer, new: FloatPointer, K: FloatPointer, dense: FloatPointer
-) -> None:
-    """Coefficients of the interpolant over the step, shape (8, WIDTH), from all 16 stages."""
+def build_interpolant(n: int, h: float, step: StepBuffers) -> None:
+    """Coefficients of the interpolant over the step, shape (INTERPOLANT, STATE_WIDTH), from all 16 stages."""
+    K, out = step.stages, step.interpolant
     for i in range(n):
-        delta = new[i] - z[i]
-        dense[i] = z[i]
-        dense[at.WIDTH + i] = delta
-        dense[2 * at.WIDTH + i] = h * K[i] - delta
-        dense[3 * at.WIDTH + i] = 2.0 * delta - h * (K[STAGES * at.WIDTH + i] + K[i])
+        delta = step.next_state[i] - step.state[i]
+        out[i] = step.state[i]
+        out[at.STATE_WIDTH + i] = delta
+        out[2 * at.STATE_WIDTH + i] = h * K[i] - delta
+        out[3 * at.STATE_WIDTH + i] = 2.0 * delta - h * (K[STAGES * at.STATE_WIDTH + i] + K[i])
         for j in range(4):
             total = 0.0
             for s in range(EXTENDED):
-                total += _D[j, s] * K[s * at.WIDTH + i]
-            dense[(4 + j) * at.WIDTH + i] = h * total
+                total += D[j, s] * K[s * at.STATE_WIDTH + i]
+            out[(4 + j) * at.STATE_WIDTH + i] = h * total
 
 
 @compiled
-def evaluate(theta: float, dense: FloatPointer, i: int) -> float:
+def interpolate(theta: float, interpolant: FloatPointer, i: int) -> float:
     """Component i of the state at the fraction `theta` of the step."""
     rest = 1.0 - theta
-    value = dense[7 * at.WIDTH + i] * theta
-    value = (value + dense[6 * at.WIDTH + i]) * rest
-    value = (value + dense[5 * at.WIDTH + i]) * theta
-    value = (value + dense[4 * at.WIDTH + i]) * rest
-    value = (value + dense[3 * at.WIDTH + i]) * theta
-    value = (value + dense[2 * at.WIDTH + i]) * rest
-    value = (value + dense[at.WIDTH + i]) * theta
-    return value + dense[i]
+    value = interpolant[7 * at.STATE_WIDTH + i] * theta
+    value = (value + interpolant[6 * at.STATE_WIDTH + i]) * rest
+    value = (value + interpolant[5 * at.STATE_WIDTH + i]) * theta
+    value = (value + interpolant[4 * at.STATE_WIDTH + i]) * rest
+    value = (value + interpolant[3 * at.STATE_WIDTH + i]) * theta
+    value = (value + interpolant[2 * at.STATE_WIDTH + i]) * rest
+    value = (value + interpolant[at.STATE_WIDTH + i]) * theta
+    return value + interpolant[i]
+
+
+@compiled
+def interpolate_state(theta: float, n: int, step: StepBuffers) -> None:
+    """Write the state at the fraction `theta` of the step into `trial_state`."""
+    for i in range(n):
+        step.trial_state[i] = interpolate(theta, step.interpolant, i)

@@ -1,37 +1,37 @@
-"""Numbers and figures gathered from one accepted step."""
+"""Samples and outputs gathered from one accepted step."""
 
 import math
+from typing import Final
 
 import numpy as np
 
-from impactcell.numerics.jit import FloatPointer, IntPointer, compiled
+from impactcell.numerics.jit import FloatPointer, advance, compiled
 from impactcell.physics import memory_layout as at
-from impactcell.physics.events import state_at
-from impactcell.physics.forces import actuator_speed, contact_force, reading
-from impactcell.physics.runge_kutta import evaluate
+from impactcell.physics.forces import actuator_speed, contact_force, sensor_reading
+from impactcell.physics.memory_layout import SmoothPhase, StepBuffers, TapRecord
+from impactcell.physics.runge_kutta import interpolate, interpolate_state
 
-# Chebyshev-Lobatto points of the unit step and the monomial coefficients of the polynomial through them
-POWERS = 10
+POWERS: Final = at.LAG_MOMENTS - at.FORCE_POWERS
+"""Coefficients of the polynomial that stands for the contact force over a step."""
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(POWERS) / (POWERS - 1))
+"""Chebyshev-Lobatto points of the unit step, through which that polynomial goes."""
 MONOMIALS = np.linalg.inv(np.vander(NODES, increasing=True))
+"""Its monomial coefficients for a unit value at each node."""
+STARTED_EARLIER: Final = 14
+"""Powers above the last at which the downward recursion starts, by which its error has died away."""
+GOLDEN = 0.3819660112501051  # (3 - sqrt 5) / 2, of a golden-section search
+NARROWINGS = 24  # of that search: an error of 1e-6 in time, near a maximum, is one of 1e-12 in force
+PROBES: Final = 8  # equal parts of a step at whose ends the force is looked at
 
 
 @compiled
-def force_at(
-    theta: float,
-    t: float,
-    h: float,
-    dense: FloatPointer,
-    z: FloatPointer,
-    mode: IntPointer,
-    row: FloatPointer,
-    program: IntPointer,
-) -> float:
-    """Contact force at the fraction `theta` of the step [N]; `z` is scratch."""
-    if mode[at.ZONE] < at.NEAR:
+def force_at(theta: float, t: float, h: float, phase: SmoothPhase, step: StepBuffers) -> float:
+    """Contact force at the fraction `theta` of the step [N]."""
+    if phase.contact_mode[at.ZONE] < at.NEAR:
         return 0.0
-    state_at(theta, mode[at.STATES], dense, z)
-    return contact_force(z, actuator_speed(t + theta * h, z, mode, row, program), mode, row, program)
+    interpolate_state(theta, phase.contact_mode[at.STATE_COUNT], step)
+    state = step.trial_state
+    return contact_force(state, actuator_speed(t + theta * h, state, phase), phase)
 
 
 @compiled
@@ -55,7 +55,7 @@ def exponential_moments(theta: float, ratio: float, out: FloatPointer) -> None:
             out[j] = value
     else:
         value = 0.0
-        for j in range(n + 14, 0, -1):
+        for j in range(n + STARTED_EARLIER, 0, -1):
             value = (1.0 - value) / (j * relative)
             if j - 1 < n:
                 out[j - 1] = value
@@ -66,184 +66,126 @@ def exponential_moments(theta: float, ratio: float, out: FloatPointer) -> None:
 
 
 @compiled
-def lagged(theta: float, before: float, ratio: float, powers: FloatPointer, moments: FloatPointer) -> float:
-    """Lagged force at the fraction `theta` of a step over which the force is the polynomial `powers`."""
-    exponential_moments(theta, ratio, moments)
-    value = before * math.exp(-theta / ratio)
+def lagged_force(theta: float, h: float, cache: FloatPointer) -> float:
+    """Force after the lag of the sensor at the fraction `theta` of a step h that has been fitted [N]."""
+    ratio = cache[at.LAG_S] / h
+    exponential_moments(theta, ratio, advance(cache, at.LAG_MOMENTS))
+    value = cache[at.LAGGED_FORCE] * math.exp(-theta / ratio)
     for j in range(POWERS):
-        value += powers[j] * moments[j]
+        value += cache[at.FORCE_POWERS + j] * cache[at.LAG_MOMENTS + j]
     return value
 
 
 @compiled
-def force_polynomial(
-    t: float,
-    h: float,
-    dense: FloatPointer,
-    z: FloatPointer,
-    mode: IntPointer,
-    row: FloatPointer,
-    program: IntPointer,
-    powers: FloatPointer,
-) -> None:
-    """Monomial coefficients of the contact force over the step, in the fraction of the step."""
-    n = POWERS
-    for j in range(n):
+def fit_force(t: float, h: float, phase: SmoothPhase, step: StepBuffers) -> None:
+    """Fit the polynomial that stands for the contact force over the step, in the fraction of the step."""
+    powers = advance(phase.cache, at.FORCE_POWERS)
+    for j in range(POWERS):
         powers[j] = 0.0
-    if mode[at.ZONE] < at.NEAR:
+    if phase.contact_mode[at.ZONE] < at.NEAR:
         return
-    for i in range(n):
-        force = force_at(NODES[i], t, h, dense, z, mode, row, program)
-        for j in range(n):
+    for i in range(POWERS):
+        force = force_at(NODES[i], t, h, phase, step)
+        for j in range(POWERS):
             powers[j] += MONOMIALS[j, i] * force
 
 
 @compiled
-def sensed(
-    theta: float,
-    t: float,
-    h: float,
-    dense: FloatPointer,
-    z: FloatPointer,
-    mode: IntPointer,
-    memo: FloatPointer,
-    row: FloatPointer,
-    program: IntPointer,
-    before: float,
-    powers: FloatPointer,
-    moments: FloatPointer,
-) -> float:
+def sensed_force(theta: float, t: float, h: float, phase: SmoothPhase, step: StepBuffers) -> float:
     """Contact force after the sensor's lag, before its other laws [N]."""
-    if memo[at.LAG_S] > 0.0:
-        return lagged(theta, before, memo[at.LAG_S] / h, powers, moments)
-    return force_at(theta, t, h, dense, z, mode, row, program)
+    if phase.cache[at.LAG_S] > 0.0:
+        return lagged_force(theta, h, phase.cache)
+    return force_at(theta, t, h, phase, step)
 
 
 @compiled
-def find_peak(
-    t: float,
-    h: float,
-    dense: FloatPointer,
-    z: FloatPointer,
-    mode: IntPointer,
-    memo: FloatPointer,
-    row: FloatPointer,
-    program: IntPointer,
-    before: float,
-    powers: FloatPointer,
-    moments: FloatPointer,
-    figures: FloatPointer,
+def update_peak_force(
+    t: float, h: float, phase: SmoothPhase, step: StepBuffers, outputs: FloatPointer
 ) -> None:
-    """Raise the peak force to the largest within this step."""
-    if mode[at.ZONE] == at.ABSENT or (mode[at.ZONE] != at.TOUCHING and memo[at.LAG_S] == 0.0):
+    """Raise the peak force to the largest within this step: by golden section about the largest probe."""
+    zone = phase.contact_mode[at.ZONE]
+    if zone == at.ABSENT or (zone != at.TOUCHING and phase.cache[at.LAG_S] == 0.0):
         return
     best = -np.inf
     best_at = 0.0
-    for i in range(9):
-        theta = 0.125 * i
-        force = sensed(theta, t, h, dense, z, mode, memo, row, program, before, powers, moments)
+    for i in range(PROBES + 1):
+        theta = i / PROBES
+        force = sensed_force(theta, t, h, phase, step)
         if force > best:
             best = force
             best_at = theta
-    low = max(best_at - 0.125, 0.0)
-    high = min(best_at + 0.125, 1.0)
-    if best < figures[at.PEAK_FORCE] - 0.1 * abs(figures[at.PEAK_FORCE]):
+    low = max(best_at - 1.0 / PROBES, 0.0)
+    high = min(best_at + 1.0 / PROBES, 1.0)
+    if best < outputs[at.PEAK_FORCE] - 0.1 * abs(outputs[at.PEAK_FORCE]):
         return
     if best_at == 0.0 or best_at == 1.0:  # compiled
         inside = abs(best_at - 1e-6)
-        if sensed(inside, t, h, dense, z, mode, memo, row, program, before, powers, moments) < best:
+        if sensed_force(inside, t, h, phase, step) < best:
             high = low
-    # Golden section; near a maximum an error of 1e-6 in time is one of 1e-12 in force.
-    golden = 0.3819660112501051
-    a = low + golden * (high - low)
-    b = high - golden * (high - low)
-    fa = sensed(a, t, h, dense, z, mode, memo, row, program, before, powers, moments)
-    fb = sensed(b, t, h, dense, z, mode, memo, row, program, before, powers, moments)
-    for _ in range(24 if high > low else 0):
-        if fa > fb:
-            high, b, fb = b, a, fa
-            a = low + golden * (high - low)
-            fa = sensed(a, t, h, dense, z, mode, memo, row, program, before, powers, moments)
+    a = low + GOLDEN * (high - low)
+    b = high - GOLDEN * (high - low)
+    force_a = sensed_force(a, t, h, phase, step)
+    force_b = sensed_force(b, t, h, phase, step)
+    for _ in range(NARROWINGS if high > low else 0):
+        if force_a > force_b:
+            high, b, force_b = b, a, force_a
+            a = low + GOLDEN * (high - low)
+            force_a = sensed_force(a, t, h, phase, step)
         else:
-            low, a, fa = a, b, fb
-            b = high - golden * (high - low)
-            fb = sensed(b, t, h, dense, z, mode, memo, row, program, before, powers, moments)
-    if fa > best:
-        best, best_at = fa, a
-    if fb > best:
-        best, best_at = fb, b
-    if best > figures[at.PEAK_FORCE]:
-        figures[at.PEAK_FORCE] = best
-        figures[at.PEAK_TIME] = t + best_at * h
+            low, a, force_a = a, b, force_b
+            b = high - GOLDEN * (high - low)
+            force_b = sensed_force(b, t, h, phase, step)
+    if force_a > best:
+        best, best_at = force_a, a
+    if force_b > best:
+        best, best_at = force_b, b
+    if best > outputs[at.PEAK_FORCE]:
+        outputs[at.PEAK_FORCE] = best
+        outputs[at.PEAK_TIME] = t + best_at * h
 
 
 @compiled
-def take_samples(
-    t: float,
-    h: float,
-    dense: FloatPointer,
-    z: FloatPointer,
-    mode: IntPointer,
-    memo: FloatPointer,
-    row: FloatPointer,
-    program: IntPointer,
-    before: float,
-    powers: FloatPointer,
-    moments: FloatPointer,
-    cursor: IntPointer,
-    times: FloatPointer,
-    out: FloatPointer,
-) -> None:
-    """Fill every channel's samples that fall into [t, t + h)."""
-    end = t + h
-    sign = row[at.DIRECTION]
-    delay = memo[at.DELAY_S]
-    i = cursor[at.FORCE]
-    while i < cursor[at.CHANNELS + at.FORCE] and times[i] - delay < end:
-        theta = (times[i] - delay - t) / h
-        force = sensed(theta, t, h, dense, z, mode, memo, row, program, before, powers, moments)
-        out[i] = reading(force, row, program)
+def fill_force(t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
+    """Fill the samples of the force channel that fall into [t, t + h), as the sensor shows them."""
+    index, times = record.sample_index, record.sample_times
+    delay = phase.cache[at.DELAY_S]
+    i = index[at.FORCE]
+    while i < index[at.CHANNEL_COUNT + at.FORCE] and times[i] - delay < t + h:
+        force = sensed_force((times[i] - delay - t) / h, t, h, phase, step)
+        record.samples[i] = sensor_reading(force, phase)
         i += 1
-    cursor[at.FORCE] = i
-    i = cursor[at.POSITION]
-    while i < cursor[at.CHANNELS + at.POSITION] and times[i] < end:
-        out[i] = sign * evaluate((times[i] - t) / h, dense, at.U)
-        i += 1
-    cursor[at.POSITION] = i
-    i = cursor[at.ACTUATOR]
-    while i < cursor[at.CHANNELS + at.ACTUATOR] and times[i] < end:
-        out[i] = sign * evaluate((times[i] - t) / h, dense, at.TRAVEL)
-        i += 1
-    cursor[at.ACTUATOR] = i
-    i = cursor[at.PART_VELOCITY]
-    while i < cursor[at.CHANNELS + at.PART_VELOCITY] and times[i] < end:
-        out[i] = sign * evaluate((times[i] - t) / h, dense, at.SPEED_OF_PART)
-        i += 1
-    cursor[at.PART_VELOCITY] = i
+    index[at.FORCE] = i
 
 
 @compiled
-def record(
+def fill_channel(
+    channel: int,
+    component: int,
     t: float,
     h: float,
-    dense: FloatPointer,
-    z: FloatPointer,
-    mode: IntPointer,
-    memo: FloatPointer,
-    row: FloatPointer,
-    program: IntPointer,
-    powers: FloatPointer,
-    moments: FloatPointer,
-    cursor: IntPointer,
-    times: FloatPointer,
-    out: FloatPointer,
-    figures: FloatPointer,
+    sign: float,
+    interpolant: FloatPointer,
+    record: TapRecord,
 ) -> None:
+    """Fill the samples of a channel that is a component of the state, along +1, that fall into [t, t + h)."""
+    index, times = record.sample_index, record.sample_times
+    i = index[channel]
+    while i < index[at.CHANNEL_COUNT + channel] and times[i] < t + h:
+        record.samples[i] = sign * interpolate((times[i] - t) / h, interpolant, component)
+        i += 1
+    index[channel] = i
+
+
+@compiled
+def record_step(t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
     """Take the peak force and the samples of an accepted step, and carry the sensor's lag over it."""
-    before = memo[at.LAGGED_FORCE]
-    if memo[at.LAG_S] > 0.0:
-        force_polynomial(t, h, dense, z, mode, row, program, powers)
-    find_peak(t, h, dense, z, mode, memo, row, program, before, powers, moments, figures)
-    take_samples(t, h, dense, z, mode, memo, row, program, before, powers, moments, cursor, times, out)
-    if memo[at.LAG_S] > 0.0:
-        memo[at.LAGGED_FORCE] = lagged(1.0, before, memo[at.LAG_S] / h, powers, moments)
+    sign = phase.parameters[at.DIRECTION]
+    if phase.cache[at.LAG_S] > 0.0:
+        fit_force(t, h, phase, step)
+    update_peak_force(t, h, phase, step, record.outputs)
+    fill_force(t, h, phase, step, record)
+    fill_channel(at.POSITION, at.ADVANCE, t, h, sign, step.interpolant, record)
+    fill_channel(at.ACTUATOR, at.TRAVEL, t, h, sign, step.interpolant, record)
+    fill_channel(at.PART_VELOCITY, at.PART_SPEED, t, h, sign, step.interpolant, record)
+    if phase.cache[at.LAG_S] > 0.0:
+        phase.cache[at.LAGGED_FORCE] = lagged_force(1.0, h, phase.cache)

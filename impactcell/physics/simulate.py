@@ -6,24 +6,25 @@ import numpy as np
 
 from impactcell.errors import NoStopError
 from impactcell.physics import memory_layout as at
+from impactcell.physics.batch_integration import MAX_DURATION_S, NO_SAMPLES, sample_taps, undriven
 from impactcell.physics.ensemble import Ensemble
-from impactcell.physics.integrator import integrate_all
-from impactcell.physics.law_table import LawTable, build_law_table, parameter_vector, tap_columns
+from impactcell.physics.integrator import integrate_taps
+from impactcell.physics.law_table import build_law_table, parameter_vector, tap_columns
+from impactcell.physics.memory_layout import SampleArrays, TapArrays
 from impactcell.physics.motion import ChannelSamples, Motion, TapEvent, TapEventKind
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
-LONGEST_S = 600.0
-ROOM = 4096
-KINDS = (
+MAX_EVENTS = 4096
+"""Events of a tap that are kept: those of half a minute of stick and slip."""
+EVENT_KINDS = (
     TapEventKind.BREAKAWAY,
     TapEventKind.CONTACT,
     TapEventKind.SEPARATION,
     TapEventKind.STOP,
     TapEventKind.HALT,
 )
-NONE = np.empty(0)
-UNDRIVEN = np.zeros(2, dtype=np.int64)
+"""By their number in `impactcell.physics.memory_layout`."""
 
 
 def simulate_tap(plant: Plant, tap: TapInput) -> Motion:
@@ -80,7 +81,7 @@ def simulate_driven(
 
     Returns
     -------
-    Sampled
+    ChannelSamples
         `force_n` repeats the driving force; the actuator is nan.
 
     Raises
@@ -108,62 +109,50 @@ def simulate_driven(
 
 def _simulate(plant: Plant, tap: TapInput, initial_speed_m_s: float) -> Motion:
     batches = tap.batch + 1
-    program = build_law_table(tuple(plant.effects), batches)
-    taps = tap_columns([tap])
-    taps["initial_speed_m_s"][0] = initial_speed_m_s
-    rows = program.rows(parameter_vector(plant, program, batches)[None, :], plant.gravity_m_s2, taps)
-    table = np.empty((1, at.FIGURES))
-    kinds = np.empty(ROOM, dtype=np.int64)
-    times = np.empty(ROOM)
-    cursors = np.zeros((1, at.CURSORS), dtype=np.int64)
-    cursors[0, at.ROOM] = ROOM
-    laws = program.laws
-    integrate_all(rows, laws, NONE, UNDRIVEN, LONGEST_S, at.TO_REST, cursors, NONE, NONE, kinds, times, table)
-    figures = table[0]
-    status = figures[at.STATUS]
+    table = build_law_table(tuple(plant.effects), batches)
+    columns = tap_columns([tap])
+    columns["initial_speed_m_s"][0] = initial_speed_m_s
+    values = parameter_vector(plant, table, batches)[None, :]
+    taps = undriven(table.tap_parameters(values, plant.gravity_m_s2, columns), table.laws)
+    outputs = np.empty((1, at.OUTPUT_COUNT))
+    kinds = np.empty(MAX_EVENTS, dtype=np.int64)
+    times = np.empty(MAX_EVENTS)
+    sample_index = np.zeros((1, at.SAMPLE_INDEX_COUNT), dtype=np.int64)
+    sample_index[0, at.EVENT_ROOM] = MAX_EVENTS
+    asked = SampleArrays(sample_index, NO_SAMPLES, NO_SAMPLES, kinds, times)
+    integrate_taps(taps[:], asked[:], outputs, MAX_DURATION_S, at.TO_REST)
+    of_tap = outputs[0]
+    status = of_tap[at.STATUS]
     if status != at.AT_REST:
+        endless = status == at.TOO_MANY_EVENTS or np.isnan(of_tap[at.HALT_TIME])
         raise NoStopError(
             "the part never came to rest: "
             + (
                 "the actuator pushed it without end. Command a stroke"
-                if status == at.TOO_MANY_EVENTS or np.isnan(figures[at.HALT_TIME])
-                else f"it was still moving after {LONGEST_S:g} s, or ran away. Less tilt, or more friction"
+                if endless
+                else f"it was still moving after {MAX_DURATION_S:g} s, or ran away. "
+                "Less tilt, or more friction"
             )
         )
-    count = min(int(figures[at.EVENT_COUNT]), ROOM)
-    stop = figures[at.STOP_TIME]
+    count = min(int(of_tap[at.EVENT_COUNT]), MAX_EVENTS)
+    stop = of_tap[at.STOP_TIME]
     return Motion(
-        events=tuple(TapEvent(KINDS[kinds[i]], float(times[i])) for i in range(count)),
-        peak_force_n=float(figures[at.PEAK_FORCE]),
-        displacement_m=float(figures[at.DISPLACEMENT]),
+        events=tuple(TapEvent(EVENT_KINDS[kinds[i]], float(times[i])) for i in range(count)),
+        peak_force_n=float(of_tap[at.PEAK_FORCE]),
+        displacement_m=float(of_tap[at.DISPLACEMENT]),
         stop_s=0.0 if np.isnan(stop) else float(stop),
-        first_breakaway_s=float(figures[at.BREAKAWAY_TIME]),
-        last_separation_s=float(figures[at.SEPARATION_TIME]),
-        distance_after_separation_m=float(figures[at.DISTANCE]),
-        course=partial(_sampled, rows, program),
+        first_breakaway_s=float(of_tap[at.BREAKAWAY_TIME]),
+        last_separation_s=float(of_tap[at.SEPARATION_TIME]),
+        distance_after_separation_m=float(of_tap[at.DISTANCE]),
+        sampler=partial(_sample, taps),
     )
 
 
-def _sampled(rows: Samples, program: LawTable, time_s: Samples) -> ChannelSamples:
+def _sample(taps: TapArrays, time_s: Samples) -> ChannelSamples:
     """Integrate again, now with samples: it costs less than keeping every step would."""
     n = time_s.size
     order = np.argsort(time_s, kind="stable")
-    cursors = np.array([[0, n, 2 * n, 3 * n, n, 2 * n, 3 * n, 4 * n, 0]], dtype=np.int64)
-    out = np.empty(4 * n)
-    integrate_all(
-        rows,
-        program.laws,
-        NONE,
-        UNDRIVEN,
-        LONGEST_S,
-        at.TO_LAST_SAMPLE,
-        cursors,
-        np.tile(time_s[order], 4),
-        out,
-        np.empty(0, dtype=np.int64),
-        NONE,
-        np.empty((1, at.FIGURES)),
-    )
+    sample_index = np.array([[0, n, 2 * n, 3 * n, n, 2 * n, 3 * n, 4 * n, 0]], dtype=np.int64)
     channels = np.empty((4, n))
-    channels[:, order] = out.reshape(4, n)
+    channels[:, order] = sample_taps(taps, sample_index, np.tile(time_s[order], 4)).reshape(4, n)
     return ChannelSamples(*channels)

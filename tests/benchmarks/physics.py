@@ -52,7 +52,7 @@ def speed(*, quick: bool) -> Table:
     for _ in range(rounds):
         ours.append(seconds(lambda: ensemble.traces(theta), 50)[0])
         batch.append(seconds(lambda: many.traces(theta), 5)[0] / 60)
-        figures.append(seconds(lambda: many.figures(theta), 5)[0] / 60)
+        figures.append(seconds(lambda: many.outputs(theta), 5)[0] / 60)
         single.append(seconds(lambda: simulate_tap(reference_plant(0.2), tap).sample(SAMPLES), 20)[0])
         theirs.append(seconds(lambda: scipy_tap(0.2, v, 1e-6), 3)[0])
     exact = scipy_tap(0.2, v, 1e-13, peak=True, method="DOP853", max_step=1e-4)
@@ -116,7 +116,7 @@ def coefficients(*, quick: bool) -> Table:
         theta = np.column_stack(
             [np.full(mu.size, k), np.full(mu.size, b), mu, ratio * mu, np.full(mu.size, k_v)]
         )
-        figures = ensemble.figures(theta)
+        figures = ensemble.outputs(theta)
         force, distance = figures.peak_force_n, figures.sliding_distance_m * 1e6
         printed_force = 146.2 * mu + 0.0529 * v
         printed_distance = 0.00041 * v**1.8997 + 0.07379 * v**1.6428 * (0.3415 - mu) ** 2

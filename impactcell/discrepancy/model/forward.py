@@ -10,39 +10,12 @@ from impactcell.discrepancy.data.shots import IndexArray, ShotSet
 from impactcell.numerics.jit import IntArray
 from impactcell.physics import TapInput
 from impactcell.physics import memory_layout as at
-from impactcell.physics.integrator import integrate_all
+from impactcell.physics.batch_integration import sample_taps
 from impactcell.physics.law_table import build_law_table, tap_columns
+from impactcell.physics.memory_layout import TapArrays
 from impactcell.records import Samples
 
 LONGEST_S = 60.0
-
-
-def _integrate_shots(
-    rows: Samples,
-    laws: IntArray,
-    drive: Samples,
-    drive_bounds: IntArray,
-    horizon: float,
-    cursors: IntArray,
-    times: Samples,
-    out: Samples,
-    figures: Samples,
-) -> None:
-    none, no_kinds = np.empty(0), np.empty(0, dtype=np.int64)
-    integrate_all(
-        rows,
-        laws,
-        drive,
-        drive_bounds,
-        horizon,
-        at.TO_LAST_SAMPLE,
-        cursors.copy(),
-        times,
-        out,
-        no_kinds,
-        none,
-        figures,
-    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,13 +89,13 @@ class ForwardModel:
         self._columns = tap_columns(taps)
         self.batches = batches
         self._times = shots.times
-        self._cursors = np.zeros((len(taps), at.CURSORS), dtype=np.int64)
+        self._sample_index = np.zeros((len(taps), at.SAMPLE_INDEX_COUNT), dtype=np.int64)
         for i, shot in enumerate(shots.items):
             place = int(shots.bounds[i])
             for channel in range(3):
-                self._cursors[i, channel] = place
+                self._sample_index[i, channel] = place
                 place += len(shot.times[channel])
-                self._cursors[i, at.CHANNELS + channel] = place
+                self._sample_index[i, at.CHANNEL_COUNT + channel] = place
         drives = [np.concatenate(shot.drive) for shot in shots.items]
         self._drive = np.concatenate(drives)
         self._drive_bounds = np.concatenate([[0], np.cumsum([len(one) for one in drives])]).astype(np.int64)
@@ -138,22 +111,25 @@ class ForwardModel:
             "initial_speed_m_s": shot_parameters.speed_m_s,
         }
         table = np.broadcast_to(parameters, (len(self.shots), parameters.shape[-1]))
-        rows = build_law_table(effects, self.batches).rows(table, self.shots.gravity_m_s2, taps)
+        rows = build_law_table(effects, self.batches).tap_parameters(table, self.shots.gravity_m_s2, taps)
         factor = np.exp(shot_parameters.log_factor)
         rows[:, at.MU_S] *= factor
         rows[:, at.MU_K] *= factor
         return rows
 
+    def _taps(
+        self, effects: tuple[str, ...], parameters: Samples, shot_parameters: ShotParameters
+    ) -> TapArrays:
+        rows = self.rows(effects, parameters, shot_parameters)
+        laws = build_law_table(effects, self.batches).laws
+        return TapArrays(rows, laws, self._drive, self._drive_bounds)
+
     def samples(
         self, effects: tuple[str, ...], parameters: Samples, shot_parameters: ShotParameters
     ) -> Samples:
         """Predicted samples, shape (N,); not finite where the plant has no answer."""
-        out = np.empty(self._times.size)
-        figures = np.empty((len(self.shots), at.FIGURES))
-        rows = self.rows(effects, parameters, shot_parameters)
-        laws = build_law_table(effects, self.batches).laws
-        _integrate_shots(
-            rows, laws, self._drive, self._drive_bounds, LONGEST_S, self._cursors, self._times, out, figures
+        out = sample_taps(
+            self._taps(effects, parameters, shot_parameters), self._sample_index, self._times, LONGEST_S
         )
         if shot_parameters.shift_m.any():
             out += np.repeat(shot_parameters.shift_m, np.diff(self.shots.bounds))
@@ -166,16 +142,12 @@ class ForwardModel:
         order = _time_order(self.shots, self._times)
         times = self._times[order]
         states = np.empty((3, times.size))
-        figures = np.empty((len(self.shots), at.FIGURES))
-        rows = self.rows(effects, parameters, shot_parameters)
-        laws = build_law_table(effects, self.batches).laws
+        taps = self._taps(effects, parameters, shot_parameters)
         for k, channel in enumerate((at.POSITION, at.PART_VELOCITY, at.ACTUATOR)):
-            cursors = np.zeros_like(self._cursors)
-            cursors[:, channel] = self.shots.bounds[:-1]
-            cursors[:, at.CHANNELS + channel] = self.shots.bounds[1:]
-            _integrate_shots(
-                rows, laws, self._drive, self._drive_bounds, LONGEST_S, cursors, times, states[k], figures
-            )
+            sample_index = np.zeros_like(self._sample_index)
+            sample_index[:, channel] = self.shots.bounds[:-1]
+            sample_index[:, at.CHANNEL_COUNT + channel] = self.shots.bounds[1:]
+            states[k] = sample_taps(taps, sample_index, times, LONGEST_S)
         back = np.empty_like(order)
         back[order] = np.arange(order.size)
         sign = np.repeat(self._columns["direction"], np.diff(self.shots.bounds))

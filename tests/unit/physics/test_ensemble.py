@@ -46,7 +46,7 @@ def test_an_ensemble_is_its_taps() -> None:
     np.testing.assert_allclose(
         traces.velocity_m_s, np.concatenate([s.velocity_m_s for s in alone]), atol=1e-10
     )
-    figures = ensemble.figures(theta)
+    figures = ensemble.outputs(theta)
     np.testing.assert_array_equal(figures.peak_force_n, [motion.peak_force_n for motion in motions])
     np.testing.assert_array_equal(figures.displacement_m, [motion.displacement_m for motion in motions])
     np.testing.assert_array_equal(
@@ -80,7 +80,7 @@ def test_factors_masses_and_vectors_may_differ_from_tap_to_tap() -> None:
     theta[:, 0] *= np.linspace(0.9, 1.1, len(TAPS))
     factor = np.linspace(0.95, 1.05, len(TAPS))
     mass = np.linspace(10.0, 30.0, len(TAPS))
-    figures = ensemble.figures(theta, factor, mass_kg=mass)
+    figures = ensemble.outputs(theta, factor, mass_kg=mass)
     for i, tap in enumerate(TAPS):
         plant = Plant(theta[i, 0], 465.0, 0.2 * factor[i], 0.152 * factor[i])
         alone = simulate_tap(plant, TapInput(tap.velocity_m_s, mass[i], 1.5e-3))
