@@ -21,6 +21,9 @@ RATIO = 0.76
 RATE_HZ = 10_000.0
 """Sampling rate of the traces where no times are given; that of the paper's sensors."""
 
+REST_S = 0.02
+"""How long the traces go on after the part has come to rest, s: an estimator has to see that it rests."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedTap:
@@ -79,7 +82,7 @@ def simulate_tap(
         `stiffness_n_per_m`, `damping_n_s_per_m`, `mu_s`, `mu_k` (0.76 mu_s if not given), `gravity_m_s2`,
         `effects` (identifier of each effect, and its parameters by name).
     time_s : array_like, shape (n,), optional
-        Times of the samples; 10 kHz until the part is at rest if not given.
+        Times of the samples; 10 kHz until the part has been at rest for 20 ms if not given.
 
     Returns
     -------
@@ -100,7 +103,7 @@ def simulate_tap(
         _plant(plant), TapInput(velocity_m_s, mass_kg, stroke_m, halts_at_separation=math.isinf(stroke_m))
     )
     times = (
-        np.arange(math.ceil(motion.stop_s * RATE_HZ) + 1) / RATE_HZ
+        np.arange(math.ceil((motion.stop_s + REST_S) * RATE_HZ) + 1) / RATE_HZ
         if time_s is None
         else np.atleast_1d(np.asarray(time_s, dtype=np.float64))
     )

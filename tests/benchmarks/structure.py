@@ -35,11 +35,11 @@ DEFINITIONS: Mapping[str, tuple[str, ...]] = {
         "prediction.(reading|feature_extraction):noise_std",
         "tracking.(slide|signature.slide_segment):_noise",
         "discrepancy.(noise|data.noise_floor):white_noise",
-        "discrepancy.(drives|data.measured_drive):_noise",
+        "discrepancy.(drives|data.measured_drive):_noise(_density)?",
     ),
     "slide extractors": (
-        "prediction.(sliding|slide_features):slide",
-        "tracking.(slide|signature.slide_segment):find_slide",
+        "prediction.(sliding|slide_features):(slide|extract_slide)",
+        "tracking.(slide|signature.slide_segment):(find_slide|extract_segment)",
     ),
 }
 """Definitions that do the same work, `module:function` below `impactcell`, under all names they have had.
@@ -166,7 +166,8 @@ def definitions(parsed: Sequence[_syntax.Module], patterns: Sequence[str]) -> Co
         home, name = pattern.split(":")
         for module in parsed:
             if re.fullmatch(rf"impactcell\.{home}", module.name):
-                items += [f"{module.name}:{name}" for node in _syntax.functions(module) if node.name == name]
+                nodes = _syntax.functions(module)
+                items += [f"{module.name}:{node.name}" for node in nodes if re.fullmatch(name, node.name)]
     return Count(len(items), tuple(items))
 
 

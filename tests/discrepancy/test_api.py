@@ -22,6 +22,8 @@ def test_findings_are_looked_at_and_written(tmp_path: Path) -> None:
     report = result.write(tmp_path / "out", source="twenty-four shots")
     assert report.is_file()
     assert json.loads((tmp_path / "out" / "result.json").read_text()) == json.loads(json.dumps(result.result))
+    page = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "result.md").read_text()
+    assert [key for key in result.result if f"`{key}`" not in page] == []
     extended = read_model(tmp_path / "out" / "model.extended.yaml")
     assert list(extended.plant.effects) == ["viscous_friction"]
     with pytest.raises(CampaignError, match="cannot be written"):

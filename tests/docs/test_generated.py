@@ -1,0 +1,74 @@
+"""What the pages take from the code is all that there is."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from impactcell.alarms import AlarmSettings
+from impactcell.records import AlarmName
+from impactcell.settings import schema
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def pages() -> Iterator[dict[str, str]]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / "docs"))
+        from generators import PAGES
+
+        yield {name: make() for name, make in PAGES.items()}
+
+
+def test_every_room_is_drawn_once_and_below_what_imports_it(pages: dict[str, str]) -> None:
+    drawn = re.findall(r">([\w ]+)</text>", pages["architecture.svg"])
+    rooms = {path.parent.name for path in (ROOT / "impactcell").glob("*/__init__.py")}
+    assert rooms <= set(drawn)
+    assert len(drawn) == len(set(drawn))
+    assert drawn.index("service") < drawn.index("cell") < drawn.index("physics") < drawn.index("records")
+    edge = re.findall(r'fill="#dbeafe".*?>(\w+)</text>', pages["architecture.svg"])
+    assert {"fieldbus", "service", "scada"} <= set(edge)
+    assert not {"cell", "physics", "tracking", "records"} & set(edge)
+
+
+def test_every_module_has_its_line(pages: dict[str, str]) -> None:
+    for path in (ROOT / "impactcell").rglob("*.py"):
+        if path.name != "__init__.py" and path.parent.name != "effects" and path.parent.name != "impactcell":
+            assert f"{path.stem}` |" in pages["rooms.md"], path
+
+
+def test_every_verb_is_listed(pages: dict[str, str]) -> None:
+    for verb in ("demo", "run", "check", "estimate", "track", "discrepancy", "users add", "model accept"):
+        assert f"## impactcell {verb}\n" in pages["command_line.md"]
+    assert "| `--seed SEED` | Of the resampling. | `0` |" in pages["command_line.md"]
+
+
+def test_every_key_of_a_cell_file_is_listed(pages: dict[str, str]) -> None:
+    whole = json.loads(schema())
+    for section in (whole, *whole["$defs"].values()):
+        for key in section.get("properties", {}):
+            assert f"| `{key}` |" in pages["cell_file.md"]
+
+
+def test_nodes_and_conditions_are_listed(pages: dict[str, str]) -> None:
+    for name in ("StaticFriction", "CyclesToLimitHigh", "TSquared", "StartBatch"):
+        assert f"| `{name}` |" in pages["nodes.md"]
+    for name in AlarmName:
+        assert f"| `{name.value}` | {AlarmSettings().rule(name).severity} |" in pages["alarms.md"]
+    assert "| `cycle_counter` | 36 | u32 |" in pages["register_map.md"]
+
+
+def test_an_outside_request_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    from generators.offline import outside_requests
+
+    page, style = tmp_path / "page.html", tmp_path / "style.css"
+    page.write_text('<a href="https://example.org">link</a><script src="static/here.js"></script>')
+    style.write_text("body { background: url(data:image/png;base64,AA) }")
+    assert outside_requests(tmp_path) == []
+    page.write_text('<script async src="https://cdn.example.org/there.js"></script>')
+    style.write_text("@font-face { src: url('//fonts.example.org/a.woff2') }")
+    assert len(outside_requests(tmp_path)) == 2

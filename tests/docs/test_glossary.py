@@ -1,0 +1,38 @@
+"""One word, one meaning: in the glossary, and in the names of the code."""
+
+from pathlib import Path
+
+from tests.benchmarks import _syntax
+from tests.benchmarks.structure import DEFINITIONS, definitions, glossary, retired_names, twice_listed
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_each_word_is_listed_once() -> None:
+    words, retired = glossary(ROOT)
+    assert len(words) > 60
+    assert twice_listed(words).items == ()
+    assert not set(words) & set(retired)
+
+
+def test_a_word_listed_twice_is_seen() -> None:
+    assert twice_listed(["shot", "cycle", "Shot"]).items == ("shot",)
+
+
+def test_no_retired_name_is_left() -> None:
+    _, retired = glossary(ROOT)
+    assert len(retired) > 40
+    assert retired_names(_syntax.modules(ROOT, "impactcell"), retired).items == ()
+
+
+def test_a_retired_name_is_seen(tmp_path: Path) -> None:
+    (tmp_path / "impactcell" / "room").mkdir(parents=True)
+    (tmp_path / "impactcell" / "room" / "file.py").write_text("class Tracked:\n    def odds(self): ...\n")
+    seen = retired_names(_syntax.modules(tmp_path, "impactcell"), ["Tracked", "odds", "room.file"])
+    assert len(seen.items) == 3
+
+
+def test_what_the_structure_table_looks_for_is_still_there() -> None:
+    parsed = _syntax.modules(ROOT, "impactcell")
+    for row, patterns in DEFINITIONS.items():
+        assert definitions(parsed, patterns).value > 0, row

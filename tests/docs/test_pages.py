@@ -1,0 +1,35 @@
+"""Every block of code in the documentation runs, and prints what the page says."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.docs.snippets import run, snippets
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(
+    page
+    for page in DOCS.rglob("*.md")
+    if not {"_build", "_generated"} & set(page.relative_to(DOCS).parts) and snippets(page)
+)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Make a directory in which the pages' paths are right."""
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    return tmp_path
+
+
+def test_there_are_pages_with_code() -> None:
+    assert {"notebook.md", "discrepancy.md", "start.md"} <= {page.name for page in PAGES}
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
+def test_a_page_does_what_it_says(page: Path, workspace: Path) -> None:
+    for block, printed in run(page, workspace):
+        assert block.printed in {None, printed}, f"{page.name}:{block.line} printed\n{printed}"
