@@ -68,6 +68,16 @@ def complexity(function: Function) -> int:
     return count
 
 
+def called(function: Function) -> set[str]:
+    """Give the bare names of all that a function calls."""
+    calls = (node.func for node in ast.walk(function) if isinstance(node, ast.Call))
+    return {
+        callee.id if isinstance(callee, ast.Name) else callee.attr
+        for callee in calls
+        if isinstance(callee, (ast.Name, ast.Attribute))
+    }
+
+
 def _has_number(node: ast.expr) -> bool:
     if any(isinstance(part, ast.Lambda) for part in ast.walk(node)):
         return False

@@ -29,23 +29,24 @@ DEFINITIONS: Mapping[str, tuple[str, ...]] = {
         "physics.(course|integrator):integrate_all",
         "physics.modified_euler:strike_modified_euler",
         "positioning.(response|displacement_model):displacements",
-        "positioning.(slide|free_slide):along_profile",
     ),
     "noise estimators of a channel": (
-        "prediction.(reading|feature_extraction):noise_std",
+        "(prediction.reading|prediction.feature_extraction|features.noise):noise_std",
+        "features.noise:white_noise_std",
         "tracking.(slide|signature.slide_segment):_noise",
         "discrepancy.(noise|data.noise_floor):white_noise",
         "discrepancy.(drives|data.measured_drive):_noise(_density)?",
     ),
     "slide extractors": (
-        "prediction.(sliding|slide_features):(slide|extract_slide)",
+        "(prediction.sliding|prediction.slide_features|features.slide):(slide|extract_slide)",
         "tracking.(slide|signature.slide_segment):(find_slide|extract_segment)",
     ),
 }
 """Definitions that do the same work, `module:function` below `impactcell`, under all names they have had.
 
-A double that is taken away, or that comes to call the one that stays, leaves this list or its home; a
-renaming is followed here, and a row of which nothing is found fails.
+One that calls another of its row is not counted: it does not do the work again. A renaming is followed here,
+and a row of which nothing is found fails. `features.segment` is not listed: it averages the slide from the
+separation on that it is given, though where rest begins it judges by itself.
 """
 
 
@@ -160,14 +161,17 @@ def effects(root: Path) -> Count:
 
 
 def definitions(parsed: Sequence[_syntax.Module], patterns: Sequence[str]) -> Count:
-    """Which of the listed definitions there are."""
-    items = []
+    """Which of the listed definitions do their work themselves, and do not call another of the list."""
+    listed = {}
     for pattern in patterns:
         home, name = pattern.split(":")
         for module in parsed:
-            if re.fullmatch(rf"impactcell\.{home}", module.name):
-                nodes = _syntax.functions(module)
-                items += [f"{module.name}:{node.name}" for node in nodes if re.fullmatch(name, node.name)]
+            if re.fullmatch(rf"impactcell\.({home})", module.name):
+                for node in _syntax.functions(module):
+                    if re.fullmatch(name, node.name):
+                        listed[f"{module.name}:{node.name}"] = node
+    names = {node.name for node in listed.values()}
+    items = [place for place, node in listed.items() if not (_syntax.called(node) & names) - {node.name}]
     return Count(len(items), tuple(items))
 
 
@@ -220,6 +224,21 @@ BARS: Mapping[str, int | str] = {
 }
 """What the tree is held to; no bar is a promise about quality, each only keeps a known evil small."""
 
+BY_HAND: Mapping[str, str] = {
+    "names of dataclasses defined more than once": "15",
+    "words listed twice in the glossary": "many",
+    "numeric constants without a word of meaning": "223",
+    "functions with 8 and more arguments": "46",
+    "files to edit for an alarm rule": "8",
+    "files to edit for a published value": "5",
+    "files to edit for an effect": "3",
+    "integrators of a tap in the product": "4",
+    "noise estimators of a channel": "4",
+    "slide extractors": "2",
+    "lines of impactcell/": "35 700",
+}
+"""What a reader had counted in the tree before, by other rules than this script's."""
+
 NOTE = (
     "Counted by `python -m tests.benchmarks.structure --list`, which prints what was counted; *before* is "
     "the last tree before the rooms were set up, counted by the same script. A constant counts as "
@@ -242,10 +261,16 @@ def tables() -> list[Table]:
     """Every table of this topic."""
     now, before = measure(ROOT), json.loads(BEFORE.read_text(encoding="utf-8"))
     rows = [
-        (name, str(before[name]), str(BARS[name]), verdict(name, count.value, before[name]))
+        (
+            name,
+            BY_HAND.get(name, ""),
+            str(before[name]),
+            str(BARS[name]),
+            verdict(name, count.value, before[name]),
+        )
         for name, count in now.items()
     ]
-    return [Table("Structure", ("what", "before", "bar", "now"), rows, NOTE)]
+    return [Table("Structure", ("what", "before, by hand", "before", "bar", "now"), rows, NOTE)]
 
 
 def main() -> int:
