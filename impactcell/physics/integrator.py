@@ -180,7 +180,7 @@ def following_length(error: float, h: float) -> float:
         return 0.1 * h
     if error < NEGLIGIBLE_ERROR:
         return h * MAX_FACTOR
-    factor = min(MAX_FACTOR, SAFETY * error**-EXPONENT)
+    factor: float = min(MAX_FACTOR, SAFETY * error**-EXPONENT)
     return h * (max(MIN_FACTOR, factor) if is_refused(error, h) else factor)
 
 
