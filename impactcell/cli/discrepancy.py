@@ -13,7 +13,7 @@ from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
 from impactcell.cli.paths import open_journal
 from impactcell.discrepancy.report.page import verdict_sentence
-from impactcell.discrepancy.search.candidate_fits import Mapper
+from impactcell.discrepancy.search.context import Mapper
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError, DiscrepancyError
 from impactcell.physics import Plant

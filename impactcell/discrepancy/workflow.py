@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.campaign import Campaign, Excitation
+from impactcell.campaign import Campaign
 from impactcell.discrepancy.data import noise_floor
 from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign, prepare, shot_set, split_held_out
 from impactcell.discrepancy.data.shots import IndexArray, decimate
@@ -15,14 +15,16 @@ from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
 from impactcell.discrepancy.model.linearisation import linearise
 from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.search.candidate_fits import Mapper, SearchContext
+from impactcell.discrepancy.search.acceptance import SelectionResult
+from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
-from impactcell.discrepancy.search.model_selection import SelectionResult, select_model
+from impactcell.discrepancy.search.model_selection import select_model
 from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
 from impactcell.discrepancy.search.validation import Validation, validate
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
 
+# Verdicts, as `result.json` has them.
 NO_GAP, NAMED, TIED, UNKNOWN = "no_gap", "named", "tied", "unknown"
 COARSE_SAMPLES = 400
 """Samples of a channel and shot that a search among many models reads."""
@@ -105,48 +107,40 @@ def investigate(
         The nominal model cannot be fitted at all.
     """
     report_step = progress or (lambda _step: None)
-    mapper_or_serial: Mapper = mapper or (lambda function, items: [function(item) for item in items])
-    names = tuple(LIBRARY) if library is None else tuple(library)
-    if campaign.excitation is Excitation.DRIVEN:
-        # Blocks of one record share what acts between records; there are too few of those for any test.
-        names = tuple(name for name in names if LIBRARY[name].kind is not Kind.BETWEEN_SHOTS)
     prepared = prepare(campaign)
     floor = noise_floor.sensor_noise(prepared)
     training, held_out = split_held_out(prepared, seed)
-    problem = Problem(shot_set(prepared, training, floor.noise_std), len(prepared.batches))
     report_step("fitting the nominal model")
+    problem = _problem(prepared, floor, training)
     nominal = fit_nominal(problem, plant)
-    if campaign.excitation is Excitation.DRIVEN:
+    if prepared.excitation.selects_blocks:
         kept = usable_blocks(problem, nominal)
         if len(kept) < len(training):
-            note = (
-                f"{len(training) - len(kept)} of {len(training)} training blocks were left out: in them "
-                "stick ends, or does not, by so little that noise decides, or the nominal model does not "
-                "follow them."
-            )
-            prepared = replace(prepared, notes=(*prepared.notes, note))
+            prepared = replace(prepared, notes=(*prepared.notes, _left_out(training, kept)))
             training = training[kept]
-            problem = Problem(shot_set(prepared, training, floor.noise_std), len(prepared.batches))
+            problem = _problem(prepared, floor, training)
             nominal = fit_nominal(problem, plant)
     report_step("locating the gap and naming effects")
-    fewer = decimate(problem.shots, COARSE_SAMPLES)
-    coarse = problem if fewer is problem.shots else Problem(fewer, len(prepared.batches))
-    selection = select_model(
-        SearchContext(
-            problem, coarse, prepared, names, seed, mapper_or_serial, _is_floor_certain(prepared, floor)
-        ),
-        nominal,
+    context = SearchContext(
+        problem,
+        _coarse(problem),
+        prepared,
+        _nameable(prepared, library),
+        seed,
+        mapper or (lambda function, items: [function(item) for item in items]),
+        # What is above the floor is a gap where noise is stated, or sampled fast enough to be seen.
+        floor_is_certain="stated" in floor.source or prepared.excitation.floor_is_certain,
     )
+    selection = select_model(context, nominal)
     final = selection.accepted or nominal
     report_step("proving on held-out shots")
-    held_problem = Problem(shot_set(prepared, held_out, floor.noise_std), len(prepared.batches))
-    if campaign.excitation is Excitation.DRIVEN:
+    held_problem = _problem(prepared, floor, held_out)
+    if prepared.excitation.selects_blocks:
         held_out = held_out[decided_blocks(held_problem, refit_shot_parameters(held_problem, final))]
-        held_problem = Problem(shot_set(prepared, held_out, floor.noise_std), len(prepared.batches))
-    proof, replicates, held_nominal, held_final = _validate(
-        prepared, floor, (problem, held_problem), nominal, final, (training, held_out), seed
-    )
-    linearisation = linearise(problem, final)
+        held_problem = _problem(prepared, floor, held_out)
+    held = refit_shot_parameters(held_problem, nominal), refit_shot_parameters(held_problem, final)
+    replicates = _replicates(prepared, (training, held_out), (final, held[1]))
+    validation = validate((problem, nominal, final), (held_problem, *held), floor, replicates, seed)
     verdict = _verdict(selection)
     report_step("planning the next experiment")
     return DiscrepancyResult(
@@ -160,20 +154,49 @@ def investigate(
         held_problem=held_problem,
         nominal=nominal,
         final=final,
-        held_nominal=held_nominal,
-        held_final=held_final,
+        held_nominal=held[0],
+        held_final=held[1],
         selection=selection,
-        parameters=estimate_parameters(final, linearisation),
-        validation=proof,
+        parameters=estimate_parameters(final, linearise(problem, final)),
+        validation=validation,
         unexplained=describe_gap(problem, selection.nominal) if verdict == UNKNOWN else None,
         experiments=propose_experiments(problem, final, _tied_models(selection)),
         seed=seed,
     )
 
 
-def _is_floor_certain(prepared: PreparedCampaign, floor: noise_floor.NoiseFloor) -> bool:
-    """Whether what is above the floor is a gap: noise is stated, or sampled fast enough to be seen."""
-    return "stated" in floor.source or prepared.excitation is Excitation.TAP
+def _problem(prepared: PreparedCampaign, floor: noise_floor.NoiseFloor, indices: IndexArray) -> Problem:
+    return Problem(shot_set(prepared, indices, floor.noise_std), len(prepared.batches))
+
+
+def _coarse(problem: Problem) -> Problem:
+    """Return the same problem on fewer samples."""
+    fewer = decimate(problem.shots, COARSE_SAMPLES)
+    return problem if fewer is problem.shots else Problem(fewer, problem.batches)
+
+
+def _nameable(prepared: PreparedCampaign, library: Sequence[str] | None) -> tuple[str, ...]:
+    """Effects that may be named: of the library, those that such shots can test."""
+    names = tuple(LIBRARY) if library is None else tuple(library)
+    if prepared.excitation.tests_between_shots:
+        return names
+    return tuple(name for name in names if LIBRARY[name].kind is not Kind.BETWEEN_SHOTS)
+
+
+def _left_out(training: IndexArray, kept: IndexArray) -> str:
+    return (
+        f"{len(training) - len(kept)} of {len(training)} training blocks were left out: in them stick ends, "
+        "or does not, by so little that noise decides, or the nominal model does not follow them."
+    )
+
+
+def _replicates(
+    prepared: PreparedCampaign, indices: tuple[IndexArray, IndexArray], fits: tuple[Fit, Fit]
+) -> noise_floor.ReplicateSpread:
+    log_factor = np.empty(len(prepared.shots))
+    for of_shots, model in zip(indices, fits, strict=True):
+        log_factor[of_shots] = model.shot_parameters.log_factor
+    return noise_floor.replicate_spread(prepared.shots, log_factor, len(prepared.batches))
 
 
 def _verdict(selection: SelectionResult) -> str:
@@ -182,25 +205,6 @@ def _verdict(selection: SelectionResult) -> str:
     if not selection.added:
         return NO_GAP
     return TIED if any(selection.ties.values()) else NAMED
-
-
-def _validate(
-    prepared: PreparedCampaign,
-    floor: noise_floor.NoiseFloor,
-    problems: tuple[Problem, Problem],
-    nominal: Fit,
-    final: Fit,
-    places: tuple[IndexArray, IndexArray],
-    seed: int,
-) -> tuple[Validation, noise_floor.ReplicateSpread, Fit, Fit]:
-    problem, held_problem = problems
-    held = refit_shot_parameters(held_problem, final)
-    log_factor = np.empty(len(prepared.shots))
-    log_factor[places[0]] = final.shot_parameters.log_factor
-    log_factor[places[1]] = held.shot_parameters.log_factor
-    replicates = noise_floor.replicate_spread(prepared.shots, log_factor, len(prepared.batches))
-    proof, held_nominal, held_final = validate(problem, nominal, final, held_problem, floor, replicates, seed)
-    return proof, replicates, held_nominal, held_final
 
 
 def _tied_models(selection: SelectionResult) -> list[tuple[str, str, Fit]]:

@@ -121,15 +121,18 @@ class Steps:
         effects = (*model.effects, effect)
         try:
             return fit(
-                self.problem, effects, theta, model.shot_parameters, spread=model.spread, most_steps=FEW_STEPS
+                self.problem.with_effects(effects),
+                theta,
+                model.shot_parameters,
+                spread=model.spread,
+                most_steps=FEW_STEPS,
             )
         except DiscrepancyError:
             return None
 
     def _finished(self, one: Fit) -> Fit | None:
         return fit(
-            self.problem,
-            one.effects,
+            self.problem.with_effects(one.effects),
             one.theta,
             one.shot_parameters,
             spread=one.spread,

@@ -22,9 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 from pysindy import STLSQ, SmoothedFiniteDifference
 
+from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, UNLOADING
 from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, PreparedShot
 from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.phases import FREE_SLIDE, LOADING, UNLOADING, sample_phases, trajectory_of
+from impactcell.discrepancy.model.phases import sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 
 SMOOTH_SLIDE_S, SMOOTH_CONTACT_S = 0.010, 0.004
@@ -67,7 +68,9 @@ class Smoothed:
 
 def sindy(problem: Problem, nominal: Fit, library: tuple[str, ...]) -> list[list[str]]:
     """Effects that PySINDy names, those with the same term together."""
-    k, b, _, mu = (float(one) for one in problem.parameters(nominal.effects, nominal.theta)[:4])
+    k, b, _, mu = (
+        float(one) for one in problem.with_effects(nominal.effects).plant_parameters(nominal.theta)[:4]
+    )
     phase = sample_phases(problem, trajectory_of(problem, nominal))
     force = problem.shots.values[problem.shots.channel == FORCE]
     peak = float(force.max(initial=0.0))
@@ -137,8 +140,7 @@ def slide(
     }
     terms |= {("stribeck_friction", f"{vs}"): np.exp(-((v / vs) ** 2)) for vs in STRIBECK_M_S}
     terms |= {
-        ("batch_shift", f"{batch}"): same * mu * (shot.batch == batch)
-        for batch in range(1, problem.forward.batches)
+        ("batch_shift", f"{batch}"): same * mu * (shot.batch == batch) for batch in range(1, problem.batches)
     }
     for period in PERIODS_M:
         terms["periodic_friction", f"sin {period}"] = mu * np.sin(2.0 * math.pi * place / period)

@@ -12,8 +12,8 @@ from impactcell.campaign import Campaign
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.noise_floor import replicate_spread
 from impactcell.discrepancy.model.fit import fit
-from impactcell.discrepancy.model.problem import Problem, remove_jumps
-from impactcell.discrepancy.model.shot_parameters import evaluate, fit_shot_parameters
+from impactcell.discrepancy.model.problem import remove_jumps
+from impactcell.discrepancy.model.shot_parameters import fit_shot_parameters
 from impactcell.discrepancy.report.result import json_text, result_document
 from impactcell.discrepancy.search.indistinguishability import (
     are_indistinguishable,
@@ -83,18 +83,17 @@ def test_likelihood_out_of_shot_is_that_of_a_fit_without_the_shot() -> None:
     for fold in folds(problem)[[0, 5, 9]]:
         mine = np.flatnonzero(folds(problem) == fold)
         others = np.setdiff1d(np.arange(problem.count), mine)
-        rest = Problem(problem.shots.select(others), problem.forward.batches)
+        rest = problem.select(others)
         refitted = fit(
             rest,
-            (),
             model.theta,
-            model.shot_parameters.samples_of(others),
+            model.shot_parameters.select(others),
             spread=model.spread,
             tolerance=1e-6,
         )
-        alone = Problem(problem.shots.select(mine), problem.forward.batches)
-        start = evaluate(alone, (), refitted.theta, model.shot_parameters.samples_of(mine), model.spread)
-        settled = fit_shot_parameters(alone, (), start, model.spread, 8)
+        alone = problem.select(mine)
+        start = alone.evaluate(refitted.theta, model.shot_parameters.select(mine), model.spread)
+        settled = fit_shot_parameters(alone, start, 8)
         there = replace(
             model, theta=refitted.theta, shot_parameters=settled.shot_parameters, residual=settled.residual
         )

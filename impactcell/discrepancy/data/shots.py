@@ -1,14 +1,19 @@
 """Shots as the workflow works on them: covariates, samples of all channels in one row, replicate groups."""
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.campaign import Excitation
 from impactcell.records import Samples
 
+if TYPE_CHECKING:
+    from impactcell.discrepancy.data.excitation import ExcitationStrategy
+
 CHANNELS = ("force", "position", "actuator")
+"""Names of the channels, in the order of all arrays of channels."""
+# Their numbers.
 FORCE, POSITION, ACTUATOR = range(3)
 
 IndexArray = NDArray[np.int64]
@@ -78,7 +83,7 @@ class ShotSet:
         Shot i owns samples `bounds[i]` to `bounds[i + 1]`.
     """
 
-    excitation: Excitation
+    excitation: "ExcitationStrategy"
     gravity_m_s2: float
     stroke_m: float
     items: tuple[PreparedShot, ...]
@@ -97,7 +102,7 @@ class ShotSet:
 
     def whiten(self, change: Samples) -> Samples:
         """Scale residuals, shape (N,), so that they are independent and of unit variance."""
-        if self.excitation is not Excitation.DRIVEN:
+        if not self.items[0].whitener.size:
             scaled: Samples = change * self.weights
             return scaled
         return np.concatenate(
@@ -106,7 +111,7 @@ class ShotSet:
 
     def unwhiten(self, residual: Samples) -> Samples:
         """Scale residuals back: measured minus predicted [N, m, m]."""
-        if self.excitation is not Excitation.DRIVEN:
+        if not self.items[0].whitener.size:
             scaled: Samples = residual / self.weights
             return scaled
         return np.concatenate(
@@ -133,7 +138,7 @@ class ShotSet:
 
 
 def concatenate_shots(
-    excitation: Excitation,
+    excitation: "ExcitationStrategy",
     gravity_m_s2: float,
     stroke_m: float,
     items: tuple[PreparedShot, ...],

@@ -11,8 +11,11 @@ from impactcell.discrepancy.model.problem import Problem
 FRICTION_CHANGE = 0.02
 """Relative change of friction that may not change what happens in a block."""
 MAX_ASYMMETRY = 25.0
+"""Ratio of the squared changes by more and by less friction beyond which events differ; alike they give 1."""
 MAX_MISFIT_OVER_MEDIAN = 30.0
+"""Times the median misfit beyond which the model does not follow a block."""
 ACCEPTED_MISFIT = 4.0
+"""Mean squared residual up to which a block is followed whatever the median."""
 
 
 def decided_blocks(problem: Problem, model: Fit) -> IndexArray:
@@ -21,6 +24,7 @@ def decided_blocks(problem: Problem, model: Fit) -> IndexArray:
     Where the drive comes within a hair of breaking the part away, or the part turns within a hair of
     sticking, noise decides what happens: one of the two makes another course of events.
     """
+    problem = problem.with_effects(model.effects)
     kept = np.ones(problem.count, dtype=bool)
     ratio = next(
         i
@@ -35,7 +39,7 @@ def decided_blocks(problem: Problem, model: Fit) -> IndexArray:
                 shot_parameters = replace(shot_parameters, log_factor=shot_parameters.log_factor + nudge)
             else:
                 theta[column] += nudge
-            change = problem.residual(model.effects, theta, shot_parameters) - model.residual
+            change = problem.residual(theta, shot_parameters) - model.residual
             size.append(np.add.reduceat(change**2, problem.shots.bounds[:-1]))
         more, less = np.maximum(*size), np.minimum(*size)
         kept &= ~(more > MAX_ASYMMETRY * np.maximum(less, problem.sizes))

@@ -13,33 +13,67 @@ import numpy as np
 
 from impactcell.discrepancy.data.shots import IndexArray, ShotSet
 from impactcell.discrepancy.model.forward import ShotParameters
+from impactcell.discrepancy.model.gauss_newton import gauss_newton
 from impactcell.discrepancy.model.parameters import Coordinate
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
 from impactcell.discrepancy.model.shot_parameters import (
     THOROUGH_STEPS,
-    FitState,
     better_per_shot,
-    correct_shot_parameters,
-    evaluate,
     fit_shot_parameters,
     initialise,
-    normal_equations,
-    shot_steps,
-    total_cost,
+    shot_equations,
 )
 from impactcell.errors import DiscrepancyError
 from impactcell.records import Samples
 
-FIRST_SPREAD = 0.03
-SMALLEST_SPREAD = 2e-4
-GIVES_UP = 1e12
-HOPELESS = 3e-5
-WHOLE = 10
-PROMISE = 2.0
-RESCUES = 2
-FAR = 4.0
-NOT_IT = 25.0
-NEAR = 0.02
+
+@dataclass(frozen=True, slots=True)
+class FitPolicy:
+    """When a fit begins, ends, and starts shots again that hold it up; numbers found by trial.
+
+    Attributes
+    ----------
+    first_spread : float
+        Of the logarithm of the friction factors, where nothing is known of it: friction of clean parts
+        repeats to some 3 %.
+    wide_spread : float
+        One that leaves the friction factors free, where they are all that is fitted.
+    most_steps, tolerance : int, float
+        Steps of a fit, and the change of the cost, in squared standard deviations, at which it ends.
+    fewest_steps_to_restart : int
+        Only a fit that may run this far starts stuck shots again.
+    restarts : int
+        How often.
+    promise : float
+        Fall of the cost to first order at which a shot's own numbers are not at their optimum.
+    worth_another : float
+        Fall of the cost by one restart without which there is no second one.
+    hopeless_misfit : float
+        Median mean squared residual beyond which the model is wrong, not a shot stuck.
+    far_misfit : float
+        Times the median: shots beyond it are left out while the others are refitted.
+    fewest_share : float
+        Share of the shots that must remain for that.
+    rough_tolerance : float
+        Tolerance of that fit.
+    """
+
+    first_spread: float = 0.03
+    wide_spread: float = 1e3
+    most_steps: int = 30
+    tolerance: float = 0.02
+    fewest_steps_to_restart: int = 10
+    restarts: int = 2
+    promise: float = 2.0
+    worth_another: float = 1.0
+    hopeless_misfit: float = 25.0
+    far_misfit: float = 4.0
+    fewest_share: float = 0.6
+    rough_tolerance: float = 1.0
+
+
+POLICY = FitPolicy()
+"""The policy in use."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +86,7 @@ class Fit:
     coordinates : tuple of Coordinate
     theta : ndarray, shape (p,)
         Coordinates at the optimum.
-    shot_parameters : Local
+    shot_parameters : ShotParameters
     spread : float
         Standard deviation of the logarithm of the friction factors.
     residual : ndarray, shape (N,)
@@ -75,26 +109,30 @@ class Fit:
         factor = (self.shot_parameters.log_factor / self.spread) ** 2 + 2.0 * math.log(self.spread)
         return -0.5 * (self.misfit(shots) + factor)
 
+    @property
+    def state(self) -> FitState:
+        """Where the fit has come to rest."""
+        cost = total_cost(self.residual, self.shot_parameters, self.spread)
+        return FitState(self.theta, self.shot_parameters, self.spread, self.residual, cost)
+
 
 def fit(
     problem: Problem,
-    effects: tuple[str, ...],
     theta: Samples,
     shot_parameters: ShotParameters,
     *,
-    spread: float = FIRST_SPREAD,
-    most_steps: int = 30,
-    tolerance: float = 0.02,
+    spread: float = POLICY.first_spread,
+    most_steps: int = POLICY.most_steps,
+    tolerance: float = POLICY.tolerance,
 ) -> Fit:
     """Fit the shared coordinates and every shot's own numbers by damped Gauss-Newton steps.
 
     Parameters
     ----------
     problem : Problem
-    effects : tuple of str
     theta : ndarray, shape (p,)
         Start, in coordinates.
-    shot_parameters : Local
+    shot_parameters : ShotParameters
         Start of each shot's own numbers.
     spread : float
         First value of the factors' spread; it is fitted too.
@@ -106,182 +144,96 @@ def fit(
     DiscrepancyError
         The plant has no answer at the start.
     """
-    coordinates = problem.coordinates(effects)
-    lower = np.array([coordinate.lower for coordinate in coordinates])
-    upper = np.array([coordinate.upper for coordinate in coordinates])
-    theta = np.clip(theta, lower, upper)
-    point = fit_shot_parameters(
-        problem, effects, evaluate(problem, effects, theta, shot_parameters, spread), spread
-    )
-    if not point.cost < math.inf:
+    state = problem.evaluate(np.clip(theta, *problem.bounds()), shot_parameters, spread)
+    state = fit_shot_parameters(problem, state)
+    if not state.cost < math.inf:
         raise DiscrepancyError(
-            f"the plant with {', '.join(effects) or 'no effect'} has no answer at the start"
+            f"the plant with {', '.join(problem.effects) or 'no effect'} has no answer at the start"
         )
-    limits = (lower, upper)
-    point = _centre_factors(coordinates, point, spread)
-    point, spread = _gauss_newton(problem, effects, point, spread, limits, (most_steps, tolerance))
-    if most_steps >= WHOLE:
-        for _ in range(RESCUES):
-            stuck = _stuck_shots(problem, effects, point, spread)
+    state = gauss_newton(problem, _centre_factors(problem, state), most_steps, tolerance)
+    if most_steps >= POLICY.fewest_steps_to_restart:
+        for _ in range(POLICY.restarts):
+            stuck = _stuck_shots(problem, state)
             if not len(stuck):
                 break
-            before = point.cost
-            point = _centre_factors(
-                coordinates, _refit_without_stuck(problem, effects, point, spread, limits, stuck), spread
-            )
-            point, spread = _gauss_newton(problem, effects, point, spread, limits, (most_steps, tolerance))
-            if point.cost > before - 1.0:
+            before = state.cost
+            state = _centre_factors(problem, _refit_without_stuck(problem, state, stuck))
+            state = gauss_newton(problem, state, most_steps, tolerance)
+            if state.cost > before - POLICY.worth_another:
                 break
-    return Fit(effects, coordinates, point.theta, point.shot_parameters, spread, point.residual)
+    return Fit(
+        problem.effects, problem.coordinates, state.theta, state.shot_parameters, state.spread, state.residual
+    )
 
 
-def _centre_factors(coordinates: tuple[Coordinate, ...], point: FitState, spread: float) -> FitState:
+def _centre_factors(problem: Problem, state: FitState) -> FitState:
     """Move what all friction factors have in common into mu_k, which leaves every trace as it is."""
     column = next(
-        i
-        for i, coordinate in enumerate(coordinates)
+        column
+        for column, coordinate in enumerate(problem.coordinates)
         if coordinate.parameter == "mu_k" and not coordinate.effect
     )
-    common = float(np.median(point.shot_parameters.log_factor))
-    moved = min(
-        max(float(point.theta[column]) + common, coordinates[column].lower), coordinates[column].upper
-    )
-    common = moved - float(point.theta[column])
-    theta = point.theta.copy()
+    coordinate = problem.coordinates[column]
+    common = float(np.median(state.shot_parameters.log_factor))
+    moved = min(max(float(state.theta[column]) + common, coordinate.lower), coordinate.upper)
+    common = moved - float(state.theta[column])
+    theta = state.theta.copy()
     theta[column] = moved
-    shot_parameters = replace(point.shot_parameters, log_factor=point.shot_parameters.log_factor - common)
-    return FitState(
-        theta, shot_parameters, point.residual, total_cost(point.residual, shot_parameters, spread)
-    )
+    shot_parameters = replace(state.shot_parameters, log_factor=state.shot_parameters.log_factor - common)
+    cost = total_cost(state.residual, shot_parameters, state.spread)
+    return FitState(theta, shot_parameters, state.spread, state.residual, cost)
 
 
-def _refit_without_stuck(
-    problem: Problem,
-    effects: tuple[str, ...],
-    point: FitState,
-    spread: float,
-    limits: tuple[Samples, Samples],
-    stuck: IndexArray,
-) -> FitState:
+def _refit_without_stuck(problem: Problem, state: FitState, stuck: IndexArray) -> FitState:
     """Start the stuck shots again, at shared parameters to which only the other shots are fitted.
 
     A few shots whose events come in another order hold up the fit of all: every step that helps the others
     makes them worse. Shots that are far off are left out with them.
     """
-    point = _reinitialise(problem, effects, point, spread, stuck)
-    misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
-    good = np.setdiff1d(np.flatnonzero(misfit <= FAR * float(np.median(misfit))), stuck)
-    if len(good) == problem.count or len(good) < 0.6 * problem.count:
-        return point
-    part = Problem(problem.shots.select(good), problem.forward.batches)
-    start = evaluate(part, effects, point.theta, point.shot_parameters.samples_of(good), spread)
-    refitted, _ = _gauss_newton(part, effects, start, spread, limits, (WHOLE, 1.0))
-    moved = evaluate(
-        problem, effects, refitted.theta, point.shot_parameters.put(good, refitted.shot_parameters), spread
-    )
+    state = _reinitialise(problem, state, stuck)
+    misfit = _misfit_per_sample(problem, state)
+    good = np.setdiff1d(np.flatnonzero(misfit <= POLICY.far_misfit * float(np.median(misfit))), stuck)
+    if len(good) == problem.count or len(good) < POLICY.fewest_share * problem.count:
+        return state
+    part = problem.select(good)
+    start = part.evaluate(state.theta, state.shot_parameters.select(good), state.spread)
+    refitted = gauss_newton(part, start, POLICY.fewest_steps_to_restart, POLICY.rough_tolerance)
+    shot_parameters = state.shot_parameters.put(good, refitted.shot_parameters)
+    moved = problem.evaluate(refitted.theta, shot_parameters, state.spread)
     left_out = np.setdiff1d(np.arange(problem.count), good)
-    restarted = _reinitialise(problem, effects, moved, spread, left_out)
-    return restarted if restarted.cost < point.cost else point
+    restarted = _reinitialise(problem, moved, left_out)
+    return restarted if restarted.cost < state.cost else state
 
 
-def _reinitialise(
-    problem: Problem, effects: tuple[str, ...], point: FitState, spread: float, which: IndexArray
-) -> FitState:
+def _reinitialise(problem: Problem, state: FitState, indices: IndexArray) -> FitState:
     """Start some shots again; each keeps what suits it better."""
-    part = Problem(problem.shots.select(which), problem.forward.batches)
-    reinitialised = initialise(part, effects, point.theta, spread, (0.0, -spread, spread))
-    restarted = evaluate(
-        problem, effects, point.theta, point.shot_parameters.put(which, reinitialised.shot_parameters), spread
-    )
-    return better_per_shot(problem, point, restarted, spread)
+    factors = (0.0, -state.spread, state.spread)
+    again = initialise(problem.select(indices), state.theta, state.spread, factors)
+    shot_parameters = state.shot_parameters.put(indices, again.shot_parameters)
+    return better_per_shot(problem, state, problem.evaluate(state.theta, shot_parameters, state.spread))
 
 
-def _stuck_shots(problem: Problem, effects: tuple[str, ...], point: FitState, spread: float) -> IndexArray:
+def _stuck_shots(problem: Problem, state: FitState) -> IndexArray:
     """Shots whose own numbers are not at their optimum: the cost would still fall to first order."""
-    misfit = np.add.reduceat(point.residual**2, problem.shots.bounds[:-1]) / problem.sizes
-    if float(np.median(misfit)) > NOT_IT:
+    if float(np.median(_misfit_per_sample(problem, state))) > POLICY.hopeless_misfit:
         return np.empty(0, dtype=np.int64)
-    Jl = problem.shot_jacobian(effects, point.theta, point.shot_parameters, point.residual)
-    _, _, blocks = normal_equations(problem, np.empty((0, point.residual.size)), Jl, point, spread)
-    promise = np.einsum("iq,iqr,ir->i", blocks.gradient, blocks.inverse, blocks.gradient)
-    return np.flatnonzero(promise > PROMISE)
+    equations = shot_equations(problem, state)
+    promise = np.einsum("iq,iqr,ir->i", equations.gradient, equations.inverse, equations.gradient)
+    return np.flatnonzero(promise > POLICY.promise)
 
 
-def _gauss_newton(
-    problem: Problem,
-    effects: tuple[str, ...],
-    point: FitState,
-    spread: float,
-    limits: tuple[Samples, Samples],
-    budget: tuple[int, float],
-) -> tuple[FitState, float]:
-    """Damped Gauss-Newton steps until the cost no longer falls."""
-    lower, upper = limits
-    most_steps, tolerance = budget
-    damping = 1e-3
-    small_gains = 0
-    keep_jacobian = False
-    J = Jl = np.empty(0)
-    for _ in range(most_steps):
-        if not keep_jacobian:
-            J = problem.shared_jacobian(effects, point.theta, point.shot_parameters, point.residual)
-            Jl = problem.shot_jacobian(effects, point.theta, point.shot_parameters, point.residual)
-        H, g, blocks = normal_equations(problem, J, Jl, point, spread)
-        improved = False
-        for _attempt in range(1 if keep_jacobian else 8):
-            free = ~(((point.theta <= lower) & (g < 0.0)) | ((point.theta >= upper) & (g > 0.0)))
-            step = np.zeros_like(point.theta)
-            scaled = H[np.ix_(free, free)].copy()
-            scale = np.maximum(np.diag(scaled), 1e-12 * max(float(np.diag(H).max()), 1e-300))
-            scaled[np.diag_indices_from(scaled)] += damping * scale
-            step[free] = np.linalg.lstsq(scaled, g[free], rcond=None)[0]
-            trial_theta = np.clip(point.theta + step, lower, upper)
-            own_steps = shot_steps(blocks, trial_theta - point.theta)
-            trial = evaluate(
-                problem,
-                effects,
-                trial_theta,
-                problem.step_shot_parameters(point.shot_parameters, own_steps),
-                spread,
-            )
-            trial = correct_shot_parameters(problem, effects, trial, Jl, blocks, spread)
-            if trial.cost < point.cost:
-                improved = True
-                break
-            damping *= 10.0
-            if damping > GIVES_UP:
-                break
-        if not improved and keep_jacobian:
-            damping /= 10.0
-            keep_jacobian = False
-            continue
-        if not improved:
-            break
-        # Derivatives are worth having anew only when the parameters have moved since.
-        keep_jacobian = float(np.abs(trial.theta - point.theta).max(initial=0.0)) < NEAR
-        gain = point.cost - trial.cost
-        point = trial
-        damping = max(damping / 8.0, 1e-9)
-        new_spread = max(float(np.sqrt(np.mean(point.shot_parameters.log_factor**2))), SMALLEST_SPREAD)
-        moved = abs(math.log(new_spread / spread))
-        spread = new_spread
-        point = replace(point, cost=total_cost(point.residual, point.shot_parameters, spread))
-        # A model that is far from the floor need not be found to the last digit.
-        excess = max(point.cost - point.residual.size, 0.0)
-        small_gains = small_gains + 1 if gain < max(tolerance, HOPELESS * excess) and moved < 0.01 else 0
-        if small_gains > (gain >= tolerance):
-            break
-    return point, spread
+def _misfit_per_sample(problem: Problem, state: FitState) -> Samples:
+    misfit: Samples = np.add.reduceat(state.residual**2, problem.shots.bounds[:-1]) / problem.sizes
+    return misfit
 
 
 def refit_shot_parameters(problem: Problem, model: Fit) -> Fit:
     """Keep the shared parameters of `model` and fit only what every shot of `problem` has of its own."""
-    point = initialise(problem, model.effects, model.theta, 1e3, (0.0, -model.spread, model.spread))
-    return replace(model, shot_parameters=point.shot_parameters, residual=point.residual)
+    factors = (0.0, -model.spread, model.spread)
+    state = initialise(problem.with_effects(model.effects), model.theta, POLICY.wide_spread, factors)
+    return replace(model, shot_parameters=state.shot_parameters, residual=state.residual)
 
 
-def initial_shot_parameters(
-    problem: Problem, effects: tuple[str, ...], theta: Samples, steps: int = THOROUGH_STEPS
-) -> ShotParameters:
+def initial_shot_parameters(problem: Problem, theta: Samples, steps: int = THOROUGH_STEPS) -> ShotParameters:
     """Fit what every shot has of its own from several starts; the best of them shot by shot."""
-    return initialise(problem, effects, theta, FIRST_SPREAD, steps=steps).shot_parameters
+    return initialise(problem, theta, POLICY.first_spread, steps=steps).shot_parameters

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from impactcell.campaign import Excitation
+from impactcell.discrepancy.data.phases import Trajectory
 from impactcell.discrepancy.data.shots import IndexArray, ShotSet
 from impactcell.numerics.jit import IntArray
 from impactcell.physics import TapInput
@@ -16,6 +16,7 @@ from impactcell.physics.memory_layout import TapArrays
 from impactcell.records import Samples
 
 LONGEST_S = 60.0
+"""Time [s] after which a part that still moves is given up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +39,7 @@ class ShotParameters:
     speed_m_s: Samples
     shift_m: Samples
 
-    def samples_of(self, places: IndexArray) -> "ShotParameters":
+    def select(self, places: IndexArray) -> "ShotParameters":
         """Return the numbers of some of the shots."""
         return ShotParameters(*(getattr(self, item.name)[places] for item in fields(self)))
 
@@ -48,15 +49,6 @@ class ShotParameters:
         for name, values in values_by_name.items():
             values[places] = getattr(replacement, name)
         return ShotParameters(**values_by_name)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
-    """State of the part and of the actuator at every sample, shape (N,) each, along the shot."""
-
-    part_displacement_m: Samples
-    speed_m_s: Samples
-    actuator_displacement_m: Samples
 
 
 class ForwardModel:
@@ -71,10 +63,9 @@ class ForwardModel:
 
     def __init__(self, shots: ShotSet, batches: int) -> None:
         self.shots = shots
-        free = shots.excitation is not Excitation.TAP
         taps = [
             TapInput(
-                velocity_m_s=1.0 if free else shot.velocity_m_s,
+                velocity_m_s=shot.velocity_m_s if shots.excitation.has_contact else 1.0,
                 mass_kg=shot.mass_kg if math.isfinite(shot.mass_kg) else 1.0,
                 stroke_m=shots.stroke_m,
                 direction=shot.direction,

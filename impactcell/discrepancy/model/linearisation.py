@@ -79,9 +79,8 @@ class Scores:
 def linearise(problem: Problem, fit: Fit) -> Linearisation:
     """Linearise about a fit."""
     bounds = problem.shots.bounds
-    shot_jacobian = problem.shot_jacobian(
-        fit.effects, fit.theta, fit.shot_parameters, fit.residual, central=True
-    )
+    model, state = problem.with_effects(fit.effects), fit.state
+    shot_jacobian = model.shot_jacobian(state, central=True)
     prior = np.zeros((len(shot_jacobian), problem.count))
     prior[0] = 1.0 / fit.spread
     basis: list[Samples] = []
@@ -95,11 +94,13 @@ def linearise(problem: Problem, fit: Fit) -> Linearisation:
                 v -= np.repeat(along, np.diff(bounds)) * b
                 pv -= along * pb
         length = np.sqrt(_shot_products(v, v, bounds) + pv * pv)
-        scale = np.where(length > 1e-8 * np.maximum(size, 1e-300), 1.0 / np.maximum(length, 1e-300), 0.0)
+        scale = np.where(
+            length > UNSEEN_SHARE * np.maximum(size, 1e-300), 1.0 / np.maximum(length, 1e-300), 0.0
+        )
         basis.append(v * np.repeat(scale, np.diff(bounds)))
         prior_basis.append(pv * scale)
     B, PB = np.array(basis), np.array(prior_basis)
-    shared = problem.shared_jacobian(fit.effects, fit.theta, fit.shot_parameters, fit.residual)
+    shared = model.shared_jacobian(state)
     J, PJ = _project(shared, np.zeros((len(shared), problem.count)), B, PB, bounds)
     r, pr = _project(fit.residual[None], (-fit.shot_parameters.log_factor / fit.spread)[None], B, PB, bounds)
     p = len(J)
@@ -174,7 +175,7 @@ def direction_products(
 
     Parameters
     ----------
-    linearisation : Tangent
+    linearisation : Linearisation
     direction : ndarray, shape (N,)
         Change of the whitened prediction.
     prior : ndarray, shape (n,), optional

@@ -10,14 +10,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from impactcell.campaign import Excitation
 from impactcell.physics import Parameter
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 
 NOMINAL_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
 MIN_RATIO, MAX_RATIO = 1.0, 5.0
+"""Range of mu_s / mu_k: stiction is never below kinetic friction, and five times it is unheard of."""
 DAMPING_SCALE = 100.0
+"""Unit [N s/m] in which a fit moves the damping, about a fifth of the source paper's."""
 MIN_TIME_CONSTANT_SHARE = 0.02
 """Time constants shorter than this share of the typical one act at once and only make the plant stiff."""
 
@@ -79,16 +80,18 @@ class Coordinate:
         return self.scale
 
 
-@lru_cache
-def nominal_coordinates(excitation: Excitation) -> tuple[Coordinate, ...]:
-    """Free numbers of the nominal plant: those that this excitation can tell anything of."""
-    k = Coordinate("", "stiffness_n_per_m", 0, "log", 1.0, math.log(1e2), math.log(1e11), math.log(6e5))
-    b = Coordinate("", "damping_n_s_per_m", 0, "linear", DAMPING_SCALE, 0.0, 1e6, 4.0)
-    mu_k = Coordinate("", "mu_k", 0, "log", 1.0, math.log(1e-3), math.log(3.0), math.log(0.15))
-    ratio = Coordinate("", "ratio", 0, "log", 1.0, math.log(MIN_RATIO), math.log(MAX_RATIO), 0.25)
-    if excitation is Excitation.TAP:
-        return (k, b, mu_k, ratio)
-    return (mu_k,) if excitation is Excitation.FREE_SLIDE else (mu_k, ratio)
+NOMINAL_COORDINATES = (
+    Coordinate("", "stiffness_n_per_m", 0, "log", 1.0, math.log(1e2), math.log(1e11), math.log(6e5)),
+    Coordinate("", "damping_n_s_per_m", 0, "linear", DAMPING_SCALE, 0.0, 1e6, 4.0),
+    Coordinate("", "mu_k", 0, "log", 1.0, math.log(1e-3), math.log(3.0), math.log(0.15)),
+    Coordinate("", "ratio", 0, "log", 1.0, math.log(MIN_RATIO), math.log(MAX_RATIO), 0.25),
+)
+"""Free numbers of the nominal plant: far wider than any material, so that no bound decides."""
+
+
+def nominal_coordinates(free: tuple[str, ...]) -> tuple[Coordinate, ...]:
+    """Free numbers of the nominal plant: those of its parameters that are named."""
+    return tuple(coordinate for coordinate in NOMINAL_COORDINATES if coordinate.parameter in free)
 
 
 @lru_cache(maxsize=256)

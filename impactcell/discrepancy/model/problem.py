@@ -1,12 +1,11 @@
-"""One set of shots to be fitted: residuals and their derivatives, and where a fit starts."""
+"""A model on a set of shots as a least-squares problem: bounds, first guess, residuals and derivatives."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.campaign import Excitation
-from impactcell.discrepancy.data.shots import ShotSet
+from impactcell.discrepancy.data.shots import IndexArray, ShotSet
 from impactcell.discrepancy.model.forward import ForwardModel, ShotParameters
 from impactcell.discrepancy.model.parameters import (
     Coordinate,
@@ -18,139 +17,183 @@ from impactcell.discrepancy.model.parameters import (
 from impactcell.records import Samples
 
 DIFFERENCE_STEP = 2e-5
+"""Step of a finite difference, relative or in a logarithm: far above the integrator's 1e-10, far below the
+size at which samples bend."""
+SMALLEST_SCALE = 0.1
+"""A linear coordinate is stepped as if it were at least this large, in its own scale."""
+SMALLEST_SPEED_M_S = 1e-3
+"""A speed is stepped as if it were at least this large [m/s]."""
 JUMP_FACTOR = 20.0
+"""A sample that changes this many times more than its neighbours has been passed by a jump."""
+LARGEST_FACTOR_STEP, LARGEST_LOG_FACTOR = 0.7, 3.0
+"""Of the logarithm of a friction factor, in one step and in all: a factor of two, and of twenty."""
+LARGEST_MASS_STEP = 0.3
+"""Of the logarithm of a mass in one step."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitState:
+    """Where a fit stands.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (p,)
+        Shared coordinates.
+    shot_parameters : ShotParameters
+    spread : float
+        Standard deviation of the logarithm of the friction factors.
+    residual : ndarray, shape (N,)
+        Whitened.
+    cost : float
+        |r|² + sum (log f_i / s)²; infinite where the plant has no answer.
+    """
+
+    theta: Samples
+    shot_parameters: ShotParameters
+    spread: float
+    residual: Samples
+    cost: float
 
 
 class Problem:
-    """One set of shots to be fitted; holds no state but the shots.
+    """One model on one set of shots; holds no state but those.
 
     Parameters
     ----------
-    shots : Shots
+    shots : ShotSet
     batches : int
         How many batches the whole campaign has.
+    effects : tuple of str
+        Of the model, beside the nominal plant.
     """
 
-    def __init__(self, shots: ShotSet, batches: int) -> None:
-        self.shots = shots
-        self.forward = ForwardModel(shots, batches)
+    def __init__(self, shots: ShotSet, batches: int, effects: tuple[str, ...] = ()) -> None:
+        self._set(ForwardModel(shots, batches), effects)
+
+    def _set(self, forward: ForwardModel, effects: tuple[str, ...]) -> None:
+        self.forward = forward
+        self.shots = shots = forward.shots
+        self.batches = forward.batches
+        self.effects = effects
         self.count = len(shots)
-        free = shots.excitation is not Excitation.TAP
-        slides = shots.excitation is Excitation.FREE_SLIDE
-        self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items]) & (not slides)
-        self.shot_parameter_names = ["log_factor"]
-        if free:
-            self.shot_parameter_names += ["speed_m_s", "shift_m"]
-        if self.unknown_mass.any():
-            self.shot_parameter_names.append("mass_kg")
         self.sizes = np.diff(shots.bounds)
+        self.coordinates: tuple[Coordinate, ...] = nominal_coordinates(
+            shots.excitation.free_plant_parameters
+        ) + tuple(one for effect in effects for one in effect_coordinates(effect, self.batches))
+        self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items])
+        self.unknown_mass &= shots.excitation.mass_is_visible
+        self.shot_parameter_names = (
+            *shots.excitation.shot_parameters,
+            *(("mass_kg",) if self.unknown_mass.any() else ()),
+        )
 
-    def coordinates(self, effects: tuple[str, ...]) -> tuple[Coordinate, ...]:
-        """Free numbers of the nominal plant and of some effects."""
-        coordinates = nominal_coordinates(self.shots.excitation)
-        for identifier in effects:
-            coordinates += effect_coordinates(identifier, self.forward.batches)
-        return coordinates
+    def with_effects(self, effects: tuple[str, ...]) -> "Problem":
+        """Return another model on the same shots."""
+        if effects == self.effects:
+            return self
+        other = object.__new__(Problem)
+        other._set(self.forward, effects)
+        return other
 
-    def parameters(self, effects: tuple[str, ...], theta: Samples) -> Samples:
+    def select(self, indices: IndexArray) -> "Problem":
+        """Return the same model on some of the shots."""
+        return Problem(self.shots.select(indices), self.batches, self.effects)
+
+    def bounds(self) -> tuple[Samples, Samples]:
+        """Lower and upper end of every coordinate, shape (p,) each."""
+        return (
+            np.array([coordinate.lower for coordinate in self.coordinates]),
+            np.array([coordinate.upper for coordinate in self.coordinates]),
+        )
+
+    def initial_guess(self, share: float = 1.0) -> ShotParameters:
+        """Where every shot's own numbers start, its state read off the first `share` of its record."""
+        excitation, items = self.shots.excitation, self.shots.items
+        states = np.array([excitation.initial_state(shot, share) for shot in items])
+        return ShotParameters(
+            np.zeros(self.count), excitation.initial_mass(items), states[:, 0].copy(), states[:, 1].copy()
+        )
+
+    def plant_parameters(self, theta: Samples) -> Samples:
         """Parameter vector of the plant at some coordinates."""
-        names = self.forward.names(effects)
-        return plant_parameters(self.coordinates(effects), theta, names, default_parameters(names))
+        names = self.forward.names(self.effects)
+        return plant_parameters(self.coordinates, theta, names, default_parameters(names))
 
-    def residual(self, effects: tuple[str, ...], theta: Samples, shot_parameters: ShotParameters) -> Samples:
+    def residual(self, theta: Samples, shot_parameters: ShotParameters) -> Samples:
         """Whitened residuals, shape (N,)."""
-        predicted = self.forward.samples(effects, self.parameters(effects, theta), shot_parameters)
+        predicted = self.forward.samples(self.effects, self.plant_parameters(theta), shot_parameters)
         return self.shots.whiten(self.shots.values - predicted)
 
+    def evaluate(self, theta: Samples, shot_parameters: ShotParameters, spread: float) -> FitState:
+        """Evaluate a state of a fit."""
+        residual = self.residual(theta, shot_parameters)
+        return FitState(
+            theta, shot_parameters, spread, residual, total_cost(residual, shot_parameters, spread)
+        )
+
+    def linearise(self, state: FitState) -> tuple[Samples, Samples]:
+        """Differentiate the whitened prediction: shared coordinates, shape (p, N), and shots' own, (q, N)."""
+        return self.shared_jacobian(state), self.shot_jacobian(state)
+
+    def shared_jacobian(self, state: FitState) -> Samples:
+        """Differentiate the whitened prediction by the shared coordinates, shape (p, N)."""
+        jacobian = np.empty((len(self.coordinates), state.residual.size))
+        for column, coordinate in enumerate(self.coordinates):
+            step = DIFFERENCE_STEP
+            if coordinate.form != "log":
+                step *= max(abs(state.theta[column]), SMALLEST_SCALE)
+            if state.theta[column] + step > coordinate.upper:
+                step = -step
+            moved = state.theta.copy()
+            moved[column] += step
+            change = state.residual - self.residual(moved, state.shot_parameters)
+            jacobian[column] = remove_jumps(change) / step
+        return jacobian
+
+    def shot_jacobian(self, state: FitState, *, central: bool = False) -> Samples:
+        """Differentiate the whitened prediction by each shot's own numbers, shape (q, N)."""
+        jacobian = np.empty((len(self.shot_parameter_names), state.residual.size))
+        speed = state.shot_parameters.speed_m_s
+        for column, name in enumerate(self.shot_parameter_names):
+            if name == "shift_m":
+                jacobian[column] = self.shots.whiten((self.shots.channel == 1).astype(np.float64))
+                continue
+            steps = np.zeros((self.count, len(self.shot_parameter_names)))
+            size = DIFFERENCE_STEP
+            if name == "speed_m_s":
+                size *= max(float(np.abs(speed).max()), SMALLEST_SPEED_M_S)
+            # A part that starts at rest stays there until it breaks away: its speed is no free number.
+            steps[:, column] = size if name != "speed_m_s" else size * (speed != 0.0)
+            ahead = self.residual(state.theta, self.step_shot_parameters(state.shot_parameters, steps))
+            if central:
+                back = self.residual(state.theta, self.step_shot_parameters(state.shot_parameters, -steps))
+                jacobian[column] = remove_jumps(back - ahead) / (2.0 * size)
+            else:
+                jacobian[column] = remove_jumps(state.residual - ahead) / size
+        return jacobian
+
     def step_shot_parameters(self, shot_parameters: ShotParameters, steps: Samples) -> ShotParameters:
-        """Return each shot's own numbers after steps of shape (n, q) in the order of `own`."""
+        """Each shot's own numbers after steps of shape (n, q) in the order of `shot_parameter_names`."""
         changed = {name: getattr(shot_parameters, name) for name in self.shot_parameter_names}
         for column, name in enumerate(self.shot_parameter_names):
             if name == "mass_kg":
-                factor = np.exp(np.clip(steps[:, column], -0.3, 0.3))
+                factor = np.exp(np.clip(steps[:, column], -LARGEST_MASS_STEP, LARGEST_MASS_STEP))
                 changed[name] = np.where(self.unknown_mass, changed[name] * factor, changed[name])
             elif name == "log_factor":
-                changed[name] = np.clip(changed[name] + np.clip(steps[:, column], -0.7, 0.7), -3.0, 3.0)
+                step = np.clip(steps[:, column], -LARGEST_FACTOR_STEP, LARGEST_FACTOR_STEP)
+                changed[name] = np.clip(changed[name] + step, -LARGEST_LOG_FACTOR, LARGEST_LOG_FACTOR)
             elif name == "speed_m_s":
                 changed[name] = changed[name] + steps[:, column] * (changed[name] != 0.0)
             else:
                 changed[name] = changed[name] + steps[:, column]
         return replace(shot_parameters, **changed)
 
-    def shared_jacobian(
-        self, effects: tuple[str, ...], theta: Samples, shot_parameters: ShotParameters, base: Samples
-    ) -> Samples:
-        """Differentiate the whitened prediction, shape (p, N)."""
-        coordinates = self.coordinates(effects)
-        jacobian = np.empty((len(coordinates), base.size))
-        for column, coordinate in enumerate(coordinates):
-            step = (
-                DIFFERENCE_STEP * max(abs(theta[column]), 0.1)
-                if coordinate.form != "log"
-                else DIFFERENCE_STEP
-            )
-            if theta[column] + step > coordinate.upper:
-                step = -step
-            moved = theta.copy()
-            moved[column] += step
-            jacobian[column] = remove_jumps(base - self.residual(effects, moved, shot_parameters)) / step
-        return jacobian
 
-    def shot_jacobian(
-        self,
-        effects: tuple[str, ...],
-        theta: Samples,
-        shot_parameters: ShotParameters,
-        base: Samples,
-        *,
-        central: bool = False,
-    ) -> Samples:
-        """Differentiate the whitened prediction by each shot's own numbers, shape (q, N)."""
-        jacobian = np.empty((len(self.shot_parameter_names), base.size))
-        for column, name in enumerate(self.shot_parameter_names):
-            if name == "shift_m":
-                jacobian[column] = self.shots.whiten((self.shots.channel == 1).astype(np.float64))
-                continue
-            steps = np.zeros((self.count, len(self.shot_parameter_names)))
-            size = (
-                DIFFERENCE_STEP
-                if name != "speed_m_s"
-                else DIFFERENCE_STEP * max(float(np.abs(shot_parameters.speed_m_s).max()), 1e-3)
-            )
-            # A part that starts at rest stays there until it breaks away: its speed is no free number.
-            steps[:, column] = size if name != "speed_m_s" else size * (shot_parameters.speed_m_s != 0.0)
-            ahead = self.residual(effects, theta, self.step_shot_parameters(shot_parameters, steps))
-            if central:
-                back = self.residual(effects, theta, self.step_shot_parameters(shot_parameters, -steps))
-                jacobian[column] = remove_jumps(back - ahead) / (2.0 * size)
-            else:
-                jacobian[column] = remove_jumps(base - ahead) / size
-        return jacobian
-
-    def initial_shot_parameters(self, share: float = 1.0) -> ShotParameters:
-        """Where a fit starts from: initial speeds by a parabola through the first `share` of each record.
-
-        With a share of 0 a driven block starts with the speed that was measured.
-        """
-        n = self.count
-        mass = np.array([shot.mass_kg for shot in self.shots.items])
-        stated = mass[np.isfinite(mass)]
-        mass = np.where(np.isfinite(mass), mass, float(np.median(stated)) if len(stated) else 1.0)
-        if self.shots.excitation is Excitation.DRIVEN:
-            mass = np.array([shot.covariates["mass"] for shot in self.shots.items])
-        speed = np.full(n, math.nan)
-        shift = np.zeros(n)
-        if self.shots.excitation is not Excitation.TAP:
-            for i, shot in enumerate(self.shots.items):
-                time, position = shot.times[1], shot.values[1]
-                count = min(len(time), max(6, round(share * len(time))))
-                _, slope, level = np.polyfit(time[:count], position[:count], 2)
-                speed[i] = slope * shot.direction
-                shift[i] = level
-                if share <= 0.0:
-                    speed[i] = shot.covariates["initial_speed"] * shot.direction
-                    shift[i] = position[0]
-        return ShotParameters(np.zeros(n), mass, speed, shift)
+def total_cost(residual: Samples, shot_parameters: ShotParameters, spread: float) -> float:
+    """Sum the squared misfit and the squared factors over their spread; infinite without an answer."""
+    misfit = float(np.einsum("i,i->", residual, residual))
+    cost = misfit + float(np.sum((shot_parameters.log_factor / spread) ** 2))
+    return cost if math.isfinite(cost) else math.inf
 
 
 def remove_jumps(change: Samples) -> Samples:

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.campaign import Excitation
+from impactcell.discrepancy.data.excitation import ExcitationStrategy
+from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.shots import POSITION, PreparedShot, concatenate_shots
 from impactcell.discrepancy.model.fit import Fit, fit, initial_shot_parameters
 from impactcell.discrepancy.model.phases import trajectory_of
@@ -21,7 +22,9 @@ SEPARATION_MARGIN = 0.1
 """Share of the contact's duration left out after it: the model need not know the separation to the sample."""
 
 MIN_SAMPLES = 12
+"""Samples of a contact or slide below which it is left out: it has up to four numbers of its own."""
 MIN_SHOTS = 3
+"""Contacts or slides below which they are not fitted apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +54,8 @@ def fit_split(problem: Problem, nominal: Fit) -> SplitFits:
     contacts = [_contact_of(shot, end) for shot, end in shots if end > 0.0]
     slides = [_slide_of(shot, (1.0 + SEPARATION_MARGIN) * end) for shot, end in shots]
     return SplitFits(
-        _rms_of_fit(problem, nominal, Excitation.TAP, contacts),
-        _rms_of_fit(problem, nominal, Excitation.FREE_SLIDE, slides),
+        _rms_of_fit(problem, nominal, problem.shots.excitation, contacts),
+        _rms_of_fit(problem, nominal, FreeSlide(), slides),
     )
 
 
@@ -76,17 +79,19 @@ def _slide_of(shot: PreparedShot, begin_s: float) -> PreparedShot:
     )
 
 
-def _rms_of_fit(problem: Problem, nominal: Fit, excitation: Excitation, items: list[PreparedShot]) -> float:
+def _rms_of_fit(
+    problem: Problem, nominal: Fit, excitation: ExcitationStrategy, items: list[PreparedShot]
+) -> float:
     items = [shot for shot in items if shot.size >= MIN_SAMPLES]
     if len(items) < MIN_SHOTS:
         return math.nan
     whole = problem.shots
     shots = concatenate_shots(excitation, whole.gravity_m_s2, whole.stroke_m, tuple(items), whole.noise_std)
-    part = Problem(shots, problem.forward.batches)
+    part = Problem(shots, problem.batches, nominal.effects)
     nominal_theta = dict(zip(nominal.coordinates, nominal.theta, strict=True))
-    start = np.array([nominal_theta[coordinate] for coordinate in part.coordinates(nominal.effects)])
+    start = np.array([nominal_theta[coordinate] for coordinate in part.coordinates])
     try:
-        fitted = fit(part, nominal.effects, start, initial_shot_parameters(part, nominal.effects, start))
+        fitted = fit(part, start, initial_shot_parameters(part, start))
     except DiscrepancyError:
         return math.nan
     free = shots.values.size - len(part.shot_parameter_names) * part.count - len(start)

@@ -98,7 +98,7 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
         "shots": len(result.prepared.shots),
         "training": len(result.training),
         "held_out": len(result.held_out),
-        "excitation": str(result.prepared.excitation),
+        "excitation": str(result.prepared.excitation.excitation),
         "notes": [*result.prepared.notes, *result.floor.notes],
         "map_before": figures.map_figure(search.nominal),
         "map_after": figures.map_figure(search.final) if search.final is not search.nominal else None,

@@ -4,8 +4,8 @@ import json
 import math
 from typing import Any
 
+from impactcell.discrepancy.data.phases import BETWEEN_SHOTS
 from impactcell.discrepancy.model.intervals import ParameterEstimate
-from impactcell.discrepancy.model.phases import BETWEEN_SHOTS
 from impactcell.discrepancy.search.evidence import ModelEvidence
 from impactcell.discrepancy.search.validation import Gap
 from impactcell.discrepancy.workflow import DiscrepancyResult

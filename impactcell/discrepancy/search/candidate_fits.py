@@ -1,76 +1,68 @@
-"""Fits that a search tries: several starts of every promising effect, a race, and the finalists.
+"""Fits that a search tries: several starts of every promising effect, screened, refined, and the finalists.
 
 A few Gauss-Newton steps on few samples tell who cannot win; the likeliest run to the end, on all samples.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from impactcell.campaign import Excitation
-from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
 from impactcell.discrepancy.model.fit import Fit, fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.search import candidate_scores
-from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan, ModelEvidence, test_model
+from impactcell.discrepancy.search.context import SearchContext
+from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan
 from impactcell.discrepancy.search.indistinguishability import (
     CandidateFit,
     are_indistinguishable,
     rank_out_of_shot,
     sort_by_likelihood,
-    total_log_likelihood,
 )
+from impactcell.discrepancy.search.policy import POLICY
 from impactcell.errors import DiscrepancyError
-from impactcell.physics import Kind
-from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 
-MAX_SCREENED = 10
-REFINE_STEPS = 25
-START_STEPS = 2
-SCREEN_STEPS = 5
-MAX_REFINED = 5
-FINAL_STEPS = 40
-MIN_FINALISTS = 2
-MAX_FINALISTS = 6
-STARTS_PER_EFFECT = 2
-MIN_SCREENED_GAIN = 15.0
-MAX_RMS_AT_FLOOR = 1.1
-MIN_GAIN = 30.0
-"""Log-likelihood that a second effect has to add; an effect that is worth less has no visible gap."""
-MAX_SPREAD_RATIO = 0.85
-"""Or by which factor it has to lower the spread of the friction factors, if it acts between shots."""
-BOUND_SHARE = 0.01
-"""Share of the (logarithmic) range of a shape that counts as its end."""
-
-Mapper = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
+AS_IT_STANDS = np.empty(0)
+"""Start of an effect's coordinates that are in the base already."""
 
 
-def _fit_from_starts(task: tuple[Problem, tuple[str, ...], list[Samples], Fit, int]) -> Fit | None:
-    """Fit a set of effects from several starts of its last effect, and keep the best.
+@dataclass(frozen=True, slots=True, eq=False)
+class FitTask:
+    """A model to be fitted, as it travels to another process.
 
-    None if the plant has no answer at any start.
+    Attributes
+    ----------
+    problem : Problem
+        The model on its shots.
+    starts : tuple of ndarray
+        Coordinates of its last effect, appended to those of `base`.
+    base : Fit
+        Where all else starts.
+    steps : int
     """
-    problem, effects, starts, base, steps = task
-    first = min(steps, START_STEPS) if len(starts) > 1 else steps
-    tried = [
-        _fit_or_none(problem, effects, np.concatenate([base.theta, start]), base, first) for start in starts
-    ]
-    best = next(iter(sort_by_likelihood(problem, [fitted for fitted in tried if fitted is not None])), None)
-    if best is None or first == steps:
-        return best
-    return _fit_or_none(problem, effects, best.theta, best, steps - first) or best
 
+    problem: Problem
+    starts: tuple[Samples, ...]
+    base: Fit
+    steps: int
 
-def _fit_or_none(
-    problem: Problem, effects: tuple[str, ...], theta: Samples, base: Fit, steps: int
-) -> Fit | None:
-    try:
-        return fit(problem, effects, theta, base.shot_parameters, spread=base.spread, most_steps=steps)
-    except DiscrepancyError:
-        return None
+    def run(self) -> Fit | None:
+        """Fit from every start and keep the best; None if the plant has no answer at any of them."""
+        first = min(self.steps, POLICY.start_steps) if len(self.starts) > 1 else self.steps
+        tried = [
+            self._fit(np.concatenate([self.base.theta, start]), self.base, first) for start in self.starts
+        ]
+        ranking = sort_by_likelihood(self.problem, [fitted for fitted in tried if fitted is not None])
+        if not ranking or first == self.steps:
+            return next(iter(ranking), None)
+        return self._fit(ranking[0].theta, ranking[0], self.steps - first) or ranking[0]
+
+    def _fit(self, theta: Samples, base: Fit, steps: int) -> Fit | None:
+        try:
+            return fit(self.problem, theta, base.shot_parameters, spread=base.spread, most_steps=steps)
+        except DiscrepancyError:
+            return None
 
 
 def is_at_bound(model: Fit) -> bool:
@@ -82,7 +74,7 @@ def is_at_bound(model: Fit) -> bool:
         coordinate.effect
         and coordinate.form == "log"
         and min(float(theta) - coordinate.lower, coordinate.upper - float(theta))
-        < BOUND_SHARE * (coordinate.upper - coordinate.lower)
+        < POLICY.bound_share * (coordinate.upper - coordinate.lower)
         for coordinate, theta in zip(model.coordinates, model.theta, strict=True)
     )
 
@@ -99,107 +91,55 @@ def prefer_interior(problem: Problem, ranking: list[CandidateFit]) -> list[Candi
     return [*inside, *(candidate for candidate in ranking if candidate not in inside)]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchContext:
-    """What a search works on: all samples, fewer of them, and what may be named.
-
-    `floor_is_certain` says that the noise is stated, so that what is left above it is a gap.
-    """
-
-    problem: Problem
-    coarse: Problem
-    prepared: PreparedCampaign
-    library: tuple[str, ...]
-    seed: int
-    mapper: Mapper
-    floor_is_certain: bool
-
-    def test_model(self, model: Fit) -> ModelEvidence:
-        """All evidence against a model."""
-        key = (self.seed, len(model.effects))
-        return test_model(self.problem, self.coarse, model, self.prepared, self.library, key)
-
-    def is_sufficient(self, evidence: ModelEvidence) -> bool:
-        """Whether nothing significant is left, and nothing large either where the noise is stated."""
-        return evidence.p_value > ALPHA and self.reaches_floor(evidence.fit)
-
-    def is_closed(self, evidence: ModelEvidence) -> bool:
-        """Whether what is left beside an effect is not significant, or too little to be worth a name."""
-        return self.is_sufficient(evidence) or (
-            self.reaches_floor(evidence.fit) and not self.has_promising(evidence)
-        )
-
-    def has_promising(self, evidence: ModelEvidence) -> bool:
-        """Whether some candidate or some cell of the map promises enough to be worth a name."""
-        gains = evidence.candidate_scan.gains()
-        promised = [gain for effect, gain in gains.items() if LIBRARY[effect].kind is not Kind.BETWEEN_SHOTS]
-        between = [gain for effect, gain in gains.items() if LIBRARY[effect].kind is Kind.BETWEEN_SHOTS]
-        chart, gain = evidence.map, evidence.map_scores.gain
-        promised += gain[chart.channel >= 0].tolist()
-        between += gain[chart.channel < 0].tolist()
-        share = max(between, default=0.0) / self.problem.count
-        return max(promised, default=0.0) > 2.0 * MIN_GAIN or share > 1.0 - MAX_SPREAD_RATIO**2
-
-    def gains_enough(self, fewer: Fit, more: Fit) -> bool:
-        """Whether one more effect explains enough to be worth a name, significant or not."""
-        gain = total_log_likelihood(self.problem, more) - total_log_likelihood(self.problem, fewer)
-        return gain > MIN_GAIN or more.spread < MAX_SPREAD_RATIO * fewer.spread
-
-    def reaches_floor(self, model: Fit) -> bool:
-        """Whether a model comes near the noise, where that is stated."""
-        misfit_per_sample = model.misfit(self.problem.shots) / self.problem.sizes
-        # A driven block in which stick ends at the wrong moment is far off whatever the model.
-        driven = self.problem.shots.excitation is Excitation.DRIVEN
-        misfit = float(
-            np.median(misfit_per_sample)
-            if driven
-            else np.average(misfit_per_sample, weights=self.problem.sizes)
-        )
-        return not (self.floor_is_certain and misfit > MAX_RMS_AT_FLOOR**2)
-
-    def refit_on_all_samples(self, fits: Sequence[Fit]) -> list[CandidateFit]:
-        """Refit on all samples, the likeliest out of shot first."""
-        tasks = [(self.problem, model.effects, [np.empty(0)], model, FINAL_STEPS) for model in fits]
-        return rank_out_of_shot(
-            self.problem, [fitted for fitted in self.mapper(_fit_from_starts, tasks) if fitted is not None]
-        )
-
-
 def screen(context: SearchContext, scanned: CandidateScan, max_effects: int) -> list[Fit]:
     """Fit the most promising candidates beside what the model has already by a few steps."""
     tasks = []
     gains = scanned.gains()
-    for effect in sorted(gains, key=lambda effect_name: -gains[effect_name])[:max_effects]:
-        if gains[effect] < MIN_SCREENED_GAIN and scanned.p_value_of(effect) > ALPHA:
+    for effect in sorted(gains, key=lambda name: -gains[name])[:max_effects]:
+        if gains[effect] < POLICY.min_screened_gain and scanned.p_value_of(effect) > ALPHA:
             continue
         starts = candidate_scores.starting_points(
-            scanned.candidates, scanned.scores, effect, STARTS_PER_EFFECT
+            scanned.candidates, scanned.scores, effect, POLICY.starts_per_effect
         )
         if starts:
-            tasks.append((context.coarse, (*scanned.fit.effects, effect), starts, scanned.fit, SCREEN_STEPS))
-    return sort_by_likelihood(
-        context.coarse, [fitted for fitted in context.mapper(_fit_from_starts, tasks) if fitted is not None]
+            model = context.coarse.with_effects((*scanned.fit.effects, effect))
+            tasks.append(FitTask(model, tuple(starts), scanned.fit, POLICY.screen_steps))
+    return sort_by_likelihood(context.coarse, _run(context, tasks))
+
+
+def refine(context: SearchContext, screened: list[Fit]) -> list[Fit]:
+    """Run the likeliest of those that were screened to the end."""
+    refined = _continue(context, context.coarse, screened[: POLICY.max_refined], POLICY.refine_steps)
+    return sort_by_likelihood(context.coarse, [*refined, *screened[POLICY.max_refined :]])
+
+
+def refit_on_all_samples(context: SearchContext, fits: Sequence[Fit]) -> list[CandidateFit]:
+    """Refit on all samples, the likeliest out of shot first."""
+    return rank_out_of_shot(context.problem, _continue(context, context.problem, fits, POLICY.final_steps))
+
+
+def _continue(context: SearchContext, problem: Problem, fits: Sequence[Fit], steps: int) -> list[Fit]:
+    """Fit models further from where they stand."""
+    return _run(
+        context, [FitTask(problem.with_effects(one.effects), (AS_IT_STANDS,), one, steps) for one in fits]
     )
 
 
-def refine(context: SearchContext, raced: list[Fit]) -> list[Fit]:
-    """Run the likeliest of a race to the end."""
-    none = [np.empty(0)]
-    tasks = [(context.coarse, model.effects, none, model, REFINE_STEPS) for model in raced[:MAX_REFINED]]
-    finished = [fitted for fitted in context.mapper(_fit_from_starts, tasks) if fitted is not None]
-    return sort_by_likelihood(context.coarse, [*finished, *raced[MAX_REFINED:]])
+def _run(context: SearchContext, tasks: Sequence[FitTask]) -> list[Fit]:
+    """Fit models, in parallel where the mapper is; those that the plant has no answer for are left out."""
+    return [fitted for fitted in context.mapper(FitTask.run, tasks) if fitted is not None]
 
 
 def finalists(context: SearchContext, rough: list[Fit]) -> list[Fit]:
     """Keep the likeliest, and those that fewer samples do not tell from it."""
     in_sample = [
         CandidateFit(candidate, candidate.log_likelihood(context.coarse.shots))
-        for candidate in rough[:MAX_FINALISTS]
+        for candidate in rough[: POLICY.max_finalists]
     ]
     return [
         candidate.fit
         for place, candidate in enumerate(in_sample)
-        if place < MIN_FINALISTS or are_indistinguishable(context.coarse, in_sample[0], candidate)
+        if place < POLICY.min_finalists or are_indistinguishable(context.coarse, in_sample[0], candidate)
     ]
 
 

@@ -79,7 +79,7 @@ def candidate_directions(
     for identifier in library:
         if identifier in fit.effects:
             continue
-        grid = effect_grid(identifier, problem.forward.batches, visited)
+        grid = effect_grid(identifier, problem.batches, visited)
         count = 0
         for point in grid:
             between = between_shot_factors(problem, identifier, point)
@@ -109,7 +109,7 @@ def effect_direction(
     A direction that `is_single` is a central difference: what the friction factors can do as well must cancel
     to the last digits. Of a whole grid each is a small step forward.
     """
-    effects = (*fit.effects, identifier)
+    model = problem.with_effects((*fit.effects, identifier))
     forward_theta, backward_theta = point.theta.copy(), point.theta.copy()
     both = point.scaled and point.sign == 0
     if both and is_single:
@@ -117,11 +117,9 @@ def effect_direction(
     elif both:
         forward_theta[point.amplitude] -= (1.0 - FORWARD_STEP) * SMALL_STRENGTH
     try:
-        forward = problem.residual(effects, np.concatenate([fit.theta, forward_theta]), fit.shot_parameters)
+        forward = model.residual(np.concatenate([fit.theta, forward_theta]), fit.shot_parameters)
         if both and is_single:
-            backward = problem.residual(
-                effects, np.concatenate([fit.theta, backward_theta]), fit.shot_parameters
-            )
+            backward = model.residual(np.concatenate([fit.theta, backward_theta]), fit.shot_parameters)
             change = 0.5 * (backward - forward)
             change[np.abs(backward + forward - 2.0 * fit.residual) > 1.0 + np.abs(change)] = 0.0
         elif both:
@@ -141,8 +139,8 @@ def between_shot_factors(problem: Problem, identifier: str, point: GridPoint) ->
     if effect.between is None or effect.laws:
         return None
     items = problem.shots.items
-    names = build_law_table((identifier,), problem.forward.batches).names
-    coordinates = effect_coordinates(identifier, problem.forward.batches)
+    names = build_law_table((identifier,), problem.batches).names
+    coordinates = effect_coordinates(identifier, problem.batches)
     values = {
         parameter_name(coordinate): coordinate.value(float(theta))
         for coordinate, theta in zip(coordinates, point.theta, strict=True)
@@ -151,7 +149,7 @@ def between_shot_factors(problem: Problem, identifier: str, point: GridPoint) ->
     columns = []
     place = 0
     for parameter in effect.parameters:
-        width = problem.forward.batches - 1 if parameter.per_batch else 1
+        width = problem.batches - 1 if parameter.per_batch else 1
         values_of_shots = np.tile(row[place : place + width], (len(items), 1))
         columns.append(values_of_shots if parameter.per_batch else values_of_shots[:, 0])
         place += width

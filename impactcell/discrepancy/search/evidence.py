@@ -72,7 +72,8 @@ class ModelEvidence:
 
 def evaluate_on(problem: Problem, fit: Fit) -> Fit:
     """Return the same model with the residuals of another selection of the same shots' samples."""
-    return replace(fit, residual=problem.residual(fit.effects, fit.theta, fit.shot_parameters))
+    model = problem.with_effects(fit.effects)
+    return replace(fit, residual=model.residual(fit.theta, fit.shot_parameters))
 
 
 def scan_candidates(
@@ -82,24 +83,30 @@ def scan_candidates(
     coarse_fit = evaluate_on(coarse, fit)
     linearisation = linearise(coarse, coarse_fit)
     directions = candidate_scores.candidate_directions(coarse, coarse_fit, linearisation, library)
-    candidate_scores_ = scores(linearisation, directions.products)
+    gains = scores(linearisation, directions.products)
     return CandidateScan(
         fit,
         directions,
-        candidate_scores_,
-        wild_bootstrap(linearisation, candidate_scores_, directions.group, (*seed, 2), directions.sign),
+        gains,
+        wild_bootstrap(linearisation, gains, directions.group, (*seed, 2), directions.sign),
     )
 
 
 def test_model(
-    problem: Problem,
-    coarse: Problem,
+    problems: tuple[Problem, Problem],
     fit: Fit,
     prepared: PreparedCampaign,
     library: Sequence[str],
     seed: tuple[int, ...],
 ) -> ModelEvidence:
-    """Test a fitted model against the map, and against every candidate on fewer samples."""
+    """Test a fitted model against the map, and against every candidate on fewer samples.
+
+    Parameters
+    ----------
+    problems : tuple of Problem
+        The shots with all samples, and with fewer of them.
+    """
+    problem, coarse = problems
     linearisation = linearise(problem, fit)
     chart = residual_map.map_directions(problem, fit, linearisation, prepared)
     chart_scores = scores(linearisation, chart.products)

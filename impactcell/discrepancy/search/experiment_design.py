@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
-from impactcell.campaign import Excitation
 from impactcell.discrepancy.data.shots import PreparedShot, concatenate_shots
 from impactcell.discrepancy.model.fit import Fit
 from impactcell.discrepancy.model.problem import Problem
@@ -16,10 +15,11 @@ from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
 
 POWER = 0.9
+"""Probability with which the shots proposed tell two effects apart."""
 SIGNIFICANCE = 0.025
+"""One-sided error of the test that they are proposed for."""
 MAX_SHOTS = 400
-FASTER, SLOWER, HEAVIER = 1.3, 0.7, 1.5
-DWELLS_S = (1.0, 1000.0)
+"""More shots than that are no proposal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def propose_experiments(
 
 def _cheapest_experiment(problem: Problem, best: Fit, rival_fit: Fit, effect: str, rival: str) -> Proposal:
     feasible: list[tuple[int, str, float]] = []
-    for setting, shot in _settings_within_reach(problem):
+    for setting, shot in problem.shots.excitation.settings_within_reach(problem.shots.items):
         separation = _separation(problem, best, rival_fit, shot)
         if separation <= 0.0:
             continue
@@ -92,35 +92,6 @@ def _separate_measurement(effect: str, rival: str) -> str:
     return "no setting within reach tells them apart: measure one of them by itself"
 
 
-def _settings_within_reach(problem: Problem) -> list[tuple[str, PreparedShot]]:
-    """List settings within reach: what was done, and one step beyond it."""
-    items = problem.shots.items
-    typical = sorted(items, key=lambda shot: (shot.velocity_m_s, shot.place))[len(items) // 2]
-    if problem.shots.excitation is not Excitation.TAP:
-        return []
-    velocities = sorted({shot.velocity_m_s for shot in items})
-    masses = sorted({shot.mass_kg for shot in items if math.isfinite(shot.mass_kg)}) or [1.0]
-    settings = []
-    for velocity in (velocities[0] * SLOWER, velocities[0], velocities[-1], velocities[-1] * FASTER):
-        for mass in (masses[0], masses[-1], masses[-1] * HEAVIER):
-            for direction in (1, -1):
-                words = f"{velocity * 60000.0:.0f} mm/min, {mass:.3g} kg, direction {direction:+d}"
-                shot = replace(typical, velocity_m_s=velocity, mass_kg=mass, direction=direction, group=-1)
-                settings.append((words, shot))
-                if math.isfinite(typical.dwell_s):
-                    settings += [
-                        (f"{words}, after {dwell:g} s at rest", replace(shot, dwell_s=dwell))
-                        for dwell in DWELLS_S
-                    ]
-    last = max(shot.batch for shot in items)
-    if last:
-        settings += [
-            (f"batch {batch + 1} again, after the others", replace(typical, batch=batch, place=typical.shots))
-            for batch in range(last + 1)
-        ]
-    return settings
-
-
 def _separation(problem: Problem, best: Fit, rival_fit: Fit, shot: PreparedShot) -> float:
     """Squared distance of the two models' predictions for one shot, its own factor free, in noise units.
 
@@ -130,15 +101,14 @@ def _separation(problem: Problem, best: Fit, rival_fit: Fit, shot: PreparedShot)
     shot_set = concatenate_shots(
         problem.shots.excitation, problem.shots.gravity_m_s2, problem.shots.stroke_m, (shot,), noise
     )
-    single = Problem(shot_set, problem.forward.batches)
+    single = Problem(shot_set, problem.batches, best.effects)
     try:
-        shot_parameters = single.initial_shot_parameters()
-        a = single.residual(best.effects, best.theta, shot_parameters)
-        b = single.residual(rival_fit.effects, rival_fit.theta, shot_parameters)
-        slope = single.shot_jacobian(best.effects, best.theta, shot_parameters, a)[0]
+        state = single.evaluate(best.theta, single.initial_guess(), best.spread)
+        rival = single.with_effects(rival_fit.effects)
+        difference = state.residual - rival.residual(rival_fit.theta, state.shot_parameters)
+        slope = single.shot_jacobian(state)[0]
     except (PhysicsError, ValueError):
         return 0.0
-    difference = a - b
     if not (np.isfinite(difference).all() and np.isfinite(slope).all()):
         return 0.0
     along = float(slope @ slope)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES
 from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
 from impactcell.discrepancy.data.shots import CHANNELS, IndexArray
 from impactcell.discrepancy.model.fit import Fit
@@ -18,20 +19,18 @@ from impactcell.discrepancy.model.linearisation import (
     concatenate_products,
     direction_products,
 )
-from impactcell.discrepancy.model.phases import (
-    BETWEEN_SHOTS,
-    PHASES,
-    phase_positions,
-    sample_phases,
-    trajectory_of,
-)
+from impactcell.discrepancy.model.phases import phase_positions, sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
 ALL = "all"
+"""Column of the map for a mean over all shots."""
 MEAN_KNOTS = 10
+"""Knots along a phase of a shape that all shots share."""
 COVARIATE_KNOTS = 3
+"""Knots of a shape that a covariate multiplies: shots are fewer than samples."""
 MIN_SAMPLES_PER_SHOT = 4
+"""Samples of a phase and channel, a shot on average, from which on they are tested."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,18 +4,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.campaign import Excitation
+from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES
 from impactcell.discrepancy.data.shots import CHANNELS
-from impactcell.discrepancy.model.phases import BETWEEN_SHOTS, PHASES, sample_phases, trajectory_of
+from impactcell.discrepancy.model.phases import sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
-from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
+from impactcell.discrepancy.search.evidence import ModelEvidence
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.records import Samples
 
 STRONG_SHARE = 0.25
+"""Share of the largest amplitude from which on the sign of a shape counts."""
 NO_GAP_RMS = 1.1
+"""RMS in noise floors up to which traces show no gap."""
+MAX_P_DEPENDS_ON = 0.05
+"""p-value over the whole map up to which a gap is said to depend on a covariate."""
 AFTER_SEPARATION = frozenset({"free_slide", "stop", "driven"})
+"""Phases without contact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +109,7 @@ def _strongest_row(evidence: ModelEvidence) -> str:
 def describe_gap(problem: Problem, evidence: ModelEvidence) -> UnexplainedGap:
     """Describe what a fitted model leaves."""
     chart, tests = evidence.map, evidence.map_tests
-    taps = problem.shots.excitation is Excitation.TAP
+    taps = problem.shots.excitation.has_contact
     parts = fit_split(problem, evidence.fit) if taps else None
     phase = phase_of_gap(problem, evidence, parts)
     if phase not in chart.rows:
@@ -116,7 +121,7 @@ def describe_gap(problem: Problem, evidence: ModelEvidence) -> UnexplainedGap:
         if cell < len(tests.p_adjusted):
             p[column] = tests.p_adjusted[cell]
     depends = tuple(
-        name for column, name in enumerate(chart.columns) if name != ALL and p[column] <= ALPHA * 5.0
+        name for column, name in enumerate(chart.columns) if name != ALL and p[column] <= MAX_P_DEPENDS_ON
     )
     shapes = _shapes(evidence, row, depends) if phase != BETWEEN_SHOTS else ()
     return UnexplainedGap(phase, depends, _in_words(phase, shapes), shapes, parts)

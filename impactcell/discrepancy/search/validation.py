@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.data.noise_floor import NoiseFloor, ReplicateSpread
+from impactcell.discrepancy.data.phases import PHASES
 from impactcell.discrepancy.data.shots import CHANNELS
-from impactcell.discrepancy.model.fit import Fit, refit_shot_parameters
-from impactcell.discrepancy.model.phases import PHASES, sample_phases, trajectory_of
+from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.model.phases import sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
@@ -16,6 +17,9 @@ MIN_OPEN_GAP = 1.05
 """A gap of at most this before is none that could be closed."""
 
 RESAMPLES = 1999
+"""Draws of the held-out shots: a quantile at 2.5 % rests on fifty of them."""
+RESAMPLING = 7
+"""Stream of random numbers of these draws, apart from those of split and tests."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,55 +92,57 @@ def _gap(misfit: Samples, free: Samples, log_factor: Samples, spread: float) -> 
 
 
 def validate(
-    training: Problem,
-    before: Fit,
-    after: Fit,
-    held_out: Problem,
+    training: tuple[Problem, Fit, Fit],
+    held_out: tuple[Problem, Fit, Fit],
     floor: NoiseFloor,
     replicates: ReplicateSpread,
     seed: int,
-) -> tuple[Validation, Fit, Fit]:
-    """Open the held-out shots; returns the proof and both models fitted to their factors."""
-    held_before, held_after = refit_shot_parameters(held_out, before), refit_shot_parameters(held_out, after)
-    gap_before, gap_after = (gap(held_out, model, floor, replicates) for model in (held_before, held_after))
+) -> Validation:
+    """Gaps of two models on training and held-out shots, and the share that the second one closes.
+
+    Parameters
+    ----------
+    training, held_out : tuple of Problem, Fit and Fit
+        Shots, and the model before and after, its shots' own numbers fitted to them.
+    """
+    problem, before, after = held_out
+    gap_before, gap_after = (gap(problem, model, floor, replicates) for model in (before, after))
     closed = low = high = math.nan
     if gap_before.whole > MIN_OPEN_GAP:
         closed = _closed_share(gap_before, gap_after)
-        rng = np.random.default_rng([seed, 7])
-        (misfit_before, free), (misfit_after, _) = (
-            _counted_misfit(held_out, model, floor) for model in (held_before, held_after)
-        )
-        draws = []
-        for _ in range(RESAMPLES):
-            pick = rng.integers(0, held_out.count, held_out.count)
-            a = _gap(
-                misfit_before[pick],
-                free[pick],
-                held_before.shot_parameters.log_factor[pick],
-                replicates.spread,
-            )
-            b = _gap(
-                misfit_after[pick], free[pick], held_after.shot_parameters.log_factor[pick], replicates.spread
-            )
-            if a.whole > MIN_OPEN_GAP:
-                draws.append(_closed_share(a, b))
+        draws = _resampled_shares(held_out, floor, replicates, seed)
         if draws:
             low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
             low, high = min(low, closed), max(high, closed)
-    return (
-        Validation(
-            gap(training, before, floor, replicates),
-            gap(training, after, floor, replicates),
-            gap_before,
-            gap_after,
-            closed,
-            low,
-            high,
-            _regions(held_out, held_before, held_after),
-        ),
-        held_before,
-        held_after,
+    return Validation(
+        gap(training[0], training[1], floor, replicates),
+        gap(training[0], training[2], floor, replicates),
+        gap_before,
+        gap_after,
+        closed,
+        low,
+        high,
+        _regions(problem, before, after),
     )
+
+
+def _resampled_shares(
+    held_out: tuple[Problem, Fit, Fit], floor: NoiseFloor, replicates: ReplicateSpread, seed: int
+) -> list[float]:
+    """Share of the gap that is closed in shots drawn with replacement; draws without a gap are left out."""
+    problem, *models = held_out
+    rng = np.random.default_rng([seed, RESAMPLING])
+    counted = [_counted_misfit(problem, model, floor) for model in models]
+    shares = []
+    for _ in range(RESAMPLES):
+        drawn = rng.integers(0, problem.count, problem.count)
+        before, after = (
+            _gap(misfit[drawn], free[drawn], model.shot_parameters.log_factor[drawn], replicates.spread)
+            for (misfit, free), model in zip(counted, models, strict=True)
+        )
+        if before.whole > MIN_OPEN_GAP:
+            shares.append(_closed_share(before, after))
+    return shares
 
 
 def _closed_share(before: Gap, after: Gap) -> float:

@@ -1,0 +1,164 @@
+"""Taps: an actuator at constant velocity pushes the part, and halts after its stroke."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell.campaign import Excitation
+from impactcell.discrepancy.data.excitation import ExcitationStrategy
+from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, PRELOAD, STOP, UNLOADING, Trajectory
+from impactcell.discrepancy.data.plant_guesses import contact_by_regression, friction_of_slides
+from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, IndexArray, PreparedShot, ShotSet
+from impactcell.discrepancy.data.unit_checks import PlausibleRatio
+from impactcell.records import Capture, Channel
+
+SPEED_RATIO = PlausibleRatio(
+    0.05, 20.0, "the part's speed over the actuator's velocity", "position_m, time_s or velocity_mm_per_min"
+)
+"""The part leaves the actuator at one to two times its velocity."""
+IMPULSE_RATIO = PlausibleRatio(
+    0.02, 50.0, "the impulse of force_n over mass times velocity", "force_n or mass_kg"
+)
+"""The impulse of the contact makes about m v."""
+MIN_SAMPLES = 8
+"""Samples of a channel from which on its ratios mean anything."""
+RATIOS = (1.15, 1.5)
+"""mu_s / mu_k at which fits start, below and above the paper's 1.3."""
+FALLBACK_STIFFNESSES = (5e4, 2e5, 6e5, 2e6, 8e6)
+"""Contact stiffnesses [N/m] at which fits start where no force was recorded: two decades about 6e5."""
+DAMPING_TIME_S = 0.7e-3
+"""Damping over stiffness [s] of those starts; the paper's plant has 465 N s/m over 6.5e5 N/m."""
+FASTER, SLOWER, HEAVIER = 1.3, 0.7, 1.5
+"""Factors of velocity and mass by which a next experiment may leave the range that was covered."""
+DWELLS_S = (1.0, 1000.0)
+"""Dwells [s] that a next experiment may take, three decades apart."""
+MM_PER_MIN = 60_000.0
+"""Millimetres per minute in a metre per second."""
+
+
+class Tap(ExcitationStrategy):
+    """The actuator runs at constant velocity from first contact until its stroke, in contact or not."""
+
+    excitation = Excitation.TAP
+    free_plant_parameters = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_k", "ratio")
+    shot_parameters = ("log_factor",)
+    has_contact = True
+    has_replicates = True
+    floor_is_certain = True
+
+    def predicted_channels(self, capture: Capture) -> tuple[Channel | None, Channel | None, Channel | None]:
+        """All of them."""
+        return capture.force, capture.position, capture.actuator
+
+    def missing_information(self, shots: Sequence[PreparedShot]) -> list[str]:
+        """Channels, directions, velocities, masses and replicates that are not there."""
+        masses = [shot.mass_kg for shot in shots if math.isfinite(shot.mass_kg)]
+        unstated = len(shots) - len(masses)
+        lacks = (
+            (
+                not _is_recorded(shots, FORCE),
+                "No force channel: effects of contact and force sensor are seen in the motion only.",
+            ),
+            (not _is_recorded(shots, POSITION), "No position channel: effects on the slide are hardly seen."),
+            (
+                not _is_recorded(shots, ACTUATOR),
+                "No actuator channel: droop and ramp of the actuator are hard to tell from damping.",
+            ),
+            (
+                len({shot.direction for shot in shots}) < 2,
+                "One direction only: tilt and asymmetry of direction cannot be seen.",
+            ),
+            (
+                len({round(shot.velocity_m_s, 9) for shot in shots}) < 2,
+                "One velocity only: terms that depend on speed are hard to tell apart.",
+            ),
+            (
+                len({round(mass, 9) for mass in masses}) < 2,
+                "One mass only: mass and stiffness, tilt and restoring force lose their contrast.",
+            ),
+            (unstated > 0, f"The mass of {unstated} shots is not stated and is fitted."),
+            (
+                len({shot.group for shot in shots}) == len(shots),
+                "No replicates: the sensors' noise is only a lower bound of the floor, and gap (b) is null.",
+            ),
+        )
+        return [note for is_lacking, note in lacks if is_lacking]
+
+    def unit_ratios(self, shot: PreparedShot, gravity_m_s2: float) -> Mapping[PlausibleRatio, float]:
+        """Speed of the part over that of the actuator, impulse over momentum."""
+        del gravity_m_s2
+        time, position = shot.times[POSITION], shot.values[POSITION]
+        if len(time) < MIN_SAMPLES:
+            return {}
+        step = max(len(time) // 60, 1)
+        speed = np.abs(np.diff(position[::step]) / np.diff(time[::step]))
+        ratios = {SPEED_RATIO: float(np.quantile(speed, 0.95)) / shot.velocity_m_s}
+        if len(shot.times[FORCE]) > MIN_SAMPLES and math.isfinite(shot.mass_kg):
+            impulse = float(np.trapezoid(np.maximum(shot.values[FORCE], 0.0), shot.times[FORCE]))
+            ratios[IMPULSE_RATIO] = impulse / (shot.mass_kg * shot.velocity_m_s)
+        return ratios
+
+    def plant_guesses(self, shots: Sequence[PreparedShot], gravity_m_s2: float) -> list[dict[str, float]]:
+        """Contact by regression of the force, friction by the curvature of the slides."""
+        mu_k = friction_of_slides(shots, gravity_m_s2)
+        contact = contact_by_regression(shots)
+        contacts = [contact] if contact else [(k, DAMPING_TIME_S * k) for k in FALLBACK_STIFFNESSES]
+        return [
+            {"stiffness_n_per_m": k, "damping_n_s_per_m": b, "mu_k": mu_k, "ratio": ratio}
+            for k, b in contacts
+            for ratio in RATIOS
+        ]
+
+    def initial_state(self, shot: PreparedShot, share: float) -> tuple[float, float]:
+        """None: the part lies at rest where positions count from."""
+        del shot, share
+        return math.nan, 0.0
+
+    def sample_phases(self, shots: ShotSet, trajectory: Trajectory) -> IndexArray:
+        """Preload, loading, unloading, free slide and stop."""
+        phase = np.full(shots.values.size, STOP, dtype=np.int64)
+        moving = np.abs(trajectory.speed_m_s) > 0.0
+        touching = trajectory.actuator_displacement_m - trajectory.part_displacement_m > 0.0
+        velocity = np.repeat([shot.velocity_m_s for shot in shots.items], np.diff(shots.bounds))
+        closing = velocity > trajectory.speed_m_s
+        phase[moving & ~touching] = FREE_SLIDE
+        phase[moving & touching & ~closing] = UNLOADING
+        phase[moving & touching & closing] = LOADING
+        phase[~moving & (trajectory.part_displacement_m <= 1e-12)] = PRELOAD
+        return phase
+
+    def settings_within_reach(self, shots: Sequence[PreparedShot]) -> list[tuple[str, PreparedShot]]:
+        """Velocities, masses, directions, dwells and batches: what was done, and one step beyond it."""
+        typical = sorted(shots, key=lambda shot: (shot.velocity_m_s, shot.place))[len(shots) // 2]
+        velocities = sorted({shot.velocity_m_s for shot in shots})
+        masses = sorted({shot.mass_kg for shot in shots if math.isfinite(shot.mass_kg)}) or [1.0]
+        settings = []
+        for velocity in (velocities[0] * SLOWER, velocities[0], velocities[-1], velocities[-1] * FASTER):
+            for mass in (masses[0], masses[-1], masses[-1] * HEAVIER):
+                for direction in (1, -1):
+                    words = f"{velocity * MM_PER_MIN:.0f} mm/min, {mass:.3g} kg, direction {direction:+d}"
+                    shot = replace(
+                        typical, velocity_m_s=velocity, mass_kg=mass, direction=direction, group=-1
+                    )
+                    settings.append((words, shot))
+                    if math.isfinite(typical.dwell_s):
+                        settings += [
+                            (f"{words}, after {dwell:g} s at rest", replace(shot, dwell_s=dwell))
+                            for dwell in DWELLS_S
+                        ]
+        last = max(shot.batch for shot in shots)
+        if last:
+            settings += [
+                (
+                    f"batch {batch + 1} again, after the others",
+                    replace(typical, batch=batch, place=typical.shots),
+                )
+                for batch in range(last + 1)
+            ]
+        return settings
+
+
+def _is_recorded(shots: Sequence[PreparedShot], channel: int) -> bool:
+    return any(len(shot.times[channel]) for shot in shots)

@@ -1,0 +1,148 @@
+"""What a search says at its end: effects accepted, those tied with them, or none."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.search.candidate_fits import is_at_bound
+from impactcell.discrepancy.search.context import SearchContext
+from impactcell.discrepancy.search.evidence import CandidateScan, ModelEvidence
+from impactcell.discrepancy.search.indistinguishability import (
+    Alternative,
+    CandidateFit,
+    are_indistinguishable,
+    compare_fits,
+)
+from impactcell.discrepancy.search.policy import POLICY
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SelectionResult:
+    """Outcome of the search.
+
+    Attributes
+    ----------
+    nominal, final : ModelEvidence
+        Against the nominal model, and against the model that was accepted or tried last.
+    accepted : Fit or None
+        None where nothing suffices.
+    added : tuple of str
+        Effects in the order they were added.
+    ties : dict of str to tuple of str
+        For each of them those that cannot be told from it.
+    p_values : dict of str to float
+    alternatives : tuple of Alternative
+        Everything that was fitted, the likeliest first.
+    """
+
+    nominal: ModelEvidence
+    final: ModelEvidence
+    accepted: Fit | None
+    added: tuple[str, ...]
+    ties: dict[str, tuple[str, ...]]
+    p_values: dict[str, float]
+    alternatives: tuple[Alternative, ...] = field(default=())
+
+
+def reject(
+    nominal: ModelEvidence, final: ModelEvidence, alternatives: tuple[Alternative, ...]
+) -> SelectionResult:
+    """Nothing suffices."""
+    return SelectionResult(nominal, final, None, (), {}, {}, alternatives)
+
+
+def accept_single(
+    problem: Problem, nominal: ModelEvidence, final: ModelEvidence, singles: list[CandidateFit]
+) -> SelectionResult:
+    """Accept the likeliest single effect, with those that the shots do not tell from it.
+
+    A shape that was fitted to the end of its range is no name.
+    """
+    best = singles[0].fit
+    if is_at_bound(best):
+        return reject(nominal, final, compare_fits(singles))
+    tied = tuple(
+        other.fit.effects[-1] for other in singles[1:] if are_indistinguishable(problem, singles[0], other)
+    )
+    return _single(nominal, final, best, tied, compare_fits(singles))
+
+
+def accept_plausible(
+    context: SearchContext,
+    nominal: ModelEvidence,
+    final: ModelEvidence,
+    singles: list[CandidateFit],
+    screened: Sequence[Fit],
+) -> SelectionResult | None:
+    """Accept the effect that explains most of a gap, if the floor itself is only a lower bound.
+
+    What is left then may be noise that nobody stated. It also may be what separates the best effect from its
+    rivals: whoever is behind by less than that is tied.
+    """
+    best = singles[0].fit
+    if context.floor_is_certain or is_at_bound(best):
+        return None
+    shots, coarse = context.problem.shots, context.coarse.shots
+    size = shots.values.size
+    before = float(nominal.fit.misfit(shots).sum()) - size
+    after = float(best.misfit(shots).sum()) - size
+    if after > (1.0 - POLICY.min_share_explained) * before:
+        return None
+    scale = coarse.values.size / size
+    smallest = float(best.misfit(shots).sum()) * scale
+    tied = tuple(
+        model.effects[-1]
+        for model in screened
+        if model.effects != best.effects
+        and float(model.misfit(coarse).sum()) - smallest <= POLICY.max_rival_share * after * scale
+    )
+    return _single(nominal, final, best, tied, compare_fits(singles))
+
+
+def _single(
+    nominal: ModelEvidence,
+    final: ModelEvidence,
+    best: Fit,
+    tied: tuple[str, ...],
+    alternatives: tuple[Alternative, ...],
+) -> SelectionResult:
+    effect = best.effects[-1]
+    p_value = nominal.candidate_scan.p_value_of(effect)
+    return SelectionResult(nominal, final, best, (effect,), {effect: tied}, {effect: p_value}, alternatives)
+
+
+def accept_pair(
+    problem: Problem,
+    evidence: tuple[ModelEvidence, ModelEvidence],
+    pairs: list[CandidateFit],
+    order: Sequence[str],
+    scans: Sequence[CandidateScan],
+) -> SelectionResult:
+    """Accept the likeliest pair.
+
+    Parameters
+    ----------
+    evidence : tuple of ModelEvidence
+        Against the nominal model and against the pair.
+    order : sequence of str
+        Single effects, the likeliest first: the one that would have come first is the first of the pair.
+    scans : sequence of CandidateScan
+        Of the nominal model, then of models with one effect: the p-value of the second effect is that
+        beside the first, where it was scanned.
+    """
+    nominal, final = evidence
+    best = pairs[0].fit
+    new_effects = [effect for effect in best.effects if effect not in nominal.fit.effects]
+    place = {effect: index for index, effect in enumerate(order)}
+    first, second = sorted(new_effects, key=lambda effect: place.get(effect, len(place)))
+    ties: dict[str, tuple[str, ...]] = {first: (), second: ()}
+    for rival in pairs[1:]:
+        other = rival.fit.effects
+        if len(set(other) & {first, second}) == 1 and are_indistinguishable(problem, pairs[0], rival):
+            replaced = first if first not in other else second
+            instead = next(effect for effect in other if effect not in best.effects)
+            ties[replaced] = (*ties[replaced], instead)
+    beside_first = next((scan for scan in scans[1:] if scan.fit.effects[-1:] == (first,)), scans[0])
+    p_values = {first: scans[0].p_value_of(first), second: beside_first.p_value_of(second)}
+    return SelectionResult(nominal, final, best, (first, second), ties, p_values)
