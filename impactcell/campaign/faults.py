@@ -5,6 +5,7 @@ from pathlib import Path
 from impactcell.errors import CampaignError
 
 MAX_FAULTS_SHOWN = 20
+"""Faults told of one campaign; a reader mends twenty at a time."""
 
 
 class Faults:

@@ -10,6 +10,7 @@ from impactcell.campaign.contents import CHANNELS, Excitation, Sensor
 from impactcell.campaign.faults import Faults, read_text
 
 FORMAT = 1
+"""Version of the campaign directory."""
 NOISE_KEY = {"force": "noise_std_n", "position": "noise_std_m", "actuator": "noise_std_m"}
 
 

@@ -9,6 +9,7 @@ from impactcell.campaign.faults import Faults, read_text
 from impactcell.records import Samples
 
 MAX_FAULTS_PER_TRACE = 3
+"""Faults of one kind told of one trace."""
 
 
 def read_trace(file: Path, faults: Faults) -> dict[str, tuple[Samples, Samples]] | None:

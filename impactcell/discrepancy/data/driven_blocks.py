@@ -19,6 +19,7 @@ MAX_BLOCKS = 60
 MIN_BLOCK_SAMPLES = 40
 """Samples of a block."""
 BLOCK_CORRELATION_TIMES = 2.0
+"""Shortest block, in correlation times of the velocity: two are nearly independent."""
 CUT_SPEED_SHARE = 0.25
 """A cut needs this share of the record's RMS speed."""
 VELOCITY_NOISE_SHARE = 0.02

@@ -22,7 +22,9 @@ from impactcell.features import white_noise_std
 from impactcell.records import Channel, Samples
 
 MAX_BLOCK_SAMPLES = 80
+"""Samples of a block that a fit reads: its whitener is a dense matrix of that size."""
 MIN_KNOTS, MAX_KNOTS = 60, 160
+"""Knots of a block's drive: enough for its moments of breakaway, few enough for a dense covariance."""
 SIGNAL_GROWTH = 4.0
 """Growth of the apparent noise density, when the window doubles, that only a signal makes."""
 RESTING_SPEED_SHARE = 0.02
@@ -30,6 +32,7 @@ RESTING_SPEED_SHARE = 0.02
 SLIPPING_SPEED_SHARE = 0.15
 """Share above which it slips without doubt."""
 MIN_SLIP_SAMPLES = 10
+"""Samples of a slip from which on a line through it means anything."""
 MAX_SPEED_ERROR_SHARE = 0.5
 """Error of the speed after a breakaway, over the block's largest speed, at one standard deviation."""
 

@@ -12,8 +12,11 @@ from impactcell.features import white_noise_std
 from impactcell.records import Samples
 
 NOISE_UNIT_FACTOR = 30.0
+"""Ratio of estimated and stated noise which only a wrong unit can explain."""
 MIN_DEGREES_OF_FREEDOM = 3
+"""Fewer degrees of freedom give no spread of replicates: it would be uncertain by half."""
 MIN_REPLICATE_SPREAD = 1e-9
+"""Smallest spread of replicates, so that equal factors divide nothing by zero."""
 
 
 @dataclass(frozen=True, slots=True)

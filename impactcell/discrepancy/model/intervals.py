@@ -6,11 +6,14 @@ import numpy as np
 from scipy.stats import t as student
 
 from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.linearisation import Linearisation
+from impactcell.discrepancy.model.linearisation import LinearisedFit
 from impactcell.discrepancy.model.parameters import Coordinate
 from impactcell.records import Samples
 
 CONFIDENCE_LEVEL = 0.95
+"""Probability with which intervals are to cover: `ci95` of `result.json`."""
+MAX_LEVERAGE = 0.98
+"""Share of a shot's leverage that is taken out of its score, so that none divides by zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +28,7 @@ class ParameterEstimate:
     high: float
 
 
-def covariance(linearisation: Linearisation) -> Samples:
+def covariance(linearisation: LinearisedFit) -> Samples:
     """Covariance of the shared coordinates, shape (p, p).
 
     H^-1 (sum u_i u_i') H^-1 n/(n - p), with the leverage of every shot taken out of its own score
@@ -38,13 +41,15 @@ def covariance(linearisation: Linearisation) -> Samples:
     meat = np.zeros((p, p))
     for i in range(n):
         share = linearisation.shot_information[i] @ inverse
-        corrected = np.linalg.lstsq(np.eye(p) - 0.98 * share, linearisation.shot_gradient[i], rcond=None)[0]
+        corrected = np.linalg.lstsq(
+            np.eye(p) - MAX_LEVERAGE * share, linearisation.shot_gradient[i], rcond=None
+        )[0]
         meat += np.outer(corrected, corrected)
     sandwich: Samples = inverse @ meat @ inverse
     return sandwich
 
 
-def estimate_parameters(fit: Fit, linearisation: Linearisation) -> tuple[ParameterEstimate, ...]:
+def estimate_parameters(fit: Fit, linearisation: LinearisedFit) -> tuple[ParameterEstimate, ...]:
     """Every shared parameter with its interval."""
     shots = len(linearisation.bounds) - 1
     spread = np.sqrt(np.maximum(np.diag(covariance(linearisation)), 0.0))

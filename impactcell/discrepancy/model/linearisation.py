@@ -18,7 +18,7 @@ UNSEEN_SHARE = 1e-8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Linearisation:
+class LinearisedFit:
     """Projected residuals and shared derivatives.
 
     Attributes
@@ -76,7 +76,7 @@ class Scores:
         return np.where(seen, self.each.sum(0) / np.where(seen, self.information, 1.0), 0.0)
 
 
-def linearise(problem: Problem, fit: Fit) -> Linearisation:
+def linearise(problem: Problem, fit: Fit) -> LinearisedFit:
     """Linearise about a fit."""
     bounds = problem.shots.bounds
     model, state = problem.with_effects(fit.effects), fit.state
@@ -110,7 +110,7 @@ def linearise(problem: Problem, fit: Fit) -> Linearisation:
         part = problem.shots.samples_of(i)
         H[i] = J[:, part] @ J[:, part].T + np.outer(PJ[:, i], PJ[:, i])
         u[i] = J[:, part] @ r[0, part] + PJ[:, i] * pr[0, i]
-    return Linearisation(bounds, r[0], pr[0], B, PB, J, PJ, H.sum(0), H, u)
+    return LinearisedFit(bounds, r[0], pr[0], B, PB, J, PJ, H.sum(0), H, u)
 
 
 def _shot_products(a: Samples, b: Samples, bounds: np.ndarray) -> Samples:
@@ -169,13 +169,13 @@ class DirectionProducts:
 
 
 def direction_products(
-    linearisation: Linearisation, direction: Samples, prior: Samples | None = None
+    linearisation: LinearisedFit, direction: Samples, prior: Samples | None = None
 ) -> DirectionProducts:
     """Products of one direction.
 
     Parameters
     ----------
-    linearisation : Linearisation
+    linearisation : LinearisedFit
     direction : ndarray, shape (N,)
         Change of the whitened prediction.
     prior : ndarray, shape (n,), optional
@@ -209,7 +209,7 @@ def concatenate_products(parts: list[DirectionProducts]) -> DirectionProducts:
     )
 
 
-def scores(linearisation: Linearisation, products: DirectionProducts) -> Scores:
+def scores(linearisation: LinearisedFit, products: DirectionProducts) -> Scores:
     """Effective scores: the shared parameters projected out of the directions."""
     inverse = np.linalg.pinv(linearisation.information, rcond=1e-13, hermitian=True)
     summed = products.shared.sum(0)

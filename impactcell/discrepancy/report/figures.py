@@ -15,8 +15,10 @@ from impactcell.discrepancy.workflow import DiscrepancyResult
 
 UNITS = ("N", "mm", "mm")
 SCALES = (1.0, 1e3, 1e3)
+"""From SI to the units of the figures."""
 INK, BEFORE, AFTER = "#22313f", "#c8553d", "#2a7f8e"
 MEASURED, UNTESTED = "#9fb0bf", "#eceff2"
+# Style of all figures; the salt makes the ids in an SVG the same in every run.
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.size": 9,

@@ -15,6 +15,7 @@ from impactcell.discrepancy.workflow import NAMED, NO_GAP, TIED, DiscrepancyResu
 from impactcell.physics.effects import LIBRARY
 
 EFFECT_GUIDE = (Path(__file__).parents[1] / "README.md").as_uri() + "#a-new-effect"
+"""Where the report sends whoever wants to write a new effect."""
 LARGE_REGION_RMS = 1.25
 """RMS of a region's residuals, in noise floors, from which on it is shown as large."""
 PARAMETER_LABELS = {"ratio": "mu_s/mu_k"}

@@ -13,8 +13,11 @@ from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
 
 FORMAT = 1
+"""Version of `result.json`."""
 DIGITS = 6
+"""Significant digits written: more would change with the machine's rounding."""
 MAX_P_DEPENDS_ON = 0.05
+"""p-value over the whole map up to which an effect is said to depend on a covariate."""
 
 
 def round_digits(value: float) -> float | None:

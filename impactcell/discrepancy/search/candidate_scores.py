@@ -10,7 +10,7 @@ from impactcell.discrepancy.data.shots import IndexArray
 from impactcell.discrepancy.model.fit import Fit
 from impactcell.discrepancy.model.linearisation import (
     DirectionProducts,
-    Linearisation,
+    LinearisedFit,
     Scores,
     concatenate_products,
     direction_products,
@@ -28,8 +28,9 @@ from impactcell.records import Samples
 FORWARD_STEP = 0.1
 """Step forward, in units of `SMALL`."""
 MAX_STRENGTH = 5.0
+"""Strongest start of a fit, in units of an effect's typical strength."""
 WEAK_STRENGTH = 0.3
-"""Strengths in units of an effect's typical one."""
+"""A second start of a fit, much weaker than the score promises, in the same units."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +68,7 @@ def visited_range(problem: Problem, fit: Fit) -> VisitedRange:
 
 
 def candidate_directions(
-    problem: Problem, fit: Fit, linearisation: Linearisation, library: Sequence[str]
+    problem: Problem, fit: Fit, linearisation: LinearisedFit, library: Sequence[str]
 ) -> CandidateDirections:
     """Directions of the effects of `library` that the fit does not have yet."""
     visited = visited_range(problem, fit)

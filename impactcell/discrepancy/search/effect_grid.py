@@ -15,10 +15,15 @@ from impactcell.discrepancy.model.parameters import Coordinate, effect_coordinat
 from impactcell.records import Samples
 
 SMALL_STRENGTH = 2e-3
+"""Strength, in units of an effect's typical one, at which its score is taken."""
 DECADE_FACTORS = (0.1, 0.316, 1.0, 3.16, 10.0)
+"""Two decades about the typical value of a shape that nothing else bounds."""
 RECIPROCAL_POINTS = tuple(float(0.08 * 1.42**i) for i in range(16))
+"""Of what vanishes at infinity, the typical value over these is tried."""
 MAX_CYCLES = 40
+"""Largest number of periods over the range gone through."""
 CYCLE_STEP = 0.5
+"""Half a period more at each point: the next one is out of phase by a quarter at either end."""
 
 
 @dataclass(frozen=True, slots=True)

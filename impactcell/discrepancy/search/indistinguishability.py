@@ -17,10 +17,13 @@ from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
 MAX_DEVIATION = 2.2
+"""Standard deviations of the difference up to which two models are not told apart: two-sided 3 %."""
 NEGLIGIBLE_DIFFERENCE = 2.0
+"""Log-likelihood that tells nothing apart, however sure it is."""
 DECISIVE_DIFFERENCE = 150.0
 """Log-likelihood, over the best model's mean squared residual, beyond which a few shots alone decide."""
 MAX_FOLD_SHARE = 0.25
+"""A group of replicates that holds more of the shots is left out shot by shot."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

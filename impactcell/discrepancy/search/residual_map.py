@@ -15,7 +15,7 @@ from impactcell.discrepancy.data.shots import CHANNELS, IndexArray
 from impactcell.discrepancy.model.fit import Fit
 from impactcell.discrepancy.model.linearisation import (
     DirectionProducts,
-    Linearisation,
+    LinearisedFit,
     concatenate_products,
     direction_products,
 )
@@ -70,7 +70,7 @@ def standardised_covariates(problem: Problem, prepared: PreparedCampaign) -> dic
 
 
 def map_directions(
-    problem: Problem, fit: Fit, linearisation: Linearisation, prepared: PreparedCampaign
+    problem: Problem, fit: Fit, linearisation: LinearisedFit, prepared: PreparedCampaign
 ) -> MapDirections:
     """Directions of every cell of the map."""
     trajectory = trajectory_of(problem, fit)

@@ -12,11 +12,13 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from impactcell.discrepancy.data.shots import IndexArray
-from impactcell.discrepancy.model.linearisation import Linearisation, Scores
+from impactcell.discrepancy.model.linearisation import LinearisedFit, Scores
 from impactcell.records import Samples
 
 DRAWS = 1999
+"""Draws: the smallest p-value is 1/2000, a tenth of the level of a step's half."""
 DIRECTIONS_PER_BATCH = 64
+"""Directions resampled at once, so that the draws fit into a few megabytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +40,7 @@ class BootstrapTests:
 
 
 def wild_bootstrap(
-    linearisation: Linearisation,
+    linearisation: LinearisedFit,
     scores: Scores,
     groups: IndexArray,
     seed: tuple[int, ...],
