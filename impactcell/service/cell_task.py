@@ -18,7 +18,6 @@ from impactcell.journal.store import AuditEntry, Journal
 from impactcell.journal.stored_forms import upgraded_state
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
-    Alarm,
     AlarmName,
     BatchAnnouncement,
     Evidence,
@@ -30,6 +29,7 @@ from impactcell.scada import Server
 from impactcell.service.factory import cell_design, module_link, retention_policy
 from impactcell.service.monitoring import CellHealth
 from impactcell.service.positioning import PositioningTask
+from impactcell.service.publisher import CellPublisher
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig, read_cell
 
@@ -39,7 +39,6 @@ STALE_PERIODS = 10.0
 """So many periods without a cycle, and values count as stale ..."""
 STALE_AT_LEAST_S = 5.0
 """... but not before so many seconds."""
-_LOGGED_ELSEWHERE = (AlarmName.MODULE_CONNECTION, AlarmName.JOURNAL_FAULT)
 
 SnapshotCallback = Callable[[str, Snapshot], None]
 
@@ -49,7 +48,7 @@ class CellTask:
 
     Parameters
     ----------
-    cell : Cell
+    cell : CellConfig
     on_snapshot : callable, optional
         Called with the cell's name and each snapshot, after it was published.
 
@@ -71,9 +70,8 @@ class CellTask:
             if journal is not None:
                 journal.close()
             raise
-        self.server: Server | None = None
+        self._publisher = CellPublisher(cell.name, self.worker.alarms, self.log)
         self._notes: tuple[str, ...] = ()
-        self._active = {alarm.name for alarm in self.worker.alarms if alarm.active}
         self._on_snapshot = on_snapshot
         self._module = ModuleAcquisition(
             cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map, self._link_changed
@@ -113,8 +111,8 @@ class CellTask:
 
     async def run(self, server: Server) -> None:
         """Run until cancelled."""
-        self.server = server
-        self._publish_restored(server)
+        self._publisher.server = server
+        self._publish_restored()
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self._acquire(), name=f"{self.cell.name} cycles")
@@ -202,10 +200,10 @@ class CellTask:
                 self.log.info("%s", note, cycle=capture.cycle)
         self._notes = notes
         self._last_cycle_s, self._stale = time.monotonic(), False
-        if self.server is not None:
-            self.server.publish(self.cell.name, snapshot)
-            self._publish_module(self.server)
-        self._log_alarms(result.step_result.changed)
+        self._publisher.publish(snapshot)
+        self._publisher.publish_module(self._module.status)
+        for alarm in result.step_result.changed:  # the snapshot has shown them
+            self._publisher.log_alarm(alarm)
         mu_s, late_s = snapshot.friction.mu_s, time.time() - 1e-9 * capture.time_ns
         self.log.debug(
             "mu_s %.4f ± %.4f (%s), gap %.2f, published %s after its end",
@@ -227,9 +225,9 @@ class CellTask:
             await self._positioning_change.wait()
             self._positioning_change.clear()
             task = self._positioning_task()
-            if self.server is not None and self.worker.snapshot is not None:
+            if self.worker.snapshot is not None:
                 snapshot = replace(self.worker.snapshot, positioning=task.state, alarms=self.worker.alarms)
-                self.server.publish(self.cell.name, snapshot)
+                self._publisher.publish(snapshot)
             fault = task.fault
             reason, evidence = fault or ("", Evidence())
             await self._apply_rule_result(
@@ -248,10 +246,7 @@ class CellTask:
     async def _publish_link(self) -> None:
         while True:
             status = await self._link_changes.get()
-            if self.server is not None:
-                if not status.connected:
-                    self.server.mark_bad(self.cell.name, time.time_ns())
-                self._publish_module(self.server)
+            self._publisher.publish_link(status)
             await self._apply_rule_result(
                 RuleResult(AlarmName.MODULE_CONNECTION, not status.connected, status.reason)
             )
@@ -265,17 +260,17 @@ class CellTask:
             await self._apply_rule_result(RuleResult(AlarmName.JOURNAL_FAULT, bool(fault), fault, Evidence()))
 
     async def _apply_rule_result(self, rule_result: RuleResult) -> None:
-        self._publish_alarms(await self.worker.apply_rule_result(rule_result, time.time_ns()))
+        self._publisher.publish_alarms(await self.worker.apply_rule_result(rule_result, time.time_ns()))
 
     async def _tick(self) -> None:
         while True:
             await asyncio.sleep(TICK_S)
-            self._publish_alarms(await self.worker.expire_shelving(time.time_ns()))
+            self._publisher.publish_alarms(await self.worker.expire_shelving(time.time_ns()))
             silent_s = time.monotonic() - self._last_cycle_s
             late = silent_s > max(STALE_AT_LEAST_S, STALE_PERIODS * self.worker.period_s)
-            if late and not self._stale and self.server is not None and self._module.status.connected:
+            if late and not self._stale and self._module.status.connected:
                 self._stale = True
-                self.server.mark_stale(self.cell.name, time.time_ns())
+                self._publisher.mark_stale(time.time_ns())
             await self.worker.retry()
             await self._check_journal()
             if self._model_time_ns() not in (0, self._model_seen_ns):
@@ -288,27 +283,9 @@ class CellTask:
         except OSError:
             return 0
 
-    def _publish_restored(self, server: Server) -> None:
-        self._publish_alarms(self.worker.alarms)
-        self._publish_module(server)
+    def _publish_restored(self) -> None:
+        self._publisher.publish_alarms(self.worker.alarms)
+        self._publisher.publish_module(self._module.status)
         if self.worker.snapshot is not None:
-            server.publish(self.cell.name, self.worker.snapshot)
-            server.mark_stale(self.cell.name, self.worker.snapshot.time_ns)
-
-    def _publish_alarms(self, changed: tuple[Alarm, ...]) -> None:
-        self._log_alarms(changed)
-        if self.server is not None:
-            for alarm in changed:
-                self.server.alarm(self.cell.name, alarm)
-
-    def _log_alarms(self, changed: tuple[Alarm, ...]) -> None:
-        """Log each alarm that comes or goes, but for those that their finder has told of already."""
-        for alarm in changed:
-            if alarm.active != (alarm.name in self._active) and alarm.name not in _LOGGED_ELSEWHERE:
-                message = "alarm %s is active: %s" if alarm.active else "alarm %s is over: %s"
-                level = logging.WARNING if alarm.active else logging.INFO
-                self.log.log(level, message, alarm.name.value, alarm.message, cycle=alarm.cycle or None)
-            (self._active.add if alarm.active else self._active.discard)(alarm.name)
-
-    def _publish_module(self, server: Server) -> None:
-        server.module(self.cell.name, self._module.status, time.time_ns())
+            self._publisher.publish(self.worker.snapshot)
+            self._publisher.mark_stale(self.worker.snapshot.time_ns)

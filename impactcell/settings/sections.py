@@ -19,6 +19,17 @@ from pydantic import (
     model_validator,
 )
 
+from impactcell.alarms import AlarmSettings
+from impactcell.cell.preprocessing import CaptureDefaults
+from impactcell.fieldbus.link import ModuleLink
+from impactcell.journal.retention import Retention
+from impactcell.tracking.signature.tracker import SignatureSettings
+
+_LINK, _CAPTURE, _ALARMS, _SIGNATURE, _RETENTION = (
+    ModuleLink(), CaptureDefaults(), AlarmSettings(), SignatureSettings(), Retention()
+)  # fmt: skip
+"""What the parts of the service do by themselves; a key that is left out means that."""
+
 
 def _resolved(value: object, info: ValidationInfo) -> object:
     if not isinstance(value, str) or not value:
@@ -104,23 +115,23 @@ class TlsSection(Section):
 class ModuleSection(Section):
     """The FPGA module on Modbus TCP."""
 
-    host: str = "127.0.0.1"
+    host: str = _LINK.host
     """Address of the module, or of the gateway in front of it."""
-    port: Annotated[int, Field(ge=1, le=65535)] = 502
+    port: Annotated[int, Field(ge=1, le=65535)] = _LINK.port
     """TCP port; 802 is customary with TLS."""
-    device_id: Annotated[int, Field(ge=0, le=255)] = 1
+    device_id: Annotated[int, Field(ge=0, le=255)] = _LINK.device_id
     """Modbus unit id."""
     register_map: InputFile
     """Register map that the module speaks."""
     word_order: Literal["big", "little"] | None = None
     """Order of the words of a value of several registers; absent: as the map says."""
-    window: Annotated[int, Field(ge=1, le=64)] = 1
+    window: Annotated[int, Field(ge=1, le=64)] = _LINK.window
     """Requests in flight; 1 is safe with any device; 16 is fast with those that queue, 64 twice as fast."""
-    max_registers_per_request: Annotated[int, Field(ge=1, le=125)] = 125
+    max_registers_per_request: Annotated[int, Field(ge=1, le=125)] = _LINK.max_registers
     """Registers asked for at once; some gateways allow fewer than 125."""
-    pause_between_requests_ms: NotNegative = 0.0
+    pause_between_requests_ms: NotNegative = _LINK.pause_s * 1e3
     """Rest that a slow device needs between requests."""
-    timeout_ms: Positive = 500.0
+    timeout_ms: Positive = _LINK.timeout_s * 1e3
     """An answer later than this closes the connection."""
     tls: TlsSection | None = None
     """Encrypted link; absent: plain Modbus TCP."""
@@ -151,9 +162,9 @@ class ActuatorSection(Section):
 class SensorSection(Section):
     """Noise of the sensors, one standard deviation."""
 
-    force_noise_std_n: Positive = 0.4
+    force_noise_std_n: Positive = _CAPTURE.force_noise_std_n
     """Force sensor."""
-    position_noise_std_um: Positive = 1.5
+    position_noise_std_um: Positive = _CAPTURE.position_noise_std_m * 1e6
     """Position sensor."""
 
 
@@ -169,11 +180,11 @@ class AlarmSection(Section):
 
     wear_limit: Positive
     """mu_s at which the surface counts as worn."""
-    wear_probability_on: Probability = 0.98
+    wear_probability_on: Probability = _ALARMS.wear_on
     """The wear alarm comes when P(level > limit) passes this ..."""
-    wear_probability_off: Probability = 0.5
+    wear_probability_off: Probability = _ALARMS.wear_off
     """... and goes when it falls below this."""
-    false_alarm_cycles: Annotated[float, Field(ge=100)] = 100_000.0
+    false_alarm_cycles: Annotated[float, Field(ge=100)] = _SIGNATURE.false_alarm_cycles
     """Designed mean number of cycles between two false alarms of one rule."""
     on_delay_cycles: Annotated[int, Field(ge=0)] | None = None
     """Cycles a rule must hold before its alarm comes; absent: each rule's own delay."""
@@ -190,11 +201,11 @@ class AlarmSection(Section):
 class SignatureSection(Section):
     """Friction along the stroke."""
 
-    length_mm: Positive = 4.0
+    length_mm: Positive = _SIGNATURE.length_m * 1e3
     """Distance slid at the last grid point."""
-    points: Annotated[int, Field(ge=4, le=200)] = 33
+    points: Annotated[int, Field(ge=4, le=200)] = _SIGNATURE.points
     """Number of grid points."""
-    learning_cycles: Annotated[int, Field(ge=10)] = 50
+    learning_cycles: Annotated[int, Field(ge=10)] = _SIGNATURE.learned_cycles
     """Cycles from which the cell learns how its cycles vary before any is judged."""
 
 
@@ -231,11 +242,11 @@ class JournalSection(Section):
 
     file: OutputFile
     """SQLite file; one a cell."""
-    retain_days: Positive = 365.0
+    retain_days: Positive = _RETENTION.days
     """Cycles older than this are dropped; those without a time only where room is needed."""
-    retain_captures_days: Positive = 30.0
+    retain_captures_days: Positive = _RETENTION.captures_days
     """Captures older than this are dropped; their summaries stay."""
-    max_size_mb: Positive = 4096.0
+    max_size_mb: Positive = _RETENTION.max_size_bytes / 2**20
     """Size that is kept; from 5 % below it on, captures are thinned, oldest first, then summaries."""
 
 
