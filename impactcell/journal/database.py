@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
-from impactcell.journal.schema import APPLICATION_ID, FORMAT, OLDEST, TABLES, UPGRADES
+from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, OLDEST, TABLES, UPGRADES
 
 WAY_OUT: Final = "run the version that wrote it, or name another file to begin anew"
 _NO_ROOM: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
@@ -183,10 +183,14 @@ def _bring_up(database: sqlite3.Connection, path: Path, upgrade: Upgrade | None)
         state = None if row is None or upgrade is None else upgrade(bytes(row[0]))
     except ValueError as error:
         raise unreadable_state(path, _named_cell(database), error) from error
-    if version == FORMAT and state is None:
+    present = {name for _, name, *_ in database.execute("PRAGMA table_info (cycles)")}
+    absent = [column for column in COLUMNS if column.name not in present]
+    if version == FORMAT and state is None and not absent:
         return
     database.execute("BEGIN IMMEDIATE")
     try:
+        for column in absent:  # a quantity that was not published when the file was made
+            database.execute(f"ALTER TABLE cycles ADD COLUMN {column.name} {column.sql_type}")
         for earlier in range(version, FORMAT):
             for statement in UPGRADES[earlier]:
                 database.execute(statement)

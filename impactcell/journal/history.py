@@ -3,26 +3,18 @@
 import math
 import sqlite3
 import struct
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
 from impactcell.errors import JournalError
 from impactcell.journal.stored_forms import load_alarm
+from impactcell.quantities import BY_PATH, HISTORY
 from impactcell.records import Alarm, Quality
 
 T = TypeVar("T")
 
-VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
-    "Friction/StaticFriction": ("mu_s", "mu_s_quality"),
-    "Friction/StaticFrictionStdDev": ("mu_s_std", "mu_s_quality"),
-    "Friction/KineticFriction": ("mu_k", "mu_k_quality"),
-    "Wear/Level": ("wear_level", "wear_quality"),
-    "Wear/LevelStdDev": ("wear_level_std", "wear_quality"),
-    "Batch/Offset": ("batch_offset", "batch_quality"),
-    "Batch/OffsetStdDev": ("batch_offset_std", "batch_quality"),
-}
-"""Variables with a past, by their OPC UA path: their columns for value and quality. All are without unit."""
+VARIABLES: Final = {path: BY_PATH[path] for path in HISTORY}
+"""Quantities with a past, by their OPC UA path."""
 
 _TOKEN = struct.Struct(">qq")
 
@@ -77,11 +69,16 @@ def stored_values(database: sqlite3.Connection, variable: str, query: HistoryQue
     """
     if variable not in VARIABLES:
         raise JournalError(f"{variable} has no history; these have: {', '.join(VARIABLES)}")
-    value, quality = VARIABLES[variable]
-    rows, resume = _page(database, query, f"seq, time_ns, {value}, {quality}", "cycles", "seq")
+    quantity = VARIABLES[variable]
+    columns = f"seq, time_ns, {quantity.column}, {quantity.quality_column}"
+    rows, resume = _page(database, query, columns, "cycles", "seq")
     return Page(
         tuple(
-            StoredValue(time_ns, math.nan if stored is None else stored, Quality(level))
+            StoredValue(
+                time_ns,
+                math.nan if stored is None else stored * quantity.per_si,
+                Quality.BAD if level is None else Quality(level),
+            )
             for _, time_ns, stored, level in rows
         ),
         resume,

@@ -1,4 +1,4 @@
-"""Tables of a journal, and which figure of a snapshot goes into which column.
+"""Tables of a journal, and what of a cycle goes into which column.
 
 One SQLite file a cell. `PRAGMA application_id` and `user_version` say that it is ours and of which
 format. `cycles` grows by one row a cycle; `captures` holds what was measured, and is thinned first;
@@ -10,8 +10,10 @@ numbers again.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import cast
 
-from impactcell.records import Capture, Coefficient, Snapshot
+from impactcell.quantities import BY_COLUMN, QUALITY_BY_COLUMN, DataType, Quantity
+from impactcell.records import Capture, Quality, Snapshot
 
 APPLICATION_ID = 0x49435243  # "ICRC"
 FORMAT = 4
@@ -31,48 +33,70 @@ class Column:
     of: Callable[[Capture, Snapshot], Value]
 
 
-def _coefficient(name: str, of: Callable[[Snapshot], Coefficient]) -> tuple[Column, ...]:
-    return (
-        Column(name, "REAL", lambda _, s: of(s).value),
-        Column(f"{name}_std", "REAL", lambda _, s: of(s).std),
-        Column(f"{name}_quality", "INTEGER", lambda _, s: int(of(s).quality)),
-        Column(f"{name}_reason", "TEXT", lambda _, s: of(s).reason),
+_NOT_PUBLISHED: Mapping[str, Column] = {
+    column.name: column
+    for column in (
+        Column("session", "INTEGER", lambda c, _: c.session),
+        Column("cycle", "INTEGER", lambda c, _: c.cycle),
+        Column("time_ns", "INTEGER", lambda c, _: c.time_ns),
+        Column("velocity_m_s", "REAL", lambda c, _: c.velocity_m_s),
+        Column("mass_kg", "REAL", lambda c, _: c.mass_kg),
+        Column("direction", "INTEGER", lambda c, _: c.direction),
+        Column("stroke_m", "REAL", lambda c, _: c.stroke_m),
+        Column("dwell_s", "REAL", lambda c, _: c.dwell_s),
+        Column("start_m", "REAL", lambda c, _: c.start_m),
+        Column("mu_s_reason", "TEXT", lambda _, s: s.friction.mu_s.reason),
+        Column("mu_k_std", "REAL", lambda _, s: s.friction.mu_k.std),
+        Column("mu_k_reason", "TEXT", lambda _, s: s.friction.mu_k.reason),
+        Column("by_force_std", "REAL", lambda _, s: s.friction.by_force.std),
+        Column("by_force_reason", "TEXT", lambda _, s: s.friction.by_force.reason),
+        Column("by_distance_std", "REAL", lambda _, s: s.friction.by_distance.std),
+        Column("by_distance_reason", "TEXT", lambda _, s: s.friction.by_distance.reason),
+        Column("combined", "REAL", lambda _, s: s.friction.combined.value),
+        Column("combined_std", "REAL", lambda _, s: s.friction.combined.std),
+        Column("combined_quality", "INTEGER", lambda _, s: int(s.friction.combined.quality)),
+        Column("combined_reason", "TEXT", lambda _, s: s.friction.combined.reason),
+        Column("estimator", "TEXT", lambda _, s: s.friction.estimator.value),
     )
+}
+"""Columns of what is kept of a cycle and not published; those of published quantities are in `quantities`."""
 
-
-COLUMNS: tuple[Column, ...] = (
-    Column("session", "INTEGER", lambda c, _: c.session),
-    Column("cycle", "INTEGER", lambda c, _: c.cycle),
-    Column("time_ns", "INTEGER", lambda c, _: c.time_ns),
-    Column("velocity_m_s", "REAL", lambda c, _: c.velocity_m_s),
-    Column("mass_kg", "REAL", lambda c, _: c.mass_kg),
-    Column("direction", "INTEGER", lambda c, _: c.direction),
-    Column("stroke_m", "REAL", lambda c, _: c.stroke_m),
-    Column("dwell_s", "REAL", lambda c, _: c.dwell_s),
-    Column("start_m", "REAL", lambda c, _: c.start_m),
-    Column("batch_id", "TEXT", lambda _, s: s.batch.batch_id),
-    *_coefficient("mu_s", lambda s: s.friction.mu_s),
-    *_coefficient("mu_k", lambda s: s.friction.mu_k),
-    *_coefficient("by_force", lambda s: s.friction.by_force),
-    *_coefficient("by_distance", lambda s: s.friction.by_distance),
-    *_coefficient("combined", lambda s: s.friction.combined),
-    Column("estimator", "TEXT", lambda _, s: s.friction.estimator.value),
-    Column("peak_force_n", "REAL", lambda _, s: s.friction.peak_force_n),
-    Column("sliding_distance_m", "REAL", lambda _, s: s.friction.sliding_distance_m),
-    Column("wear_level", "REAL", lambda _, s: s.wear.level),
-    Column("wear_level_std", "REAL", lambda _, s: s.wear.level_std),
-    Column("wear_rate_per_cycle", "REAL", lambda _, s: s.wear.rate_per_cycle),
-    Column("wear_quality", "INTEGER", lambda _, s: int(s.wear.quality)),
-    Column("cycles_to_limit", "REAL", lambda _, s: s.wear.cycles_to_limit),
-    Column("batch_offset", "REAL", lambda _, s: s.batch.offset),
-    Column("batch_offset_std", "REAL", lambda _, s: s.batch.offset_std),
-    Column("batch_quality", "INTEGER", lambda _, s: int(s.batch.quality)),
-    Column("t_squared", "REAL", lambda _, s: s.signature.t_squared),
-    Column("spe", "REAL", lambda _, s: s.signature.spe),
-    Column("gap", "REAL", lambda _, s: s.gap),
-    Column("gap_quality", "INTEGER", lambda _, s: int(s.gap_quality)),
-    Column("model_name", "TEXT", lambda _, s: s.model_name),
+_ORDER = (
+    *("session", "cycle", "time_ns", "velocity_m_s", "mass_kg", "direction", "stroke_m", "dwell_s"),
+    *("start_m", "batch_id"),
+    *("mu_s", "mu_s_std", "mu_s_quality", "mu_s_reason"),
+    *("mu_k", "mu_k_std", "mu_k_quality", "mu_k_reason"),
+    *("by_force", "by_force_std", "by_force_quality", "by_force_reason"),
+    *("by_distance", "by_distance_std", "by_distance_quality", "by_distance_reason"),
+    *("combined", "combined_std", "combined_quality", "combined_reason", "estimator"),
+    *("peak_force_n", "sliding_distance_m"),
+    *("wear_level", "wear_level_std", "wear_rate_per_cycle", "wear_quality", "cycles_to_limit"),
+    *("batch_offset", "batch_offset_std", "batch_quality", "t_squared", "spe"),
+    *("gap", "gap_quality", "model_name"),
 )
+"""Columns in the order that files have had since format 3; those of later quantities come after them."""
+
+_SQL_TYPES = {DataType.DOUBLE: "REAL", DataType.UINT32: "INTEGER", DataType.STRING: "TEXT"}
+
+
+def _value(quantity: Quantity[Snapshot]) -> Callable[[Capture, Snapshot], Value]:
+    return lambda _, snapshot: cast("Value", quantity.value(snapshot))
+
+
+def _quality(quality: Callable[[Snapshot], Quality]) -> Callable[[Capture, Snapshot], Value]:
+    return lambda _, snapshot: int(quality(snapshot))
+
+
+def _columns() -> tuple[Column, ...]:
+    columns = {
+        **_NOT_PUBLISHED,
+        **{n: Column(n, _SQL_TYPES[q.data_type], _value(q)) for n, q in BY_COLUMN.items()},
+        **{n: Column(n, "INTEGER", _quality(q)) for n, q in QUALITY_BY_COLUMN.items()},
+    }
+    return tuple(columns[name] for name in dict.fromkeys((*_ORDER, *columns)))
+
+
+COLUMNS = _columns()
 
 EARLIER_STATES = """
 CREATE TABLE earlier_states (id INTEGER PRIMARY KEY, seq INTEGER NOT NULL, blob BLOB NOT NULL) STRICT

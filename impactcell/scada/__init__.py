@@ -15,6 +15,7 @@ from impactcell.opcua.host_interface import (
     ServerLimits,
     ServerSettings,
 )
+from impactcell.quantities import Ranges
 from impactcell.scada.interface import (
     Actions,
     AlarmPage,
@@ -22,7 +23,6 @@ from impactcell.scada.interface import (
     HistorySource,
     HistoryValue,
     Machine,
-    Ranges,
     ValuePage,
     default_application_uri,
 )

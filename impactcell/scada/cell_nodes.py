@@ -17,9 +17,9 @@ from impactcell.opcua.type_instances import (
     set_attribute,
     targets,
 )
+from impactcell.quantities import CYCLE, HISTORY
 from impactcell.records import AlarmName
 from impactcell.scada.interface import CellDescription, Machine
-from impactcell.scada.node_table import CYCLE, HISTORY
 from impactcell.scada.standard_descriptions import DESCRIPTIONS
 
 TYPES_URI: Final = "urn:impactcell:ua"
@@ -152,14 +152,14 @@ class CellSpace:
             set_attribute(self._space, node, ua.AttributeIds.Value, value, variant_type)
 
     def _set_ranges(self) -> None:
-        for path, row in CYCLE.items():
-            if row.eu_range is not None:
-                low, high = row.eu_range(self.description.ranges)
+        for quantity in CYCLE:
+            eu_range = quantity.node_range(self.description.ranges)
+            if eu_range is not None:
                 set_attribute(
                     self._space,
-                    self.path(f"{path}/EURange"),
+                    self.path(f"{quantity.path}/EURange"),
                     ua.AttributeIds.Value,
-                    ua.Range(low, high),
+                    ua.Range(*eu_range),
                     ua.VariantType.ExtensionObject,
                 )
 

@@ -16,6 +16,7 @@ from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.variable_store import GOOD, VariableStore, moment
 from impactcell.records import Alarm, AlarmName, Shelving
 from impactcell.scada.cell_nodes import CellSpace
+from impactcell.scada.condition_table import CONDITIONS
 
 MAX_SHELVE_S: Final = 24 * 3600.0
 """Longest time a condition can be shelved: nobody remembers longer why."""
@@ -23,20 +24,6 @@ KEPT_EVENT_IDS: Final = 100
 """EventIds of one condition that an action may name."""
 
 _LT: Final = ua.VariantType.LocalizedText
-_CLASSES: Final = {
-    AlarmName.WEAR_LIMIT: ("MaintenanceConditionClass", ua.ObjectIds.MaintenanceConditionClassType),
-    AlarmName.MODULE_CONNECTION: ("SystemConditionClass", ua.ObjectIds.SystemConditionClassType),
-    AlarmName.JOURNAL_FAULT: ("SystemConditionClass", ua.ObjectIds.SystemConditionClassType),
-}
-_PROCESS: Final = ("ProcessConditionClass", ua.ObjectIds.ProcessConditionClassType)
-_INPUTS: Final = {
-    AlarmName.WEAR_LIMIT: "Wear/Level",
-    AlarmName.BATCH_SHIFT: "Batch/Offset",
-    AlarmName.DEVIANT_CYCLE: "Signature/TSquared",
-    AlarmName.MODULE_CONNECTION: "Module/Connected",
-    AlarmName.MODEL_GAP: "Model/Gap",
-    AlarmName.POSITIONING_FAULT: "Positioning/Remaining",
-}
 _SHELVING: Final[dict[Shelving, tuple[str, int]]] = {
     Shelving.UNSHELVED: ("Unshelved", ua.ObjectIds.ShelvedStateMachineType_Unshelved),
     Shelving.TIMED: ("Timed Shelved", ua.ObjectIds.ShelvedStateMachineType_TimedShelved),
@@ -90,7 +77,7 @@ class Condition:
         self._event_type = cell.alarm_type(name)
         self._event_ids: dict[bytes, None] = {}
         self._last_severity = 0
-        input_path = _INPUTS.get(name)
+        input_path = CONDITIONS[name].input_path
         self._input = cell.path(input_path) if input_path else ua.NodeId()
         cell.compute(f"{name.value}/ShelvingState/UnshelveTime", self._unshelve_time)
         self._write_nodes(self.alarm)
@@ -171,7 +158,8 @@ class Condition:
             }
         )
         yield (), ua.Variant(self.node, ua.VariantType.NodeId)
-        class_name, class_id = _CLASSES.get(alarm.name, _PROCESS)
+        class_name = f"{CONDITIONS[alarm.name].condition_class}ConditionClass"
+        class_id = getattr(ua.ObjectIds, f"{class_name}Type")
         yield ("ConditionClassId",), ua.Variant(ua.NodeId(class_id), ua.VariantType.NodeId)
         yield ("ConditionClassName",), ua.Variant(ua.LocalizedText(class_name), _LT)
         for name in ("Quality", "LastSeverity", "Comment"):

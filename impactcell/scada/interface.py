@@ -7,6 +7,7 @@ from typing import Protocol
 
 from impactcell.alarms import EventKind
 from impactcell.opcua.host_interface import Actor, HistoryRequest
+from impactcell.quantities import Ranges
 from impactcell.records import Alarm, AlarmName, Quality
 
 
@@ -33,18 +34,6 @@ class Machine:
     location: str | None = None
     year_of_construction: int | None = None
     month_of_construction: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Ranges:
-    """Ranges the values of a cell are expected in, SI units: EURange, and the bounds of `SetTarget`."""
-
-    friction: float = 1.0
-    force_n: float = 500.0
-    velocity_m_s: float = 0.2
-    sliding_distance_m: float = 0.01
-    stroke_m: float = 0.1
-    target_m: tuple[float, float] = (-1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,12 +13,12 @@ from impactcell.opcua.host_interface import RefusedError
 from impactcell.opcua.method_service import InputArgument, InvalidArgumentError, Method, MethodService
 from impactcell.opcua.request_dispatch import RequestContext
 from impactcell.opcua.subscription_service import SubscriptionService
+from impactcell.quantities import BY_PATH, MILLIMETRE
 from impactcell.records import Alarm, AlarmName
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition, refresh_event
 from impactcell.scada.interface import Actions, CellDescription
-from impactcell.scada.node_table import MM_PER_M, target_range_mm
 from impactcell.scada.rights import CONDITION_AREAS, Area
 
 _audit: Final = logging.getLogger("impactcell.audit")
@@ -116,11 +116,10 @@ def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeI
         )
 
     async def set_target(context: RequestContext, arguments: Sequence[Any]) -> None:
-        low, high = target_range_mm(description.ranges)
-        target = arguments[0]
-        if not math.isfinite(target) or not low <= target <= high:
+        target, allowed = arguments[0], BY_PATH["Positioning/Target"].node_range(description.ranges)
+        if not math.isfinite(target) or allowed is None or not allowed[0] <= target <= allowed[1]:
             raise InvalidArgumentError(0, ua.StatusCodes.BadOutOfRange)
-        work = actions.set_target(cell, target / MM_PER_M, context.actor)
+        work = actions.set_target(cell, target / MILLIMETRE.per_si, context.actor)
         await _audited(context, f"{cell}: SetTarget({target} mm)", work)
 
     async def abort(context: RequestContext, _given: Sequence[Any]) -> None:

@@ -8,10 +8,9 @@ from asyncua import ua
 
 from impactcell.opcua.type_instances import read_attribute
 from impactcell.opcua.variable_store import GOOD, StoredVariable, VariableStore, moment
+from impactcell.quantities import CYCLE, MODULE, Value
 from impactcell.records import ModuleStatus, Quality, Snapshot
 from impactcell.scada.cell_nodes import CellSpace
-from impactcell.scada.node_table import CYCLE, MODULE
-from impactcell.scada.node_table import Value as NodeValue
 
 BAD: Final = ua.StatusCode(ua.StatusCodes.Bad)
 NO_COMMUNICATION: Final = ua.StatusCode(ua.StatusCodes.BadNoCommunication)
@@ -42,7 +41,7 @@ class CellValues:
     def __init__(self, cell: CellSpace, values: VariableStore, space: object, now: datetime) -> None:
         self._variables: dict[str, tuple[StoredVariable, ua.VariantType, bool]] = {}
         self._seen: set[str] = set()
-        for path in (*CYCLE, *MODULE):
+        for path in (*(q.path for q in CYCLE), *(q.path for q in MODULE)):
             node = cell.path(path)
             kind = ua.VariantType(read_attribute(space, node, ua.AttributeIds.DataType).Identifier)
             is_array = read_attribute(space, node, ua.AttributeIds.ValueRank) == 1
@@ -54,17 +53,16 @@ class CellValues:
     def publish(self, snapshot: Snapshot) -> None:
         """Write all that one cycle has to say."""
         time, now = moment(snapshot.time_ns), datetime.now(UTC)
-        for path, row in CYCLE.items():
-            value, quality = row.read(snapshot)
-            self._write(path, value, quality, time, now)
+        for quantity in CYCLE:
+            value, quality = quantity.read(snapshot)
+            self._write(quantity.path, value, quality, time, now)
 
     def module(self, state: ModuleStatus, time_ns: int) -> None:
         """Write the state of the link."""
         time, now = moment(time_ns), datetime.now(UTC)
-        for path, pick in MODULE.items():
-            value = pick(state)
-            missing = isinstance(value, float) and math.isnan(value)
-            self._write(path, value, Quality.BAD if missing else Quality.GOOD, time, now)
+        for quantity in MODULE:
+            value, quality = quantity.read(state)
+            self._write(quantity.path, value, quality, time, now)
 
     def lost(self, time_ns: int) -> None:
         """No communication: every figure of a cycle becomes Bad and keeps its last value."""
@@ -76,11 +74,11 @@ class CellValues:
 
     def _restate(self, status: ua.StatusCode, time_ns: int) -> None:
         time = moment(time_ns)
-        for path in CYCLE:
-            if path in self._seen:
-                self._variables[path][0].set_status(status, time)
+        for quantity in CYCLE:
+            if quantity.path in self._seen:
+                self._variables[quantity.path][0].set_status(status, time)
 
-    def _write(self, path: str, value: NodeValue, quality: Quality, time: datetime, now: datetime) -> None:
+    def _write(self, path: str, value: Value, quality: Quality, time: datetime, now: datetime) -> None:
         variable, kind, is_array = self._variables[path]
         if quality is Quality.BAD or (isinstance(value, float) and math.isnan(value)):
             # A Bad value is the last one that could be believed; there is none before the first.

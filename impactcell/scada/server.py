@@ -17,6 +17,7 @@ from impactcell.opcua.host_interface import Host, Product, ServerSettings
 from impactcell.opcua.service_host import ServiceHost, aggregate_functions
 from impactcell.opcua.type_instances import link
 from impactcell.opcua.variable_store import VariableStore
+from impactcell.quantities import HISTORY
 from impactcell.records import Alarm, AlarmName, ModuleStatus, Snapshot
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.cell_history import CellHistory
@@ -24,7 +25,6 @@ from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, m
 from impactcell.scada.conditions import Condition
 from impactcell.scada.interface import Actions, CellDescription, HistorySource
 from impactcell.scada.methods import MethodTable, bind_cell, bind_condition, bind_refresh
-from impactcell.scada.node_table import HISTORY
 from impactcell.scada.publishing import CellValues
 from impactcell.scada.users import Users
 

@@ -13,11 +13,11 @@ import time
 from asyncua import Client, ua
 from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 
-from impactcell.scada.node_table import CYCLE
+from impactcell.quantities import CYCLE
 from tests.opcua_server import CELL, CLIENT_URI
 
 # All figures that change with each cycle, and one of the link: 30.
-ITEMS = [path for path in CYCLE if path not in ("Batch/BatchId", "Model/Name")] + ["Module/RoundTripTime"]
+ITEMS = [q.path for q in CYCLE if q.path not in ("Batch/BatchId", "Model/Name")] + ["Module/RoundTripTime"]
 IN_FLIGHT = 3
 EPOCH_DIFFERENCE_S = 11_644_473_600
 

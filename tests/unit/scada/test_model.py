@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 import impactcell
+from impactcell.quantities import CYCLE, HISTORY, MODULE
 from impactcell.records import AlarmName
-from impactcell.scada.node_table import CYCLE, HISTORY, MODULE
+from impactcell.scada.condition_table import CONDITIONS
+from impactcell.scada.nodeset import MODEL_FILE, nodeset
 
 MODEL = Path(impactcell.__file__).parent / "scada" / "model"
 NS = "{http://opcfoundation.org/UA/2011/03/UANodeSet.xsd}"
@@ -36,7 +38,7 @@ def test_every_variable_is_bound_and_every_binding_has_a_variable(nodes: list[ET
         for element in nodes
         if element.tag == f"{NS}UAVariable" and (parent := element.get("ParentNodeId")) in folders
     }
-    assert found == set(CYCLE) | set(MODULE)
+    assert found == {quantity.path for quantity in (*CYCLE, *MODULE)}
     assert set(HISTORY) <= found
     assert len(by_id) == len(nodes), "a NodeId is there twice"
 
@@ -56,3 +58,18 @@ def test_references_inside_the_file_lead_somewhere(nodes: list[ET.Element]) -> N
         for reference in element.iter(f"{NS}Reference"):
             target = reference.text or ""
             assert not target.startswith("ns=1;") or target in ids, (element.get("NodeId"), target)
+
+
+def test_the_file_is_what_the_tables_say() -> None:
+    assert MODEL_FILE.read_text(encoding="utf-8") == nodeset(), "run python -m impactcell.scada.nodeset"
+
+
+def test_every_condition_is_described() -> None:
+    assert set(CONDITIONS) == set(AlarmName)
+    assert {c.input_path for c in CONDITIONS.values() if c.input_path} <= {q.path for q in (*CYCLE, *MODULE)}
+
+
+def test_what_has_a_history_is_kept() -> None:
+    for quantity in CYCLE:
+        assert not quantity.has_history or (quantity.column and quantity.quality_column), quantity.path
+        assert (quantity.unit is None) == (quantity.eu_range is None), quantity.path
