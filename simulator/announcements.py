@@ -29,16 +29,16 @@ class BatchAnnouncer:
         self._last = None
         self._coming = None
 
-    def announce(self, made: int, cycle: int) -> None:
-        """Announce what begins soon, after `made` strikes of the scenario and `cycle` on the counter."""
-        known = [batch for batch in self._batches if batch.from_cycle <= made + ANNOUNCED_CYCLES_AHEAD]
-        if known and known[-1] is not self._last:
-            self._last = known[-1]
-            self._image.put("batch_from_cycle", max(known[-1].from_cycle - made, 1) + cycle)
-            self._image.put("batch_announced", known[-1].id)
+    def announce(self, strikes: int, cycle: int) -> None:
+        """Announce what begins soon, after `strikes` strikes of the scenario and `cycle` on the counter."""
+        begun = [batch for batch in self._batches if batch.from_cycle <= strikes + ANNOUNCED_CYCLES_AHEAD]
+        if begun and begun[-1] is not self._last:
+            self._last = begun[-1]
+            self._image.put("batch_from_cycle", max(begun[-1].from_cycle - strikes, 1) + cycle)
+            self._image.put("batch_announced", begun[-1].id)
             self._image.put("batch_sequence", self._shown_sequence() + 1)
             if "batch_sequence" not in self._image.registers:
-                self._coming = (max(known[-1].from_cycle - made, 1) + cycle, known[-1].id)
+                self._coming = (max(begun[-1].from_cycle - strikes, 1) + cycle, begun[-1].id)
         self.take(cycle)
 
     def take(self, cycle: int) -> None:

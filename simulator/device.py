@@ -180,28 +180,28 @@ class Device:
         self._tap = RunningTap(strike, met, motion, self._now_s, sequence)
         self._image.put("state", ModuleState.CYCLE_RUNNING)
 
-    def _finish(self, done: RunningTap) -> None:
+    def _finish(self, ended: RunningTap) -> None:
         """Put the cycle into the ring, now that the part is at rest."""
         scenario = self.scenario
         self._tap = None
         faulty = next((entry.kind for entry in scenario.faulty_captures if entry.cycle == self._made), "")
-        samples, rates = record(scenario, done.motion, self._room, done.met.random, faulty)
-        time_ns = self._time_ns(done.began_s)
+        samples, rates = record(scenario, ended.motion, self._room, ended.met.random, faulty)
+        time_ns = self._time_ns(ended.began_s)
         header = (
-            done.header(time_ns, self._announcements.batch_id, mass_stated=scenario.part.mass_stated) | rates
+            ended.header(time_ns, self._announcements.batch_id, mass_stated=scenario.part.mass_stated) | rates
         )
         self._rested_s = self._now_s
         self._image.put("state", ModuleState.READY)
         if scenario.positioning is not None:
-            self._parts.moved(done.position_m, self._now_s)
+            self._parts.moved(ended.position_m, self._now_s)
         cycle = self._image.complete(samples, header)
         if scenario.positioning is not None:
             self._image.put("command_cycle", cycle)
             aborted = bool(self._image.get("command_abort"))
-            show_result(self._image, done.sequence, CommandResult.ABORTED if aborted else CommandResult.DONE)
+            show_result(self._image, ended.sequence, CommandResult.ABORTED if aborted else CommandResult.DONE)
             self._image.put("command_abort", 0)
             self._show_ready()
-        self._tell(done.truth(self._image.session, cycle, time_ns))
+        self._tell(ended.truth(self._image.session, cycle, time_ns))
         self._show_part()
         self._announcements.announce(self._made, self.cycle)
 
@@ -294,6 +294,6 @@ class Device:
     def overrun(self, cycles: int) -> None:
         """Make so many cycles at once."""
         for _ in range(cycles):
-            made = self.cycle
-            while self.cycle == made and math.isfinite(self._due_s()):
+            before = self.cycle
+            while self.cycle == before and math.isfinite(self._due_s()):
                 self._step()

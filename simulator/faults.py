@@ -108,8 +108,8 @@ class FaultInjector:
             if self.random.random() < fault.probability:
                 self.happened[fault.kind] += 1
                 if fault.remaining is not None:
-                    left = fault.remaining - 1
-                    self._faults[i : i + 1] = [replace(fault, remaining=left)] if left else []
+                    remaining = fault.remaining - 1
+                    self._faults[i : i + 1] = [replace(fault, remaining=remaining)] if remaining else []
                 return fault
         return None
 

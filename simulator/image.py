@@ -52,8 +52,8 @@ class RegisterImage:
         if leaving and (counter - leaving) % LAST_CYCLE < (counter - acknowledged) % LAST_CYCLE:
             self._overwritten += 1
             self.put("overwritten_count", self._overwritten)
-        shown = {name: value for name, value in header.items() if name in self.registers}
-        return self._image.complete(samples, **shown)
+        in_map = {name: value for name, value in header.items() if name in self.registers}
+        return self._image.complete(samples, **in_map)
 
     def restart(self) -> int:
         """Empty the ring and set the counter to zero; returns the new session."""

@@ -171,7 +171,7 @@ class _ClientConnection(asyncio.Protocol):
         self.gone = asyncio.Event()
         self._server = server
         self._transport: asyncio.Transport | None = None
-        self._held = b""
+        self._buffer = b""
         self._joined = b""
         self._gate: list[bytes] | None = None
         self._mute = False
@@ -205,19 +205,19 @@ class _ClientConnection(asyncio.Protocol):
         server = self._server
         if server.before is not None:
             server.before()
-        held = self._held + data if self._held else data
+        buffer = self._buffer + data if self._buffer else data
         replies: list[bytes] = []
-        at, size, honest = 0, len(held), self._honest
+        at, size, honest = 0, len(buffer), self._honest
         unpack, pack, answer = _HEADER.unpack_from, _HEADER.pack, server.answer
         while size - at >= 7:
-            transaction, protocol, length, unit = unpack(held, at)
+            transaction, protocol, length, unit = unpack(buffer, at)
             if protocol or not 2 <= length <= 254:
                 self.abort()
                 return
             if at + 6 + length > size:
                 break
             end = at + 6 + length
-            pdu = answer(unit, held[at + 7 : end])
+            pdu = answer(unit, buffer[at + 7 : end])
             at = end
             head = pack(transaction, 0, len(pdu) + 1, unit)
             if honest:
@@ -236,7 +236,7 @@ class _ClientConnection(asyncio.Protocol):
                 self._joined = b""
             else:
                 replies.append(reply)
-        self._held = held[at:]
+        self._buffer = buffer[at:]
         self._send(b"".join(replies))
 
     def _send(self, data: bytes) -> None:
@@ -296,5 +296,5 @@ class _ClientConnection(asyncio.Protocol):
         self._send(joined)
 
     def _open_gate(self) -> None:
-        held, self._gate = self._gate, None
-        self._send(b"".join(held or ()))
+        buffer, self._gate = self._gate, None
+        self._send(b"".join(buffer or ()))

@@ -55,8 +55,8 @@ def record(
 def _rate(sensor: Sensor, lasts_s: float, room: int) -> int:
     """Rate at which the record fits both its longest duration and its room."""
     most = min(room, max(int(sensor.longest_s * sensor.rate_hz), 1))
-    wanted = max(int(lasts_s * sensor.rate_hz), 1)
-    return max(sensor.rate_hz // math.ceil(wanted / most), 1)
+    samples_needed = max(int(lasts_s * sensor.rate_hz), 1)
+    return max(sensor.rate_hz // math.ceil(samples_needed / most), 1)
 
 
 def _spoil(samples: dict[str, Samples], faulty: str) -> dict[str, Samples]:

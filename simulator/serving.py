@@ -69,7 +69,7 @@ async def serve(
     """
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
-    with stop_on_signals(stop) as came, _truths(truth_file, verbose=verbose) as tell:
+    with stop_on_signals(stop) as received, _truths(truth_file, verbose=verbose) as tell:
         epoch_ns = time.time_ns()
         device = Device(
             scenario,
@@ -80,7 +80,7 @@ async def serve(
             on_truth=tell,
         )
         await _serve(scenario, device, stop)
-    return signal.SIGINT in came
+    return signal.SIGINT in received
 
 
 async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> None:

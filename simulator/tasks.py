@@ -72,5 +72,5 @@ class PartSequence:
 
     def outcomes(self) -> list[Mapping[str, Any]]:
         """Return what became of parts since the last call."""
-        told, self._outcomes = self._outcomes, []
-        return told
+        outcomes, self._outcomes = self._outcomes, []
+        return outcomes

@@ -22,10 +22,12 @@ def accept_model(cell: Path, extended: Path) -> None:
     PredictionError
         The part would not slide free over the calibrated range.
     """
-    given = read_cell(cell)
-    model = calibrated_model(replace(given, model=read_model(extended)))
-    target = given.settings.model
+    cell_config = read_cell(cell)
+    model = calibrated_model(replace(cell_config, model=read_model(extended)))
+    target = cell_config.settings.model
     previous = target.with_name(f"{target.stem}.previous{target.suffix}")
     previous.write_bytes(target.read_bytes())
     write_model(model, target)
-    print_result(f"{given.name} runs with model {model.name} from the next cycle on; before: {previous}")
+    print_result(
+        f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}"
+    )

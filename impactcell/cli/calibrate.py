@@ -54,9 +54,9 @@ def calibrate(cell: Path, output: Path) -> None:
         The part does not slide free over the range.
     """
     check_output(output, SettingsError)
-    given = read_cell(cell)
-    write_model(calibrated_model(given), output)
-    print_result(f"{output}: model of {given.name}; it is used where a cell file's `model` names it")
+    cell_config = read_cell(cell)
+    write_model(calibrated_model(cell_config), output)
+    print_result(f"{output}: model of {cell_config.name}; it is used where a cell file's `model` names it")
 
 
 def calibrated_model(cell: CellConfig) -> Model:
@@ -70,9 +70,9 @@ def calibrated_model(cell: CellConfig) -> Model:
     frictions = np.linspace(lowest, highest, FRICTIONS)
     masses = _masses(settings.part.mass_kg)
     tap = TapInput(fastest, float(masses[0]), stroke, halts_at_separation=math.isinf(stroke))
-    with progress("calibrating", len(masses)) as done:
+    with progress("calibrating", len(masses)) as advance:
         predictors = fit_predictors(
-            model.plant, tap, masses.tolist(), velocities, frictions, lambda at, _: done() if at else None
+            model.plant, tap, masses.tolist(), velocities, frictions, lambda at, _: advance() if at else None
         )
     swept = (
         f"mu_s {lowest:.4g}-{highest:.4g} ({FRICTIONS} values, mu_k/mu_s {model.ratio:.4g}), "

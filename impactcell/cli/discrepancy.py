@@ -63,8 +63,8 @@ def discrepancy(
     if cell is not None:
         from impactcell.settings import read_cell
 
-        given = read_cell(cell)
-        plant, name = given.model.plant, given.model.name
+        cell_config = read_cell(cell)
+        plant, name = cell_config.model.plant, cell_config.model.name
     elif journal is not None:
         recording = _recording_model(journal)
         if recording is not None:

@@ -58,11 +58,11 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
         taps = with_masses([extract(shot) for shot in campaign_data.shots])
         plant, misfit = _model(campaign_data, taps, cell)
         model = calibrated(plant, [tap.capture for tap in taps])
-        with progress("estimating", len(taps)) as done:
+        with progress("estimating", len(taps)) as advance:
             rows = []
             for tap in taps:
                 rows.append((tap.capture.cycle, estimate_from_features(tap, model, misfit)))
-                done()
+                advance()
     if output is None:
         _write(rows, sys.stdout)
         return

@@ -61,21 +61,21 @@ class AutoTeach:
         journal, path = self._cell.settings.journal, self._cell.path
         assert journal is not None  # noqa: S101 - the demo's cells have one
         with tempfile.TemporaryDirectory(prefix="impactcell-remedy-") as temporary:
-            shots, found = Path(temporary) / "shots", Path(temporary) / "found"
+            shots, results = Path(temporary) / "shots", Path(temporary) / "found"
             self._say(f"impactcell discrepancy on cycles {first} to {last} ...")
             between = ["--first-cycle", str(first), "--last-cycle", str(last)]
             await self._run("export", str(journal.file), "-o", str(shots), *between)
-            await self._run("discrepancy", str(shots), "--cell", str(path), "-o", str(found))
-            result = json.loads((found / "result.json").read_text(encoding="utf-8"))
+            await self._run("discrepancy", str(shots), "--cell", str(path), "-o", str(results))
+            result = json.loads((results / "result.json").read_text(encoding="utf-8"))
             named = ", ".join(effect["effect"] for effect in result["effects"]) or "nothing"
             held_out = result["gap"]["held_out"]
             gaps = f"held-out gap {held_out['before']} before, {held_out['after']} after"
-            told = f"{result['verdict']}: {named}; {gaps}"
-            self._say(told)
+            verdict = f"{result['verdict']}: {named}; {gaps}"
+            self._say(verdict)
             if result["effects"]:
-                await self._run("model", "accept", str(path), str(found / result["model"]))
+                await self._run("model", "accept", str(path), str(results / result["model"]))
                 self._accepted = True
-                self._say(f"{told}; the extended model is in service")
+                self._say(f"{verdict}; the extended model is in service")
 
     async def _run(self, *arguments: str) -> None:
         """Run a verb in a process of its own, so that the cell goes on undisturbed."""

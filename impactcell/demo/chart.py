@@ -16,9 +16,9 @@ LEGEND = "mu_s  • cycle  ░ level ± 2 sd  ✗ deviant  ┆ shift"
 
 def chart(snapshots: Sequence[Snapshot], columns: int, rows: int) -> Text:
     """Draw one column a cycle: what stands in `LEGEND`, the level with the offset of its batch."""
-    shown = list(snapshots)[-columns:]
-    bands = [_band(s) for s in shown]
-    numbers = [s.friction.mu_s.value for s in shown] + [edge for band in bands for edge in band]
+    visible = list(snapshots)[-columns:]
+    bands = [_band(s) for s in visible]
+    numbers = [s.friction.mu_s.value for s in visible] + [edge for band in bands for edge in band]
     finite = [n for n in numbers if math.isfinite(n)]
     if not finite:
         return Text("no usable estimate yet", style="dim")
@@ -27,12 +27,12 @@ def chart(snapshots: Sequence[Snapshot], columns: int, rows: int) -> Text:
     low, high = low - margin, high + margin
 
     scale = _Scale(low, high, rows)
-    shifts = _shifts(shown)
+    shifts = _shifts(visible)
     text = Text()
     for row in range(rows):
         label = f"{high - (row + 0.5) * (high - low) / rows:7.4f} " if row % 3 == 0 else " " * 8
         text.append(label, style="dim")
-        for snapshot, band in zip(shown, bands, strict=True):
+        for snapshot, band in zip(visible, bands, strict=True):
             mark, style = _mark(snapshot, row, scale, band)
             shifted = mark == " " and snapshot.cycle in shifts
             text.append(*(("┆", "magenta") if shifted else (mark, style)))
@@ -42,15 +42,15 @@ def chart(snapshots: Sequence[Snapshot], columns: int, rows: int) -> Text:
 
 def _shifts(snapshots: Sequence[Snapshot]) -> set[int]:
     """Cycles of the batch shifts as last believed: each is found, and refined, some cycles after it."""
-    last, found = 0, [0]
+    last, shift_cycles = 0, [0]
     for snapshot in snapshots:
         shift = snapshot.batch.last_shift_cycle
         if shift > last:
-            found.append(shift)
+            shift_cycles.append(shift)
             last = snapshot.cycle
         elif shift:
-            found[-1] = shift
-    return set(found)
+            shift_cycles[-1] = shift
+    return set(shift_cycles)
 
 
 def _band(snapshot: Snapshot) -> tuple[float, float]:

@@ -101,10 +101,10 @@ def fit_events(content: dict, cycles: int | None) -> dict:  # type: ignore[type-
 
 def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-arg]
     """Tell what a scenario does, from which cycle on."""
-    told = [(1, "the surface wears: mu_s grows slowly")] if content.get("wear") else []
+    events = [(1, "the surface wears: mu_s grows slowly")] if content.get("wear") else []
     if content.get("positioning"):
-        told.append((1, "parts come one after the other and are tapped to their targets"))
-    told += [
+        events.append((1, "parts come one after the other and are tapped to their targets"))
+    events += [
         (
             batch["from_cycle"],
             f"batch {batch['id']} is on the table"
@@ -113,15 +113,15 @@ def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-ar
         for batch in content.get("batches", [])
         if batch["from_cycle"] > 1
     ]
-    told += [
+    events += [
         (deviation["cycle"], f"cycle {deviation['cycle']} is odd: a {deviation['kind']} along its stroke")
         for deviation in content.get("deviations", [])
     ]
-    told += [
+    events += [
         (entry["from_cycle"], f"a new effect acts in the plant: {', '.join(entry['effects'])}")
         for entry in content.get("appearances", [])
     ]
-    return tuple(sorted(told))
+    return tuple(sorted(events))
 
 
 def last_target_m(content: dict) -> float:  # type: ignore[type-arg]

@@ -54,9 +54,9 @@ def render(scene: Scene, width: int = 100, height: int = 40) -> RenderableType:
     if scene.link:
         below.append(Text(f"OPC UA: {scene.endpoint} · Ctrl-C ends", style="dim"))
     measure = Console(width=width - 4, file=io.StringIO())
-    taken = sum(len(measure.render_lines(part)) for part in (*parts, *below)) + 4
-    if height - taken >= LEAST_ROWS:
-        curve = chart(scene.snapshots, max(20, width - 16), min(height - taken, MOST_ROWS))
+    rows_used = sum(len(measure.render_lines(part)) for part in (*parts, *below)) + 4
+    if height - rows_used >= LEAST_ROWS:
+        curve = chart(scene.snapshots, max(20, width - 16), min(height - rows_used, MOST_ROWS))
         parts.append(Panel(curve, title=LEGEND, title_align="left"))
     title = f"impactcell · {scene.cell} · cycle {last.cycle} · "
     title += f"module {scene.link}" if scene.link else "ended"
@@ -65,31 +65,31 @@ def render(scene: Scene, width: int = 100, height: int = 40) -> RenderableType:
 
 def _facts(last: Snapshot, *, wide: bool) -> Table:
     friction = last.friction
-    left: list[tuple[str, str | Text]] = [
+    left_column: list[tuple[str, str | Text]] = [
         ("mu_s", _coefficient(last)),
         ("mu_k", _plus_minus(friction.mu_k.value, friction.mu_k.std)),
         ("peak force", _measured(friction.peak_force_n, "N", 1)),
         ("slid", _measured(friction.sliding_distance_m * 1e6, "µm", 0)),
     ]
-    right: list[tuple[str, str | Text]] = [
+    right_column: list[tuple[str, str | Text]] = [
         ("wear level", _level(last)),
         ("wear limit", _limit(last)),
         ("batch", _batch(last)),
         ("signature", _signature(last)),
     ]
     if math.isfinite(last.positioning.target_m):
-        left.append(("", ""))
+        left_column.append(("", ""))
         remaining = _measured(last.positioning.remaining_m * 1e3, "mm", 3)
-        right.append(("target", f"{last.positioning.target_m * 1e3:.2f} mm, remaining {remaining}"))
+        right_column.append(("target", f"{last.positioning.target_m * 1e3:.2f} mm, remaining {remaining}"))
     facts = Table.grid(padding=(0, 2))
     for _ in range(2 if wide else 1):
         facts.add_column(style="dim", no_wrap=True)
         facts.add_column()
     if wide:
-        for one, other in zip(left, right, strict=True):
-            facts.add_row(*one, *other)
+        for left_row, right_row in zip(left_column, right_column, strict=True):
+            facts.add_row(*left_row, *right_row)
     else:
-        for name, value in left + right:
+        for name, value in left_column + right_column:
             if name:
                 facts.add_row(name, value)
     return facts
@@ -159,19 +159,19 @@ def _signature(snapshot: Snapshot) -> Text:
 
 
 def _alarms(alarms: Sequence[Alarm], *, wide: bool) -> RenderableType:
-    shown = [alarm for alarm in alarms if alarm.active or not alarm.acknowledged]
-    if not shown:
+    visible = [alarm for alarm in alarms if alarm.active or not alarm.acknowledged]
+    if not visible:
         return Text("no alarms", style="green")
     rows = []
-    for alarm in shown:
+    for alarm in visible:
         state = ("active" if alarm.active else "cleared") + ("" if alarm.acknowledged else ", unacknowledged")
         name = Text(alarm.name.value, style="bold red" if alarm.active else "yellow")
         rows.append((name, state, str(alarm.cycle), alarm.message))
     if not wide:
         return Group(
             *(
-                Text.assemble(name, f" {state} since cycle {cycle}: {said}")
-                for name, state, cycle, said in rows
+                Text.assemble(name, f" {state} since cycle {cycle}: {message}")
+                for name, state, cycle, message in rows
             )
         )
     table = Table(expand=True, box=None, header_style="dim", padding=(0, 2, 0, 0))

@@ -65,8 +65,8 @@ class ModuleAcquisition:
         """What the module said at the last poll; None before the first."""
         self._status_values: Mapping[str, Value] = {}
         self._client = client
-        self.device = RegisterClient(client, registers)
-        self._reader = CaptureReader(cell, self.device)
+        self.register_client = RegisterClient(client, registers)
+        self._reader = CaptureReader(cell, self.register_client)
         self._status = ModuleStatus()
         self._on_change = on_change
         self._ready = asyncio.Event()
@@ -106,7 +106,7 @@ class ModuleAcquisition:
 
     async def read_status(self) -> StatusBlock:
         """Read the status block now; raises FieldbusError where `captures` would only note it."""
-        values = await self.device.values(decoding.STATUS_REGISTERS)
+        values = await self.register_client.read_values(decoding.STATUS_REGISTERS)
         if self.status_block is None or values is not self._status_values:
             self.status_block, self._status_values = decoding.decode_status(self.registers, values), values
         return self.status_block
@@ -140,9 +140,9 @@ class ModuleAcquisition:
                 sent_s = loop.time()
                 status = await self._poll()
                 backoff.reset()
-                shown = CycleId(status.session, status.cycle_counter)
-                schedule.record_poll(sent_s, loop.time(), new=shown != newest)
-                newest = shown
+                newest_now = CycleId(status.session, status.cycle_counter)
+                schedule.record_poll(sent_s, loop.time(), new=newest_now != newest)
+                newest = newest_now
                 target = next_capture(
                     last,
                     status.session,
@@ -192,7 +192,7 @@ class ModuleAcquisition:
             name for name, register in self.registers.registers.items() if register.expect is not None
         )
         try:
-            values = await self.device.values(pinned)
+            values = await self.register_client.read_values(pinned)
         except ModbusExceptionError as error:
             if error.code not in _NOT_THIS_DEVICE:
                 raise
@@ -226,7 +226,7 @@ class ModuleAcquisition:
             values = {"acknowledge_cycle": cycle_id.cycle}
             if "acknowledge_session" in self.registers:
                 values["acknowledge_session"] = cycle_id.session
-            await self.device.write(values)
+            await self.register_client.write_values(values)
         self._acknowledged = cycle_id
 
     async def _disconnect(self, error: FieldbusError) -> None:

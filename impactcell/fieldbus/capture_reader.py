@@ -142,17 +142,17 @@ class CaptureReader:
         """Show the slot and read its header, or go on with the reading that was interrupted."""
         client, registers = self._client, self._registers
         if self._partial is not None:
-            _, words = await client.header()
+            _, words = await client.read_header()
             if words.tobytes() == self._partial.words.tobytes():
                 return self._partial
             self._partial = None
             self.discarded += 1
-        header, words = await client.header(target.slot)
+        header, words = await client.read_header(target.slot)
         if header["window_slot"] != target.slot:
-            header, words = await client.header()
+            header, words = await client.read_header()
         if _at_rest(header["window_sequence"]) and header["window_slot"] == target.slot:
-            shown = (header["window_session"], header["window_cycle"])
-            if shown != (target.cycle_id.session, target.cycle_id.cycle):
+            identity = (header["window_session"], header["window_cycle"])
+            if identity != (target.cycle_id.session, target.cycle_id.cycle):
                 return None
         counts = decoding.sample_counts(registers, header)
         blocks = {name: client.partial_block(name, count) for name, count in counts.items()}
@@ -164,12 +164,12 @@ class CaptureReader:
         """Read the samples and what follows them; return why the reading is of no use, None if it is good."""
         registers, header, target = self._registers, partial.header, partial.target
         before = header["window_sequence"]
-        shown = (header["window_slot"], header["window_session"], header["window_cycle"])
+        identity = (header["window_slot"], header["window_session"], header["window_cycle"])
         if not _at_rest(before):
             return f"register window_sequence shows {before}: the window was being changed"
-        if shown != (target.slot, target.cycle_id.session, target.cycle_id.cycle):
+        if identity != (target.slot, target.cycle_id.session, target.cycle_id.cycle):
             address = registers["window_slot"].address
-            return f"register window_slot ({address}) shows {shown[0]} instead of {target.slot}"
+            return f"register window_slot ({address}) shows {identity[0]} instead of {target.slot}"
         complete, last = self._client.modbus.complete, self._client.partial_block("window_sequence_after", 1)
         provable = "capture_crc32" in registers and not decoding.excessive_counts(registers, header)
         if provable:  # in whatever order the device answers

@@ -67,13 +67,13 @@ def next_capture(
     )
     if last is None or restarted:
         behind = counter if restarted else CYCLE_PERIOD
-        held = sorted((age for age in ages if age <= CYCLE_PERIOD // 2), reverse=True)
+        ages_to_read = sorted((age for age in ages if age <= CYCLE_PERIOD // 2), reverse=True)
     else:
         behind = cycles_after(last.cycle, counter)
-        held = sorted((age for age in ages if age < behind), reverse=True)
-    if not held:
+        ages_to_read = sorted((age for age in ages if age < behind), reverse=True)
+    if not ages_to_read:
         return None
-    age = held[min(skip, len(held) - 1)]
+    age = ages_to_read[min(skip, len(ages_to_read) - 1)]
     slot = ages[age]
     missed = 0 if last is None else max(0, behind - age - 1)
     if restarted and missed > CYCLE_PERIOD // 2:

@@ -63,7 +63,7 @@ class RegisterClient:
         self._groups: dict[tuple[str, ...], tuple[RegisterBlock, ...]] = {}
         self._last: dict[tuple[str, ...], tuple[list[bytes], dict[str, Value]]] = {}
 
-    async def values(self, names: tuple[str, ...]) -> Mapping[str, Value]:
+    async def read_values(self, names: tuple[str, ...]) -> Mapping[str, Value]:
         """Read registers and decode them, in SI; those that the map does not have are left out.
 
         What shows the same words as before comes back as the very same mapping.
@@ -85,13 +85,13 @@ class RegisterClient:
         register = self.registers[name]
         return self.modbus.block(register.address, values * register.words_per_value, register.table)
 
-    async def words(self, name: str, values: int) -> Words:
+    async def read_words(self, name: str, values: int) -> Words:
         """Read the words of the first `values` values of a register."""
         partial_block = self.partial_block(name, values)
         await self.modbus.complete(partial_block)
         return partial_block.words()
 
-    async def header(self, slot: int | None = None) -> tuple[dict[str, Value], Words]:
+    async def read_header(self, slot: int | None = None) -> tuple[dict[str, Value], Words]:
         """Read the window's header: its values, and its words from `window_sequence` to the first array.
 
         With `slot` that is selected right before; a device that is busy meanwhile may still show another.
@@ -105,7 +105,7 @@ class RegisterClient:
             words[block.address - header.address :][: block.count] = partial_block
         return header.decode(words), words
 
-    async def write(self, values: Mapping[str, ArrayLike | str]) -> None:
+    async def write_values(self, values: Mapping[str, ArrayLike | str]) -> None:
         """Write registers; neighbours go out in one request, so that the device takes them together."""
         registers = [self.registers[name] for name in values]
         for block in _adjacent_runs(registers):

@@ -79,7 +79,7 @@ class TapCommander:
 
     async def abort(self) -> None:
         """Abort what is being executed; raises LinkError without a connection."""
-        await self._module.device.write({"command_abort": 1})
+        await self._module.register_client.write_values({"command_abort": 1})
 
     def _check(self, command: TapCommand) -> None:
         cell = self._module.cell
@@ -115,10 +115,10 @@ class TapCommander:
         while True:
             await self._module.wait_connected()
             try:
-                await self._module.device.write(parameters)
+                await self._module.register_client.write_values(parameters)
                 for name, words in codes.items():
-                    shown = await self._module.device.words(name, 1)
-                    if shown.tobytes() != words.tobytes():
+                    read_back = await self._module.register_client.read_words(name, 1)
+                    if read_back.tobytes() != words.tobytes():
                         register = registers[name]
                         raise PositioningError(
                             f"{self._module.cell}: register {name} ({register.address}) does not show what "
@@ -136,17 +136,17 @@ class TapCommander:
         cell = self._module.cell
         written = False
         while True:
-            session_now, shown = await self._read_positioning()
+            session_now, positioning = await self._read_positioning()
             if session_now != session:
                 raise PositioningError(f"{cell}: module was started anew during tap {sequence}")
-            if shown.accepted_command == sequence:
-                if shown.result == "done":
-                    return shown.cycle
-                if shown.result != "executing":
-                    raise PositioningError(f"{cell}: tap {sequence}: {shown.result}")
+            if positioning.accepted_command == sequence:
+                if positioning.result == "done":
+                    return positioning.cycle
+                if positioning.result != "executing":
+                    raise PositioningError(f"{cell}: tap {sequence}: {positioning.result}")
             elif not written:
                 try:
-                    await self._module.device.write({"command_sequence": sequence})
+                    await self._module.register_client.write_values({"command_sequence": sequence})
                     written = True
                 except (LinkError, ProtocolError):
                     continue  # whether it arrived is seen in the next report

@@ -160,9 +160,11 @@ def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
             f"{path}: the journal{of} has format {version}, this version of the program knows {OLDEST} to "
             f"{FORMAT}; it is left as it is: {WAY_OUT}"
         )
-    kept = _named_cell(database)
-    if cell is not None and kept != cell:
-        raise ForeignJournalError(f"{path}: the journal of cell '{kept}', not of '{cell}'; name another file")
+    stored_cell = _named_cell(database)
+    if cell is not None and stored_cell != cell:
+        raise ForeignJournalError(
+            f"{path}: the journal of cell '{stored_cell}', not of '{cell}'; name another file"
+        )
 
 
 def _named_cell(database: sqlite3.Connection) -> str:

@@ -73,6 +73,6 @@ class OperatorCommands:
 
 
 def _audit(actor: Actor, action: str, **arguments: object) -> AuditEntry:
-    given = {name: value for name, value in arguments.items() if value not in ("", 0.0)}
+    stated = {name: value for name, value in arguments.items() if value not in ("", 0.0)}
     user = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
-    return AuditEntry(time.time_ns(), user, action, json.dumps(given), "Good")
+    return AuditEntry(time.time_ns(), user, action, json.dumps(stated), "Good")

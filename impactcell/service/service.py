@@ -199,9 +199,9 @@ async def _until_signalled(service: Service) -> bool:
         task.add_done_callback(reloads.discard)
 
     loop.add_signal_handler(signal.SIGHUP, reload)
-    with stop_on_signals(stop) as came:
+    with stop_on_signals(stop) as received:
         await service.run(stop, lambda: _say_started(service))
-    return signal.SIGINT in came
+    return signal.SIGINT in received
 
 
 def _say_started(service: Service) -> None:
