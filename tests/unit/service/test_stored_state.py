@@ -24,7 +24,9 @@ def copied(version: str, directory: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("how", [{"read_only": True}, {}, {"upgrade": upgraded_state}], ids=str)
+@pytest.mark.parametrize(
+    "how", [{"read_only": True}, {}, {"upgrade": upgraded_state}], ids=["read only", "as it is", "upgraded"]
+)
 @pytest.mark.parametrize("version", VERSIONS)
 def test_all_that_an_older_journal_holds_is_read(tmp_path: Path, version: str, how: dict[str, Any]) -> None:
     expected = json.loads((DATA / f"{version}.json").read_text(encoding="utf-8"))
