@@ -12,6 +12,7 @@ from typing import TextIO
 
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.process import yaml_loader
 from impactcell.process.signals import stop_on_signals
 from simulator.control import Control
 from simulator.device import Device, Truth
@@ -19,7 +20,6 @@ from simulator.fault_schedule import arm
 from simulator.faults import FaultInjector
 from simulator.modbus_server import ModbusServer
 from simulator.scenario import Scenario
-from simulator.scenario_file import read_yaml
 
 LONGEST_NAP_S = 0.5
 """The module is brought up to date at least so often, seconds."""
@@ -33,7 +33,7 @@ def read_register_map(file: Path) -> RegisterMap:
     SettingsError
         The file cannot be read, or is no map.
     """
-    content, _ = read_yaml(file)
+    content, _ = yaml_loader.load(file)
     try:
         return RegisterMap.from_mapping(content)
     except (MapError, TypeError, AttributeError) as error:

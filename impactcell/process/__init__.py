@@ -1,1 +1,1 @@
-"""What a program does with its terminal, its log, its signals and its service manager."""
+"""What a program does with its terminal, log, signals, service manager and YAML files."""

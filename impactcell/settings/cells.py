@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.prediction.model import Model
-from impactcell.settings import yaml_loader
+from impactcell.process import yaml_loader
 from impactcell.settings.model_file import read_model
 from impactcell.settings.sections import CellSettings
 

@@ -13,7 +13,7 @@ from impactcell.errors import ImpactCellError, SettingsError
 from impactcell.physics import Plant
 from impactcell.physics.effects import LIBRARY
 from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predictor, Prior, Sensitivity
-from impactcell.settings import yaml_loader
+from impactcell.process import yaml_loader
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 """A finite number above 0."""

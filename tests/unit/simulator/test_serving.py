@@ -33,12 +33,12 @@ def test_the_scenarios_that_come_with_it(name: str) -> None:
     ("text", "place", "message"),
     [
         ("", "1:1", "is empty"),
-        ("format: 1\n  x: 2\n", "2:4", "is not YAML"),
-        ("format: 1\nformat: 1\n", "2:1", "appears twice"),
-        ("format: 1\nstrikes: {period_s: 1}\n", "1:1", "register_map: is missing"),
+        ("format: 1\n  x: 2\n", "2:4", "not allowed here"),
+        ("format: 1\nformat: 1\n", "2:1", "is given twice"),
+        ("format: 1\nstrikes: {period_s: 1}\n", "1:1", "'register_map' is missing"),
         ("format: 1\nregister_map: m.yaml\n", "1:1", "give either `strikes`"),
         (GOOD + "positioning: {}\n", "1:1", "give either `strikes`"),
-        (GOOD + "speed: 1\n", "4:8", "speed: unknown key"),
+        (GOOD + "speed: 1\n", "4:1", "unknown key 'speed'"),
         (GOOD + "listen: {port: 70000}\n", "4:16", "listen.port: "),
         (GOOD + "part: {mass_kg: heavy}\n", "4:17", "part.mass_kg: "),
         (GOOD + "acceleration: 0\n", "4:15", "acceleration: "),
@@ -49,7 +49,7 @@ def test_the_scenarios_that_come_with_it(name: str) -> None:
             "surface_tilt has no parameter 'a'",
         ),
         (GOOD + "batches: [{from_cycle: 2, id: A}]\n", "1:1", "the first begins with cycle 1"),
-        (GOOD + "deviations: [{cycle: 1, kind: dent, size: 1.0}]\n", "4:31", "deviations.0.kind: "),
+        (GOOD + "deviations: [{cycle: 1, kind: dent, size: 1.0}]\n", "4:31", "deviations[0].kind: "),
     ],
 )
 def test_faults_of_a_scenario(tmp_path: Path, text: str, place: str, message: str) -> None:

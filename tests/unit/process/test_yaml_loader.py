@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict, Field
 
 from impactcell.errors import SettingsError
-from impactcell.settings.yaml_loader import load, read
+from impactcell.process.yaml_loader import load, read
 
 
 class Part(BaseModel):
