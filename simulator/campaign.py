@@ -19,10 +19,9 @@ from scipy.signal import lfilter
 from impactcell.errors import CampaignError
 from simulator.campaign_scenario import CampaignScenario, SensorScenario
 from simulator.plant import Motion, Plant, Shot, TapInput, simulate_driven, simulate_free_slide, simulate_tap
+from simulator.scenario_file import MM_PER_MIN
 
 Samples = NDArray[np.float64]
-MM_PER_MIN = 1e-3 / 60.0
-"""Metres a second of one millimetre a minute."""
 COLUMNS = {"force": "force_n", "position": "position_m", "actuator": "actuator_m"}
 
 

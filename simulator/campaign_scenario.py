@@ -6,12 +6,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from simulator.effects import LIBRARY, UNLISTED, check
-from simulator.scenario_file import ScenarioModel
+from simulator.scenario_file import NotNegative, Positive, ScenarioModel
 
-Positive = Annotated[float, Field(gt=0)]
-"""A number above 0."""
-NotNegative = Annotated[float, Field(ge=0)]
-"""A number of at least 0."""
 Share = Annotated[float, Field(ge=0, lt=1)]
 """A number from 0 to below 1."""
 Strength = float | list[float]

@@ -6,10 +6,9 @@ from typing import Final
 from simulator.image import RegisterImage
 from simulator.plant import TapInput
 from simulator.scenario import Positioning
+from simulator.scenario_file import MM_PER_MIN
 from simulator.tasks import PartSequence
 
-MM_PER_MIN: Final = 1e-3 / 60.0
-"""Metres a second of one millimetre a minute."""
 SINGLE_PRECISION: Final = 1.0 + 1e-6
 """The registers are single precision: a limit itself must not be refused for its last bit."""
 

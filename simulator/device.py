@@ -14,7 +14,6 @@ import numpy as np
 from impactcell.fieldbus.registers import RegisterMap, Words
 from simulator.announcements import BatchAnnouncer
 from simulator.commands import (
-    MM_PER_MIN,
     CommandResult,
     ModuleState,
     PositioningState,
@@ -28,6 +27,7 @@ from simulator.plant import NeverAtRestError, TapInput, simulate_tap
 from simulator.process import strike_conditions
 from simulator.recorder import record
 from simulator.scenario import Scenario
+from simulator.scenario_file import MM_PER_MIN
 from simulator.tasks import PartSequence
 
 NO_SLOT: Final = 0xFFFF

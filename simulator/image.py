@@ -1,16 +1,13 @@
 """The register image of a module whose map may lack some registers, with its ring and acknowledgements."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impactcell.fieldbus.registers import RegisterMap, Words
-from simulator.scripted import ScriptedDevice
-
-LAST_CYCLE: Final = 2**32 - 1
-"""Largest cycle number: 32 bits."""
+from simulator.scripted import LAST_CYCLE, ScriptedDevice
 
 
 class RegisterImage:

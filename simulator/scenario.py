@@ -8,12 +8,8 @@ from pydantic import Field, field_validator, model_validator
 
 from simulator.effects import check
 from simulator.fault_schedule import ScheduledFault
-from simulator.scenario_file import ScenarioModel, load
+from simulator.scenario_file import NotNegative, Positive, ScenarioModel, load
 
-Positive = Annotated[float, Field(gt=0)]
-"""A number above 0."""
-NotNegative = Annotated[float, Field(ge=0)]
-"""A number of at least 0."""
 Cycle = Annotated[int, Field(ge=1)]
 """Number of a cycle, from 1."""
 Rate = Annotated[int, Field(ge=1, le=1_000_000)]

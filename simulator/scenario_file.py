@@ -1,9 +1,9 @@
-"""What all scenario files have in common."""
+"""What all scenario files have in common: how they are read, and the numbers in them."""
 
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, Final, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from impactcell.process import yaml_loader
 
@@ -13,6 +13,14 @@ class ScenarioModel(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
+
+Positive = Annotated[float, Field(gt=0)]
+"""A number above 0."""
+NotNegative = Annotated[float, Field(ge=0)]
+"""A number of at least 0."""
+
+MM_PER_MIN: Final = 1e-3 / 60.0
+"""Metres a second of one millimetre a minute, in which scenarios give velocities."""
 
 M = TypeVar("M", bound=ScenarioModel)
 

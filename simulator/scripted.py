@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from impactcell.fieldbus.registers import REGISTER_SPACE, WIRE, RegisterMap, Words, capture_crc32
 
 _ARRAYS: Final = ("force", "position", "actuator")
-_LAST_CYCLE: Final = 2**32 - 1
+LAST_CYCLE: Final = 2**32 - 1
 """Largest cycle number: 32 bits."""
 
 
@@ -84,7 +84,7 @@ class ScriptedDevice:
 
         `samples` holds force, position and actuator in SI; `header` any register of the window.
         """
-        cycle = int(self.get("cycle_counter")) % _LAST_CYCLE + 1
+        cycle = int(self.get("cycle_counter")) % LAST_CYCLE + 1
         slot = self.next_slot
         words = self._encoded(slot, cycle, samples, header)
         self._slots[slot] = _Slot(words)
