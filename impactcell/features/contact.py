@@ -128,6 +128,6 @@ def _fit_maximum(
     step = median(times[1:100] - times[: min(len(times), 100) - 1])
     narrowest_s = max(MIN_WINDOW_S, 4.0 * step)
     is_fitted, value, std = widest_cubic(
-        times, values, sigma, at_s, left, right, narrowest_s, MAX_WINDOW_S, step
+        times, values, sigma, (at_s, left, right), (narrowest_s, MAX_WINDOW_S, step)
     )
     return MeasuredFeature(value, BIAS_FACTOR * std) if is_fitted else None

@@ -71,6 +71,14 @@ class _Cache(FunctionCache):
         super().__init__(function)  # type: ignore[no-untyped-call]
         self._digest = _digest(_room(function))
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Give machine code from disk; an index that names a class this version lacks is begun anew."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except (AttributeError, ImportError):
+            self.flush()  # type: ignore[no-untyped-call]
+            return None
+
     def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
         return (*super()._index_key(signature, codegen), self._digest)  # type: ignore[no-untyped-call]
 

@@ -13,8 +13,9 @@ from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
 GROWTH = 1.3
-"""Factor by which windows grow."""
+"""Factor by which windows grow: finer steps cost more fits and find the same maximum. Our choice."""
 MAX_WINDOWS = 64
+"""Windows tried at most: `GROWTH` to this power is 2e7."""
 
 
 @compiled
@@ -216,25 +217,32 @@ def widest_cubic(
     times: Samples,
     values: Samples,
     sigma: float,
-    at_s: float,
-    left: float,
-    right: float,
-    narrowest_s: float,
-    widest_s: float,
-    step_s: float,
+    start: tuple[float, float, float],
+    widths_s: tuple[float, float, float],
 ) -> tuple[bool, float, float]:
     """Maximum of a cubic over the widest window about `at_s` in which its residuals are noise.
 
     Lepski's rule: windows grow until the residuals, or the maximum against those of narrower windows, show
     more than noise. A window reaches `left` and `right` of its half width to either side of its centre, which
-    follows the maximum where both are 1; `step_s` is the time between samples.
+    follows the maximum where both are 1.
+
+    Parameters
+    ----------
+    times, values : ndarray, shape (n,)
+    sigma : float
+        Noise of one sample.
+    start : tuple of float
+        Time of the first centre, `left` and `right`.
+    widths_s : tuple of float
+        Narrowest and widest half width, and the time between samples.
 
     Returns
     -------
     found : bool
     value, std : float
-        The maximum and its standard deviation from the noise `sigma` of one sample.
+        The maximum and its standard deviation.
     """
+    (at_s, left, right), (narrowest_s, widest_s, step_s) = start, widths_s
     found, value, std = False, np.nan, np.nan
     highest, lowest = np.inf, -np.inf
     half, centre = narrowest_s, at_s

@@ -133,10 +133,8 @@ class LinearisedModel:
             (self.position_time_s, self._scatters[1], slice(split, None)),
         ):
             if len(times) > 2:
-                squares, used = _sample_squares(
-                    times, model[part], residual[part], self._weights[part], scatter.count, scatter.times,
-                    scatter.values, scatter.both, scatter.noise_std,
-                )  # fmt: skip
+                sums = scatter.count, scatter.times, scatter.values, scatter.both, scatter.noise_std
+                squares, used = _sample_squares(times, model[part], residual[part], self._weights[part], sums)
                 total += squares
                 count += used
         return math.sqrt(total / count)
@@ -250,17 +248,14 @@ def _sample_squares(
     model: Samples,
     residual: Samples,
     weights: Samples,
-    count: Samples,
-    spread: Samples,
-    scatter: Samples,
-    both: Samples,
-    noise_std: float,
+    sums: tuple[Samples, Samples, Samples, Samples, float],
 ) -> tuple[float, float]:
     """Sum of squares of single samples over their noise, and their number, blocks about a jump left out.
 
     The model's slope in a block comes from its neighbours; beside a jump from the one this side of it.
-    `spread`, `scatter` and `both` are the sums of `Scatter`.
+    `sums` are the fields of `WithinBlockSums`.
     """
+    count, spread, scatter, both, noise_std = sums
     last = len(model) - 1
     total, used = 0.0, 0.0
     for i in range(last + 1):

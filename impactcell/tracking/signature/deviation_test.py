@@ -76,29 +76,16 @@ def test_deviation(
     reference: Reference, slide: friction_profile.SplineInformation, grid_m: Samples
 ) -> DeviationTest:
     """Test one cycle against its material's reference."""
-    cycles = float(reference.variation.cycles)
+    cycles = reference.variation.cycles
     looked = deviation_shapes.deviation_shapes(float(grid_m[-1]), len(grid_m))
     rows, across, waves = looked.within(slide.reached_m, len(slide.vector))
-    t_squared, spe, freedom, scale, p_scan, centre, least, wider, P, u = _statistics(
-        reference.matrix,
-        reference.strength,
-        reference.mean,
-        reference.components,
-        reference.met,
-        reference.varied,
-        reference.weight,
-        cycles,
-        reference.spe_sum,
-        float(max(reference.spe_count, 1)),
-        slide.matrix,
-        slide.vector,
-        slide.seen,
-        rows,
-        across,
-        waves,
+    spe_usual = reference.spe_sum, float(max(reference.spe_count, 1))
+    statistics = _statistics(
+        reference.fields(reference.components, cycles), spe_usual, slide.fields, (rows, across, waves)
     )
+    t_squared, spe, freedom, scale, p_scan, centre, least, wider, P, u = statistics
     chi_squared = float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0
-    p_values = (_hotelling_p_value(t_squared, int(cycles)), chi_squared, *p_scan.tolist())
+    p_values = (_hotelling_p_value(t_squared, cycles), chi_squared, *p_scan.tolist())
     odds = [share / max(p, MIN_P_VALUE) for share, p in zip(FALSE_ALARM_SHARES, p_values, strict=True)]
     most = odds.index(max(odds))
     at = float(grid_m[centre]) if centre >= 0 else math.nan
@@ -111,72 +98,49 @@ def test_deviation(
 
 @compiled
 def _statistics(
-    pooled: Samples,
-    strength: float,
-    mean: Samples,
-    components: Samples,
-    met: Samples,
-    varied: Samples,
-    weight: float,
-    cycles: float,
-    spe_sum: float,
-    spe_count: float,
-    matrix: Samples,
-    vector: Samples,
-    seen: int,
-    rows: Samples,
-    across: int,
-    waves: int,
+    reference_fields: references.ReferenceFields,
+    spe_usual: tuple[float, float],
+    slide_fields: tuple[Samples, Samples, int],
+    shapes: tuple[Samples, int, int],
 ) -> tuple[float, float, int, float, Samples, int, float, float, Samples, Samples]:
-    """T^2, SPE, its freedom and the scale of the noise, what `scan.scan` finds, and what it was told."""
-    n = min(seen, references.judged_coefficients(met, varied, weight, cycles))
-    known, own = references.information_on_deviation(matrix, vector, mean, n, seen)
-    G, y = references.with_mean_error(known, own, pooled, strength)
-    C = small_linalg.block(components, 0, n, 0, MODES)
+    """T^2, SPE, its freedom and the scale of the noise, what `scan` finds, and what it was told.
+
+    `spe_usual` are the sum of SPE over its freedom and how many cycles it is of, `shapes` what
+    `DeviationShapes.within` gives.
+    """
+    reference = references.ReferenceArrays(*reference_fields)
+    cycle = friction_profile.SlideInformation(*slide_fields)
+    (spe_sum, spe_count), (rows, across, waves) = spe_usual, shapes
+    n = min(cycle.seen, references.judged_coefficients(reference))
+    information, deviation = references.information_on_deviation(cycle, reference.mean, n)
+    G, y = references.with_mean_error(information, deviation, reference.matrix, reference.strength)
+    C = small_linalg.block(reference.components, 0, n, 0, MODES)
     t_squared, spe, freedom = _t_squared_and_spe(G, y, C, COMPONENTS)
     # variation beyond the modes, or noise that was declared too low, widens everything once it is certain
     usual_spe = spe_sum / spe_count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * spe_count))
     scale = max(1.0, usual_spe)
     P, u = small_linalg.with_random_effects(C, G, y)
-    least = 30.0 / (MAX_RELATIVE_SIZE * references.mean_friction(mean, n)) ** 2
-    shown, wider = small_linalg.block(rows, 0, len(rows), 0, n), scale * (1.0 + 2.0 * MODES / cycles)
-    p_values, centre = matched_filter_scan.scan(shown, P, u, C, across, waves, least, wider, cycles)
+    least = 30.0 / (MAX_RELATIVE_SIZE * references.mean_friction(reference.mean, n)) ** 2
+    shown, wider = (
+        small_linalg.block(rows, 0, len(rows), 0, n),
+        scale * (1.0 + 2.0 * MODES / reference.cycles),
+    )
+    p_values, centre = matched_filter_scan.scan(
+        matched_filter_scan.LookedFor(shown, across, waves),
+        matched_filter_scan.Scores(P, u, C),
+        matched_filter_scan.Bounds(least, wider, reference.cycles),
+    )
     return t_squared, spe, freedom, scale, p_values, centre, least, wider, P, u
 
 
 @compiled
 def _t_squared_and_spe(G: Samples, y: Samples, C: Samples, leading: int) -> tuple[float, float, int]:
-    """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom.
-
-    Whitened by a Cholesky factor that takes the best known direction next and ends where nothing is known.
-    """
-    n, k = C.shape
+    """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom."""
+    n, modes = C.shape
     # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
-    left, rest = small_linalg.with_random_effects(small_linalg.block(C, 0, n, leading, k), G, y)
+    left, rest = small_linalg.with_random_effects(small_linalg.block(C, 0, n, leading, modes), G, y)
     image = small_linalg.transposed_product(left, small_linalg.block(C, 0, n, 0, leading))
-    whitened, inside, column = np.zeros(n), np.zeros((n, leading)), np.empty(n)
-    freedom, whole = 0, 0.0
-    for k in range(n):
-        best = 0
-        for i in range(n):
-            if left[i, i] > left[best, best]:
-                best = i
-        if left[best, best] < MIN_INFORMATION:
-            break
-        root = math.sqrt(left[best, best])
-        whitened[k] = rest[best] / root
-        for j in range(leading):
-            inside[k, j] = image[best, j] / root
-        for i in range(n):
-            column[i] = left[i, best] / root
-        for i in range(n):
-            rest[i] -= column[i] * whitened[k]
-            for j in range(n):
-                left[i, j] -= column[i] * column[j]
-            for j in range(leading):
-                image[i, j] -= column[i] * inside[k, j]
-        whole += whitened[k] ** 2
-        freedom += 1
+    whitened, inside, freedom, whole = _whiten(left, rest, image)
     gram = small_linalg.transposed_product(inside, inside)
     along, sizes = np.zeros(leading), np.empty(leading)
     for a in range(leading):
@@ -200,6 +164,51 @@ def _t_squared_and_spe(G: Samples, y: Samples, C: Samples, leading: int) -> tupl
         t_squared += along[a] * seen[a]
         left_over -= along[a] * noise[a]
     return t_squared, max(left_over, 0.0), freedom - leading
+
+
+@compiled
+def _whiten(left: Samples, rest: Samples, image: Samples) -> tuple[Samples, Samples, int, float]:
+    """Whiten by a Cholesky factor that takes the best known direction next and ends where nothing is known.
+
+    Parameters
+    ----------
+    left, rest, image : ndarray, shapes (n, n), (n,), (n, c)
+        Information, its vector, and its product with the components; used up.
+
+    Returns
+    -------
+    whitened, inside : ndarray, shapes (n,), (n, c)
+        The vector and the components.
+    freedom : int
+        Directions known.
+    whole : float
+        Sum of squares of `whitened`.
+    """
+    n, leading = image.shape
+    whitened, inside, column = np.zeros(n), np.zeros((n, leading)), np.empty(n)
+    freedom, whole = 0, 0.0
+    for k in range(n):
+        best = 0
+        for i in range(n):
+            if left[i, i] > left[best, best]:
+                best = i
+        if left[best, best] < MIN_INFORMATION:
+            break
+        root = math.sqrt(left[best, best])
+        whitened[k] = rest[best] / root
+        for j in range(leading):
+            inside[k, j] = image[best, j] / root
+        for i in range(n):
+            column[i] = left[i, best] / root
+        for i in range(n):
+            rest[i] -= column[i] * whitened[k]
+            for j in range(n):
+                left[i, j] -= column[i] * column[j]
+            for j in range(leading):
+                image[i, j] -= column[i] * inside[k, j]
+        whole += whitened[k] ** 2
+        freedom += 1
+    return whitened, inside, freedom, whole
 
 
 def _hotelling_p_value(t_squared: float, cycles: int) -> float:

@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,6 +51,19 @@ class SplineInformation:
     matrix: Samples
     vector: Samples
     reached_m: float
+    seen: int
+
+    @property
+    def fields(self) -> tuple[Samples, Samples, int]:
+        """What a `SlideInformation` is made of; compiled code is called with plain tuples in less time."""
+        return self.matrix, self.vector, self.seen
+
+
+class SlideInformation(NamedTuple):
+    """Matrix G and vector h of a cycle, and how many of their first rows are not zero; in compiled code."""
+
+    matrix: Samples
+    vector: Samples
     seen: int
 
 

@@ -18,6 +18,7 @@ from impactcell.records import Samples
 
 GAIN_TOLERANCE = 1e-12  # relative change of the gain a sample, held for as many samples as follow
 STEADY_SAMPLES = 50
+"""Samples for which the gain must not change before it is constant. Our choice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,18 +98,9 @@ def update(state: InCycleFilter, position_m: Samples) -> tuple[InCycleFilter, Sa
     """
     filtered = np.empty((len(position_m), 3))
     mean, covariance, gain = state.mean.copy(), state.covariance.copy(), state.gain.copy()
-    noise = process_noise(state.interval_s, state.density)
-    steady = _filter(
-        np.ascontiguousarray(position_m, dtype=np.float64),
-        state.interval_s,
-        state.position_std**2,
-        noise,
-        mean,
-        covariance,
-        gain,
-        state.steady,
-        filtered,
-    )
+    model = state.interval_s, state.position_std**2, process_noise(state.interval_s, state.density)
+    z = np.ascontiguousarray(position_m, dtype=np.float64)
+    steady = _filter(z, model, (mean, covariance, gain), state.steady, filtered)
     fresh = InCycleFilter(state.interval_s, state.position_std, state.density, mean, covariance, gain, steady)
     return fresh, filtered
 
@@ -116,15 +108,16 @@ def update(state: InCycleFilter, position_m: Samples) -> tuple[InCycleFilter, Sa
 @compiled
 def _filter(
     z: Samples,
-    T: float,
-    variance: float,
-    noise: Samples,
-    mean: Samples,
-    covariance: Samples,
-    gain: Samples,
+    model: tuple[float, float, Samples],
+    state: tuple[Samples, Samples, Samples],
     steady: int,
     out: Samples,
 ) -> int:
+    """Filter samples `z` into `out`, shape (n, 3), in place, and give the new `steady`.
+
+    `model` are T, sigma^2 and Q; `state` are mean, covariance and gain, which are written to.
+    """
+    (T, variance, noise), (mean, covariance, gain) = model, state
     n = len(z)
     x, v, a = mean[0], mean[1], mean[2]
     half = 0.5 * T * T

@@ -11,6 +11,7 @@ with L_1 half the length of the edge of M and L_2 its area, arc lengths being ar
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,32 +21,63 @@ from impactcell.records import Samples
 FAMILIES = ("level", "tilt", "bump", "ripple")
 
 
-@compiled
-def scan(
-    rows: Samples,
-    P: Samples,
-    u: Samples,
-    C: Samples,
-    across: int,
-    waves: int,
-    least: float,
-    scale: float,
-    cycles: float,
-) -> tuple[Samples, int]:
-    """Look for every family of shapes in one cycle.
+class LookedFor(NamedTuple):
+    """Shapes, (m, s), and places of bumps and waves among them, as `DeviationShapes.within` gives them."""
 
-    Parameters
+    rows: Samples
+    across: int
+    waves: int
+
+
+class Scores(NamedTuple):
+    """Information P, (s, s), and scores u, (s,), of the coefficients seen; components C, (s, k)."""
+
+    P: Samples
+    u: Samples
+    C: Samples
+
+
+class Bounds(NamedTuple):
+    """What a shape is held against.
+
+    Attributes
     ----------
-    rows : ndarray, shape (m, s)
-        Shapes, and places of bumps and waves among them, as `Shapes.within` gives them.
-    P, u, C : ndarray, shapes (s, s), (s,), (s, k)
-        Information, scores and components of the variation, of the coefficients that were seen.
     least : float
         Information on its size that a shape must have to be looked for.
     scale : float
         Variance of a score of a normal cycle.
     cycles : float
         From which the variation was learned.
+    """
+
+    least: float
+    scale: float
+    cycles: float
+
+
+class Projected(NamedTuple):
+    """The shapes s in rows, and what they make of P, C and u.
+
+    Attributes
+    ----------
+    rows, image : ndarray, shape (m, s)
+        s and P s.
+    along : ndarray, shape (m, k)
+        s' P C.
+    score, known : ndarray, shape (m,)
+        s' u and s' P s.
+    """
+
+    rows: Samples
+    image: Samples
+    along: Samples
+    score: Samples
+    known: Samples
+
+
+@compiled
+def scan(shapes: LookedFor, scores: Scores, bounds: Bounds) -> tuple[Samples, int]:
+    """Look for every family of shapes in one cycle.
 
     Returns
     -------
@@ -54,35 +86,32 @@ def scan(
     centre : int
         Grid point of the likeliest bump; -1 if none can be seen.
     """
-    image = rows @ P
-    along, score, known = image @ C, rows @ u, np.empty(len(rows))
+    rows = shapes.rows
+    image = rows @ scores.P
+    along, score, known = image @ scores.C, rows @ scores.u, np.empty(len(rows))
     for i in range(len(rows)):
         known[i] = _dot(rows[i], image[i])
     level, tilt = len(rows) - 2, len(rows) - 1
-    bumps = level - 2 * waves
+    projected = Projected(rows, image, along, score, known)
     p_values = np.empty(4)
-    p_values[0] = _single_p_value(
-        score[level], known[level], _dot(along[level], along[level]), least, scale, cycles
-    )
+    p_values[0] = _single_p_value(score[level], known[level], _dot(along[level], along[level]), bounds)
     # slope about the point where it does not depend on the level, so that the two are looked for apart
     turn = _dot(rows[tilt], image[level]) / known[level]
     about, left, varied = score[tilt] - turn * score[level], known[tilt] - turn**2 * known[level], 0.0
     for k in range(along.shape[1]):
         varied += (along[tilt, k] - turn * along[level, k]) ** 2
-    p_values[1] = _single_p_value(about, left, varied, least, scale, cycles)
-    p_values[2], row = _largest_bump(rows, image, along, score, known, bumps, across, least, scale, cycles)
-    p_values[3] = _largest_ripple(rows, image, along, score, bumps, level, least, scale, cycles)
-    return p_values, row % across if row >= 0 else -1
+    p_values[1] = _single_p_value(about, left, varied, bounds)
+    p_values[2], row = _largest_bump(projected, level - 2 * shapes.waves, shapes.across, bounds)
+    p_values[3] = _largest_ripple(projected, level - 2 * shapes.waves, level, bounds)
+    return p_values, row % shapes.across if row >= 0 else -1
 
 
 @compiled
-def _single_p_value(
-    score: float, known: float, varied: float, least: float, scale: float, cycles: float
-) -> float:
+def _single_p_value(score: float, known: float, varied: float, bounds: Bounds) -> float:
     """Find the p-value of a single shape, of either sign; 1 where it cannot be seen."""
-    if known < least:
+    if known < bounds.least:
         return 1.0
-    z = _normal_score(score**2 / (known * scale), varied / known, cycles)
+    z = _normal_score(score**2 / (known * bounds.scale), varied / known, bounds.cycles)
     return math.erfc(z / math.sqrt(2.0))
 
 
@@ -106,33 +135,23 @@ def _dot(a: Samples, b: Samples) -> float:
 
 
 @compiled
-def _largest_bump(
-    rows: Samples,
-    image: Samples,
-    along: Samples,
-    score: Samples,
-    known: Samples,
-    bumps: int,
-    centres: int,
-    least: float,
-    scale: float,
-    cycles: float,
-) -> tuple[float, int]:
+def _largest_bump(projected: Projected, bumps: int, centres: int, bounds: Bounds) -> tuple[float, int]:
     """Find p-value of the most telling bump, and row of the likeliest one.
 
     They are not the same: a score that owes much to what was learned of the variation may be large and not
     rare.
     """
+    along, score, known = projected.along, projected.score, projected.known
     best, c, most = -1, 0.0, 0.0
     for i in range(bumps):
-        if known[i] >= least:
-            share, squared = _dot(along[i], along[i]) / known[i], score[i] ** 2 / (known[i] * scale)
-            c = max(c, _normal_score(squared, share, cycles))
+        if known[i] >= bounds.least:
+            share, squared = _dot(along[i], along[i]) / known[i], score[i] ** 2 / (known[i] * bounds.scale)
+            c = max(c, _normal_score(squared, share, bounds.cycles))
             if best < 0 or squared > most:
                 best, most = i, squared
     if best < 0:
         return 1.0, -1
-    euler, edge, area = _euler_edge_area(rows, image, known, least, centres, bumps // centres)
+    euler, edge, area = _euler_edge_area(projected, bounds.least, centres, bumps // centres)
     high = math.exp(-0.5 * c * c)
     tail = euler * 0.5 * math.erfc(c / math.sqrt(2.0)) + edge * high / (2.0 * math.pi)
     tail += area * c * high / (2.0 * math.pi) ** 1.5
@@ -141,26 +160,11 @@ def _largest_bump(
 
 @compiled
 def _euler_edge_area(
-    rows: Samples, image: Samples, known: Samples, least: float, across: int, down: int
+    projected: Projected, least: float, across: int, down: int
 ) -> tuple[float, float, float]:
     """Euler characteristic, half the edge and area of the triangulated surface of visible shapes."""
-    euler, edge, area = 0.0, 0.0, 0.0
-    # of every edge: right, down, and diagonal from the right one to the lower one; and triangles beside it
-    length = np.full((3, across * down), np.nan)
-    beside = np.zeros((3, across * down))
-    for i in range(down):
-        for k in range(across):
-            a = i * across + k
-            euler += 1.0 if known[a] >= least else 0.0
-            for kind in range(3):
-                if (kind != 1 and k + 1 == across) or (kind != 0 and i + 1 == down):
-                    continue
-                p = a + 1 if kind == 2 else a
-                q = a + 1 if kind == 0 else a + across
-                if known[p] >= least and known[q] >= least:
-                    near = _dot(rows[p], image[q]) / math.sqrt(known[p] * known[q])
-                    length[kind, a] = math.acos(min(max(near, -1.0), 1.0))
-                    euler -= 1.0
+    euler, length = _vertices_and_edges(projected, least, across, down)
+    edge, area, beside = 0.0, 0.0, np.zeros((3, across * down))
     for i in range(down - 1):
         for k in range(across - 1):
             a = i * across + k
@@ -184,6 +188,30 @@ def _euler_edge_area(
 
 
 @compiled
+def _vertices_and_edges(projected: Projected, least: float, across: int, down: int) -> tuple[float, Samples]:
+    """Visible vertices less edges, and lengths of the edges, nan where one is not.
+
+    Edges of each vertex go right, down, and diagonally from the right one to the lower one.
+    """
+    rows, image, known = projected.rows, projected.image, projected.known
+    euler, length = 0.0, np.full((3, across * down), np.nan)
+    for i in range(down):
+        for k in range(across):
+            a = i * across + k
+            euler += 1.0 if known[a] >= least else 0.0
+            for kind in range(3):
+                if (kind != 1 and k + 1 == across) or (kind != 0 and i + 1 == down):
+                    continue
+                p = a + 1 if kind == 2 else a
+                q = a + 1 if kind == 0 else a + across
+                if known[p] >= least and known[q] >= least:
+                    near = _dot(rows[p], image[q]) / math.sqrt(known[p] * known[q])
+                    length[kind, a] = math.acos(min(max(near, -1.0), 1.0))
+                    euler -= 1.0
+    return euler, length
+
+
+@compiled
 def _triangle_area(a: float, b: float, c: float) -> float:
     """Area from the sides (Heron); nan if one is missing."""
     half = (a + b + c) / 2.0
@@ -192,34 +220,27 @@ def _triangle_area(a: float, b: float, c: float) -> float:
 
 
 @compiled
-def _largest_ripple(
-    rows: Samples,
-    image: Samples,
-    along: Samples,
-    score: Samples,
-    first: int,
-    end: int,
-    least: float,
-    scale: float,
-    cycles: float,
-) -> float:
+def _largest_ripple(projected: Projected, first: int, end: int, bounds: Bounds) -> float:
     """Find p-value of the most telling ripple.
 
     The phase goes round, so that the edge of the surface is two circles. Between neighbouring waves it is as
     wide as the root mean square of the two angles between their planes.
     """
+    rows, image, along, score = projected.rows, projected.image, projected.along, projected.score
     c, area, before = -1.0, 0.0, -1
     for i in range(first, end, 2):
         j = i + 1
         cc, ss, cs = _dot(rows[i], image[i]), _dot(rows[j], image[j]), _dot(rows[i], image[j])
-        if (cc + ss) / 2.0 - math.sqrt(((cc - ss) / 2.0) ** 2 + cs * cs) < least:
+        if (cc + ss) / 2.0 - math.sqrt(((cc - ss) / 2.0) ** 2 + cs * cs) < bounds.least:
             continue
         solid = cc * ss - cs * cs
         a, b = (ss * score[i] - cs * score[j]) / solid, (cc * score[j] - cs * score[i]) / solid
         squared, varied = score[i] * a + score[j] * b, 0.0
         for k in range(along.shape[1]):
             varied += (a * along[i, k] + b * along[j, k]) ** 2
-        c = max(c, _normal_score(max(squared, 0.0) / scale, varied / max(squared, 1e-300), cycles))
+        c = max(
+            c, _normal_score(max(squared, 0.0) / bounds.scale, varied / max(squared, 1e-300), bounds.cycles)
+        )
         if before == i - 2:
             area += 2.0 * math.pi * _angle_between_planes(rows, image, i - 2, i)
         before = i

@@ -9,6 +9,7 @@ least-squares one under a roughness penalty, slowly forgetting, so that wear doe
 """
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,6 +69,31 @@ class Reference:
     spe_sum: float = 0.0
     spe_count: int = 0
 
+    def fields(self, components: Samples, cycles: int) -> "ReferenceFields":
+        """Give what a `ReferenceArrays` is made of: compiled code takes plain tuples in less time."""
+        return (
+            self.weight, self.matrix, self.vector, self.mean, self.strength, components, self.met,
+            self.varied, float(cycles),
+        )  # fmt: skip
+
+
+class ReferenceArrays(NamedTuple):
+    """Fields of a `Reference` in compiled code, and the cycles from which its variation was learned."""
+
+    weight: float
+    matrix: Samples
+    vector: Samples
+    mean: Samples
+    strength: float
+    components: Samples
+    met: Samples
+    varied: Samples
+    cycles: float
+
+
+ReferenceFields = tuple[float, Samples, Samples, Samples, float, Samples, Samples, Samples, float]
+"""Fields of a `ReferenceArrays`."""
+
 
 def initial_state(coefficients: int) -> Reference:
     """Before the first cycle."""
@@ -92,12 +118,12 @@ def known_coefficients(met: Samples, weight: float) -> int:
 
 
 @compiled
-def judged_coefficients(met: Samples, varied: Samples, weight: float, cycles: float) -> int:
+def judged_coefficients(reference: ReferenceArrays) -> int:
     """Coefficients, from the first on, where cycles can be judged: mean and variation are known."""
     n = 0
-    for learned in varied:
-        n += 1 if learned >= min(cycles, MIN_VARIATION_CYCLES) else 0
-    return min(known_coefficients(met, weight), n)
+    for learned in reference.varied:
+        n += 1 if learned >= min(reference.cycles, MIN_VARIATION_CYCLES) else 0
+    return min(known_coefficients(reference.met, reference.weight), n)
 
 
 @compiled
@@ -111,13 +137,14 @@ def mean_friction(mean: Samples, n: int) -> float:
 
 @compiled
 def information_on_deviation(
-    matrix: Samples, vector: Samples, mean: Samples, n: int, seen: int
+    cycle: friction_profile.SlideInformation, mean: Samples, n: int
 ) -> tuple[Samples, Samples]:
-    """Leave of a cycle what it says of its first n coefficients, of `seen`: information, and h - G m.
+    """Leave of a cycle what it says of its first n coefficients: information, and h - G m.
 
     Friction beyond is no better known than that it goes on from where it was, in steps of
     `RELATIVE_CONTINUATION_STEP` of itself: a longer slide tells neither deviance nor how cycles vary.
     """
+    matrix, vector, seen = cycle
     own = np.empty(seen)
     for i in range(seen):
         own[i] = vector[i]
@@ -192,23 +219,9 @@ def update(
         known = pca_variation.initial_guess(float(np.median(first)))
         components = pca_variation.components(np.eye(MODES), pca_variation.cosines(total) * known.scale)
     cycles = known.cycles + 1 if varies else known.cycles
+    basis = known.scale, pca_variation.cosines(total)
     matrix, vector, mean, components, met, varied, sums = _update_arrays(
-        reference.matrix,
-        reference.vector,
-        reference.mean,
-        strength,
-        components,
-        reference.met,
-        reference.varied,
-        reference.weight,
-        (known.weights, known.moments, known.seen, known.noise),
-        cycles,
-        known.scale,
-        pca_variation.cosines(total),
-        slide.matrix,
-        slide.vector,
-        slide.seen,
-        varies,
+        reference.fields(components, cycles), known.sums, basis, slide.fields, varies
     )
     if reference.weight in SMOOTHING_WEIGHTS:
         pooled = friction_profile.SplineInformation(
@@ -233,46 +246,42 @@ def update(
 
 @compiled
 def _update_arrays(
-    pooled: Samples,
-    summed: Samples,
-    mean: Samples,
-    strength: float,
-    components: Samples,
-    met: Samples,
-    varied: Samples,
-    weight: float,
-    sums: pca_variation.Sums,
-    cycles: int,
-    scale: Samples,
-    cosines: Samples,
-    matrix: Samples,
-    vector: Samples,
-    seen: int,
+    reference_fields: ReferenceFields,
+    sums_fields: pca_variation.SumsFields,
+    basis: tuple[Samples, Samples],
+    slide_fields: tuple[Samples, Samples, int],
     varies: bool,  # noqa: FBT001  # compiled code takes its arguments by position
-) -> tuple[Samples, Samples, Samples, Samples, Samples, Samples, pca_variation.Sums]:
-    """All that a reference keeps with one cycle more, which says less of the mean the more cycles vary."""
-    met, varied, pooled, summed = met.copy(), varied.copy(), pooled.copy(), summed.copy()
+) -> tuple[Samples, Samples, Samples, Samples, Samples, Samples, pca_variation.SumsFields]:
+    """Take one cycle more into all that a reference keeps; it says less of the mean the more cycles vary.
+
+    `basis` are the first guesses of the modes' standard deviations, shape (6,), and the modes, shape (j, 6).
+    """
+    before, sums = ReferenceArrays(*reference_fields), pca_variation.Sums(*sums_fields)
+    cycle = friction_profile.SlideInformation(*slide_fields)
+    met, varied, seen = before.met.copy(), before.varied.copy(), cycle.seen
+    matrix, vector, components = before.matrix.copy(), before.vector.copy(), before.components
     if varies:
-        n, B = min(known_coefficients(met, weight), seen), cosines.copy()
+        scale, cosines = basis
+        n, B = min(known_coefficients(met, before.weight), seen), cosines.copy()
         for i in range(len(B)):
             for k in range(MODES):
                 B[i, k] *= scale[k]
-        known, own = information_on_deviation(matrix, vector, mean, n, seen)
-        sums = pca_variation.update_sums(B, known, own, weight, *sums)
-        components = pca_variation.components(pca_variation.covariance(*sums, cycles), B)
+        information, deviation = information_on_deviation(cycle, before.mean, n)
+        sums = pca_variation.update_sums(B, information, deviation, before.weight, sums)
+        components = pca_variation.components(pca_variation.covariance(sums, before.cycles), B)
         for i in range(min(n, seen - 1)):
             varied[i] += 1.0
-    kept = 1.0 - 1.0 / MEMORY if weight >= MEMORY else 1.0
+    kept = 1.0 - 1.0 / MEMORY if before.weight >= MEMORY else 1.0
     vary = small_linalg.block(components, 0, seen, 0, MODES)
-    left, rest = small_linalg.with_random_effects(
-        vary, small_linalg.block(matrix, 0, seen, 0, seen), vector[:seen]
-    )
+    of_cycle = small_linalg.block(cycle.matrix, 0, seen, 0, seen)
+    of_mean, score = small_linalg.with_random_effects(vary, of_cycle, cycle.vector[:seen])
     p = 0
-    for i in range(len(summed)):
+    for i in range(len(vector)):
         met[i] = met[i] * kept + (1.0 if i < seen - 1 else 0.0)
-        summed[i] = summed[i] * kept + (rest[i] if i < seen else 0.0)
+        vector[i] = vector[i] * kept + (score[i] if i < seen else 0.0)
         for j in range(i + 1):
-            pooled[p] = pooled[p] * kept + (left[i, j] if i < seen else 0.0)
+            matrix[p] = matrix[p] * kept + (of_mean[i, j] if i < seen else 0.0)
             p += 1
-    mean = small_linalg.solve(precision(pooled, strength), summed)
-    return pooled, summed, mean, components, met, varied, sums
+    mean = small_linalg.solve(precision(matrix, before.strength), vector)
+    kept_sums = sums.weights, sums.moments, sums.seen, sums.noise
+    return matrix, vector, mean, components, met, varied, kept_sums

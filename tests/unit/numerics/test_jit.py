@@ -34,6 +34,27 @@ def test_an_edited_callee_is_compiled_anew(tmp_path: Path) -> None:
     assert run(tmp_path) == ["3.0", "0"]
 
 
+NAMED = (
+    "from typing import NamedTuple\nfrom impactcell.numerics.jit import compiled\n\n"
+    "class {0}(NamedTuple):\n    x: float\n\n"
+    "@compiled\ndef outer(named):\n    return 2.0 * named.x\n\n"
+    "if __name__ == '__main__':\n    import caller\n"
+    "    print(caller.outer(caller.{0}(1.0)), sum(caller.outer.stats.cache_hits.values()))\n"
+)
+
+
+def test_a_class_that_was_renamed_since_is_compiled_anew(tmp_path: Path) -> None:
+    """The index on disk names the classes of the arguments, and reading it looks them up."""
+    (tmp_path / "caller.py").write_text(NAMED.format("Before"))
+    assert run(tmp_path) == ["2.0", "0"]
+    assert run(tmp_path) == ["2.0", "1"]
+    written = (tmp_path / "caller.py").stat()
+    (tmp_path / "caller.py").write_text(NAMED.format("Afterw"))
+    os.utime(tmp_path / "caller.py", ns=(written.st_atime_ns, written.st_mtime_ns))
+    assert run(tmp_path) == ["2.0", "0"]
+    assert run(tmp_path) == ["2.0", "1"]
+
+
 def test_without_a_place_for_a_cache_it_still_runs(tmp_path: Path) -> None:
     source = (
         "from impactcell.numerics.jit import _can_cache, compiled\n\n"

@@ -89,8 +89,10 @@ def test_the_widest_cubic_stops_where_the_record_bends_away() -> None:
     found, value, std = widest_cubic(
         times,
         np.where(times < 0.0225, top, 0.0) + rng.normal(0.0, 0.4, 4001),
-        0.4, 0.02, 1.0, 1.0, 2.5e-4, 4e-3, 1e-5,
-    )  # fmt: skip
+        0.4,
+        (0.02, 1.0, 1.0),
+        (2.5e-4, 4e-3, 1e-5),
+    )
     assert found
     assert abs(value - 300.0) < 5.0 * std
     assert 0.4 / math.sqrt(500) < std < 0.2

@@ -15,17 +15,21 @@ def information(level):
     return level * np.eye(COEFFICIENTS)
 
 
+def sums_of(variation):
+    return pca_variation.Sums(*variation.sums)
+
+
 def learned(true_sizes, cycles, seed):
     """First guess, and Lambda of cycles whose modes vary by `true_sizes` of it, far above their noise."""
     rng = np.random.default_rng(seed)
     first = pca_variation.initial_guess(0.2)
-    sums, basis = (first.weights, first.moments, first.seen, first.noise), first.scale * MODES
+    sums, basis = sums_of(first), first.scale * MODES
     G = information(1e8)
     for _ in range(cycles):
         deviation = basis @ (np.array(true_sizes) * rng.normal(size=pca_variation.MODES))
         vector = G @ deviation + 1e4 * rng.normal(size=COEFFICIENTS)
-        sums = pca_variation.update_sums(basis, G, vector, 1e12, *sums)
-    return first, pca_variation.covariance(*sums, cycles)
+        sums = pca_variation.update_sums(basis, G, vector, 1e12, sums)
+    return first, pca_variation.covariance(sums, cycles)
 
 
 def test_sizes_of_the_modes_are_found_without_bias():
@@ -43,10 +47,10 @@ def test_modes_that_do_not_vary_are_zero():
 
 def test_what_was_never_seen_keeps_the_first_guess():
     first = pca_variation.initial_guess(0.2)
-    sums = (first.weights, first.moments, first.seen, first.noise)
+    sums = sums_of(first)
     for _ in range(50):
-        sums = pca_variation.update_sums(MODES, information(0.0), np.zeros(COEFFICIENTS), 100.0, *sums)
-    assert pca_variation.covariance(*sums, 50) == pytest.approx(np.eye(pca_variation.MODES))
+        sums = pca_variation.update_sums(MODES, information(0.0), np.zeros(COEFFICIENTS), 100.0, sums)
+    assert pca_variation.covariance(sums, 50) == pytest.approx(np.eye(pca_variation.MODES))
 
 
 def test_precise_cycles_are_not_judged_by_what_noisy_ones_leave_unknown():
@@ -55,15 +59,15 @@ def test_precise_cycles_are_not_judged_by_what_noisy_ones_leave_unknown():
     unit = np.eye(pca_variation.MODES)
     for seed in range(20):
         rng, first = np.random.default_rng(seed), pca_variation.initial_guess(0.2)
-        sums = (first.weights, first.moments, first.seen, first.noise)
+        sums = sums_of(first)
 
         def drawn(noise, rng=rng):
             return level * rng.normal() * unit[0] + noise * rng.normal(size=pca_variation.MODES)
 
         for cycle in range(60):
             noise = precise if cycle % 2 else noisy
-            sums = pca_variation.update_sums(unit, unit / noise**2, drawn(noise) / noise**2, 1e12, *sums)
-        covariance = pca_variation.covariance(*sums, 60) + precise**2 * unit
+            sums = pca_variation.update_sums(unit, unit / noise**2, drawn(noise) / noise**2, 1e12, sums)
+        covariance = pca_variation.covariance(sums, 60) + precise**2 * unit
         scores = np.array([drawn(precise) for _ in range(400)])
         distances = np.einsum("ni,ij,nj->n", scores, np.linalg.inv(covariance), scores)
         odd.append(np.mean(distances > 22.46))  # one in a thousand of chi squared with six degrees of freedom
@@ -89,7 +93,9 @@ def test_tail_of_every_family_against_drawn_normal_scores():
     counts = dict.fromkeys(("level", "tilt", "bump", "ripple"), 0)
     for _ in range(n):
         p_values, _ = matched_filter_scan.scan(
-            rows, P, root @ rng.normal(size=20), C, across, waves, 3000.0, 1.0, 1e9
+            matched_filter_scan.LookedFor(rows, across, waves),
+            matched_filter_scan.Scores(P, root @ rng.normal(size=20), C),
+            matched_filter_scan.Bounds(3000.0, 1.0, 1e9),
         )
         for name, p_value in zip(matched_filter_scan.FAMILIES, p_values, strict=True):
             counts[name] += p_value < level
