@@ -22,11 +22,11 @@ def draw(directory: Path) -> list[Path]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
         files: list[Path] = []
-        topics = list(pkgutil.iter_modules(__path__))
-        with progress("drawing", len(topics)) as done:
+        topics = [module for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")]
+        with progress("drawing", len(topics)) as advance:
             for topic in topics:
                 files += importlib.import_module(f"{__name__}.{topic.name}").draw(directory)
-                done()
+                advance()
         return sorted(files)
     except OSError as error:
         raise SettingsError(

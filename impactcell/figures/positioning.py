@@ -11,42 +11,49 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from impactcell.figures.friction import COLOURS, GREY, STYLE
+from impactcell.figures._style import COLOURS, GREY, write_figures
 from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.positioning import Tap, TapPlanner
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MASSES_KG = (8.0, 16.0, 32.0)
+"""One panel each; an octave apart."""
 NOMINAL = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.2, mu_k=0.152)
+"""What the planner is told: the reference plant, without viscous friction."""
 STIFFNESS, DAMPING, MU_S, RATIO = 7.15e5, 418.5, 0.22, 0.76
+"""Of the cell: k in N/m and b in N s/m, 10 % above and below the nominal ones, mu_s, and mu_k / mu_s."""
 SCATTER = 0.03
+"""Relative standard deviation of each tap's friction, as a real surface scatters."""
 TOLERANCE_M = 10e-6
-TASKS = 25  # of each mass
+"""Of the paper's task."""
+TASKS = 25
+"""Of each mass."""
 LEARNING = 5
+"""First tasks of each mass, drawn apart."""
 MOST_TAPS = 60
-FLOOR_M = 0.3e-6  # below this a remainder is drawn here, for the logarithmic axis
+"""After so many a task is given up: it would have failed."""
+FLOOR_M = 0.3e-6
+"""Below this a remainder is drawn here, for the logarithmic axis."""
 SEED = 7
+"""Of the tasks and of the scatter."""
 
 
 def draw(directory: Path) -> list[Path]:
     """Write the figure as PNG and SVG."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
+    return write_figures(directory, [("positioning", (7.2, 2.9), remaining_distance)])
 
+
+def remaining_distance(figure: "Figure") -> None:
+    """Draw the remaining distance of every task, a panel for each mass."""
     courses = _courses()
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 2.9))
-        axes: list[Axes] = list(figure.subplots(1, len(MASSES_KG), sharey=True))
-        for axis, mass, colour in zip(axes, MASSES_KG, COLOURS, strict=True):
-            _panel(axis, courses[mass], mass, colour)
-        axes[0].set_ylabel("remaining distance / mm")
-        axes[0].legend(loc="lower left", fontsize=7)
-        files = [directory / f"positioning.{suffix}" for suffix in ("png", "svg")]
-        for file in files:
-            figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else {"Software": None})
-    return files
+    axes: list[Axes] = list(figure.subplots(1, len(MASSES_KG), sharey=True))
+    for axis, mass, colour in zip(axes, MASSES_KG, COLOURS, strict=True):
+        _panel(axis, courses[mass], mass, colour)
+    axes[0].set_ylabel("remaining distance / mm")
+    axes[0].legend(loc="lower left", fontsize=7)
 
 
 def _courses() -> dict[float, list[list[float]]]:

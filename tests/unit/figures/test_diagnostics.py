@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from impactcell.figures import diagnostics
-from impactcell.figures.friction import STYLE
+from impactcell.figures._style import STYLE
 
 
 @pytest.mark.parametrize("make", [diagnostics.over_batches, diagnostics.along_stroke])
