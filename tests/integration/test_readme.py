@@ -19,6 +19,7 @@ COPIED = (
     "pyproject.toml",
     "requirements.lock",
     "README.md",
+    "docs",
 )
 ELSEWHERE = {
     "make demo": "tried below with its own arguments; without an end it runs until Ctrl-C",
@@ -38,7 +39,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in COPIED:
         source = ROOT / name
         if source.is_dir():
-            ignored = shutil.ignore_patterns("node_modules")
+            ignored = shutil.ignore_patterns("node_modules", "_build", "_generated")
             shutil.copytree(source, directory / name, ignore=ignored)
         else:
             shutil.copy2(source, directory / name)  # make looks at the times
@@ -77,6 +78,17 @@ def test_the_commands_in_their_order(checkout: Path, tmp_path: Path) -> None:
     assert len(rows) > 10
     assert all(",uncertain," in row for row in rows)
     assert sum("the model misses" in row for row in rows) > 0.9 * len(rows)
+
+
+def test_the_notebook_lines_run(tmp_path: Path) -> None:
+    (code,) = re.findall(
+        r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL
+    )
+    names: dict[str, object] = {}
+    exec(code, names)
+    assert abs(names["friction"].mu_k.value - 0.16) < 1e-3
+    assert names["series"].used == 3
+    assert names["action"].velocity_m_s > 0.0
 
 
 def test_every_link_leads_somewhere() -> None:
