@@ -37,7 +37,7 @@ class NextCapture:
 def cycles_after(after: int, to: int) -> int:
     """Return how many steps lead from cycle `after` to cycle `to`, 0 standing for before the first.
 
-    >>> distance(4294967295, 2), distance(0, 3), distance(7, 7)
+    >>> cycles_after(4294967295, 2), cycles_after(0, 3), cycles_after(7, 7)
     (2, 3, 0)
     """
     return to if after == 0 or to == 0 else (to - after) % CYCLE_PERIOD
