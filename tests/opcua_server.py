@@ -10,10 +10,10 @@ from pathlib import Path
 from asyncua import Client, ua
 from asyncua.crypto import security_policies
 
-from impactcell.alarms import AlarmEvent, EventKind
+from impactcell.alarms import AlarmEvent, EventKind, Message
 from impactcell.alarms.lifecycle import transition
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
-from impactcell.records import Alarm, AlarmName, Evidence, Quality, Snapshot
+from impactcell.records import Alarm, Evidence, Quality, Snapshot
 from impactcell.scada import (
     Actor,
     AlarmPage,
@@ -77,13 +77,13 @@ class LifecycleActions:
     """`Actions` on alarms that are kept here, through the life cycle the service uses too."""
 
     def __init__(self) -> None:
-        self.alarms: dict[tuple[str, AlarmName], Alarm] = {}
+        self.alarms: dict[tuple[str, str], Alarm] = {}
         self.calls: list[tuple[object, ...]] = []
 
-    def of(self, cell: str, name: AlarmName) -> Alarm:
+    def of(self, cell: str, name: str) -> Alarm:
         return self.alarms.get((cell, name), Alarm(name))
 
-    def apply(self, cell: str, name: AlarmName, occurrence: AlarmEvent) -> Alarm:
+    def apply(self, cell: str, name: str, occurrence: AlarmEvent) -> Alarm:
         done = transition(self.of(cell, name), occurrence)
         if done.refusal is not None:
             raise RefusedError(done.refusal.value)
@@ -105,7 +105,7 @@ class LifecycleActions:
     async def act_on_condition(
         self,
         cell: str,
-        alarm: AlarmName,
+        alarm: str,
         event: EventKind,
         actor: Actor,
         *,
@@ -143,9 +143,7 @@ class Site:
         self.server.publish(cell, snapshot)
         return snapshot
 
-    def raise_alarm(
-        self, name: AlarmName = AlarmName.WEAR_LIMIT, cell: str = CELL, message: str = "worn"
-    ) -> Alarm:
+    def raise_alarm(self, name: str = "WearLimit", cell: str = CELL, message: str = "worn") -> Alarm:
         evidence = Evidence(
             statistic=0.95, threshold=0.9, change_cycle=7, size=0.01, size_std=0.002, false_alarm_cycles=1e5
         )
@@ -156,7 +154,7 @@ class Site:
                 EventKind.ACTIVATE,
                 self.cycle,
                 time.time_ns(),
-                message=message,
+                message=Message(message, message),
                 severity=700,
                 evidence=evidence,
             ),
@@ -164,7 +162,7 @@ class Site:
         self.server.alarm(cell, alarm)
         return alarm
 
-    def clear_alarm(self, name: AlarmName = AlarmName.WEAR_LIMIT, cell: str = CELL) -> Alarm:
+    def clear_alarm(self, name: str = "WearLimit", cell: str = CELL) -> Alarm:
         alarm = self.actions.apply(cell, name, AlarmEvent(EventKind.CLEAR, self.cycle, time.time_ns()))
         self.server.alarm(cell, alarm)
         return alarm

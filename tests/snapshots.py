@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
+from impactcell.alarms import NAMES
 from impactcell.records import (
     Alarm,
-    AlarmName,
     BatchState,
     Capture,
     Channel,
@@ -62,7 +62,7 @@ def make_snapshot(capture: Capture, mu_s: float = 0.2, alarms: tuple[Alarm, ...]
         batch=BatchState("A", 0.0, 0.001, 0.0, math.nan, 0, Quality.GOOD),
         signature=Signature(grid, np.full(30, 0.15), np.full(30, 1e-3), 2.0, 3.0, math.nan, Quality.GOOD),
         positioning=PositioningState(),
-        alarms=alarms or tuple(Alarm(name) for name in AlarmName),
+        alarms=alarms or tuple(Alarm(name) for name in NAMES),
         model_name="prototype",
         gap=1.0,
         gap_quality=Quality.GOOD,

@@ -1,9 +1,12 @@
-"""Alarms people trust: rules that raise them, and one life cycle as a transition table."""
+"""Alarms people trust: rules that raise them, one file each, and one life cycle as a transition table."""
 
 from impactcell.alarms.alarm_set import (
+    NAMES,
     AlarmSetState,
+    AlarmSettings,
     apply_event,
     apply_rule_result,
+    evaluate,
     expire_shelving,
     initial_state,
     update,
@@ -17,33 +20,40 @@ from impactcell.alarms.lifecycle import (
     is_retained,
     is_silenced,
 )
-from impactcell.alarms.rules import (
-    AlarmSettings,
+from impactcell.alarms.rule import (
+    AlarmRule,
+    ConditionClass,
+    CycleInputs,
+    Message,
+    RuleContext,
     RuleResult,
     RuleSettings,
-    batch_shift,
-    deviant_cycle,
-    wear_limit,
 )
+from impactcell.alarms.rules import RULES
 
 __all__ = [
+    "NAMES",
+    "RULES",
     "AlarmEvent",
+    "AlarmRule",
     "AlarmSetState",
     "AlarmSettings",
+    "ConditionClass",
+    "CycleInputs",
     "EventKind",
+    "Message",
     "Notification",
     "Refusal",
+    "RuleContext",
     "RuleResult",
     "RuleSettings",
     "Transition",
     "apply_event",
     "apply_rule_result",
-    "batch_shift",
-    "deviant_cycle",
+    "evaluate",
     "expire_shelving",
     "initial_state",
     "is_retained",
     "is_silenced",
     "update",
-    "wear_limit",
 ]

@@ -1,49 +1,88 @@
 """All alarms of one cell: results of the rules and events go in, transitions come out."""
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from impactcell.alarms.debounce import ZERO_COUNTS, DebounceCounters, debounce
 from impactcell.alarms.lifecycle import AlarmEvent, EventKind, Transition, expire, transition
-from impactcell.alarms.rules import (
-    ZERO_COUNTS,
-    AlarmSettings,
-    DebounceCounters,
-    RuleResult,
-    alarm_event,
-    debounce,
-)
-from impactcell.records import Alarm, AlarmName, Shelving
+from impactcell.alarms.rule import CycleInputs, RuleContext, RuleResult, RuleSettings
+from impactcell.alarms.rules import RULES
+from impactcell.records import Alarm, Evidence, Shelving
 from impactcell.serialization import stored
 
 T = TypeVar("T")
-_INDEX = {name: index for index, name in enumerate(AlarmName)}
+SECONDS_A_DAY = 86_400.0
+"""Seconds."""
+NAMES = tuple(RULES)
+"""Published names of all conditions, in the order in which they are listed."""
+_INDEX = {name: index for index, name in enumerate(NAMES)}
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmSettings:
+    """What a cell chooses of its conditions.
+
+    Attributes
+    ----------
+    rules : mapping
+        Settings of conditions by name; one that is missing has its rule's defaults.
+    announced_cycles : int
+        For how many cycles an announced batch change keeps the rules silent that it suppresses.
+    """
+
+    rules: Mapping[str, RuleSettings] = field(default_factory=dict)
+    announced_cycles: int = 50
+
+    def rule(self, name: str) -> RuleSettings:
+        """Return the settings of one condition."""
+        return self.rules.get(name, RULES[name].settings)
 
 
 @dataclass(frozen=True, slots=True)
 class AlarmSetState:
-    """Alarms of a cell with their delays, in the order of `AlarmName`.
+    """Alarms of a cell with their delays, in the order of `NAMES`.
 
     Attributes
     ----------
     announced : int
-        Cycles for which BatchShift stays suppressed.
+        Cycles for which conditions stay suppressed after an announced batch change.
     """
 
-    alarms: tuple[Alarm, ...] = field(metadata=stored(by=AlarmName))
-    delays: tuple[DebounceCounters, ...] = field(metadata=stored(by=AlarmName))
+    alarms: tuple[Alarm, ...] = field(metadata=stored(by=NAMES))
+    delays: tuple[DebounceCounters, ...] = field(metadata=stored(by=NAMES))
     announced: int = 0
 
-    def alarm(self, name: AlarmName) -> Alarm:
+    def alarm(self, name: str) -> Alarm:
         """One alarm by its name."""
         return self.alarms[_INDEX[name]]
 
 
 def initial_state(settings: AlarmSettings) -> AlarmSetState:
     """All conditions normal."""
-    rules = [(name, settings.rule(name)) for name in AlarmName]
+    rules = [(name, settings.rule(name)) for name in NAMES]
     alarms = tuple(Alarm(name, enabled=rule.enabled, severity=rule.severity) for name, rule in rules)
     return AlarmSetState(alarms, tuple(ZERO_COUNTS for _ in alarms))
+
+
+def evaluate(settings: AlarmSettings, state: AlarmSetState, inputs: CycleInputs) -> list[RuleResult]:
+    """Ask every rule that looks at cycles; each result says how rarely the rule was designed to be wrong."""
+    results = [
+        rule.evaluate(inputs, RuleContext(settings.rule(name), state.alarm(name).active))
+        for name, rule in RULES.items()
+        if rule.evaluate is not None
+    ]
+    if math.isnan(inputs.false_alarm_cycles):
+        return results
+    return [replace(result, evidence=_rated(result.evidence, inputs)) for result in results]
+
+
+def _rated(evidence: Evidence, inputs: CycleInputs) -> Evidence:
+    cycles = inputs.false_alarm_cycles
+    return replace(
+        evidence, false_alarm_cycles=cycles, false_alarm_days=cycles * inputs.period_s / SECONDS_A_DAY
+    )
 
 
 def update(
@@ -55,7 +94,7 @@ def update(
     *,
     announced: bool = False,
 ) -> tuple[AlarmSetState, tuple[Transition, ...]]:
-    """Move all alarms by what the rules found in one cycle, and by its time.
+    """Move all alarms by what the rules say of one cycle, and by its time.
 
     Parameters
     ----------
@@ -68,21 +107,31 @@ def update(
     transitions : tuple of Transition
         Those that have notifications.
     """
-    state, changes = expire_shelving(state, cycle, time_ns)
-    remaining = settings.announced_cycles if announced else max(state.announced - 1, 0)
-    if announced or (state.announced and not remaining):
-        kind = EventKind.SUPPRESS if announced else EventKind.UNSUPPRESS
-        state, change = apply_event(state, AlarmName.BATCH_SHIFT, AlarmEvent(kind, cycle, time_ns))
-        changes = (*changes, *([change] if change.notifications else []))
-    if remaining != state.announced:
-        state = replace(state, announced=remaining)
+    state, transitions = expire_shelving(state, cycle, time_ns)
+    state, suppressions = _suppress(settings, state, cycle, time_ns, announced=announced)
+    transitions = (*transitions, *suppressions)
     for result in results:
         index = _INDEX[result.name]
         # nearly always there is nothing to do
         if result.holds or state.alarms[index].active or state.delays[index] is not ZERO_COUNTS:
             state, change = apply_rule_result(settings, state, result, cycle, time_ns)
-            changes = (*changes, *([change] if change.notifications else []))
-    return state, changes
+            transitions = (*transitions, *([change] if change.notifications else []))
+    return state, transitions
+
+
+def _suppress(
+    settings: AlarmSettings, state: AlarmSetState, cycle: int, time_ns: int, *, announced: bool
+) -> tuple[AlarmSetState, tuple[Transition, ...]]:
+    """Suppress rules for a while after an announced batch change, and end it."""
+    remaining = settings.announced_cycles if announced else max(state.announced - 1, 0)
+    transitions: tuple[Transition, ...] = ()
+    if announced or (state.announced and not remaining):
+        event = AlarmEvent(EventKind.SUPPRESS if announced else EventKind.UNSUPPRESS, cycle, time_ns)
+        for name, rule in RULES.items():
+            if rule.suppressed_by_announcement:
+                state, change = apply_event(state, name, event)
+                transitions = (*transitions, *([change] if change.notifications else []))
+    return (replace(state, announced=remaining) if remaining != state.announced else state), transitions
 
 
 def apply_rule_result(
@@ -91,18 +140,27 @@ def apply_rule_result(
     """Move one alarm by one result: of a cycle, or of what happens beside the cycles."""
     index = _INDEX[result.name]
     alarm, rule = state.alarms[index], settings.rule(result.name)
-    delay, kind = debounce(rule, alarm, state.delays[index], result)
-    if delay is not state.delays[index]:
-        state = AlarmSetState(state.alarms, _with(state.delays, index, delay), state.announced)
+    counters, kind = debounce(rule, alarm, state.delays[index], result)
+    if counters is not state.delays[index]:
+        state = AlarmSetState(state.alarms, _with(state.delays, index, counters), state.announced)
     if kind is None:
         if alarm.active and result.holds and result.evidence != alarm.evidence:
-            renewed = replace(alarm, message=result.message or alarm.message, evidence=result.evidence)
+            message = result.message
+            renewed = replace(
+                alarm,
+                message=message.english or alarm.message,
+                message_de=message.german or alarm.message_de,
+                evidence=result.evidence,
+            )
             state = replace(state, alarms=_with(state.alarms, index, renewed))
         return state, Transition(state.alarms[index])
-    return apply_event(state, result.name, alarm_event(kind, result, rule.severity, cycle, time_ns))
+    event = AlarmEvent(kind, cycle, time_ns)
+    if result.holds:
+        event = replace(event, message=result.message, severity=rule.severity, evidence=result.evidence)
+    return apply_event(state, result.name, event)
 
 
-def apply_event(state: AlarmSetState, name: AlarmName, event: AlarmEvent) -> tuple[AlarmSetState, Transition]:
+def apply_event(state: AlarmSetState, name: str, event: AlarmEvent) -> tuple[AlarmSetState, Transition]:
     """Move one alarm by an event: a person's action, or the outside's suppression."""
     index = _INDEX[name]
     change = transition(state.alarms[index], event)

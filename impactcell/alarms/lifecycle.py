@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from impactcell.alarms.rule import Message
 from impactcell.records import Alarm, Evidence, Shelving
 
 
@@ -187,7 +188,7 @@ class AlarmEvent:
     time_ns: int = 0
     user: str = ""
     comment: str = ""
-    message: str | None = None
+    message: Message | None = None
     severity: int | None = None
     evidence: Evidence | None = None
     shelve_ns: int = 0
@@ -279,7 +280,8 @@ def _described(alarm: Alarm, event: AlarmEvent) -> Alarm:
         alarm,
         cycle=event.cycle,
         time_ns=event.time_ns,
-        message=alarm.message if event.message is None else event.message,
+        message=alarm.message if event.message is None else event.message.english,
+        message_de=alarm.message_de if event.message is None else event.message.german,
         severity=alarm.severity if event.severity is None else event.severity,
         evidence=alarm.evidence if event.evidence is None else event.evidence,
         comment=event.comment or alarm.comment,

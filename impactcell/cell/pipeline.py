@@ -16,7 +16,14 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from impactcell import alarms
-from impactcell.alarms import AlarmEvent, AlarmSetState, AlarmSettings, RuleResult, Transition
+from impactcell.alarms import (
+    AlarmEvent,
+    AlarmSetState,
+    AlarmSettings,
+    CycleInputs,
+    RuleResult,
+    Transition,
+)
 from impactcell.cell.preprocessing import (
     BatchNaming,
     CaptureDefaults,
@@ -31,10 +38,8 @@ from impactcell.physics import Plant, TapInput, free_motion
 from impactcell.prediction import Model, estimate_from_features
 from impactcell.records import (
     Alarm,
-    AlarmName,
     BatchAnnouncement,
     Capture,
-    Evidence,
     FrictionEstimate,
     PositioningState,
     Quality,
@@ -152,9 +157,27 @@ def step(
     )
     signed = _sign(design, state, features, tracked, period_s)
     gapped = gap_cusum.update(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
-    results = _findings(design, state, capture, tracked, signed, gapped, period_s)
-    alarm_state, moved = alarms.update(
-        design.alarms, state.alarms, results, capture.cycle, capture.time_ns, announced=tracked.expected
+    inputs = CycleInputs(
+        cycle=capture.cycle,
+        wear=tracked.wear,
+        batch=tracked.batch,
+        friction=friction,
+        signature=signed.signature,
+        shift=tracked.shift,
+        deviation=signed.deviation,
+        judged=signed.judged,
+        gap=gapped.evidence,
+        gap_exceeds=gapped.exceeds,
+        false_alarm_cycles=design.false_alarm_cycles,
+        period_s=period_s or math.nan,
+    )
+    alarm_state, transitions = alarms.update(
+        design.alarms,
+        state.alarms,
+        alarms.evaluate(design.alarms, state.alarms, inputs),
+        capture.cycle,
+        capture.time_ns,
+        announced=tracked.expected,
     )
     after = replace(
         state,
@@ -182,7 +205,7 @@ def step(
         gap=friction.gap,
         gap_quality=_gap_quality(friction, gapped),
     )
-    return StepResult(after, snapshot, tuple(t.alarm for t in moved), _notes(friction, tracked))
+    return StepResult(after, snapshot, tuple(t.alarm for t in transitions), _notes(friction, tracked))
 
 
 def apply_rule_result(
@@ -195,14 +218,14 @@ def apply_rule_result(
 
 def expire_shelving(state: CellState, time_ns: int) -> tuple[CellState, tuple[Alarm, ...]]:
     """End every shelving whose time is over, also while no cycles come."""
-    passed, moved = alarms.expire_shelving(state.alarms, state.cycle, time_ns)
-    return replace(state, alarms=passed), tuple(transition.alarm for transition in moved)
+    alarm_state, transitions = alarms.expire_shelving(state.alarms, state.cycle, time_ns)
+    return replace(state, alarms=alarm_state), tuple(transition.alarm for transition in transitions)
 
 
-def apply_event(state: CellState, name: AlarmName, event: AlarmEvent) -> tuple[CellState, Transition]:
+def apply_event(state: CellState, name: str, event: AlarmEvent) -> tuple[CellState, Transition]:
     """Apply a person's action on a condition; a refused one leaves the state as it was."""
-    acted, done = alarms.apply_event(state.alarms, name, replace(event, cycle=state.cycle))
-    return replace(state, alarms=acted), done
+    alarm_state, transition = alarms.apply_event(state.alarms, name, replace(event, cycle=state.cycle))
+    return replace(state, alarms=alarm_state), transition
 
 
 def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState:
@@ -249,40 +272,6 @@ def _known(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | Non
         return None
     tap = TapInput(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
     return partial(free_motion.acceleration, replace(plant, effects=others), tap)
-
-
-def _findings(
-    design: CellDesign,
-    state: CellState,
-    capture: Capture,
-    tracked: TrackingResult,
-    signed: SignatureResult,
-    gapped: gap_cusum.GapResult,
-    period_s: float,
-) -> list[RuleResult]:
-    wear_active = state.alarms.alarm(AlarmName.WEAR_LIMIT).active
-    found = [
-        alarms.wear_limit(design.alarms, tracked.wear, capture.cycle, active=wear_active),
-        alarms.batch_shift(tracked.shift),
-        alarms.deviant_cycle(signed.deviation, signed.signature.deviates_at_m, judged=signed.judged),
-        RuleResult(AlarmName.MODEL_GAP, gapped.exceeds, _gap_message(gapped), gapped.evidence),
-    ]
-    return [replace(one, evidence=_rated(design, one.evidence, period_s)) for one in found]
-
-
-def _rated(design: CellDesign, evidence: Evidence, period_s: float) -> Evidence:
-    """Add how rarely the rule was designed to be wrong, in cycles and in days at the present rate."""
-    cycles = design.false_alarm_cycles
-    return replace(
-        evidence,
-        false_alarm_cycles=cycles,
-        false_alarm_days=cycles * period_s / 86_400 if period_s else math.nan,
-    )
-
-
-def _gap_message(gapped: gap_cusum.GapResult) -> str:
-    evidence = gapped.evidence
-    return f"residual {evidence.size:+.2f} above its usual level since cycle {evidence.change_cycle}"
 
 
 def _gap_quality(friction: FrictionEstimate, gapped: gap_cusum.GapResult) -> Quality:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell import alarms
-from impactcell.alarms import AlarmSettings, Notification
+from impactcell.alarms import AlarmSettings, CycleInputs, Notification
+from impactcell.alarms.rules import batch_shift
 from impactcell.errors import SeriesError
-from impactcell.records import AlarmName, BatchState, Evidence, Samples, WearState
+from impactcell.records import BatchState, Evidence, Samples, WearState
 from impactcell.tracking import wear_batch
 from impactcell.tracking.wear_batch import (
     FrictionObservation,
@@ -25,7 +26,8 @@ class RaisedAlarm:
 
     Attributes
     ----------
-    alarm : AlarmName
+    alarm : str
+        Name of its condition.
     cycle : int
         At which it was raised.
     evidence : Evidence
@@ -33,7 +35,7 @@ class RaisedAlarm:
         cycles after it came to see it.
     """
 
-    alarm: AlarmName
+    alarm: str
     cycle: int
     evidence: Evidence
 
@@ -91,11 +93,8 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
         used += result.used
         notes.extend((observation.cycle, note) for note in result.notes)
         course.append((observation.cycle, result.wear.level, result.wear.level_std, result.batch.offset))
-        active = alarm_set.alarm(AlarmName.WEAR_LIMIT).active
-        rule_results = [
-            alarms.wear_limit(rules, result.wear, observation.cycle, active=active),
-            alarms.batch_shift(result.shift),
-        ]
+        inputs = CycleInputs(observation.cycle, result.wear, result.batch, shift=result.shift)
+        rule_results = alarms.evaluate(rules, alarm_set, inputs)
         alarm_set, transitions = alarms.update(
             rules,
             alarm_set,
@@ -107,13 +106,12 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
         raised.extend(
             RaisedAlarm(event.alarm.name, observation.cycle, event.alarm.evidence)
             for event in transitions
-            if Notification.ANNUNCIATE in event.notifications
-            and event.alarm.name is not AlarmName.BATCH_SHIFT
+            if Notification.ANNUNCIATE in event.notifications and event.alarm.name != batch_shift.NAME
         )
         if result.shift is not None:
             # a second shift while the first still stands is news too
             open_shift = len(raised)
-            raised.append(RaisedAlarm(AlarmName.BATCH_SHIFT, observation.cycle, result.shift))
+            raised.append(RaisedAlarm(batch_shift.NAME, observation.cycle, result.shift))
         elif open_shift >= 0:
             raised[open_shift] = _refined(raised[open_shift], result.batch)
     if result is None:

@@ -132,7 +132,7 @@ def _as_json(series: TrackedSeries) -> dict[str, object]:
         "cycles_to_limit_high": _finite(wear.cycles_to_limit_high),
         "alarms": [
             {
-                "alarm": r.alarm.value,
+                "alarm": r.alarm,
                 "cycle": r.cycle,
                 "change_cycle": r.evidence.change_cycle,
                 "size": r.evidence.size,
@@ -171,8 +171,7 @@ def _as_text(series: TrackedSeries) -> str:
     for r in series.alarms:
         e = r.evidence
         lines.append(
-            f"{r.alarm.value} at cycle {r.cycle}: "
-            f"changed at {e.change_cycle}, {e.size:+.5f} ± {e.size_std:.5f}"
+            f"{r.alarm} at cycle {r.cycle}: changed at {e.change_cycle}, {e.size:+.5f} ± {e.size_std:.5f}"
         )
     lines.extend(f"cycle {cycle}: {note}" for cycle, note in series.notes)
     return "\n".join(lines)

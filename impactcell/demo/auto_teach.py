@@ -7,7 +7,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from impactcell.records import AlarmName, Snapshot
+from impactcell.alarms.rules import model_gap
+from impactcell.records import Snapshot
 from impactcell.settings import CellConfig
 
 SHOTS = 60
@@ -38,7 +39,7 @@ class AutoTeach:
 
     def take(self, snapshot: Snapshot) -> None:
         """Look at a cycle."""
-        gap = next(alarm for alarm in snapshot.alarms if alarm.name is AlarmName.MODEL_GAP)
+        gap = next(alarm for alarm in snapshot.alarms if alarm.name == model_gap.NAME)
         if self._accepted:
             if not gap.active:
                 self._say("the gap alarm has cleared: the extended model explains the captures")

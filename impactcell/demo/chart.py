@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
-from impactcell.records import AlarmName, Quality, Snapshot
+from impactcell.alarms.rules import deviant_cycle
+from impactcell.records import Quality, Snapshot
 
 QUALITY_STYLE = {Quality.GOOD: "green", Quality.UNCERTAIN: "yellow", Quality.BAD: "red"}
 
@@ -64,7 +65,7 @@ def _mark(snapshot: Snapshot, row: int, scale: "_Scale", band: tuple[float, floa
     mu_s = snapshot.friction.mu_s
     if math.isfinite(mu_s.value) and scale.row(mu_s.value) == row:
         odd = any(
-            alarm.active and alarm.name is AlarmName.DEVIANT_CYCLE and alarm.cycle == snapshot.cycle
+            alarm.active and alarm.name == deviant_cycle.NAME and alarm.cycle == snapshot.cycle
             for alarm in snapshot.alarms
         )
         return ("✗", "bold red") if odd else ("•", QUALITY_STYLE[mu_s.quality])

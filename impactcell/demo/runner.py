@@ -111,7 +111,7 @@ class _DemoRun:
         self.missed = self._status.missed
         before = {alarm.name: alarm.active for alarm in self.snapshots[-1].alarms} if self.snapshots else {}
         self.raised += [
-            {"alarm": alarm.name.value, "cycle": snapshot.cycle, "message": alarm.message}
+            {"alarm": alarm.name, "cycle": snapshot.cycle, "message": alarm.message}
             for alarm in snapshot.alarms
             if alarm.active and not before.get(alarm.name, False)
         ]
@@ -228,7 +228,7 @@ def _rendered(scene: Scene) -> RenderableType:
 
 def _print_line(_: _DemoRun, snapshot: Snapshot) -> None:
     mu_s = snapshot.friction.mu_s
-    active = ", ".join(alarm.name.value for alarm in snapshot.alarms if alarm.active)
+    active = ", ".join(alarm.name for alarm in snapshot.alarms if alarm.active)
     print(  # noqa: T201 - the view of a demo without a terminal
         f"cycle {snapshot.cycle}: mu_s {mu_s.value:.4f} ± {mu_s.std:.4f}, batch {snapshot.batch.batch_id}"
         f"{', ' + active if active else ''}",

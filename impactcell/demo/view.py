@@ -165,7 +165,7 @@ def _alarms(alarms: Sequence[Alarm], *, wide: bool) -> RenderableType:
     rows = []
     for alarm in visible:
         state = ("active" if alarm.active else "cleared") + ("" if alarm.acknowledged else ", unacknowledged")
-        name = Text(alarm.name.value, style="bold red" if alarm.active else "yellow")
+        name = Text(alarm.name, style="bold red" if alarm.active else "yellow")
         rows.append((name, state, str(alarm.cycle), alarm.message))
     if not wide:
         return Group(

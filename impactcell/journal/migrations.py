@@ -69,12 +69,14 @@ def _numbers(tree: Tree) -> Tree:
     return float.fromhex(tree)
 
 
-def _under(place: str, rows: Mapping[str, str]) -> dict[str, str]:
+def _under(place: str, rows: Mapping[str, Tree]) -> dict[str, Tree]:
     return {f"{place}.{row}": key for row, key in rows.items()}
 
 
 _ALARM_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.records.Alarm`, as "evidence.size": "magnitude"; they hold for the state too."""
+_ALARM_2_ADDED: Final[Mapping[str, Tree]] = {"message_de": ""}
+"""The German message; like those above, they hold for the state too."""
 _STATE_2_RENAMED: Final[Mapping[str, str]] = {
     "state": "cell",
     "belief": "planner",
@@ -84,6 +86,12 @@ _STATE_2_RENAMED: Final[Mapping[str, str]] = {
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
 
-STATE_MIGRATIONS: Final = (Migration(_state_2, renamed=_STATE_2_RENAMED),)
-ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED),)
+STATE_MIGRATIONS: Final = (
+    Migration(
+        _state_2,
+        renamed=_STATE_2_RENAMED,
+        added=_under("state.alarms.alarms.*", _ALARM_2_ADDED),
+    ),
+)
+ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

@@ -12,7 +12,7 @@ from impactcell.cell import CellState
 from impactcell.journal.migrations import ALARM_MIGRATIONS, ALARM_NAMES_1, MODEL_MIGRATIONS, STATE_MIGRATIONS
 from impactcell.positioning import PlannerPosterior
 from impactcell.prediction import Model
-from impactcell.records import Alarm, AlarmName, Snapshot
+from impactcell.records import Alarm, Snapshot
 from impactcell.serialization import Versioned
 from impactcell.serialization.json_text import load_tree
 from impactcell.serialization.tree import Unknown
@@ -36,7 +36,7 @@ class StoredState:
 STATE: Final = Versioned("the state", StoredState, STATE_MIGRATIONS)
 ALARM: Final = Versioned("an alarm", Alarm, ALARM_MIGRATIONS)
 MODEL: Final = Versioned("the model", Model, MODEL_MIGRATIONS)
-_KNOWN_ALARMS: Final = {*ALARM_NAMES_1, *(name.value for name in AlarmName)}
+_KNOWN_ALARMS: Final = {*ALARM_NAMES_1, *alarms.NAMES}
 
 
 def load_alarm(record: str) -> Alarm | None:

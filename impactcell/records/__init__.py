@@ -4,7 +4,7 @@ A `Capture` comes in; `FrictionEstimate`, `WearState`, `BatchState`, `Signature`
 from it; a `Snapshot` holds them together for one cycle and is what is published and journalled.
 """
 
-from impactcell.records.alarm import Alarm, AlarmName, Evidence, Shelving
+from impactcell.records.alarm import Alarm, Evidence, Shelving
 from impactcell.records.capture import Capture, Channel, Samples, Summary, uniform_times
 from impactcell.records.friction import (
     BatchState,
@@ -20,7 +20,6 @@ from impactcell.records.snapshot import PositioningState, Snapshot
 
 __all__ = [
     "Alarm",
-    "AlarmName",
     "BatchAnnouncement",
     "BatchState",
     "Capture",

@@ -4,18 +4,6 @@ import enum
 from dataclasses import dataclass, field
 
 
-class AlarmName(enum.Enum):
-    """The conditions of a cell, by their OPC UA browse names."""
-
-    WEAR_LIMIT = "WearLimit"
-    BATCH_SHIFT = "BatchShift"
-    DEVIANT_CYCLE = "DeviantCycle"
-    MODULE_CONNECTION = "ModuleConnection"
-    MODEL_GAP = "ModelGap"
-    POSITIONING_FAULT = "PositioningFault"
-    JOURNAL_FAULT = "JournalFault"
-
-
 class Shelving(enum.Enum):
     """Shelved states of OPC UA Part 9, ShelvedStateMachineType."""
 
@@ -55,15 +43,19 @@ class Alarm:
 
     Attributes
     ----------
+    name : str
+        Browse name of the condition, as its rule in `impactcell.alarms.rules` declares it.
     severity : int
         1-1000, as in OPC UA.
+    message, message_de : str
+        Of the last activation, for a shift worker: English and German; empty before the first.
     cycle, time_ns : int
         Cycle and time of the last transition.
     comment, user : str
         Of the last action by a person.
     """
 
-    name: AlarmName
+    name: str
     enabled: bool = True
     active: bool = False
     acknowledged: bool = True
@@ -74,6 +66,7 @@ class Alarm:
     out_of_service: bool = False
     severity: int = 500
     message: str = ""
+    message_de: str = ""
     cycle: int = 0
     time_ns: int = 0
     evidence: Evidence = field(default_factory=Evidence)

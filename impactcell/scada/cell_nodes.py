@@ -7,6 +7,7 @@ from typing import Final
 
 from asyncua import ua
 
+from impactcell.alarms import RULES
 from impactcell.errors import SettingsError
 from impactcell.opcua.asyncua_adapter import AddressSpace, StandardServer, address_space, compute_attribute
 from impactcell.opcua.type_instances import (
@@ -18,7 +19,6 @@ from impactcell.opcua.type_instances import (
     targets,
 )
 from impactcell.quantities import CYCLE, HISTORY
-from impactcell.records import AlarmName
 from impactcell.scada.interface import CellDescription, Machine
 from impactcell.scada.standard_descriptions import DESCRIPTIONS
 
@@ -106,8 +106,8 @@ class CellSpace:
         link(self._space, parent, ua.NodeId(ua.ObjectIds.HasNotifier), self.node)
         machines = ua.NodeId(1001, uris.index(MACHINERY_URI))
         link(self._space, machines, ua.NodeId(ua.ObjectIds.Organizes), self.node)
-        for alarm in AlarmName:
-            link(self._space, self.node, ua.NodeId(ua.ObjectIds.HasCondition), self.path(alarm.value))
+        for alarm in RULES:
+            link(self._space, self.node, ua.NodeId(ua.ObjectIds.HasCondition), self.path(alarm))
         self._identify(description.machine)
         self._set_ranges()
         self._set_history()
@@ -120,9 +120,9 @@ class CellSpace:
         """Let a variable be computed whenever it is read."""
         compute_attribute(self._space, self.path(path), ua.AttributeIds.Value, value)
 
-    def alarm_type(self, alarm: AlarmName) -> ua.NodeId:
+    def alarm_type(self, alarm: str) -> ua.NodeId:
         """Event type of a condition."""
-        return targets(self._space[self.path(alarm.value)], HAS_TYPE_DEFINITION)[0]
+        return targets(self._space[self.path(alarm)], HAS_TYPE_DEFINITION)[0]
 
     def _named(self, parent: ua.NodeId, name: str, reference_type: int) -> ua.NodeId:
         browse_name = ua.QualifiedName(name, self._types)
@@ -136,7 +136,7 @@ class CellSpace:
         if head == "Identification":
             field = _IDENTIFICATION.get(rest)
             return field is not None and getattr(self.description.machine, field) is not None
-        return rest in _CONDITION_OPTIONS and head in {alarm.value for alarm in AlarmName}
+        return rest in _CONDITION_OPTIONS and head in RULES
 
     def _identify(self, machine: Machine) -> None:
         for name, field in _IDENTIFICATION.items():

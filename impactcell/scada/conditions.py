@@ -11,12 +11,11 @@ from typing import Any, Final
 
 from asyncua import ua
 
-from impactcell.alarms import is_retained
+from impactcell.alarms import RULES, is_retained
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.variable_store import GOOD, VariableStore, moment
-from impactcell.records import Alarm, AlarmName, Shelving
+from impactcell.records import Alarm, Shelving
 from impactcell.scada.cell_nodes import CellSpace
-from impactcell.scada.condition_table import CONDITIONS
 
 MAX_SHELVE_S: Final = 24 * 3600.0
 """Longest time a condition can be shelved: nobody remembers longer why."""
@@ -65,11 +64,11 @@ class Condition:
     """One condition: its present state, its nodes, and the EventIds a client may act on."""
 
     def __init__(
-        self, cell: CellSpace, name: AlarmName, values: VariableStore, notifiers: frozenset[ua.NodeId]
+        self, cell: CellSpace, name: str, values: VariableStore, notifiers: frozenset[ua.NodeId]
     ) -> None:
         self.cell = cell.description.name
         self.name = name
-        self.node = cell.path(name.value)
+        self.node = cell.path(name)
         self.alarm = Alarm(name)
         self._space = cell
         self._values = values
@@ -77,9 +76,9 @@ class Condition:
         self._event_type = cell.alarm_type(name)
         self._event_ids: dict[bytes, None] = {}
         self._last_severity = 0
-        input_path = CONDITIONS[name].input_path
+        input_path = RULES[name].input_node
         self._input = cell.path(input_path) if input_path else ua.NodeId()
-        cell.compute(f"{name.value}/ShelvingState/UnshelveTime", self._unshelve_time)
+        cell.compute(f"{name}/ShelvingState/UnshelveTime", self._unshelve_time)
         self._write_nodes(self.alarm)
 
     def _unshelve_time(self) -> ua.DataValue:
@@ -127,7 +126,7 @@ class Condition:
             if not path:
                 continue
             status = GOOD if alarm.enabled or path[0] in _TOLD_WHEN_DISABLED else _DISABLED
-            node = self._space.path("/".join((self.name.value, *path)))
+            node = self._space.path("/".join((self.name, *path)))
             self._values.write(node, ua.DataValue(variant, status, time_of, datetime.now(UTC)))
 
     def _fields(self, alarm: Alarm) -> Iterator[tuple[BrowsePath, ua.Variant]]:
@@ -140,9 +139,9 @@ class Condition:
                 "SourceName": (self.cell, ua.VariantType.String),
                 "Time": (time_of, ua.VariantType.DateTime),
                 "ReceiveTime": (time_of, ua.VariantType.DateTime),
-                "Message": (ua.LocalizedText(alarm.message or alarm.name.value), _LT),
+                "Message": (ua.LocalizedText(alarm.message or RULES[alarm.name].title.english), _LT),
                 "Severity": (alarm.severity, ua.VariantType.UInt16),
-                "ConditionName": (alarm.name.value, ua.VariantType.String),
+                "ConditionName": (alarm.name, ua.VariantType.String),
                 "BranchId": (ua.NodeId(), ua.VariantType.NodeId),
                 "Retain": (is_retained(alarm), ua.VariantType.Boolean),
                 "ClientUserId": (alarm.user, ua.VariantType.String),
@@ -158,7 +157,7 @@ class Condition:
             }
         )
         yield (), ua.Variant(self.node, ua.VariantType.NodeId)
-        class_name = f"{CONDITIONS[alarm.name].condition_class}ConditionClass"
+        class_name = RULES[alarm.name].condition_class.value
         class_id = getattr(ua.ObjectIds, f"{class_name}Type")
         yield ("ConditionClassId",), ua.Variant(ua.NodeId(class_id), ua.VariantType.NodeId)
         yield ("ConditionClassName",), ua.Variant(ua.LocalizedText(class_name), _LT)

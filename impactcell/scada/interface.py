@@ -8,7 +8,7 @@ from typing import Protocol
 from impactcell.alarms import EventKind
 from impactcell.opcua.host_interface import Actor, HistoryRequest
 from impactcell.quantities import Ranges
-from impactcell.records import Alarm, AlarmName, Quality
+from impactcell.records import Alarm, Quality
 
 
 def default_application_uri() -> str:
@@ -63,7 +63,7 @@ class Actions(Protocol):
     async def act_on_condition(
         self,
         cell: str,
-        alarm: AlarmName,
+        alarm: str,
         event: EventKind,
         actor: Actor,
         *,

@@ -14,7 +14,7 @@ from impactcell.opcua.method_service import InputArgument, InvalidArgumentError,
 from impactcell.opcua.request_dispatch import RequestContext
 from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.quantities import BY_PATH, MILLIMETRE
-from impactcell.records import Alarm, AlarmName
+from impactcell.records import Alarm
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition, refresh_event
@@ -146,10 +146,10 @@ def bind_condition(
     table: MethodTable, space: CellSpace, condition: Condition, actions: Actions, show_alarm: ShowAlarm
 ) -> None:
     """Make the methods of a condition callable, on itself and on its shelving state."""
-    shelving = space.path(f"{condition.name.value}/ShelvingState")
+    shelving = space.path(f"{condition.name}/ShelvingState")
     for event, (name, type_ids, arguments) in _CONDITION_METHODS.items():
         method = Method(arguments, _action(condition, event, actions, show_alarm))
-        instance_method = space.path(f"{condition.name.value}/{name}")
+        instance_method = space.path(f"{condition.name}/{name}")
         for owner in (condition.node, shelving) if "/" in name else (condition.node,):
             for method_id in (instance_method, *(ua.NodeId(number) for number in type_ids)):
                 table.bind(owner, method_id, CONDITION_AREAS[event], method)
@@ -170,7 +170,7 @@ def _action(
                 raise StatusCodeError(ua.StatusCodes.BadShelvingTimeOutOfRange)
         elif event is EventKind.SHELVE_ONE_SHOT:
             shelve_s = MAX_SHELVE_S
-        what = f"{condition.cell}: {condition.name.value}: {event.value}"
+        what = f"{condition.cell}: {condition.name}: {event.value}"
         if comment:
             what += f" ({comment!r})"
         if event is EventKind.SHELVE_TIMED:
@@ -186,7 +186,7 @@ def _action(
 def bind_refresh(
     table: MethodTable,
     subscriptions: SubscriptionService,
-    conditions: Mapping[tuple[str, AlarmName], Condition],
+    conditions: Mapping[tuple[str, str], Condition],
 ) -> None:
     """Make ConditionRefresh and ConditionRefresh2 callable."""
 

@@ -1,4 +1,4 @@
-"""The NodeSet2 file of the information model, written from the tables of quantities and conditions.
+"""The NodeSet2 file of the information model, written from the table of quantities and the alarm rules.
 
 `python -m impactcell.scada.nodeset` writes it anew; a test holds that what lies in the tree is what would be
 written. Everything else that it says stands in its template beside it.
@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from jinja2 import Environment, StrictUndefined
 
+from impactcell.alarms import RULES
 from impactcell.quantities import CYCLE, FOLDERS, MODULE, Quantity, Ranges, Unit
-from impactcell.scada.condition_table import CONDITIONS
 
 MODEL_FILE: Final = Path(__file__).parent / "model" / "ImpactCell.NodeSet2.xml"
 
@@ -58,16 +58,7 @@ def nodeset() -> str:
         autoescape=True,
     )
     template = MODEL_FILE.with_name(f"{MODEL_FILE.name}.j2").read_text(encoding="utf-8")
-    conditions = [
-        {
-            "name": alarm.value,
-            "number": condition.number,
-            "type_number": condition.type_number,
-            "description": condition.description,
-        }
-        for alarm, condition in CONDITIONS.items()
-    ]
-    return environment.from_string(template).render(folders=list(_folders()), conditions=conditions)
+    return environment.from_string(template).render(folders=list(_folders()), conditions=RULES.values())
 
 
 def _folders() -> Iterator[_Folder]:

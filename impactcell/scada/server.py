@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from asyncua import ua
 
 from impactcell import __version__
+from impactcell.alarms import RULES
 from impactcell.opcua.asyncua_adapter import AddressSpace, address_space, new_standard_server
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.host_interface import Host, Product, ServerSettings
@@ -18,7 +19,7 @@ from impactcell.opcua.service_host import ServiceHost, aggregate_functions
 from impactcell.opcua.type_instances import link
 from impactcell.opcua.variable_store import VariableStore
 from impactcell.quantities import HISTORY
-from impactcell.records import Alarm, AlarmName, ModuleStatus, Snapshot
+from impactcell.records import Alarm, ModuleStatus, Snapshot
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.cell_history import CellHistory
 from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
@@ -74,7 +75,7 @@ class Server:
         self._history = history
         self._actions = actions
         self._cells: dict[str, CellValues] = {}
-        self._conditions: dict[tuple[str, AlarmName], Condition] = {}
+        self._conditions: dict[tuple[str, str], Condition] = {}
         self._host: ServiceHost | None = None
 
     @property
@@ -106,7 +107,7 @@ class Server:
             self._cells[name] = CellValues(cell, values, space, datetime.now(UTC))
             access.add_notifiers(cell_notifiers(cell))
             bind_cell(table, cell, method_declarations(space, cell.cell_type), self._actions)
-            for alarm in AlarmName:
+            for alarm in RULES:
                 condition = Condition(cell, alarm, values, cell_notifiers(cell))
                 self._conditions[name, alarm] = condition
                 bind_condition(table, cell, condition, self._actions, self.alarm)

@@ -13,28 +13,28 @@ import numpy as np
 _KEY, _MEMBERS = "stored key", "stored by"
 
 
-def stored(*, key: str | None = None, by: type[enum.Enum] | None = None) -> Mapping[str, Any]:
+def stored(*, key: str | None = None, by: tuple[str, ...] | None = None) -> Mapping[str, Any]:
     """Metadata of a field: `field(metadata=stored(...))`.
 
     Parameters
     ----------
     key : str, optional
         Stored instead of the field's name; it stays when the field is renamed.
-    by : type of Enum, optional
-        The field is a tuple with one item for each member, in the order of the members: they are stored by
-        the value of the member instead of by place, so that a member more or less does no harm.
+    by : tuple of str, optional
+        The field is a tuple with one item for each of these names, in their order: they are stored by name
+        instead of by place, so that a name more or less does no harm.
     """
     return types.MappingProxyType({_KEY: key, _MEMBERS: by})
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class StoredField:
-    """A field of a dataclass: its name, its stored key, its annotation, and the enum it is stored by."""
+    """A field of a dataclass: its name, its stored key, its annotation, and the names it is stored by."""
 
     name: str
     key: str
     hint: Any
-    members: type[enum.Enum] | None
+    members: tuple[str, ...] | None
 
 
 @cache
@@ -73,7 +73,7 @@ def _described_field(field: StoredField) -> Any:
     if field.members is None:
         return described(field.hint)
     item = described(items_of(field.hint)[0])
-    return {"for each of": [member.value for member in field.members], "is": item}
+    return {"for each of": list(field.members), "is": item}
 
 
 def is_dataclass(hint: Any) -> bool:

@@ -70,7 +70,7 @@ def _compiled(kind: type) -> _Writer:
 def _field_source(stored: StoredField, value: str, names: dict[str, Any]) -> str:
     if stored.members is None:
         return _source(stored.hint, value, names)
-    keys = tuple(member.value for member in stored.members)
+    keys = stored.members
     item = _source(items_of(stored.hint)[0], "i", names)
     return f"{{k: {item} for k, i in paired({keys!r}, {value})}}"
 
@@ -168,7 +168,7 @@ def _dataclass_reader(kind: type) -> _Reader:
 def _field_reader(stored: StoredField) -> _Reader:
     if stored.members is None:
         return _reader(stored.hint)
-    keys = tuple(member.value for member in stored.members)
+    keys = stored.members
     item = _reader(items_of(stored.hint)[0])
 
     def read(tree: Tree, place: _Place) -> Any:

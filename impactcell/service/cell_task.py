@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 from impactcell.alarms import RuleResult
+from impactcell.alarms.rules import journal_fault, module_connection, positioning_fault
 from impactcell.errors import ImpactCellError, JournalError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.fieldbus.modbus_client import ModbusClient
@@ -18,7 +19,6 @@ from impactcell.journal.store import AuditEntry, Journal
 from impactcell.journal.stored_forms import upgraded_state
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
-    AlarmName,
     BatchAnnouncement,
     Evidence,
     ModuleStatus,
@@ -230,9 +230,7 @@ class CellTask:
                 self._publisher.publish(snapshot)
             fault = task.fault
             reason, evidence = fault or ("", Evidence())
-            await self._apply_rule_result(
-                RuleResult(AlarmName.POSITIONING_FAULT, fault is not None, reason, evidence)
-            )
+            await self._apply_rule_result(positioning_fault.result(reason, evidence))
 
     def _announcement(self) -> BatchAnnouncement | None:
         status_block = self._module.status_block
@@ -247,17 +245,15 @@ class CellTask:
         while True:
             status = await self._link_changes.get()
             self._publisher.publish_link(status)
-            await self._apply_rule_result(
-                RuleResult(AlarmName.MODULE_CONNECTION, not status.connected, status.reason)
-            )
+            await self._apply_rule_result(module_connection.result(status.reason, connected=status.connected))
 
     async def _check_journal(self) -> None:
         fault = self.worker.journal_fault
-        active = any(a.active for a in self.worker.alarms if a.name is AlarmName.JOURNAL_FAULT)
+        active = any(a.active for a in self.worker.alarms if a.name == journal_fault.NAME)
         if bool(fault) != active:
             if fault:
                 self.log.error("%s", fault)
-            await self._apply_rule_result(RuleResult(AlarmName.JOURNAL_FAULT, bool(fault), fault, Evidence()))
+            await self._apply_rule_result(journal_fault.result(fault))
 
     async def _apply_rule_result(self, rule_result: RuleResult) -> None:
         self._publisher.publish_alarms(await self.worker.apply_rule_result(rule_result, time.time_ns()))

@@ -3,13 +3,12 @@
 from dataclasses import replace
 
 from impactcell import __version__
-from impactcell.alarms import AlarmSettings, RuleSettings
-from impactcell.alarms.rules import DEFAULT_RULES
+from impactcell.alarms import RULES, AlarmSettings
+from impactcell.alarms.rules import wear_limit
 from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink, TlsFiles
 from impactcell.journal.retention import Retention
-from impactcell.records import AlarmName
 from impactcell.scada import (
     CellDescription,
     Machine,
@@ -25,8 +24,6 @@ from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 
 MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
 """SI units of what a cell file is written in."""
-
-_CYCLE_RULES = (AlarmName.WEAR_LIMIT, AlarmName.BATCH_SHIFT, AlarmName.DEVIANT_CYCLE, AlarmName.MODEL_GAP)
 
 
 def cell_design(cell: CellConfig) -> CellDesign:
@@ -61,19 +58,22 @@ def cell_design(cell: CellConfig) -> CellDesign:
 def alarm_settings(cell: CellConfig) -> AlarmSettings:
     """When the cell calls a person; what the YAML leaves out keeps its default."""
     chosen = cell.settings.alarms
-
-    def rule(name: AlarmName, default: RuleSettings) -> RuleSettings:
-        if name not in _CYCLE_RULES:
-            return default
-        on, off = chosen.on_delay_cycles, chosen.off_delay_cycles
-        return replace(
-            default,
-            on_delay=default.on_delay if on is None else on,
-            off_delay=default.off_delay if off is None else off,
+    on, off = chosen.on_delay_cycles, chosen.off_delay_cycles
+    rules = {
+        name: replace(
+            rule.settings,
+            on_delay=rule.settings.on_delay if on is None else on,
+            off_delay=rule.settings.off_delay if off is None else off,
         )
-
-    rules = {name: rule(name, default) for name, default in DEFAULT_RULES.items()}
-    return AlarmSettings(rules, wear_on=chosen.wear_probability_on, wear_off=chosen.wear_probability_off)
+        for name, rule in RULES.items()
+        if rule.evaluate is not None
+    }
+    rules[wear_limit.NAME] = replace(
+        rules[wear_limit.NAME],
+        activate_above=chosen.wear_probability_on,
+        clear_below=chosen.wear_probability_off,
+    )
+    return AlarmSettings(rules)
 
 
 def module_link(cell: CellConfig) -> ModuleLink:

@@ -8,7 +8,7 @@ from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind
 from impactcell.errors import PositioningError
 from impactcell.journal.store import AuditEntry
-from impactcell.records import Alarm, AlarmName
+from impactcell.records import Alarm
 from impactcell.scada import Actor, RefusedError
 from impactcell.service.cell_task import CellTask
 
@@ -54,7 +54,7 @@ class OperatorCommands:
     async def act_on_condition(
         self,
         cell: str,
-        alarm: AlarmName,
+        alarm: str,
         event: EventKind,
         actor: Actor,
         *,
@@ -62,13 +62,13 @@ class OperatorCommands:
         shelve_s: float = 0.0,
     ) -> Alarm:
         """Apply an action through the life cycle in `impactcell.alarms`; the new state of the condition."""
-        audit = _audit(actor, event.value, Condition=alarm.value, Comment=comment, Seconds=shelve_s)
+        audit = _audit(actor, event.value, Condition=alarm, Comment=comment, Seconds=shelve_s)
         alarm_event = AlarmEvent(
             event, time_ns=audit.time_ns, user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
         )
         transition = await self._cell(cell).worker.apply_event(alarm, alarm_event, audit)
         if transition.refusal is not None:
-            raise RefusedError(transition.refusal.value, f"{cell}: {alarm.value}: {transition.refusal.value}")
+            raise RefusedError(transition.refusal.value, f"{cell}: {alarm}: {transition.refusal.value}")
         return transition.alarm
 
 

@@ -5,13 +5,12 @@ import time
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from impactcell.alarms import RULES
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Alarm, AlarmName, ModuleStatus, Snapshot
+from impactcell.records import Alarm, ModuleStatus, Snapshot
 
 if TYPE_CHECKING:
     from impactcell.scada import Server
-
-_LOGGED_ELSEWHERE = (AlarmName.MODULE_CONNECTION, AlarmName.JOURNAL_FAULT)
 
 
 class CellPublisher:
@@ -57,10 +56,10 @@ class CellPublisher:
 
     def log_alarm(self, alarm: Alarm) -> None:
         """Log an alarm that comes or goes, but for those that their finder has told of already."""
-        if alarm.active != (alarm.name in self._active) and alarm.name not in _LOGGED_ELSEWHERE:
+        if alarm.active != (alarm.name in self._active) and not RULES[alarm.name].logged_by_cause:
             message = "alarm %s is active: %s" if alarm.active else "alarm %s is over: %s"
             level = logging.WARNING if alarm.active else logging.INFO
-            self._log.log(level, message, alarm.name.value, alarm.message, cycle=alarm.cycle or None)
+            self._log.log(level, message, alarm.name, alarm.message, cycle=alarm.cycle or None)
         (self._active.add if alarm.active else self._active.discard)(alarm.name)
 
     def mark_stale(self, time_ns: int) -> None:

@@ -10,12 +10,11 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 
 from impactcell import cell as core
-from impactcell.alarms import RuleResult
+from impactcell.alarms.rules import journal_fault
 from impactcell.errors import JournalError
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.signals import stop_on_signals
-from impactcell.records import AlarmName
 from impactcell.scada import Server
 from impactcell.service.cell_task import CellTask, SnapshotCallback
 from impactcell.service.factory import cell_description, cell_design, server_settings
@@ -213,7 +212,7 @@ def _tell_fault(cell: CellConfig, server: Server, reason: str) -> None:
     """Log why a cell does not run, and raise its alarm; once it runs, it shows its own."""
     log.error("cell=%s waits until its journal can be opened: %s", cell.name, reason)
     design = cell_design(cell)
-    fault = RuleResult(AlarmName.JOURNAL_FAULT, holds=True, message=reason)
+    fault = journal_fault.result(reason)
     for alarm in core.apply_rule_result(design, core.initial_state(design), fault, time.time_ns())[1]:
         server.alarm(cell.name, alarm)
 

@@ -19,7 +19,6 @@ from impactcell.journal.stored_forms import MODEL, StoredState, pack_state, unpa
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
     Alarm,
-    AlarmName,
     BatchAnnouncement,
     Capture,
     CycleId,
@@ -149,7 +148,7 @@ class CellWorker:
             return ()
         return await self.run(lambda: self._expire_shelving(time_ns))
 
-    async def apply_event(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
+    async def apply_event(self, name: str, event: AlarmEvent, audit: AuditEntry) -> Transition:
         """Apply a person's action on a condition, and write down who did it."""
         return await self.run(lambda: self._apply_event(name, event, audit))
 
@@ -275,7 +274,7 @@ class CellWorker:
             self._record(changed, None)
         return changed
 
-    def _apply_event(self, name: AlarmName, event: AlarmEvent, audit: AuditEntry) -> Transition:
+    def _apply_event(self, name: str, event: AlarmEvent, audit: AuditEntry) -> Transition:
         self._state, transition = core.apply_event(self._state, name, event)
         result = "Good" if transition.refusal is None else transition.refusal.value
         self._record((transition.alarm,) if transition.notifications else (), _with_result(audit, result))

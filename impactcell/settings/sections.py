@@ -19,14 +19,14 @@ from pydantic import (
     model_validator,
 )
 
-from impactcell.alarms import AlarmSettings
+from impactcell.alarms.rules import wear_limit
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.journal.retention import Retention
 from impactcell.tracking.signature.tracker import SignatureSettings
 
-_LINK, _CAPTURE, _ALARMS, _SIGNATURE, _RETENTION = (
-    ModuleLink(), CaptureDefaults(), AlarmSettings(), SignatureSettings(), Retention()
+_LINK, _CAPTURE, _WEAR_LIMIT, _SIGNATURE, _RETENTION = (
+    ModuleLink(), CaptureDefaults(), wear_limit.RULE.settings, SignatureSettings(), Retention()
 )  # fmt: skip
 """What the parts of the service do by themselves; a key that is left out means that."""
 
@@ -180,9 +180,9 @@ class AlarmSection(Section):
 
     wear_limit: Positive
     """mu_s at which the surface counts as worn."""
-    wear_probability_on: Probability = _ALARMS.wear_on
+    wear_probability_on: Probability = _WEAR_LIMIT.activate_above
     """The wear alarm comes when P(level > limit) passes this ..."""
-    wear_probability_off: Probability = _ALARMS.wear_off
+    wear_probability_off: Probability = _WEAR_LIMIT.clear_below
     """... and goes when it falls below this."""
     false_alarm_cycles: Annotated[float, Field(ge=100)] = _SIGNATURE.false_alarm_cycles
     """Designed mean number of cycles between two false alarms of one rule."""

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from impactcell.alarms import AlarmSettings, RuleSettings
-from impactcell.records import AlarmName
 from tests.benchmarks import _charts, _classical, _steps, _streams
 from tests.benchmarks.table import Table
 
@@ -38,11 +37,11 @@ def wear_alarms(seed: int, truth: _streams.Stream, level: np.ndarray) -> dict[st
     limit, rules = crossing(seed), AlarmSettings()
     z = (level[:, 0] - limit) / np.sqrt(np.maximum(level[:, 1], 1e-12))
     probability = 0.5 * np.array([math.erfc(-x / math.sqrt(2.0)) for x in z.tolist()])
-    rule = rules.rule(AlarmName.WEAR_LIMIT)
+    rule = rules.rule("WearLimit")
     bare = RuleSettings()
     smooth = _classical.ewma(truth.values)
     found = {
-        "ours": activations(probability > rules.wear_on, probability > rules.wear_off, rule),
+        "ours": activations(probability > rule.activate_above, probability > rule.clear_below, rule),
         "raw": activations(truth.values > limit, truth.values > limit, bare),
         "EWMA": activations(smooth > limit, smooth > limit, bare),
         "raw, delays": activations(truth.values > limit, truth.values > limit, rule),

@@ -8,9 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from impactcell import alarms
-from impactcell.alarms import AlarmSettings
+from impactcell.alarms import AlarmSettings, CycleInputs
 from impactcell.features import extract
-from impactcell.records import AlarmName
 from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker
@@ -66,13 +65,17 @@ def cost_table(*, quick: bool) -> Table:
             seen = tracker.update(shape, signed, extract(captures[i % 20]))
             t2 = time.thread_time()
             followed = gap_cusum.update(gaps, 1.0 + 0.02 * rng.normal(), i, 1e5, 1.0)
-            active = book.alarm(AlarmName.WEAR_LIMIT).active
-            findings = [
-                alarms.wear_limit(rules, tracked.wear, i, active=active),
-                alarms.batch_shift(tracked.shift),
-                alarms.deviant_cycle(seen.deviation, seen.signature.deviates_at_m, judged=seen.judged),
-                alarms.RuleResult(AlarmName.MODEL_GAP, followed.exceeds, "", followed.evidence),
-            ]
+            inputs = CycleInputs(
+                i,
+                tracked.wear,
+                signature=seen.signature,
+                shift=tracked.shift,
+                deviation=seen.deviation,
+                judged=seen.judged,
+                gap=followed.evidence,
+                gap_exceeds=followed.exceeds,
+            )
+            findings = alarms.evaluate(rules, book, inputs)
             book, _ = alarms.update(rules, book, findings, i, reading.time_ns)
             t3 = time.thread_time()
             state, signed, gaps = tracked.state, seen.state, followed.state

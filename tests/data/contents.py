@@ -143,7 +143,7 @@ def _alarms(durable: StoredState) -> dict[str, Any]:
     book = durable.cell.alarms
     counters = dict(zip((alarm.name for alarm in book.alarms), book.delays, strict=True))
     conditions = {
-        alarm.name.value: {
+        alarm.name: {
             **_alarm(alarm),
             "cycles the rule held, missed, called": [
                 counters[alarm.name].held,
@@ -159,7 +159,7 @@ def _alarms(durable: StoredState) -> dict[str, Any]:
 def _alarm(alarm: Alarm) -> dict[str, Any]:
     evidence = alarm.evidence
     return {
-        "condition": alarm.name.value,
+        "condition": alarm.name,
         "enabled": alarm.enabled,
         "active": alarm.active,
         "acknowledged": alarm.acknowledged,
@@ -255,7 +255,7 @@ def _snapshot(durable: StoredState) -> dict[str, Any]:
             "taps": task.taps,
             "reason": task.reason,
         },
-        "alarms": [alarm.name.value for alarm in snapshot.alarms],
+        "alarms": [alarm.name for alarm in snapshot.alarms],
         "model": snapshot.model_name,
         "gap": {"size": snapshot.gap.hex(), "quality": snapshot.gap_quality.name},
     }

@@ -14,7 +14,6 @@ from typing import Any
 
 from impactcell.alarms import EventKind
 from impactcell.journal.store import Journal
-from impactcell.records import AlarmName
 from impactcell.scada import Actor, Role
 from impactcell.service.factory import cell_design
 from impactcell.service.operator_commands import OperatorCommands
@@ -83,22 +82,22 @@ async def make(directory: Path) -> Path:
 async def _wearing(watched: Watched) -> None:
     """Let the cell wear; people see its alarms, and each is left in another state."""
     act = OperatorCommands(watched.service.running).act_on_condition
-    await watched.alarm(CELL, AlarmName.DEVIANT_CYCLE, active=True)
-    await act(CELL, AlarmName.DEVIANT_CYCLE, EventKind.ACKNOWLEDGE, OPERATOR, comment="a chip on the table")
-    await act(CELL, AlarmName.DEVIANT_CYCLE, EventKind.SHELVE_TIMED, OPERATOR, shelve_s=YEARS_S)
-    await watched.alarm(CELL, AlarmName.BATCH_SHIFT, active=True)
-    await act(CELL, AlarmName.BATCH_SHIFT, EventKind.ACKNOWLEDGE, OPERATOR)
-    await act(CELL, AlarmName.BATCH_SHIFT, EventKind.CONFIRM, OPERATOR)
+    await watched.alarm(CELL, "DeviantCycle", active=True)
+    await act(CELL, "DeviantCycle", EventKind.ACKNOWLEDGE, OPERATOR, comment="a chip on the table")
+    await act(CELL, "DeviantCycle", EventKind.SHELVE_TIMED, OPERATOR, shelve_s=YEARS_S)
+    await watched.alarm(CELL, "BatchShift", active=True)
+    await act(CELL, "BatchShift", EventKind.ACKNOWLEDGE, OPERATOR)
+    await act(CELL, "BatchShift", EventKind.CONFIRM, OPERATOR)
     await act(
         CELL,
-        AlarmName.BATCH_SHIFT,
+        "BatchShift",
         EventKind.COMMENT,
         ENGINEER,
         comment="supplier changed the coating, µ lower",
     )
-    await act(CELL, AlarmName.MODEL_GAP, EventKind.DISABLE, ENGINEER)
-    await act(CELL, AlarmName.JOURNAL_FAULT, EventKind.SHELVE_ONE_SHOT, OPERATOR)
-    await watched.alarm(CELL, AlarmName.WEAR_LIMIT, active=True)
+    await act(CELL, "ModelGap", EventKind.DISABLE, ENGINEER)
+    await act(CELL, "JournalFault", EventKind.SHELVE_ONE_SHOT, OPERATOR)
+    await watched.alarm(CELL, "WearLimit", active=True)
     await watched.until(CELL, CYCLES - 2)
 
 
@@ -113,8 +112,8 @@ async def _positioning(watched: Watched, module: dict[str, Any]) -> None:
     await actions.set_target(CELL, 0.03, ENGINEER)
     await watched.until(CELL, seen + 1)
     module["running"].process.kill()
-    await watched.alarm(CELL, AlarmName.MODULE_CONNECTION, active=True)
-    await watched.alarm(CELL, AlarmName.POSITIONING_FAULT, active=True)
+    await watched.alarm(CELL, "ModuleConnection", active=True)
+    await watched.alarm(CELL, "PositioningFault", active=True)
     await actions.start_batch(CELL, "E", expected=True, actor=OPERATOR)
 
 

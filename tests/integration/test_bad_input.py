@@ -14,7 +14,7 @@ import pytest
 
 from impactcell.errors import JournalError
 from impactcell.journal.store import Journal
-from impactcell.records import AlarmName, Quality
+from impactcell.records import Quality
 from impactcell.scada import Actor, HistoryRequest, RefusedError, Role
 from impactcell.service.history_source import JournalHistory
 from impactcell.service.operator_commands import OperatorCommands
@@ -63,7 +63,7 @@ async def test_alarms_are_logged_as_they_come_and_every_cycle_where_asked(
     async with simulator(tmp_path, strikes={"period_s": 0.2}) as module:
         path = write_cell(tmp_path, module["port"], alarms={"wear_limit": 0.1})
         async with serving(path) as watched:
-            await watched.alarm("press-1", AlarmName.WEAR_LIMIT, active=True)
+            await watched.alarm("press-1", "WearLimit", active=True)
             seen = len(watched.snapshots["press-1"])
             await watched.until("press-1", seen + 3)
     lines = [record.getMessage() for record in caplog.records]
@@ -81,8 +81,8 @@ async def test_one_sick_cell_leaves_the_other_alone(tmp_path: Path) -> None:
         stranger = write_cell(tmp_path, module["port"], "stranger", module={"device_id": 9})
         async with serving(well, absent, stranger) as watched:
             await watched.until("well", 5)
-            assert "127.0.0.1:1" in await watched.alarm("absent", AlarmName.MODULE_CONNECTION, active=True)
-            message = await watched.alarm("stranger", AlarmName.MODULE_CONNECTION, active=True)
+            assert "127.0.0.1:1" in await watched.alarm("absent", "ModuleConnection", active=True)
+            message = await watched.alarm("stranger", "ModuleConnection", active=True)
             assert "device_id 9" in message or "device 9" in message
             await watched.until("well", 8)
 
@@ -160,7 +160,7 @@ async def test_another_map_version_is_refused_by_name(tmp_path: Path) -> None:
     async with simulator(tmp_path, strikes={"period_s": 0.5}) as module:
         cell = write_cell(tmp_path, module["port"], module={"register_map": str(newer)})
         async with serving(cell) as watched:
-            message = await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=True)
+            message = await watched.alarm("press-1", "ModuleConnection", active=True)
     assert "register map_version (16)" in message
     assert "press-1" in message
 
@@ -174,11 +174,11 @@ async def test_a_module_that_goes_and_comes_back(tmp_path: Path) -> None:
         path.write_text(path.read_text().replace("port: 1\n", f"port: {module['port']}\n"))
         watched = await stack.enter_async_context(serving(path))
         await watched.until("press-1", 3)
-        await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=False)
+        await watched.alarm("press-1", "ModuleConnection", active=False)
         await first.aclose()
-        await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=True)
+        await watched.alarm("press-1", "ModuleConnection", active=True)
         seen = len(watched.snapshots["press-1"])
         listen = {"port": module["port"]}
         await stack.enter_async_context(simulator(tmp_path, strikes=strikes, listen=listen))
-        await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=False)
+        await watched.alarm("press-1", "ModuleConnection", active=False)
         await watched.until("press-1", seen + 3)

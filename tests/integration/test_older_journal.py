@@ -12,7 +12,7 @@ import pytest
 from impactcell.errors import JournalError
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import STATE
-from impactcell.records import Alarm, AlarmName
+from impactcell.records import Alarm
 from impactcell.scada import Server
 from impactcell.serialization.message_pack import pack_tree, unpack_tree
 from tests.data.contents import described, stored
@@ -38,8 +38,8 @@ def content(file: Path) -> bytes:
 def learned(read: dict[str, Any]) -> dict[str, Any]:
     """What a journal holds, but for the link, of which the service says something itself."""
     conditions = read["alarms"]["conditions"]
-    kept = {name: alarm for name, alarm in conditions.items() if name != AlarmName.MODULE_CONNECTION.value}
-    told = [a for a in read["transitions of alarms"] if a["condition"] != AlarmName.MODULE_CONNECTION.value]
+    kept = {name: alarm for name, alarm in conditions.items() if name != "ModuleConnection"}
+    told = [a for a in read["transitions of alarms"] if a["condition"] != "ModuleConnection"]
     return {**read, "alarms": {**read["alarms"], "conditions": kept}, "transitions of alarms": told}
 
 
@@ -47,10 +47,10 @@ def learned(read: dict[str, Any]) -> dict[str, Any]:
 async def test_the_service_goes_on_from_an_older_journal(tmp_path: Path, older: Path) -> None:
     async with serving(write_cell(tmp_path, 1, CELL, **CELL_FILE)) as watched:
         running = watched.service.running[CELL]
-        await watched.alarm(CELL, AlarmName.MODULE_CONNECTION, active=True)
+        await watched.alarm(CELL, "ModuleConnection", active=True)
         shown = {alarm.name: alarm for alarm in running.worker.alarms}
-        assert shown[AlarmName.WEAR_LIMIT].active
-        assert not shown[AlarmName.JOURNAL_FAULT].active
+        assert shown["WearLimit"].active
+        assert not shown["JournalFault"].active
         assert running.worker.journal_fault == ""
         assert running.worker.snapshot is not None
     with Journal(older, CELL, read_only=True) as journal:
@@ -87,13 +87,13 @@ async def test_a_later_state_is_left_alone_with_an_alarm_and_the_others_run(
     monkeypatch.setattr(Server, "alarm", seen)
     odd, well = write_cell(tmp_path, 1, CELL, **CELL_FILE), write_cell(tmp_path, 2, "well")
     async with serving(odd, well) as watched:
-        await watched.alarm("well", AlarmName.MODULE_CONNECTION, active=True)
+        await watched.alarm("well", "ModuleConnection", active=True)
         async with asyncio.timeout(60):
             while not any(cell == CELL for cell, _ in shown):
                 await asyncio.sleep(0.02)
         assert CELL not in watched.service.running
     ((_, alarm),) = [entry for entry in shown if entry[0] == CELL]
-    assert (alarm.name, alarm.active, alarm.acknowledged) == (AlarmName.JOURNAL_FAULT, True, False)
+    assert (alarm.name, alarm.active, alarm.acknowledged) == ("JournalFault", True, False)
     known = f"the state is of format {STATE.format + 1}, this version knows up to {STATE.format}"
     for words in (str(later), f"cell '{CELL}' is left as it is", known, "name another file"):
         assert words in alarm.message

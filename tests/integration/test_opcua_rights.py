@@ -8,7 +8,6 @@ import pytest
 from asyncua import Client, ua
 
 from impactcell.quantities import CYCLE
-from impactcell.records import AlarmName
 from impactcell.scada import HistoryValue, Permission, Role
 from impactcell.scada.rights import MATRIX, Area, allowed
 from tests.opcua_server import CELL, START_NS, Site, site
@@ -109,7 +108,7 @@ async def events(hand: Hand) -> int:
 
 
 async def event_history(hand: Hand) -> int:
-    hand.here.history.transitions[CELL] = [hand.here.actions.of(CELL, AlarmName.WEAR_LIMIT)]
+    hand.here.history.transitions[CELL] = [hand.here.actions.of(CELL, "WearLimit")]
     node = await hand.here.node(hand.client, "")
     condition = hand.client.get_node(ua.ObjectIds.ConditionType)
     found = await node.read_event_history(
@@ -144,9 +143,7 @@ async def _acknowledged(hand: Hand) -> None:
     from impactcell.alarms import AlarmEvent, EventKind
 
     _fresh(hand)
-    alarm = hand.here.actions.apply(
-        CELL, AlarmName.WEAR_LIMIT, AlarmEvent(EventKind.ACKNOWLEDGE, time_ns=START_NS)
-    )
+    alarm = hand.here.actions.apply(CELL, "WearLimit", AlarmEvent(EventKind.ACKNOWLEDGE, time_ns=START_NS))
     hand.here.server.alarm(CELL, alarm)
 
 

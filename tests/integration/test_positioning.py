@@ -8,7 +8,6 @@ import pytest
 
 from impactcell.errors import PositioningError
 from impactcell.journal.store import AuditEntry
-from impactcell.records import AlarmName
 from tests.integration.processes import simulator, told, write_cell
 from tests.integration.watched import Watched, serving
 
@@ -57,7 +56,7 @@ async def test_what_is_refused_commands_nothing(tmp_path: Path) -> None:
     one_sided = {**CELL, "actuator": {**CELL["actuator"], "both_ends": False}}
     async with simulator(tmp_path, **scenario([])) as module:
         async with serving(write_cell(tmp_path, module["port"], **one_sided)) as watched:
-            await watched.alarm("press-1", AlarmName.MODULE_CONNECTION, active=False)
+            await watched.alarm("press-1", "ModuleConnection", active=False)
             await watched.connected("press-1")
             assert "beyond the travel" in await refused(watched, 0.5)
             assert "beyond the travel" in await refused(watched, -0.001)
@@ -97,5 +96,5 @@ async def test_a_lost_link_stops_the_sequence_with_an_alarm(tmp_path: Path) -> N
             await cell.set_target(0.03, AUDIT)
             await watched.until("press-1", 1)
             module["running"].process.kill()
-            message = await watched.alarm("press-1", AlarmName.POSITIONING_FAULT, active=True)
+            message = await watched.alarm("press-1", "PositioningFault", active=True)
             assert "press-1" in message

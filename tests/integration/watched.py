@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from impactcell.records import AlarmName, Snapshot
+from impactcell.records import Snapshot
 from impactcell.service import Service
 from impactcell.settings import read_cells
 
@@ -31,7 +31,7 @@ class Watched:
             while not self.service.running[cell].status.connected:
                 await asyncio.sleep(0.02)
 
-    async def alarm(self, cell: str, name: AlarmName, *, active: bool, timeout_s: float = 60.0) -> str:
+    async def alarm(self, cell: str, name: str, *, active: bool, timeout_s: float = 60.0) -> str:
         """Wait until an alarm is active, or not; its message."""
         async with asyncio.timeout(timeout_s):
             while True:

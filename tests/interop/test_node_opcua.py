@@ -16,10 +16,10 @@ import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 
-from impactcell.alarms import AlarmEvent, EventKind
+from impactcell.alarms import NAMES, AlarmEvent, EventKind, Message
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.trust_list import fingerprint
-from impactcell.records import Alarm, AlarmName
+from impactcell.records import Alarm
 from impactcell.scada import HistoryValue, Role
 from impactcell.scada.users import User, read_users, write_users
 from tests.interop.wire import Wire
@@ -104,7 +104,7 @@ class Commands:
 
     async def do_normal(self) -> None:
         self.here.actions.alarms.clear()
-        self.here.server.alarm(CELL, Alarm(AlarmName.WEAR_LIMIT, time_ns=time.time_ns()))
+        self.here.server.alarm(CELL, Alarm("WearLimit", time_ns=time.time_ns()))
 
     async def do_raise(self) -> None:
         self.here.raise_alarm()
@@ -128,12 +128,16 @@ class Commands:
         actions = self.here.actions
         actions.alarms.clear()
         told = [
-            actions.apply(CELL, name, AlarmEvent(event, number, START_NS + number * 10**9, message="past"))
+            actions.apply(
+                CELL,
+                name,
+                AlarmEvent(event, number, START_NS + number * 10**9, message=Message("past", "vorbei")),
+            )
             for number, (name, event) in enumerate(
                 [
-                    (AlarmName.WEAR_LIMIT, EventKind.ACTIVATE),
-                    (AlarmName.WEAR_LIMIT, EventKind.CLEAR),
-                    (AlarmName.BATCH_SHIFT, EventKind.ACTIVATE),
+                    ("WearLimit", EventKind.ACTIVATE),
+                    ("WearLimit", EventKind.CLEAR),
+                    ("BatchShift", EventKind.ACTIVATE),
                 ]
             )
         ]
@@ -246,6 +250,6 @@ def test_nodesets_load_without_a_warning(node: str, companions: str) -> None:
     assert len(lines) == 1, "node-opcua had something to say: " + done.stdout
     said = json.loads(lines[0][2:])
     assert said["methods"] == ["StartBatch", "ResetWear", "SetTarget", "AbortPositioning"]
-    assert said["alarms"] == [name.value for name in AlarmName]
+    assert said["alarms"] == list(NAMES)
     assert said["identification"]
     assert (said["unit"], said["high"]) == (4404786, 1)

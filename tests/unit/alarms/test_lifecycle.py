@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from impactcell.alarms import Message
 from impactcell.alarms.lifecycle import (
     ANNUNCIATION,
     DISABLED,
@@ -20,16 +21,14 @@ from impactcell.alarms.lifecycle import (
     is_silenced,
     transition,
 )
-from impactcell.records import Alarm, AlarmName, Evidence, Shelving
+from impactcell.records import Alarm, Evidence, Shelving
 
 MINUTE = 60_000_000_000
 
 
 def alarm(state=Annunciation.NORMAL, **changes):
     active, acknowledged, confirmed = state.value
-    return Alarm(
-        AlarmName.WEAR_LIMIT, active=active, acknowledged=acknowledged, confirmed=confirmed, **changes
-    )
+    return Alarm("WearLimit", active=active, acknowledged=acknowledged, confirmed=confirmed, **changes)
 
 
 # OPC 10000-9 annex B.1.2, table B.1: one current state, confirmation required; (active, acked, confirmed)
@@ -208,7 +207,10 @@ def test_shelving_needs_a_time_and_ends_with_it():
 def test_comment_and_description_travel_with_the_event():
     evidence = Evidence(12.0, 11.5, 7, 0.01, 0.001, 1e5, 1.2)
     raised = transition(
-        alarm(), AlarmEvent(EventKind.ACTIVATE, 7, 8, message="worn", severity=900, evidence=evidence)
+        alarm(),
+        AlarmEvent(
+            EventKind.ACTIVATE, 7, 8, message=Message("worn", "verschlissen"), severity=900, evidence=evidence
+        ),
     ).alarm
     assert (raised.message, raised.severity, raised.evidence) == ("worn", 900, evidence)
     done = transition(raised, AlarmEvent(EventKind.COMMENT, 9, 10, user="ann", comment="seen"))

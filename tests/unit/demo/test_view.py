@@ -10,7 +10,6 @@ from rich.console import Console
 from impactcell.demo.view import Scene, render
 from impactcell.records import (
     Alarm,
-    AlarmName,
     Coefficient,
     Estimator,
     FrictionEstimate,
@@ -39,9 +38,7 @@ def history(count: int) -> list[Snapshot]:
 
 def test_what_a_viewer_looks_for_is_there() -> None:
     last = history(30)[-1]
-    shift = Alarm(
-        AlarmName.BATCH_SHIFT, active=True, acknowledged=False, cycle=21, message="shifted by +0.01"
-    )
+    shift = Alarm("BatchShift", active=True, acknowledged=False, cycle=21, message="shifted by +0.01")
     alarmed = replace(last, alarms=(shift, *last.alarms[1:]))
     text = drawn([*history(29), alarmed])
     for expected in (
@@ -59,7 +56,7 @@ def test_what_a_viewer_looks_for_is_there() -> None:
 
 
 def with_alarms(snapshot: Snapshot) -> Snapshot:
-    shift = Alarm(AlarmName.BATCH_SHIFT, active=True, acknowledged=False, cycle=21, message="by +0.01 " * 8)
+    shift = Alarm("BatchShift", active=True, acknowledged=False, cycle=21, message="by +0.01 " * 8)
     return replace(snapshot, alarms=(shift, *snapshot.alarms[1:]))
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from impactcell.errors import JournalError
 from impactcell.journal.history import HistoryQuery, Page, StoredValue
 from impactcell.journal.store import Journal
-from impactcell.records import Alarm, AlarmName, Coefficient, Evidence, Quality
+from impactcell.records import Alarm, Coefficient, Evidence, Quality
 from tests.snapshots import make_capture, make_snapshot
 
 CYCLES = 40
@@ -27,9 +27,7 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Journal]:
             if cycle == 7:
                 bad = replace(snapshot.friction, mu_s=Coefficient(quality=Quality.BAD, reason="clipped"))
                 snapshot = replace(snapshot, friction=bad)
-            alarm = Alarm(
-                AlarmName.WEAR_LIMIT, time_ns=capture.time_ns, cycle=cycle, evidence=Evidence(size=math.inf)
-            )
+            alarm = Alarm("WearLimit", time_ns=capture.time_ns, cycle=cycle, evidence=Evidence(size=math.inf))
             journal.append(capture, snapshot, b"", [alarm] if cycle % 4 == 0 else [])
         yield journal
 

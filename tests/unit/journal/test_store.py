@@ -10,7 +10,7 @@ from impactcell.errors import ForeignJournalError, JournalError, JournalFullErro
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import FREE_SHARE, Retention
 from impactcell.journal.store import AuditEntry, Journal
-from impactcell.records import Alarm, AlarmName, CycleId
+from impactcell.records import Alarm, CycleId
 from tests.snapshots import make_capture, make_snapshot
 
 
@@ -82,7 +82,7 @@ def test_actions_are_audited_with_their_state(tmp_path: Path) -> None:
     entry = AuditEntry(5, "anna", "ResetWear", '{"Comment": "new plate"}', "Good")
     with Journal(tmp_path / "j", "c") as journal:
         append(journal, 1)
-        journal.record(b"after reset", [Alarm(AlarmName.WEAR_LIMIT, time_ns=5)], entry)
+        journal.record(b"after reset", [Alarm("WearLimit", time_ns=5)], entry)
         assert journal.audit() == (entry,)
         assert journal.state() == b"after reset"
 
@@ -214,7 +214,7 @@ def test_what_has_no_time_is_of_no_age_but_takes_room(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", "c") as journal:
         for cycle in (1, 2, 3):
             capture = replace(make_capture(cycle), time_ns=0) if cycle == 2 else make_capture(cycle)
-            journal.append(capture, make_snapshot(capture), b"state", [Alarm(AlarmName.WEAR_LIMIT)])
+            journal.append(capture, make_snapshot(capture), b"state", [Alarm("WearLimit")])
         now_ns = make_capture(3).time_ns + 11 * 86_400 * 10**9
         journal.prune(Retention(days=10, captures_days=5), now_ns)
         assert [capture.cycle for capture in journal.captures()] == [2]

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 import impactcell
+from impactcell.alarms import RULES
 from impactcell.quantities import CYCLE, HISTORY, MODULE
-from impactcell.records import AlarmName
-from impactcell.scada.condition_table import CONDITIONS
 from impactcell.scada.nodeset import MODEL_FILE, nodeset
 
 MODEL = Path(impactcell.__file__).parent / "scada" / "model"
@@ -49,7 +48,7 @@ def test_every_node_has_a_description(nodes: list[ET.Element]) -> None:
 
 def test_every_condition_has_its_type(nodes: list[ET.Element]) -> None:
     names = {_name(element) for element in nodes}
-    assert {alarm.value for alarm in AlarmName} | {f"{alarm.value}AlarmType" for alarm in AlarmName} <= names
+    assert set(RULES) | {f"{name}AlarmType" for name in RULES} <= names
 
 
 def test_references_inside_the_file_lead_somewhere(nodes: list[ET.Element]) -> None:
@@ -64,9 +63,9 @@ def test_the_file_is_what_the_tables_say() -> None:
     assert MODEL_FILE.read_text(encoding="utf-8") == nodeset(), "run python -m impactcell.scada.nodeset"
 
 
-def test_every_condition_is_described() -> None:
-    assert set(CONDITIONS) == set(AlarmName)
-    assert {c.input_path for c in CONDITIONS.values() if c.input_path} <= {q.path for q in (*CYCLE, *MODULE)}
+def test_every_condition_watches_what_is_published() -> None:
+    watched = {rule.input_node for rule in RULES.values() if rule.input_node}
+    assert watched <= {quantity.path for quantity in (*CYCLE, *MODULE)}
 
 
 def test_what_has_a_history_is_kept() -> None:

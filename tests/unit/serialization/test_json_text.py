@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from impactcell.physics import Plant
 from impactcell.prediction import Model, Prior
-from impactcell.records import Alarm, AlarmName, Samples, Shelving
+from impactcell.records import Alarm, Samples, Shelving
 from impactcell.serialization import json_text
 
 
@@ -36,7 +36,7 @@ class Outer:
     st.dictionaries(st.text(), st.floats(), max_size=3),
 )
 def test_round_trip_is_exact(value, numbers, counts, named):
-    alarm = Alarm(AlarmName.WEAR_LIMIT, shelving=Shelving.TIMED, shelved_until_ns=2**62)
+    alarm = Alarm("WearLimit", shelving=Shelving.TIMED, shelved_until_ns=2**62)
     outer = Outer(value, Inner(np.array(numbers), tuple(counts)), (alarm,), (3, "ä"), named)
     data = json_text.dumps(outer)
     back = json_text.loads(Outer, data)

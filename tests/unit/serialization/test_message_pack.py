@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.records import Alarm, AlarmName, Quality, Samples, Shelving
+from impactcell.records import Alarm, Quality, Samples, Shelving
 from impactcell.serialization import json_text
 from impactcell.serialization.message_pack import pack, unpack
 
@@ -43,7 +43,7 @@ class Outer:
     st.text(),
 )
 def test_round_trip_is_exact(four, numbers, counts, text):
-    alarm = Alarm(AlarmName.WEAR_LIMIT, shelving=Shelving.TIMED, shelved_until_ns=2**62, message=text)
+    alarm = Alarm("WearLimit", shelving=Shelving.TIMED, shelved_until_ns=2**62, message=text)
     inner = Inner(np.array(numbers), tuple(counts), (None, text), four[1])
     outer = Outer(
         four[0], inner, (alarm, alarm), (3, text), (four[2], four[3]), four[1], Quality.BAD, text, True

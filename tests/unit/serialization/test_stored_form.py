@@ -1,7 +1,6 @@
 """What is stored does not depend on the names of classes, nor, where it is declared, on those of fields."""
 
 import dataclasses
-import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -13,19 +12,6 @@ from impactcell.serialization import described, dumps, pack, stored, unpack
 from impactcell.serialization.tree import Unknown, from_tree, to_tree
 
 
-class Name(enum.Enum):
-    LEFT = "left"
-    RIGHT = "right"
-
-
-class Wider(enum.Enum):
-    """`Name` of a version that has one member more, before the others."""
-
-    TOP = "top"
-    LEFT = "left"
-    RIGHT = "right"
-
-
 @dataclass(frozen=True)
 class Item:
     value: float
@@ -34,7 +20,7 @@ class Item:
 @dataclass(frozen=True)
 class Before:
     mean: float
-    items: tuple[Item, ...] = field(metadata=stored(by=Name))
+    items: tuple[Item, ...] = field(metadata=stored(by=("left", "right")))
 
 
 @dataclass(frozen=True)
@@ -42,13 +28,13 @@ class Renamed:
     """Another class with another name of the same field."""
 
     level: float = field(metadata=stored(key="mean"))
-    things: tuple[Item, ...] = field(metadata=stored(key="items", by=Name))
+    things: tuple[Item, ...] = field(metadata=stored(key="items", by=("left", "right")))
 
 
 @dataclass(frozen=True)
 class More:
     mean: float
-    items: tuple[Item, ...] = field(metadata=stored(by=Wider))
+    items: tuple[Item, ...] = field(metadata=stored(by=("top", "left", "right")))
 
 
 def test_a_declared_key_outlives_the_name_of_its_field_and_class():
@@ -59,7 +45,7 @@ def test_a_declared_key_outlives_the_name_of_its_field_and_class():
     assert dumps(renamed) == '{"mean":0.1,"items":{"left":{"value":1.0},"right":{"value":2.0}}}'
 
 
-def test_items_of_an_enum_are_found_by_name_and_not_by_place():
+def test_items_with_names_are_found_by_name_and_not_by_place():
     before = Before(0.1, (Item(1.0), Item(2.0)))
     fresh = More(0.0, (Item(7.0), Item(8.0), Item(9.0)))
     more = from_tree(More, to_tree(before), initial=fresh)

@@ -1,0 +1,169 @@
+"""What an alarm rule is: everything about one condition of a cell, declared in one file of `alarms.rules`."""
+
+import enum
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from impactcell.records import BatchState, Evidence, FrictionEstimate, Quality, Signature, WearState
+
+
+class ConditionClass(enum.Enum):
+    """Classes of conditions of OPC UA Part 9, 5.9, by their browse names."""
+
+    PROCESS = "ProcessConditionClass"
+    MAINTENANCE = "MaintenanceConditionClass"
+    SYSTEM = "SystemConditionClass"
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A sentence for a shift worker: what, since when, how sure, what to do."""
+
+    english: str
+    german: str
+
+    def text(self, language: str) -> str:
+        """Return it in the language of a locale id, as "de" or "de-AT"; English where there is no other."""
+        return self.german if language.partition("-")[0].lower() == "de" else self.english
+
+
+NO_MESSAGE = Message("", "")
+"""Of a rule that does not hold."""
+NO_EVIDENCE = Evidence()
+"""Of a rule without figures."""
+
+
+def german(value: float, form: str) -> str:
+    """Write a number as German has it, with a comma, in one of Python's format specifications."""
+    return format(value, form).replace(".", ",")
+
+
+@dataclass(frozen=True, slots=True)
+class RuleSettings:
+    """What a cell may choose about one condition.
+
+    Attributes
+    ----------
+    severity : int
+        1-1000, as in OPC UA.
+    on_delay, off_delay : int
+        Cycles for which the rule must hold, and not hold, before the alarm activates and clears.
+    realarm : int
+        Cycles after which an alarm that is still active calls again; 0 for never.
+    enabled : bool
+        Whether the condition starts enabled.
+    activate_above, clear_below : float
+        Hysteresis of the rule's statistic; nan for a rule that has a threshold of its own.
+    """
+
+    severity: int = 500
+    on_delay: int = 0
+    off_delay: int = 0
+    realarm: int = 0
+    enabled: bool = True
+    activate_above: float = math.nan
+    clear_below: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class RuleResult:
+    """What a rule says of one condition now; `holds` None where it cannot tell, and all stays as it is."""
+
+    name: str
+    holds: bool | None
+    message: Message = NO_MESSAGE
+    evidence: Evidence = NO_EVIDENCE
+
+
+@dataclass(frozen=True, slots=True)
+class CycleInputs:
+    """What rules may look at after a cycle; what was not computed is None.
+
+    Attributes
+    ----------
+    shift : Evidence or None
+        Of a batch shift, at the one cycle at which it is detected.
+    deviation : Evidence or None
+        Of the signature, where the cycle deviates; `judged` says whether that could be told.
+    gap : Evidence
+        Of the model's residual; `gap_exceeds` None while the usual one is being learned.
+    false_alarm_cycles, period_s : float
+        Designed mean number of cycles between false alarms, mean time between cycles; nan: not known.
+    """
+
+    cycle: int
+    wear: WearState
+    batch: BatchState | None = None
+    friction: FrictionEstimate | None = None
+    signature: Signature | None = None
+    shift: Evidence | None = None
+    deviation: Evidence | None = None
+    judged: bool = False
+    gap: Evidence = NO_EVIDENCE
+    gap_exceeds: bool | None = None
+    false_alarm_cycles: float = math.nan
+    period_s: float = math.nan
+
+    @property
+    def wear_is_known(self) -> bool:
+        """Whether the wear of this cycle can be believed at all."""
+        return self.wear.quality is not Quality.BAD and not math.isnan(self.wear.probability_above_limit)
+
+
+@dataclass(frozen=True, slots=True)
+class RuleContext:
+    """Settings of a rule in this cell, and whether its alarm is active."""
+
+    settings: RuleSettings
+    active: bool
+
+    @property
+    def threshold(self) -> float:
+        """What the statistic must pass for the alarm to come, or to stay where it is active."""
+        return self.settings.clear_below if self.active else self.settings.activate_above
+
+
+Evaluate = Callable[[CycleInputs, RuleContext], RuleResult]
+"""Says what a rule makes of a cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmRule:
+    """One condition of a cell.
+
+    Attributes
+    ----------
+    name : str
+        Published name: browse name of the condition, and what journal and logs call it. It never changes.
+    node_number, type_number : int
+        Identifiers of the condition and of its type in the NodeSet2 file, never used for another; conditions
+        are listed in the order of the first.
+    description : str
+        What it says, in a sentence; of its node and in the docs.
+    title : Message
+        What it is called where it has nothing to say.
+    settings : RuleSettings
+        Defaults of what a cell may choose.
+    condition_class : ConditionClass
+    input_node : str
+        Path of the published variable that it watches; empty for none.
+    evaluate : callable or None
+        Of a rule that looks at every cycle; None for one of what happens beside the cycles.
+    suppressed_by_announcement : bool
+        An announced batch change keeps it silent for a while.
+    logged_by_cause : bool
+        What raises it has logged it already.
+    """
+
+    name: str
+    node_number: int
+    type_number: int
+    title: Message
+    description: str
+    settings: RuleSettings
+    condition_class: ConditionClass = ConditionClass.PROCESS
+    input_node: str = ""
+    evaluate: Evaluate | None = None
+    suppressed_by_announcement: bool = False
+    logged_by_cause: bool = False

@@ -1,0 +1,61 @@
+"""DeviantCycle: friction along the stroke of one cycle is unlike that of the others."""
+
+import math
+
+from impactcell.alarms.rule import (
+    AlarmRule,
+    CycleInputs,
+    Message,
+    RuleContext,
+    RuleResult,
+    RuleSettings,
+    german,
+)
+from impactcell.records import Evidence
+
+NAME = "DeviantCycle"
+"""Published name."""
+
+
+def evaluate(inputs: CycleInputs, _context: RuleContext) -> RuleResult:
+    """Say whether the signature deviates; nothing while its reference is being learned."""
+    if not inputs.judged:
+        return RuleResult(NAME, None)
+    if inputs.deviation is None:
+        return RuleResult(NAME, holds=False)
+    at_m = inputs.signature.deviates_at_m if inputs.signature is not None else math.nan
+    message = _message(inputs.cycle, inputs.deviation, at_m)
+    return RuleResult(NAME, holds=True, message=message, evidence=inputs.deviation)
+
+
+def _message(cycle: int, deviation: Evidence, at_m: float) -> Message:
+    is_higher, at_mm = deviation.size > 0.0, 1e3 * at_m
+    size, std = abs(deviation.size), deviation.size_std
+    if not math.isfinite(deviation.size_std + at_m):
+        return Message(
+            f"Cycle {cycle} is unlike the others over the whole stroke; no single place stands out. "
+            "Set the part aside and look at it and at the surface.",
+            f"Zyklus {cycle} weicht über den ganzen Hub von den anderen ab; keine einzelne Stelle fällt auf. "
+            "Teil beiseitelegen, Teil und Oberfläche ansehen.",
+        )
+    return Message(
+        f"Cycle {cycle} is unlike the others: {at_mm:.2f} mm along the stroke friction is {size:.4f} ± "
+        f"{std:.4f} {'higher' if is_higher else 'lower'}. "
+        "Set the part aside and look at it and at the surface there.",
+        f"Zyklus {cycle} weicht von den anderen ab: bei {german(at_mm, '.2f')} mm des Hubs ist die Reibung "
+        f"um {german(size, '.4f')} ± {german(std, '.4f')} {'höher' if is_higher else 'niedriger'}. "
+        "Teil beiseitelegen, Teil und Oberfläche an dieser Stelle ansehen.",
+    )
+
+
+RULE = AlarmRule(
+    name=NAME,
+    node_number=5010,
+    type_number=1005,
+    title=Message("Deviant cycle", "Abweichender Zyklus"),
+    description="The last cycle differs from the cycles the cell has learned.",
+    settings=RuleSettings(severity=400, off_delay=1),
+    input_node="Signature/TSquared",
+    evaluate=evaluate,
+)
+"""The rule."""
