@@ -1,17 +1,33 @@
 """The tap of least expected cost, first among the table's, then refined in its stroke or velocity."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from impactcell.numerics.jit import compiled
-from impactcell.positioning.displacement_quantiles import COARSE_Z, Z, displacement_quantiles
-from impactcell.positioning.dynamic_programming import ValueFunction, expected_cost, interval_probabilities
+from impactcell.positioning.displacement_quantiles import COARSE_Z, Scenarios, Z, displacement_quantiles
+from impactcell.positioning.dynamic_programming import (
+    AIMS,
+    Goal,
+    Quadrature,
+    ValueFunction,
+    expected_cost,
+    quadrature,
+)
 from impactcell.records import Samples
 
 KEPT = 5  # taps of the table that are refined
 FINE = 11  # strokes tried between the neighbours of one of them, and again between the best two
+
+
+class ActionSpace(NamedTuple):
+    """Velocities and strokes of the table, and the longest stroke allowed at each velocity; SI."""
+
+    velocities: Samples
+    strokes: Samples
+    longest_strokes: Samples
 
 
 class SelectedAction(NamedTuple):
@@ -23,107 +39,124 @@ class SelectedAction(NamedTuple):
     overshoot: float
 
 
+@cache
+def coarse_nodes() -> Quadrature:
+    """Nodes at which the taps of a table are evaluated."""
+    return quadrature(COARSE_Z)
+
+
+@cache
+def fine_nodes() -> Quadrature:
+    """Nodes at which taps that are refined are evaluated."""
+    return quadrature(Z)
+
+
+@compiled
+def best_stroke(
+    row: Samples, remaining: float, nodes: Quadrature, goal: Goal, value: ValueFunction, aims: Samples,
+    bound: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Cost of the best tap at one velocity and its position on the stroke axis (fractional index).
+
+    Parameters
+    ----------
+    row : ndarray, shape (strokes, q)
+        Displacements (m) at the nodes.
+    bound : float
+        Costs above it do not matter.
+    """
+    middle = nodes.z.size // 2
+    moved = np.empty(nodes.z.size)
+    best, place = math.inf, 0.0
+    for j in range(row.shape[0]):
+        centre = row[j, middle]
+        if centre <= 0.0 or math.isnan(row[j].sum()):
+            continue
+        if centre <= remaining + 2.0 * goal.tolerance:
+            c, _ = expected_cost(remaining, row[j], nodes, goal, value, value.cost.size, bound)
+            if c < best:
+                best, place, bound = c, float(j), min(bound, c)
+        if j + 1 == row.shape[0]:
+            continue
+        following = row[j + 1, middle]
+        low, high = min(centre, following), max(centre, following)
+        if math.isnan(row[j + 1].sum()) or low <= 0.0 or low == high:
+            continue
+        if low > remaining or high < remaining - 3.0 * goal.tolerance:
+            continue
+        for aim in aims:
+            median = remaining - aim * goal.tolerance
+            if not low < median < high:
+                continue
+            part = (median - centre) / (following - centre)
+            for q in range(moved.size):
+                moved[q] = row[j, q] + part * (row[j + 1, q] - row[j, q])
+            c, _ = expected_cost(remaining, moved, nodes, goal, value, value.cost.size, bound)
+            if c < best:
+                best, place, bound = c, j + part, min(bound, c)
+    return best, place
+
+
 @compiled
 def shortlist(
-    table: Samples, remaining: float, z: Samples, mass: Samples, tolerance: float, penalty: float,
-    step: float, cost: Samples, overshoot: Samples, aims: Samples, kept: int,
+    table: Samples, remaining: float, nodes: Quadrature, goal: Goal, value: ValueFunction, aims: Samples,
+    kept: int,
 ) -> tuple[Samples, Samples, Samples]:  # fmt: skip
     """Velocity index, position on the stroke axis (fractional index) and cost of the best taps.
 
     At most one tap a velocity is kept, so that what is refined is not one tap `kept` times.
     """
-    nodes = z.size
-    middle = nodes // 2
-    where, what, which = np.zeros(kept), np.full(kept, math.inf), np.zeros(kept)
-    row = np.empty(nodes)
-    strokes = table.shape[1]
+    places, costs, velocities = np.zeros(kept), np.full(kept, math.inf), np.zeros(kept)
     for i in range(table.shape[0]):
-        best, place = math.inf, 0.0
-        bound = what[kept - 1]
-        for j in range(strokes):
-            centre = table[i, j, middle]
-            if centre <= 0.0 or math.isnan(table[i, j].sum()):
-                continue
-            if centre <= remaining + 2.0 * tolerance:
-                c, _ = expected_cost(
-                    remaining, table[i, j], z, mass, tolerance, penalty, step, cost, overshoot,
-                    cost.size, bound,
-                )  # fmt: skip
-                if c < best:
-                    best, place, bound = c, float(j), min(bound, c)
-            if j + 1 < strokes:
-                following = table[i, j + 1, middle]
-                low, high = min(centre, following), max(centre, following)
-                if math.isnan(table[i, j + 1].sum()) or low <= 0.0 or low == high:
-                    continue
-                if low > remaining or high < remaining - 3.0 * tolerance:
-                    continue
-                for aim in aims:
-                    wanted = remaining - aim * tolerance
-                    if not low < wanted < high:
-                        continue
-                    part = (wanted - centre) / (following - centre)
-                    for q in range(nodes):
-                        row[q] = table[i, j, q] + part * (table[i, j + 1, q] - table[i, j, q])
-                    c, _ = expected_cost(
-                        remaining, row, z, mass, tolerance, penalty, step, cost, overshoot, cost.size, bound
-                    )  # fmt: skip
-                    if c < best:
-                        best, place, bound = c, j + part, min(bound, c)
-        if best < what[kept - 1]:
+        best, place = best_stroke(table[i], remaining, nodes, goal, value, aims, costs[kept - 1])
+        if best < costs[kept - 1]:
             n = kept - 1
-            while n > 0 and what[n - 1] > best:
-                what[n], where[n], which[n] = what[n - 1], where[n - 1], which[n - 1]
+            while n > 0 and costs[n - 1] > best:
+                costs[n], places[n], velocities[n] = costs[n - 1], places[n - 1], velocities[n - 1]
                 n -= 1
-            what[n], where[n], which[n] = best, place, float(i)
-    return which, where, what
+            costs[n], places[n], velocities[n] = best, place, float(i)
+    return velocities, places, costs
 
 
 @compiled
 def evaluate_actions(
-    velocity: float, strokes: Samples, rows: Samples, z: Samples, mass: Samples, part: Samples,
-    remaining: float, tolerance: float, penalty: float,
-    step: float, cost: Samples, overshoot: Samples,
+    velocity: float, strokes: Samples, scenarios: Scenarios, remaining: float, nodes: Quadrature, goal: Goal,
+    value: ValueFunction,
 ) -> tuple[Samples, Samples]:  # fmt: skip
-    """Weigh each stroke at one velocity by the model itself: expected cost and overshoot probability."""
-    moved = np.empty((strokes.size, z.size))
-    displacement_quantiles(velocity, strokes, rows, z, part, moved)
+    """Evaluate each stroke at one velocity by the model itself: expected cost and overshoot probability."""
+    moved = np.empty((strokes.size, nodes.z.size))
+    displacement_quantiles(velocity, strokes, scenarios, nodes.z, moved)
     costs, risks = np.empty(strokes.size), np.empty(strokes.size)
     for j in range(strokes.size):
         if math.isnan(moved[j].sum()):
             costs[j], risks[j] = math.inf, 1.0
         else:
             costs[j], risks[j] = expected_cost(
-                remaining, moved[j], z, mass, tolerance, penalty, step, cost, overshoot, cost.size, math.inf
-            )  # fmt: skip
+                remaining, moved[j], nodes, goal, value, value.cost.size, math.inf
+            )
     return costs, risks
 
 
 def select_action(
-    remaining: float, table: Samples, velocities: Samples, strokes: Samples, rows: Samples,
-    value: ValueFunction, aims: Samples, *, tolerance: float, penalty: float, bound: float, part: Samples,
-    caps: Samples,
+    remaining: float, table: Samples, value: ValueFunction, space: ActionSpace, scenarios: Scenarios,
+    goal: Goal, bound: float,
 ) -> tuple[SelectedAction | None, float]:  # fmt: skip
     """Tap of least cost with an overshoot probability within `bound`, and the least probability met.
 
-    The tap is None where none is within the bound. `caps` is the longest stroke allowed at each velocity.
+    The tap is None where none is within the bound. `table` and `value` as in `LookaheadTable`.
     """
-    coarse, mass = interval_probabilities(COARSE_Z), interval_probabilities(Z)
-    which, where, what = shortlist(
-        table, remaining, COARSE_Z, coarse, tolerance, penalty, *value, aims, KEPT
-    )  # fmt: skip
     best: SelectedAction | None = None
     least = 1.0
-    for i, place, first in zip(which, where, what, strict=True):
+    shortlisted = shortlist(table, remaining, coarse_nodes(), goal, value, AIMS, KEPT)
+    for i, place, first in zip(*shortlisted, strict=True):
         if first == math.inf or (best is not None and first > best.cost + 1.0):
             continue
-        for velocity, tried in _neighbours(int(i), float(place), velocities, strokes, caps):
-            fine = tried
+        for velocity, strokes in _neighbours(int(i), float(place), space):
+            fine = strokes
             for _ in range(2):
                 costs, risks = evaluate_actions(
-                    velocity, fine, rows, Z, mass, part, remaining,
-                    tolerance, penalty, *value,
-                )  # fmt: skip
+                    velocity, fine, scenarios, remaining, fine_nodes(), goal, value
+                )
                 least = min(least, float(risks.min()))
                 costs = np.where(risks <= bound, costs, np.inf)
                 n = int(costs.argmin())
@@ -135,14 +168,13 @@ def select_action(
     return best, least
 
 
-def _neighbours(
-    i: int, place: float, velocities: Samples, strokes: Samples, caps: Samples
-) -> list[tuple[float, Samples]]:
+def _neighbours(i: int, place: float, space: ActionSpace) -> list[tuple[float, Samples]]:
     """Where to look more closely: strokes about `place`, or velocities where there is no stroke to choose."""
+    velocities, strokes, longest = space
     if strokes.size == 1:
         above = min(i + 1, velocities.size - 1)
-        high = velocities[above] if caps[above] >= strokes[0] else velocities[i]
+        high = velocities[above] if longest[above] >= strokes[0] else velocities[i]
         return [(float(v), strokes) for v in np.linspace(velocities[max(i - 1, 0)], high, 2 * FINE + 1)]
     low = strokes[max(math.ceil(place) - 1, 0)]
     high = strokes[min(math.floor(place) + 1, strokes.size - 1)]
-    return [(float(velocities[i]), np.linspace(low, min(high, caps[i]), FINE))]
+    return [(float(velocities[i]), np.linspace(low, min(high, longest[i]), FINE))]

@@ -6,6 +6,7 @@ each taken at one standard deviation and added by `reach`.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,27 +16,41 @@ from impactcell.positioning.planner_posterior import FRICTION, PlannerPosterior
 from impactcell.records import Samples
 
 Z = np.array([-4.2, -3.3, -2.6, -1.9, -1.2, -0.6, 0.0, 0.6, 1.2, 1.9, 2.6, 3.3, 4.2])
-COARSE_Z = np.array([-3.8, -2.8, -1.8, -0.85, 0.0, 0.85, 1.8, 2.8, 3.8])  # for tables of many taps
+"""Nodes along the line, in standard deviations: beyond the last lies one case in 40 000."""
+COARSE_Z = np.array([-3.8, -2.8, -1.8, -0.85, 0.0, 0.85, 1.8, 2.8, 3.8])
+"""The same for tables of many taps."""
 ACROSS = 4
+"""Directions across the line: parameters other than friction."""
 
 
-def parameter_scenarios(belief: PlannerPosterior, z: Samples) -> Samples:
-    """Parameter rows (k, b, mu_s, mu_k, k_v), shape (len(z) + 2 * ACROSS, 5): the line, then +-1 across."""
-    cov = belief.cov.copy()
-    cov[FRICTION, FRICTION] += belief.scatter**2
+class Scenarios(NamedTuple):
+    """What a tap may meet.
+
+    `plants` are rows (k, b, mu_s, mu_k, k_v), shape (nodes + 2 ACROSS, 5): those along the line, then a
+    standard deviation above and below it in each direction across. `part` as in `displacements`.
+    """
+
+    plants: Samples
+    part: Samples
+
+
+def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples) -> Scenarios:
+    """Draw up what a tap of this part may meet, along the line at the nodes z."""
+    cov = posterior.cov.copy()
+    cov[FRICTION, FRICTION] += posterior.scatter**2
     sigma = math.sqrt(cov[FRICTION, FRICTION])
     along = cov[FRICTION] / sigma
     across = cov[1:, 1:] - np.outer(along[1:], along[1:])
     values, vectors = np.linalg.eigh(across)
     steps = (vectors * np.sqrt(np.maximum(values, 0.0))).T
     theta = np.empty((z.size + 2 * ACROSS, 5))
-    theta[:] = belief.mean
+    theta[:] = posterior.mean
     theta[: z.size] += np.outer(z, along)
     # ln(1 + s z) to second order: a factor of friction is normal, not log-normal
     theta[: z.size, FRICTION] -= 0.5 * min(sigma, 0.1) ** 2 * z**2
     theta[z.size : z.size + ACROSS, 1:] += steps
     theta[z.size + ACROSS :, 1:] -= steps
-    return plant_parameters(theta)
+    return Scenarios(plant_parameters(theta), part)
 
 
 def plant_parameters(theta: Samples) -> Samples:
@@ -52,13 +67,10 @@ def plant_parameters(theta: Samples) -> Samples:
 
 @compiled
 def displacement_quantiles(
-    velocity: float, strokes: Samples, rows: Samples, z: Samples, part: Samples,
-    out: Samples,
-) -> None:  # fmt: skip
-    """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m.
-
-    `rows` as from `parameter_scenarios`.
-    """
+    velocity: float, strokes: Samples, scenarios: Scenarios, z: Samples, out: Samples
+) -> None:
+    """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m."""
+    rows, part = scenarios.plants, scenarios.part
     nodes, count = z.size, strokes.size
     middle = nodes // 2
     across = (rows.shape[0] - nodes) // 2
@@ -113,11 +125,9 @@ def reach(line: Samples, z: Samples, q: int, middle: int, aside: float) -> float
 
 
 @compiled
-def quantile_table(
-    velocities: Samples, strokes: Samples, rows: Samples, z: Samples, part: Samples
-) -> Samples:  # fmt: skip
+def quantile_table(velocities: Samples, strokes: Samples, scenarios: Scenarios, z: Samples) -> Samples:
     """Displacements (m), shape (velocities, strokes, nodes)."""
     table = np.empty((velocities.size, strokes.size, z.size))
     for i in range(velocities.size):
-        displacement_quantiles(velocities[i], strokes, rows, z, part, table[i])
+        displacement_quantiles(velocities[i], strokes, scenarios, z, table[i])
     return table

@@ -19,11 +19,26 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
-STALL_PENALTY = 60.0  # taps that a tap which moves nothing costs: it stops a sequence
-STALL_M = 2e-7
+STALL_PENALTY = 60.0  # taps that a tap which moves nothing costs: it stops a task
+STALL_M = 2e-7  # displacement below which a tap has moved nothing: an encoder's resolution
 AIMS = np.array([-0.4, 0.0, 0.4, 0.8, 1.4, 2.2])  # short of the target, in tolerances
-FAR = 0.7  # a tap whose median leaves this much more to do than the best is not weighed
+WORTH_TRYING = 0.7  # taps; one whose median leaves this much more to do than the best is not evaluated
 SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
+MOSTLY_STALLED = 0.9  # probability of no progress above which a tap is no way forward
+
+
+class Quadrature(NamedTuple):
+    """Nodes of a standard normal variable, shape (q,), and the probability between neighbours, (q - 1,)."""
+
+    z: Samples
+    probability: Samples
+
+
+class Goal(NamedTuple):
+    """What is asked of a task: the tolerance (m), and the taps that an overshoot may cost."""
+
+    tolerance: float
+    penalty: float
 
 
 class ValueFunction(NamedTuple):
@@ -34,6 +49,18 @@ class ValueFunction(NamedTuple):
     overshoot: Samples
 
 
+class Actions(NamedTuple):
+    """Taps to choose from in a sweep.
+
+    `displacements` (m), shape (m,), are medians; `taps`, shape (m, SLOTS, q), the displacements of the taps
+    kept for each at the nodes of the quadrature, nan where a slot is empty; `aims` how far short to aim.
+    """
+
+    displacements: Samples
+    taps: Samples
+    aims: Samples
+
+
 @compiled
 def normal_tail(z: float) -> float:
     """P(Z > z) of a standard normal Z."""
@@ -42,13 +69,13 @@ def normal_tail(z: float) -> float:
 
 
 @compiled
-def interpolate_value(step: float, values: Samples, known: int, r: float) -> float:
-    """Interpolate `values`, of which `known` are there; beyond them, the mean slope of their second half."""
+def interpolate_value(step: float, values: Samples, solved: int, r: float) -> float:
+    """Interpolate `values`, of which `solved` are there; beyond them, the mean slope of their second half."""
     place = r / step
     n = int(place)
-    if n + 1 < known:
+    if n + 1 < solved:
         return float(values[n] + (place - n) * (values[n + 1] - values[n]))
-    last = known - 1
+    last = solved - 1
     half = last // 2
     slope = (values[last] - values[half]) / (last - half) if last > half else 0.0
     return float(values[last] + slope * (place - last))
@@ -56,27 +83,33 @@ def interpolate_value(step: float, values: Samples, known: int, r: float) -> flo
 
 @compiled
 def expected_cost(
-    remaining: float, moved: Samples, z: Samples, mass: Samples, tolerance: float, penalty: float,
-    step: float, cost: Samples, overshoot: Samples, known: int, bound: float,
-) -> tuple[float, float]:  # fmt: skip
+    remaining: float,
+    moved: Samples,
+    nodes: Quadrature,
+    goal: Goal,
+    value: ValueFunction,
+    solved: int,
+    bound: float,
+) -> tuple[float, float]:
     """Weigh one tap: expected cost and overshoot probability of it and all that follow it.
 
     Parameters
     ----------
     moved : ndarray, shape (q,)
-        Displacement at the nodes `z`; between them it is interpolated.
-    mass : ndarray, shape (q - 1,)
-        Normal probability between neighbouring nodes.
-    known : int
-        How many points of `cost` and `overshoot` are known. A tap that leaves the part beyond them, or
-        where it was, leads back to the question that is being asked.
+        Displacement at the nodes; between them it is interpolated.
+    solved : int
+        How many points of the value function are known. A tap that leaves the part beyond them, or where it
+        was, leads back to the question that is being asked.
     bound : float
         A cost above which the answer does not matter: inf is returned as soon as it is passed.
     """
+    z, probability = nodes.z, nodes.probability
+    tolerance, penalty = goal.tolerance, goal.penalty
+    step, cost, overshoot = value.step_m, value.cost, value.overshoot
     total, risk, again = 1.0, 0.0, 0.0
-    intervals = mass.size
-    whole = known == cost.size
-    reached = step * (known - 1)
+    intervals = probability.size
+    whole = solved == cost.size
+    reached = step * (solved - 1)
     for turn in range(intervals):  # from the middle outwards: the bound is passed early
         q = intervals // 2 + (turn + 1) // 2 * (1 if turn % 2 == 0 else -1)
         a, b = remaining - moved[q], remaining - moved[q + 1]
@@ -84,16 +117,16 @@ def expected_cost(
         if near > tolerance:
             r = 0.5 * (a + b)
             if moved[q] <= STALL_M and moved[q + 1] <= STALL_M:
-                again += mass[q]
-                total += mass[q] * STALL_PENALTY
+                again += probability[q]
+                total += probability[q] * STALL_PENALTY
             elif whole or r <= reached:
-                total += mass[q] * interpolate_value(step, cost, known, r)
-                risk += mass[q] * interpolate_value(step, overshoot, known, min(r, reached))
+                total += probability[q] * interpolate_value(step, cost, solved, r)
+                risk += probability[q] * interpolate_value(step, overshoot, solved, min(r, reached))
             else:
-                again += mass[q]
+                again += probability[q]
         elif far < -tolerance:
-            total += mass[q] * penalty
-            risk += mass[q]
+            total += probability[q] * penalty
+            risk += probability[q]
         elif far > tolerance or near < -tolerance:
             # z at which the remaining distance crosses +tolerance and -tolerance, linear between nodes
             slope = (z[q + 1] - z[q]) / (b - a)
@@ -115,13 +148,13 @@ def expected_cost(
                 )
                 r = min(0.5 * (tolerance + far), reached)
                 if r > tolerance:
-                    total += part * interpolate_value(step, cost, known, r)
-                    risk += part * interpolate_value(step, overshoot, known, r)
+                    total += part * interpolate_value(step, cost, solved, r)
+                    risk += part * interpolate_value(step, overshoot, solved, r)
                 else:
                     again += part
         if total > bound:
             return math.inf, 1.0
-    if again > 0.9:
+    if again > MOSTLY_STALLED:
         return math.inf, 1.0
     return total / (1.0 - again), risk / (1.0 - again)
 
@@ -164,59 +197,79 @@ def taps_by_displacement(table: Samples, targets: Samples, z: Samples) -> Sample
 
 
 @compiled
+def best_action(
+    r: float, actions: Actions, nodes: Quadrature, goal: Goal, value: ValueFunction, solved: int
+) -> tuple[float, float]:
+    """Least expected cost from the remaining distance r, and the overshoot probability of that tap."""
+    displacements, taps = actions.displacements, actions.taps
+    best, risk = math.inf, 1.0
+    last = np.searchsorted(displacements, r + goal.tolerance)
+    for backward in range(last):
+        m = last - 1 - backward
+        if displacements[m] < 0.2 * r and displacements[m] < 0.5 * displacements[displacements.size - 1]:
+            break
+        rest = r - displacements[m]
+        if rest > goal.tolerance:
+            least = 1.0 + interpolate_value(value.step_m, value.cost, solved, rest)
+            if least > best + WORTH_TRYING:
+                continue
+        for s in range(SLOTS):
+            if not math.isnan(taps[m, s, 0]):
+                c, p = expected_cost(r, taps[m, s], nodes, goal, value, solved, best)
+                if c < best:
+                    best, risk = c, p
+    return best, risk
+
+
+@compiled
+def best_aimed_action(
+    r: float, actions: Actions, nodes: Quadrature, goal: Goal, value: ValueFunction, solved: int, best: float
+) -> tuple[float, float]:
+    """Least expected cost, below `best`, of a tap that aims just short of the target; inf where none is."""
+    displacements, taps = actions.displacements, actions.taps
+    row = np.empty(nodes.z.size)
+    least, risk = math.inf, 1.0
+    for aim in actions.aims:
+        median = r - aim * goal.tolerance
+        m = np.searchsorted(displacements, median)
+        if median <= 0.0 or m == 0 or m >= displacements.size:
+            continue
+        part = (median - displacements[m - 1]) / (displacements[m] - displacements[m - 1])
+        for s in range(SLOTS):
+            below = taps[m - 1, s] if not math.isnan(taps[m - 1, s, 0]) else taps[m - 1, 0]
+            above = taps[m, s] if not math.isnan(taps[m, s, 0]) else taps[m, 0]
+            for q in range(row.size):
+                row[q] = below[q] + part * (above[q] - below[q])
+            if not math.isnan(row[0]):
+                c, p = expected_cost(r, row, nodes, goal, value, solved, min(best, least))
+                if c < min(best, least):
+                    least, risk = c, p
+    return least, risk
+
+
+@compiled
 def bellman_sweep(
-    grid: Samples, targets: Samples, taps: Samples, aims: Samples, z: Samples, mass: Samples,
-    tolerance: float, penalty: float, step: float, cost: Samples, overshoot: Samples,
-) -> None:  # fmt: skip
-    """Fill `cost` and `overshoot`, solving on `grid` from the tolerance outwards and interpolating."""
-    nodes = z.size
-    row = np.empty(nodes)
-    known = int(tolerance / step) + 1  # zero inside the tolerance
-    before, cost_before, risk_before = tolerance, 1.0, 0.0
+    grid: Samples, actions: Actions, nodes: Quadrature, goal: Goal, value: ValueFunction
+) -> None:
+    """Fill the value function, solving on `grid` from the tolerance outwards and interpolating."""
+    step, cost, overshoot = value.step_m, value.cost, value.overshoot
+    solved = int(goal.tolerance / step) + 1  # zero inside the tolerance
+    before, cost_before, risk_before = goal.tolerance, 1.0, 0.0
     for n in range(grid.size):
         r = grid[n]
-        best, risk = math.inf, 1.0
-        last = np.searchsorted(targets, r + tolerance)
-        for backward in range(last):
-            m = last - 1 - backward
-            if targets[m] < 0.2 * r and targets[m] < 0.5 * targets[targets.size - 1]:
-                break
-            left = r - targets[m]
-            if left > tolerance and 1.0 + interpolate_value(step, cost, known, left) > best + FAR:
-                continue
-            for s in range(SLOTS):
-                if not math.isnan(taps[m, s, 0]):
-                    c, p = expected_cost(
-                        r, taps[m, s], z, mass, tolerance, penalty, step, cost, overshoot, known, best
-                    )  # fmt: skip
-                    if c < best:
-                        best, risk = c, p
-        for aim in aims:
-            wanted = r - aim * tolerance
-            m = np.searchsorted(targets, wanted)
-            if wanted <= 0.0 or m == 0 or m >= targets.size:
-                continue
-            part = (wanted - targets[m - 1]) / (targets[m] - targets[m - 1])
-            for s in range(SLOTS):
-                before_it = taps[m - 1, s] if not math.isnan(taps[m - 1, s, 0]) else taps[m - 1, 0]
-                behind_it = taps[m, s] if not math.isnan(taps[m, s, 0]) else taps[m, 0]
-                for q in range(nodes):
-                    row[q] = before_it[q] + part * (behind_it[q] - before_it[q])
-                if not math.isnan(row[0]):
-                    c, p = expected_cost(
-                        r, row, z, mass, tolerance, penalty, step, cost, overshoot, known, best
-                    )
-                    if c < best:
-                        best, risk = c, p
+        best, risk = best_action(r, actions, nodes, goal, value, solved)
+        aimed, aimed_risk = best_aimed_action(r, actions, nodes, goal, value, solved, best)
+        if aimed < best:
+            best, risk = aimed, aimed_risk
         if best == math.inf:  # nothing helps from here: as costly as an overshoot
-            best, risk = penalty, 1.0
+            best, risk = goal.penalty, 1.0
         if n == 0:
             cost_before, risk_before = best, risk
-        while known < cost.size and known * step <= r:
-            part = (known * step - before) / (r - before)
-            cost[known] = cost_before + part * (best - cost_before)
-            overshoot[known] = risk_before + part * (risk - risk_before)
-            known += 1
+        while solved < cost.size and solved * step <= r:
+            part = (solved * step - before) / (r - before)
+            cost[solved] = cost_before + part * (best - cost_before)
+            overshoot[solved] = risk_before + part * (risk - risk_before)
+            solved += 1
         before, cost_before, risk_before = r, best, risk
 
 
@@ -228,23 +281,22 @@ def graded_grid(first: float, last: float, step: float, ratio: float) -> Samples
     return np.array(points)
 
 
-def interval_probabilities(z: Samples) -> Samples:
-    """Probability between neighbouring nodes, shape (q - 1,); the tails go to the outermost intervals."""
+def quadrature(z: Samples) -> Quadrature:
+    """Nodes with the probability between neighbours; the tails go to the outermost intervals."""
     below = np.array([1.0 - normal_tail(float(v)) for v in z])
     below[0], below[-1] = 0.0, 1.0
-    return np.diff(below)
+    return Quadrature(z, np.diff(below))
 
 
-def solve_value_function(table: Samples, z: Samples, tolerance: float, penalty: float) -> ValueFunction:
-    """Sweep for one part: `table` (m) as from `spread_table`, shape (velocities, strokes, nodes)."""
-    furthest = float(np.nanmax(table[:, :, z.size // 2]))
+def solve_value_function(table: Samples, nodes: Quadrature, goal: Goal) -> ValueFunction:
+    """Sweep for one part: `table` (m) as from `quantile_table`, shape (velocities, strokes, q)."""
+    furthest = float(np.nanmax(table[:, :, nodes.z.size // 2]))
+    tolerance = goal.tolerance
     step = max(0.5 * tolerance, 2.5e-4 * furthest)
     grid = graded_grid(1.25 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
     targets = graded_grid(min(0.5 * tolerance, 5e-6), furthest, 0.25 * tolerance, 0.03)
     targets = targets[targets <= furthest]
-    taps = taps_by_displacement(table, targets, z)
-    cost, overshoot = np.zeros(int(grid[-1] / step)), np.zeros(int(grid[-1] / step))
-    bellman_sweep(
-        grid, targets, taps, AIMS, z, interval_probabilities(z), tolerance, penalty, step, cost, overshoot
-    )
-    return ValueFunction(step, cost, overshoot)
+    actions = Actions(targets, taps_by_displacement(table, targets, nodes.z), AIMS)
+    value = ValueFunction(step, np.zeros(int(grid[-1] / step)), np.zeros(int(grid[-1] / step)))
+    bellman_sweep(grid, actions, nodes, goal, value)
+    return value

@@ -6,23 +6,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from impactcell.positioning.action_selection import ActionSpace, coarse_nodes
 from impactcell.positioning.displacement_quantiles import (
     COARSE_Z,
     parameter_scenarios,
     plant_parameters,
     quantile_table,
 )
-from impactcell.positioning.dynamic_programming import ValueFunction, solve_value_function
+from impactcell.positioning.dynamic_programming import Goal, ValueFunction, solve_value_function
 from impactcell.positioning.planner_posterior import PlannerPosterior, anticipate_learning
 from impactcell.positioning.safety_limits import allowed_strokes
 from impactcell.records import Samples
 
-SLOWEST_M_S = 0.005
-VELOCITIES = 24
-STROKES = 60
+SLOWEST_M_S = 0.005  # velocity of the table that hardly moves a part
+VELOCITIES = 24  # of the table; neighbours are 14 % apart
+STROKES = 60  # of the table
 MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
-SAME_MASS = 0.03
-STALE = np.array([0.02, 0.04, 0.08, 0.03, 2.0])  # change of the belief after which an outlook is made anew
+SAME_MASS = 0.03  # relative difference of parts that share a table
+STALE = np.array([0.02, 0.04, 0.08, 0.03, 2.0])
+"""Change of the posterior's mean or standard deviation, in its units, after which a table is made anew."""
+STALE_SCATTER = (0.9, 1.1)  # bounds of the ratio of two scatters that share a table
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,19 +57,27 @@ class PlannerLimits:
         fine = np.linspace(knee / STROKES, knee, STROKES // 2, endpoint=False)
         return np.concatenate([fine, np.linspace(knee, self.max_stroke_m, STROKES // 2)])
 
-    def caps(self, belief: PlannerPosterior, part: Samples) -> Samples:
+    def goal(self, caution: float) -> Goal:
+        """Tolerance, and what an overshoot may cost."""
+        return Goal(self.tolerance_m, self.penalty(caution))
+
+    def longest_strokes(self, posterior: PlannerPosterior, part: Samples) -> Samples:
         """Longest stroke at each velocity that the limit of force allows."""
         if math.isinf(self.max_force_n):
             return np.full(self.velocities.size, math.inf)
-        return allowed_strokes(self.velocities, self.max_force_n, stiffest(belief), part[0], part[1])
+        return allowed_strokes(self.velocities, self.max_force_n, stiffest(posterior), part[0], part[1])
+
+    def space(self, posterior: PlannerPosterior, part: Samples) -> ActionSpace:
+        """Taps to choose from."""
+        return ActionSpace(self.velocities, self.strokes, self.longest_strokes(posterior, part))
 
 
 class LookaheadTable(NamedTuple):
-    """Taps and cost to go for parts of one mass, and the belief they were worked out from."""
+    """Taps and cost to go for parts of one mass, and the posterior they were worked out from."""
 
     part: Samples
     caution: float
-    belief: PlannerPosterior
+    posterior: PlannerPosterior
     table: Samples
     value: ValueFunction
 
@@ -75,45 +86,46 @@ class LookaheadTable(NamedTuple):
         """Largest median displacement; 0 where nothing moves the part."""
         return float(np.nanmax(self.table[:, :, COARSE_Z.size // 2], initial=0.0))
 
-    def serves(self, part: Samples, caution: float, belief: PlannerPosterior) -> bool:
-        """Whether it need not be made anew for this part and belief."""
+    def serves(self, part: Samples, caution: float, posterior: PlannerPosterior) -> bool:
+        """Whether it need not be made anew for this part and posterior."""
         if caution != self.caution or part.size != self.part.size:
             return False
         if abs(part[0] / self.part[0] - 1.0) > SAME_MASS or not np.allclose(part[1:], self.part[1:], 0.02):
             return False
-        now, then = np.sqrt(np.diag(belief.cov)), np.sqrt(np.diag(self.belief.cov))
-        if not 0.9 < belief.scatter / self.belief.scatter < 1.1:
+        now, then = np.sqrt(np.diag(posterior.cov)), np.sqrt(np.diag(self.posterior.cov))
+        if not STALE_SCATTER[0] < posterior.scatter / self.posterior.scatter < STALE_SCATTER[1]:
             return False
         return bool(
-            (np.abs(belief.mean - self.belief.mean) < STALE).all() and (np.abs(now - then) < STALE).all()
+            (np.abs(posterior.mean - self.posterior.mean) < STALE).all()
+            and (np.abs(now - then) < STALE).all()
         )
 
 
-def stiffest(belief: PlannerPosterior) -> Samples:
+def stiffest(posterior: PlannerPosterior) -> Samples:
     """Plant (k, b, mu_s, mu_k, k_v) that presses hardest, within three standard deviations."""
-    worst = belief.mean + 3.0 * np.sqrt(np.diag(belief.cov))
+    worst = posterior.mean + 3.0 * np.sqrt(np.diag(posterior.cov))
     plant: Samples = plant_parameters(worst[None])[0] * np.array([1.0, 1.0, 1.1, 1.1, 1.0])
     return plant
 
 
 def build_lookahead(
-    bounds: PlannerLimits, belief: PlannerPosterior, part: Samples, caution: float
+    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, caution: float
 ) -> LookaheadTable:
-    """Work out taps and cost to go; `part` as in `response.displacements`."""
-    table = _table(bounds, belief, part)
+    """Work out taps and cost to go; `part` as in `displacements`."""
+    table = _quantiles(limits, posterior, part)
     value = ValueFunction(1.0, np.ones(1), np.ones(1))
     if np.nanmax(table[:, :, COARSE_Z.size // 2], initial=0.0) > 0.0:
-        later = anticipate_learning(belief)
-        will_learn = (np.diag(belief.cov) > 1.2 * np.diag(later.cov)).any()
-        ahead = _table(bounds, later, part) if will_learn else table
-        if math.isinf(bounds.max_stroke_m):
+        later = anticipate_learning(posterior)
+        will_learn = (np.diag(posterior.cov) > 1.2 * np.diag(later.cov)).any()
+        ahead = _quantiles(limits, later, part) if will_learn else table
+        if math.isinf(limits.max_stroke_m):
             ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
-        value = solve_value_function(ahead, COARSE_Z, bounds.tolerance_m, bounds.penalty(caution))
-    return LookaheadTable(part, caution, belief, table, value)
+        value = solve_value_function(ahead, coarse_nodes(), limits.goal(caution))
+    return LookaheadTable(part, caution, posterior, table, value)
 
 
-def _table(bounds: PlannerLimits, belief: PlannerPosterior, part: Samples) -> Samples:
-    velocities, strokes = bounds.velocities, bounds.strokes
-    table = quantile_table(velocities, strokes, parameter_scenarios(belief, COARSE_Z), COARSE_Z, part)
-    table[strokes > bounds.caps(belief, part)[:, None]] = math.nan
+def _quantiles(limits: PlannerLimits, posterior: PlannerPosterior, part: Samples) -> Samples:
+    velocities, strokes = limits.velocities, limits.strokes
+    table = quantile_table(velocities, strokes, parameter_scenarios(posterior, COARSE_Z, part), COARSE_Z)
+    table[strokes > limits.longest_strokes(posterior, part)[:, None]] = math.nan
     return table

@@ -18,7 +18,7 @@ from impactcell.positioning.displacement_quantiles import (
     parameter_scenarios,
     plant_parameters,
 )
-from impactcell.positioning.dynamic_programming import AIMS
+from impactcell.positioning.dynamic_programming import Goal
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 from impactcell.positioning.lookahead_table import LookaheadTable, PlannerLimits, build_lookahead, stiffest
 from impactcell.positioning.planner_posterior import PlannerPosterior
@@ -29,7 +29,7 @@ from impactcell.records import Quality, Samples, Signature
 
 CAUTION = (1.0, 20.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
-REMEMBERED = 64  # outlooks
+REMEMBERED = 64  # tables, of parts of different mass
 
 
 @dataclass(slots=True)
@@ -66,11 +66,11 @@ class TapPlanner:
     plant: Plant | Mapping[str, float] | None = None
     max_force_n: float = math.inf
     two_sided: bool = False
-    _belief: PlannerPosterior = field(init=False, repr=False)
+    _posterior: PlannerPosterior = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
-    _bounds: PlannerLimits = field(init=False, repr=False)
+    _limits: PlannerLimits = field(init=False, repr=False)
     _profile: StrokeFriction | None = field(init=False, repr=False, default=None)
-    _outlooks: list[LookaheadTable] = field(init=False, repr=False, default_factory=list)
+    _lookaheads: list[LookaheadTable] = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have, and start from the nominal plant."""
@@ -88,23 +88,23 @@ class TapPlanner:
             plant = Plant(**plant)  # type: ignore[arg-type]
         viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
         self._gravity = plant.gravity_m_s2
-        self._bounds = PlannerLimits(
+        self._limits = PlannerLimits(
             self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
             self.overshoot_probability,
         )  # fmt: skip
         _ready()
-        self._belief = planner_posterior.prior(
+        self._posterior = planner_posterior.prior(
             plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, float(np.max(viscous))
         )
 
     @property
-    def belief(self) -> PlannerPosterior:
+    def posterior(self) -> PlannerPosterior:
         """What has been learned so far; a value, to be kept and given back with `resume`."""
-        return self._belief
+        return self._posterior
 
-    def resume(self, belief: PlannerPosterior) -> None:
-        """Go on from a belief kept earlier."""
-        self._belief = belief
+    def resume(self, posterior: PlannerPosterior) -> None:
+        """Go on from what had been learned earlier."""
+        self._posterior = posterior
 
     def next_tap(self, remaining_m: float, mass_kg: float) -> Tap | Unreachable | None:
         """Choose the next tap of a task; None where the part is in place.
@@ -136,23 +136,23 @@ class TapPlanner:
                 "and this cell cannot push it back"
             )
         distance = abs(remaining_m)
-        rows, part = parameter_scenarios(self._belief, Z), self._part(mass_kg)
+        part = self._part(mass_kg)
+        scenarios = parameter_scenarios(self._posterior, Z, part)
         least = 1.0
         for caution in CAUTION:
-            outlook = self._outlook(part, caution)
-            if not outlook.furthest_m > 0.0:
+            lookahead = self._lookahead(part, caution)
+            if not lookahead.furthest_m > 0.0:
                 return Unreachable(
                     f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
-                    f"moves a part of {mass_kg} kg at friction {self._belief.mu_k:.3f}"
+                    f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
                 )
-            chosen, met = select_action(
-                distance, outlook.table, self._bounds.velocities, self._bounds.strokes, rows, outlook.value,
-                AIMS, tolerance=self.tolerance_m, penalty=self._bounds.penalty(caution),
-                bound=self.overshoot_probability, part=part, caps=self._bounds.caps(self._belief, part),
+            action, safest = select_action(
+                distance, lookahead.table, lookahead.value, self._limits.space(self._posterior, part),
+                scenarios, self._limits.goal(caution), self.overshoot_probability,
             )  # fmt: skip
-            if chosen is not None:
+            if action is not None:
                 break
-            least = min(least, met)
+            least = min(least, safest)
         else:
             return Unreachable(
                 f"{distance * 1e6:.1f} µm remain, and every tap for a part of {mass_kg:.3g} kg overshoots "
@@ -160,18 +160,18 @@ class TapPlanner:
                 f"(the safest with {least:.2g})"
             )
         moved = np.empty((1, BAND_Z.size))
-        stroke = np.array([chosen.stroke_m])
-        band = parameter_scenarios(self._belief, BAND_Z)
-        displacement_quantiles(chosen.velocity_m_s, stroke, band, BAND_Z, part, moved)
+        stroke = np.array([action.stroke_m])
+        band = parameter_scenarios(self._posterior, BAND_Z, part)
+        displacement_quantiles(action.velocity_m_s, stroke, band, BAND_Z, moved)
         return Tap(
-            velocity_m_s=chosen.velocity_m_s,
-            stroke_m=chosen.stroke_m,
+            velocity_m_s=action.velocity_m_s,
+            stroke_m=action.stroke_m,
             direction=1 if remaining_m > 0.0 else -1,
             expected_m=float(moved[0, BAND_Z.size // 2]),
             lowest_m=float(moved.min()),
             highest_m=float(moved.max()),
-            expected_taps=chosen.cost,
-            overshoot_probability=chosen.overshoot,
+            expected_taps=action.cost,
+            overshoot_probability=action.overshoot,
         )
 
     def observe(self, tap: Tap, moved_m: float, mass_kg: float) -> None:
@@ -193,7 +193,7 @@ class TapPlanner:
                 tap.velocity_m_s, tap.stroke_m, plant_parameters(states[:, :5]), factor, part
             )
 
-        self._belief = update_posterior(self._belief, response, moved_m)
+        self._posterior = update_posterior(self._posterior, response, moved_m)
 
     def observe_friction(self, mu_k: float, std: float, batch_changed: bool = False) -> None:  # noqa: FBT001, FBT002
         """Take over the tracker's kinetic coefficient; `batch_changed`: friction has just stepped.
@@ -205,8 +205,8 @@ class TapPlanner:
         """
         if not (math.isfinite(mu_k) and mu_k > 0.0 and math.isfinite(std) and std >= 0.0):
             raise PositioningError(f"cannot use a friction of {mu_k} +- {std}")
-        self._belief = planner_posterior.condition_on_friction(
-            self._belief, mu_k, std, batch_changed=batch_changed
+        self._posterior = planner_posterior.condition_on_friction(
+            self._posterior, mu_k, std, batch_changed=batch_changed
         )
 
     def observe_signature(self, signature: Signature) -> None:
@@ -224,37 +224,38 @@ class TapPlanner:
 
     def force(self, tap: Tap, mass_kg: float) -> float:
         """Bound on the contact force of a tap (N), for `impactcell.positioning.safety_limits.check_tap`."""
-        return largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(self._belief), mass_kg, self._gravity)
+        return largest_force(
+            tap.velocity_m_s, tap.stroke_m, stiffest(self._posterior), mass_kg, self._gravity
+        )
 
     def _part(self, mass_kg: float) -> Samples:
         return np.concatenate(
             [[mass_kg, self._gravity], [] if self._profile is None else self._profile.warp()]
         )
 
-    def _outlook(self, part: Samples, caution: float) -> LookaheadTable:
-        """Outlook for this part, made anew where the belief has moved on."""
-        for n, outlook in enumerate(self._outlooks):
-            if outlook.serves(part, caution, self._belief):
-                self._outlooks.append(self._outlooks.pop(n))
-                return outlook
-        outlook = build_lookahead(self._bounds, self._belief, part, caution)
-        self._outlooks.append(outlook)
-        del self._outlooks[:-REMEMBERED]
-        return outlook
+    def _lookahead(self, part: Samples, caution: float) -> LookaheadTable:
+        """Outlook for this part, made anew where the posterior has moved on."""
+        for n, lookahead in enumerate(self._lookaheads):
+            if lookahead.serves(part, caution, self._posterior):
+                self._lookaheads.append(self._lookaheads.pop(n))
+                return lookahead
+        lookahead = build_lookahead(self._limits, self._posterior, part, caution)
+        self._lookaheads.append(lookahead)
+        del self._lookaheads[:-REMEMBERED]
+        return lookahead
 
 
 @cache
 def _ready() -> None:
     """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
-    belief = planner_posterior.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
-    bounds = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
+    posterior = planner_posterior.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
+    limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
     part = np.array([20.0, 9.81])
-    outlook = build_lookahead(bounds, belief, part, 1.0)
+    lookahead = build_lookahead(limits, posterior, part, 1.0)
     select_action(
-        2e-3, outlook.table, bounds.velocities, bounds.strokes, parameter_scenarios(belief, Z),
-        outlook.value, AIMS, tolerance=50e-6, penalty=100.0, bound=0.1, part=part,
-        caps=bounds.caps(belief, part),
+        2e-3, lookahead.table, lookahead.value, limits.space(posterior, part),
+        parameter_scenarios(posterior, Z, part), Goal(50e-6, 100.0), 0.1,
     )  # fmt: skip
-    plant = plant_parameters(belief.mean[None])
+    plant = plant_parameters(posterior.mean[None])
     displacement_of(0.02, 2e-4, plant, np.ones(1), part)
     largest_force(0.02, 2e-4, plant[0], 20.0, 9.81)

@@ -73,15 +73,15 @@ class PlannerPosterior:
         return math.exp(float(self.mean[FRICTION]))
 
 
-def with_single_gaussian(belief: PlannerPosterior, mean: Samples, cov: Samples) -> PlannerPosterior:
-    """Belief with one Gaussian over the parameters in place of what it had."""
-    return replace(belief, weights=np.ones(1), means=mean[None], covs=cov[None])
+def with_single_gaussian(posterior: PlannerPosterior, mean: Samples, cov: Samples) -> PlannerPosterior:
+    """Posterior with one Gaussian over the parameters in place of what it had."""
+    return replace(posterior, weights=np.ones(1), means=mean[None], covs=cov[None])
 
 
 def prior(
     stiffness: float, damping: float, mu_s: float, mu_k: float, viscous: float, friction_std: float = 0.35
 ) -> PlannerPosterior:
-    """Belief before the first tap: contact within some 10 %, friction within a factor of 1.4.
+    """Posterior before the first tap: contact within some 10 %, friction within a factor of 1.4.
 
     Parameters
     ----------
@@ -103,28 +103,28 @@ def prior(
     return PlannerPosterior(np.ones(1), mean[None], np.diag(std**2)[None])
 
 
-def anticipate_learning(belief: PlannerPosterior) -> PlannerPosterior:
-    """Belief as the next taps will leave it, for what is to be expected of the taps after them.
+def anticipate_learning(posterior: PlannerPosterior) -> PlannerPosterior:
+    """Posterior as the next taps will leave it, for what is to be expected of the taps after them.
 
     One strike tells friction about as well as the scatter allows, and a few tell the contact; to plan as
     if nothing were learned any more would forbid the first tap of a new cell.
     """
-    mean, cov = belief.mean, belief.cov
+    mean, cov = posterior.mean, posterior.cov
     factor = np.minimum(1.0, LEARNED_STD / np.sqrt(np.diag(cov)))
-    return with_single_gaussian(belief, mean, cov * np.outer(factor, factor))
+    return with_single_gaussian(posterior, mean, cov * np.outer(factor, factor))
 
 
 def condition_on_friction(
-    belief: PlannerPosterior, mu_k: float, std: float, *, batch_changed: bool
+    posterior: PlannerPosterior, mu_k: float, std: float, *, batch_changed: bool
 ) -> PlannerPosterior:
-    """Belief after the tracker reported its level of the kinetic coefficient.
+    """Posterior after the tracker reported its level of the kinetic coefficient.
 
-    The tracker's level is itself an average over the cycles this belief has learned from, so the two are
+    The tracker's level is itself an average over the cycles this posterior has learned from, so the two are
     not fused as if they were independent: the better informed replaces the other (Jeffrey's rule), and
     the tracker prevails where they contradict each other. After a batch change friction starts afresh,
     and what had been learned together with it keeps only its own uncertainty.
     """
-    mean, cov = belief.mean, belief.cov
+    mean, cov = posterior.mean, posterior.cov
     level, own = math.log(mu_k), float(cov[FRICTION, FRICTION])
     variance = (std / mu_k) ** 2 + LEVEL_STD**2
     difference = level - float(mean[FRICTION])
@@ -134,10 +134,10 @@ def condition_on_friction(
         mean[FRICTION] = level
         cov[FRICTION, :] = cov[:, FRICTION] = 0.0
         cov[FRICTION, FRICTION] = variance
-        return replace(with_single_gaussian(belief, mean, cov), surprise=0.0)
+        return replace(with_single_gaussian(posterior, mean, cov), surprise=0.0)
     if variance >= own:
-        return belief
+        return posterior
     regression = cov[:, FRICTION] / own
     mean = mean + regression * difference
     cov = cov - np.outer(regression, regression) * (own - variance)
-    return with_single_gaussian(belief, mean, cov)
+    return with_single_gaussian(posterior, mean, cov)

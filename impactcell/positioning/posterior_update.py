@@ -1,6 +1,6 @@
-"""Learning from a displacement: an iterated Kalman step for each Gaussian of the belief.
+"""Learning from a displacement: an iterated Kalman step for each Gaussian of the posterior.
 
-The displacement is made linear by regression over points drawn from the belief, and what the regression
+The displacement is made linear by regression over points drawn from the posterior, and what the regression
 leaves over counts as noise, so that a crooked response teaches no more than it can (iterated posterior
 linearisation: Garcia-Fernandez et al., IEEE Transactions on Signal Processing 63, 2015). Sum of Gaussians:
 Alspach and Sorenson, IEEE Transactions on Automatic Control 17 (1972). The tap's own
@@ -32,17 +32,17 @@ Response = Callable[[Samples], Samples]
 """Displacements (m), shape (n,), for rows of (theta, z sigma), shape (n, 6)."""
 
 
-def update_posterior(belief: PlannerPosterior, response: Response, moved_m: float) -> PlannerPosterior:
-    """Belief after a tap displaced the part by `moved_m`, `response` being the model of that tap."""
-    belief = split_components(belief)
+def update_posterior(posterior: PlannerPosterior, response: Response, moved_m: float) -> PlannerPosterior:
+    """Posterior after a tap displaced the part by `moved_m`, `response` being the model of that tap."""
+    posterior = split_components(posterior)
     steps = [
-        update_component(mean, cov + np.diag(WALK**2), belief.scatter, response, moved_m)
-        for mean, cov in zip(belief.means, belief.covs, strict=True)
+        update_component(mean, cov + np.diag(WALK**2), posterior.scatter, response, moved_m)
+        for mean, cov in zip(posterior.means, posterior.covs, strict=True)
     ]
     with np.errstate(divide="ignore"):
-        logarithm = np.log(belief.weights) + [s[2] for s in steps]
+        logarithm = np.log(posterior.weights) + [s[2] for s in steps]
     if not np.isfinite(logarithm).any():
-        return replace(belief, taps=belief.taps + 1)
+        return replace(posterior, taps=posterior.taps + 1)
     weights = np.exp(logarithm - logarithm.max())
     weights /= weights.sum()
     keep = weights > NEGLIGIBLE
@@ -52,26 +52,26 @@ def update_posterior(belief: PlannerPosterior, response: Response, moved_m: floa
     told = float(weights @ np.array([s[4] for s in kept]))
     square = float(weights @ np.array([s[5] for s in kept]))
     covs = np.array([s[1] for s in kept])
-    if abs(surprise) > 3.0 and belief.surprise * surprise > 6.0:
+    if abs(surprise) > 3.0 and posterior.surprise * surprise > 6.0:
         # Two in a row on one side: friction has changed and nobody said so.
         covs[:, FRICTION, FRICTION] += BATCH_STD**2
     learned = replace(
-        belief,
+        posterior,
         weights=weights,
         means=np.array([s[0] for s in kept]),
         covs=covs,
-        shape=belief.shape + 0.5 * told,
-        rate=belief.rate + 0.5 * square,
-        taps=belief.taps + 1,
+        shape=posterior.shape + 0.5 * told,
+        rate=posterior.rate + 0.5 * square,
+        taps=posterior.taps + 1,
         surprise=surprise,
     )
     return merge_components(learned)
 
 
-def split_components(belief: PlannerPosterior) -> PlannerPosterior:
-    """Sum of Gaussians narrow each in friction, then in stiffness, equal to the belief in mean and spread."""
+def split_components(posterior: PlannerPosterior) -> PlannerPosterior:
+    """Sum of Gaussians, each narrow in friction, then in stiffness, with the posterior's mean and spread."""
     weights, means, covs = [], [], []
-    for weight, mean, cov in zip(belief.weights, belief.means, belief.covs, strict=True):
+    for weight, mean, cov in zip(posterior.weights, posterior.means, posterior.covs, strict=True):
         std = np.sqrt(np.diag(cov))
         wide = next((axis for axis, narrow in NARROW.items() if std[axis] > 1.5 * narrow), None)
         if wide is None:
@@ -89,17 +89,17 @@ def split_components(belief: PlannerPosterior) -> PlannerPosterior:
             weights.append(weight * share)
             means.append(mean + regression * node)
             covs.append(left)
-    return replace(belief, weights=np.array(weights), means=np.array(means), covs=np.array(covs))
+    return replace(posterior, weights=np.array(weights), means=np.array(means), covs=np.array(covs))
 
 
-def merge_components(belief: PlannerPosterior) -> PlannerPosterior:
+def merge_components(posterior: PlannerPosterior) -> PlannerPosterior:
     """One Gaussian, as soon as together they are narrow enough for one to be trusted."""
-    if belief.weights.size == 1:
-        return belief
-    std = np.sqrt(np.diag(belief.cov))
+    if posterior.weights.size == 1:
+        return posterior
+    std = np.sqrt(np.diag(posterior.cov))
     if any(std[axis] > 1.3 * narrow for axis, narrow in NARROW.items()):
-        return belief
-    return replace(belief, weights=np.ones(1), means=belief.mean[None], covs=belief.cov[None])
+        return posterior
+    return replace(posterior, weights=np.ones(1), means=posterior.mean[None], covs=posterior.cov[None])
 
 
 def update_component(

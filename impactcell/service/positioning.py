@@ -94,7 +94,7 @@ class PositioningTask:
     @property
     def belief(self) -> PlannerPosterior:
         """What the planner has learned."""
-        return self._planner.belief
+        return self._planner.posterior
 
     async def begin(self, target_m: float) -> None:
         """Start a task.
@@ -209,7 +209,7 @@ class PositioningTask:
             after = await self._worker.run(
                 lambda: task_state_machine.observed(waiting, self._cell, self._planner, position_m)  # noqa: B023
             )
-            self._worker.belief = self._planner.belief
+            self._worker.belief = self._planner.posterior
             if self._sequence is waiting:
                 self._set_sequence(after)
 

@@ -47,7 +47,7 @@ def test_cells_off_by_a_tenth_end_inside_and_never_beyond(tolerance_m: float) ->
             assert last is None
             assert abs(remaining) <= tolerance_m
             counts.append(len(taps))
-        belief = planner.belief
+        belief = planner.posterior
         std = np.sqrt(np.diag(belief.cov))
         truth = np.log([plant.mu_k, plant.stiffness_n_per_m, plant.damping_n_s_per_m])
         assert (np.abs(belief.mean[:3] - truth) < 4.0 * std[:3]).all()
@@ -127,7 +127,7 @@ def test_a_cell_without_a_stroke_strikes_by_velocity() -> None:
 def test_the_bound_on_overshoot_is_kept_by_the_true_distribution() -> None:
     # one part, contact and friction known: the share of 20 000 outcomes beyond the tolerance
     planner = TapPlanner(tolerance_m=10e-6, plant=NOMINAL, overshoot_probability=0.02)
-    belief = planner.belief
+    belief = planner.posterior
     planner.resume(type(belief)(np.ones(1), belief.mean[None], np.diag(np.full(5, 1e-10))[None]))
     rng = np.random.default_rng(3)
     factor = 1.0 + 0.03 * rng.standard_normal(20_000)

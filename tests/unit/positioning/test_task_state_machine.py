@@ -51,7 +51,7 @@ def test_a_task_from_start_to_end() -> None:
         sequence = observed(sequence, CELL, made, sequence.position_m + sequence.tap.expected_m)
     assert sequence.phase is TaskPhase.SETTLED
     assert abs(sequence.remaining_m) <= 50e-6
-    assert made.belief.taps == sequence.taps == sequence.published().taps
+    assert made.posterior.taps == sequence.taps == sequence.published().taps
 
 
 @pytest.mark.parametrize(
