@@ -5,6 +5,7 @@
 import functools
 import hashlib
 import inspect
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
@@ -42,14 +43,22 @@ Law = Callable[[float, float, float, float, FloatPointer], float]
 
 _POINTERS: dict[Law, Any] = {}
 
+_IMPORTED_ROOM = re.compile(rb"^from impactcell\.(\w+)", re.MULTILINE)
+"""What a source says of the rooms from which it takes compiled functions."""
+
 
 @functools.cache
 def _digest(room: Path) -> str:
-    """Digest of the sources of a room, its inner rooms included, and of the numerics beside this file."""
+    """Digest of the sources of a room, its inner rooms included, and of the rooms that it imports from."""
+    package = Path(__file__).resolve().parents[1]
+    sources = {source: source.read_bytes() for source in sorted(room.rglob("*.py"))}
+    imported = {name for text in sources.values() for name in _IMPORTED_ROOM.findall(text)}
+    for name in sorted({b"numerics", *imported} - {room.name.encode()}):
+        for source in sorted((package / name.decode()).rglob("*.py")):
+            sources[source] = source.read_bytes()
     hashed = hashlib.sha256()
-    for folder in (Path(__file__).parent, room):
-        for source in sorted(folder.rglob("*.py")):
-            hashed.update(source.read_bytes())
+    for text in sources.values():
+        hashed.update(text)
     return hashed.hexdigest()
 
 
@@ -61,7 +70,7 @@ def _room(function: Callable[..., Any]) -> Path:
 
 
 class _Cache(FunctionCache):
-    """Machine code on disk, used again only while every source in the room of the function is the same.
+    """Machine code on disk, used again only while the sources of its room and those it imports are the same.
 
     By itself numba looks at the function's own file, and would go on using code into which an older
     version of a function from another file has been compiled.
@@ -96,7 +105,8 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` to machine code on its first call, cached on disk between processes.
 
     IEEE arithmetic is kept (no fast-math): NaN and infinity mean the same as in Python, and a
-    replay gives the same bits. What it calls of other compiled functions lies in its room or in this one.
+    replay gives the same bits. What it calls of other compiled
+    functions lies in its room or in one that its room imports.
     """
     dispatcher: Any = njit(error_model="numpy", nogil=True)(function)
     if _can_cache(function):

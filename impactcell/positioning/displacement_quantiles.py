@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.numerics.jit import compiled
-from impactcell.positioning.displacement_model import displacements
+from impactcell.physics.closed_form import displacements
 from impactcell.positioning.planner_posterior import FRICTION, PlannerPosterior
 from impactcell.records import Samples
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from impactcell.errors import PositioningError
 from impactcell.physics import Plant
+from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning import planner_posterior
 from impactcell.positioning.action_selection import select_action
-from impactcell.positioning.displacement_model import displacement_of
 from impactcell.positioning.displacement_quantiles import (
     Z,
     displacement_quantiles,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impactcell.numerics.jit import compiled
-from impactcell.positioning.displacement_model import displacements
+from impactcell.physics.closed_form import displacements
 
 Samples = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from impactcell.errors import PositioningError
-from impactcell.positioning.free_slide import along_profile
+from impactcell.physics.linear_slide import along_profile
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 
 GRID = np.linspace(0.0, 12e-3, 121)

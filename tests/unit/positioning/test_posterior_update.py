@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from impactcell.positioning.displacement_model import displacement_of
+from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning.displacement_quantiles import plant_parameters
 from impactcell.positioning.planner_posterior import (
     PlannerPosterior,

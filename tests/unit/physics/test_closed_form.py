@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.physics import Plant, TapInput, simulate_tap
-from impactcell.positioning.displacement_model import displacement_of, displacements
+from impactcell.physics.closed_form import displacement_of, displacements
 from impactcell.positioning.safety_limits import allowed_strokes, largest_force
 from simulator.plant import Plant as TruePlant
 from simulator.plant import TapInput as TrueStrike

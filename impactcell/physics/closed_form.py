@@ -1,0 +1,304 @@
+"""Displacement of a part for many strokes at one velocity, in closed form.
+
+The nominal plant, equations (1)-(3) with viscous friction, is linear between its events. While the
+actuator runs, its stroke does not matter; once it has halted, what is left is one half wave of an
+oscillator and a slide. One course of the running actuator therefore answers for every stroke at once,
+which is what a planner asks thousands of times a step and an integrator of single taps does not offer.
+It takes no steps in time; what does, `impactcell.physics.simulate_tap`, is what the tests hold it to.
+
+With indentation d = y - x, the static indentation L = (mu_k m g + k_v v) / k and e = d - L::
+
+    contact, actuator at v:   e'' + 2 z e' + w² e = 0,   2 z = (b [d' > 0] + k_v) / m,   w² = k / m
+    free:                     m x'' = -mu_k m g - k_v x'
+"""
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from impactcell.numerics.jit import compiled
+from impactcell.physics.linear_slide import (
+    CONVERGED,
+    NEVER,
+    NEWTON_STEPS,
+    along_profile,
+    catch_time,
+    narrowed,
+    slide_distance,
+    speed_after,
+)
+from impactcell.records import Samples
+
+MAX_RESTS = 4000  # of a part under one push, after which it is taken to creep without end
+SLOWEST_SWING = 1e-9  # of w², least squared frequency: a contact damped beyond that is taken as this
+
+TURNS: Final = 0  # how a half wave ends: compression turns into departure or back
+STOPS: Final = 1  # the part comes to rest against the actuator
+SEPARATES: Final = 2  # contact is lost
+FADES: Final = 3  # departure turns back, and will never again separate
+
+
+class Oscillator(NamedTuple):
+    """Indentation about its static value while contact and slip last: z, w² and sqrt(w² - z²)."""
+
+    decay: float
+    squared_frequency: float
+    frequency: float
+
+
+class Contact(NamedTuple):
+    """A part that an actuator pushes at `velocity`; SI, `friction` a force, `part` as in `displacements`."""
+
+    velocity: float
+    stiffness: float
+    friction: float
+    viscous: float
+    static_indentation: float
+    loading: Oscillator
+    unloading: Oscillator
+    part: Samples
+
+
+class Strokes(NamedTuple):
+    """Strokes asked for, increasing, and the displacements by them; m."""
+
+    strokes: Samples
+    displacements: Samples
+
+
+@compiled
+def contact_of(v: float, plant: Samples, part: Samples) -> Contact:
+    """Work out what is constant while an actuator at v pushes."""
+    k, b, _, mu_k, viscous = plant
+    mass = part[0]
+    kinetic = mu_k * mass * part[1]
+    w2 = k / mass
+    z_on, z_off = 0.5 * (b + viscous) / mass, 0.5 * viscous / mass
+    on = math.sqrt(max(w2 - z_on * z_on, SLOWEST_SWING * w2))
+    off = math.sqrt(w2 - z_off * z_off)
+    rest = (kinetic + viscous * v) / k
+    return Contact(v, k, kinetic, viscous, rest, Oscillator(z_on, w2, on), Oscillator(z_off, w2, off), part)
+
+
+@compiled
+def swing(s: float, e: float, r: float, of: Oscillator) -> tuple[float, float]:
+    """Indentation about its static value and approach speed, a time s after they were e and r."""
+    z, wd = of.decay, of.frequency
+    c = (of.squared_frequency * e + z * r) / wd
+    f = (r + z * e) / wd
+    decay, cosine, sine = math.exp(-z * s), math.cos(wd * s), math.sin(wd * s)
+    return decay * (e * cosine + f * sine), decay * (r * cosine - c * sine)
+
+
+@compiled
+def travel_after_halt(indentation: float, speed: float, contact: Contact) -> float:
+    """Travel to rest of a part in contact with an actuator that has just halted.
+
+    `indentation` >= 0 (m) and `speed` > 0 (m/s) at the halt. The damper is off: the part departs.
+    """
+    friction, viscous, part = contact.friction, contact.viscous, contact.part
+    mass = part[0]
+    w2 = contact.stiffness / mass
+    rest = friction / contact.stiffness
+    e = indentation - rest
+    if viscous == 0.0:
+        amplitude = math.sqrt(e * e + speed * speed / w2)
+        if amplitude <= rest:
+            return indentation - rest + amplitude
+        return indentation + along_profile(0.5 * (amplitude * amplitude - rest * rest) / rest, part)
+    z = 0.5 * viscous / mass
+    wd = math.sqrt(w2 - z * z)
+    c = (z * e - speed) / wd  # e(t) = exp(-z t) (e cos wd t + c sin wd t), e'(0) = -speed
+    p = (w2 * e - z * speed) / wd  # e'(t) = -exp(-z t) (speed cos wd t + p sin wd t)
+    turn = math.atan2(speed, -p) / wd
+    low, high = 0.0, turn
+    if math.exp(-z * turn) * (e * math.cos(wd * turn) + c * math.sin(wd * turn)) >= -rest:
+        return float(e - math.exp(-z * turn) * (e * math.cos(wd * turn) + c * math.sin(wd * turn)))
+    t = 0.5 * turn
+    for _ in range(NEWTON_STEPS):
+        decay, cosine, sine = math.exp(-z * t), math.cos(wd * t), math.sin(wd * t)
+        value = decay * (e * cosine + c * sine) + rest
+        slope = -decay * (speed * cosine + p * sine)
+        new, low, high = narrowed(t, value, slope, low, high)
+        converged = abs(new - t) <= CONVERGED * turn
+        t = new
+        if converged:
+            break
+    departure = math.exp(-z * t) * (speed * math.cos(wd * t) + p * math.sin(wd * t))
+    return indentation + along_profile(slide_distance(max(departure, 0.0), mass, friction, viscous), part)
+
+
+@compiled
+def stop_time(e: float, r: float, v: float, of: Oscillator) -> float:
+    """When the approach speed r(t), rising from `r`, reaches `v`: the part stops; NEVER if it does not."""
+    z, w2, wd = of.decay, of.squared_frequency, of.frequency
+    c = (w2 * e + z * r) / wd
+    p = -(w2 * e + 2.0 * z * r)
+    if p <= 0.0:
+        return NEVER
+    high = math.atan2(p, r * wd - z * c) / wd
+    if math.exp(-z * high) * (r * math.cos(wd * high) - c * math.sin(wd * high)) < v:
+        return NEVER
+    low = 0.0
+    t = 0.5 * high
+    for _ in range(NEWTON_STEPS):
+        decay, cosine, sine = math.exp(-z * t), math.cos(wd * t), math.sin(wd * t)
+        excess = decay * (r * cosine - c * sine) - v
+        slope = decay * (p * cosine + (z * c - r * wd) * sine)
+        new, low, high = narrowed(t, -excess, -slope, low, high)
+        if abs(new - t) <= CONVERGED * (t + 1e-9):
+            return new
+        t = new
+    return t
+
+
+@compiled
+def separation_time(e: float, ends: float, rest: float, of: Oscillator) -> float:
+    """When contact is lost in a half wave of departure from e that lasts `ends`; NEVER if it only fades."""
+    z, w2, wd = of.decay, of.squared_frequency, of.frequency
+    if e * math.exp(-z * ends) * -1.0 >= -rest:
+        return NEVER
+    low, high = 0.0, ends
+    s = math.acos(max(-rest / e, -1.0)) / wd
+    if z == 0.0:
+        return s
+    for _ in range(NEWTON_STEPS):
+        decay, cosine, sine = math.exp(-z * s), math.cos(wd * s), math.sin(wd * s)
+        value = e * decay * (cosine + z / wd * sine) + rest
+        slope = -e * decay * w2 / wd * sine
+        new, low, high = narrowed(s, value, slope, low, high)
+        converged = abs(new - s) <= CONVERGED * ends
+        s = new
+        if converged:
+            break
+    return s
+
+
+@compiled
+def half_wave(e: float, r: float, contact: Contact) -> tuple[float, int]:
+    """How long the damper stays as it is, and how that ends.
+
+    r = d' is the approach speed; r > 0 loads through the damper, r <= 0 unloads without it.
+    """
+    if r > 0.0 or e < 0.0:
+        of = contact.loading
+        c = (of.squared_frequency * e + of.decay * r) / of.frequency
+        ends = math.atan2(r, c) / of.frequency
+        if ends <= 0.0:
+            ends += math.pi / of.frequency
+        stops = stop_time(e, r, contact.velocity, of)
+        return (stops, STOPS) if stops <= ends else (ends, TURNS)
+    ends = math.pi / contact.unloading.frequency  # of half a wave from r = 0, which is how unloading starts
+    separates = separation_time(e, ends, contact.static_indentation, contact.unloading)
+    if separates == NEVER:
+        return ends, FADES
+    return (separates, SEPARATES) if separates <= ends else (ends, TURNS)
+
+
+@compiled
+def halt_apart(j: int, travel: float, place: float, asked: Strokes) -> int:
+    """Fill the strokes from the j-th up to `travel`, where the part rests at `place`; the first beyond."""
+    while j < asked.strokes.size and asked.strokes[j] <= travel:
+        asked.displacements[j] = place
+        j += 1
+    return j
+
+
+@compiled
+def halt_in_contact(
+    j: int, t: float, duration: float, e: float, r: float, contact: Contact, asked: Strokes
+) -> int:
+    """Fill the strokes from the j-th that end in a half wave from (e, r) at t; the first beyond."""
+    v = contact.velocity
+    of = contact.loading if r > 0.0 or e < 0.0 else contact.unloading
+    while j < asked.strokes.size and asked.strokes[j] <= v * (t + duration):
+        stroke = asked.strokes[j]
+        e_halt, r_halt = swing(stroke / v - t, e, r, of)
+        depth = max(e_halt + contact.static_indentation, 0.0)
+        speed = v - r_halt
+        asked.displacements[j] = stroke - depth
+        if speed > 0.0:
+            asked.displacements[j] += travel_after_halt(depth, speed, contact)
+        j += 1
+    return j
+
+
+@compiled
+def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out: Samples) -> None:
+    """Displacement from first contact to rest for each stroke, written to `out` (m).
+
+    Parameters
+    ----------
+    v : float
+        Actuator velocity, m/s.
+    strokes : ndarray, shape (n,)
+        Increasing, m. An infinite one stands for a cell without a commanded stroke, whose actuator
+        halts at the first loss of contact.
+    plant : ndarray, shape (5,)
+        k, b, mu_s, mu_k and k_v; SI; mu_s >= mu_k > 0.
+    part : ndarray, shape (2,) or (3 + n,)
+        Mass and gravity; then, where friction varies along the slide, a step of distance and what is slid
+        instead of 0, 1, 2, ... such steps.
+    out : ndarray, shape (n,)
+        nan where contact is never lost and the stroke is infinite, or after `MAX_RESTS` rests.
+    """
+    contact, asked = contact_of(v, plant, part), Strokes(strokes, out)
+    rest, mass = contact.static_indentation, part[0]
+    # indentation at which the part breaks away
+    need = max((plant[2] * mass * part[1] - plant[1] * v) / plant[0], 0.0)
+    out[:] = math.nan
+    j, count = 0, strokes.size
+    t, d = 0.0, 0.0  # x = v t - d
+    for _ in range(MAX_RESTS):
+        # at rest, the actuator approaching or pressing
+        moves_at = t + (need - d) / v if d < need else t
+        j = halt_apart(j, v * moves_at, v * t - d, asked)
+        if j == count:
+            return
+        t, e, r = moves_at, max(d, need) - rest, v
+        resting = False
+        while not resting:
+            duration, ending = half_wave(e, r, contact)
+            if ending == FADES and count > j and math.isinf(strokes[count - 1]):
+                count -= 1
+            j = halt_in_contact(j, t, duration, e, r, contact, asked)
+            if j == count:
+                return
+            e, r = swing(duration, e, r, contact.loading if r > 0.0 or e < 0.0 else contact.unloading)
+            t += duration
+            if ending == STOPS:
+                d, resting = e + rest, True
+            elif ending != SEPARATES:
+                r = 0.0
+            else:
+                speed = v - r
+                reached = v * t + along_profile(
+                    slide_distance(speed, mass, contact.friction, contact.viscous), part
+                )
+                if count > j and math.isinf(strokes[count - 1]):
+                    count -= 1
+                    out[count] = reached
+                caught = catch_time(speed, v, mass, contact.friction, contact.viscous)
+                if caught == NEVER:
+                    d, resting = v * t - reached, True
+                    continue
+                j = halt_apart(j, v * (t + caught), reached, asked)
+                if j == count:
+                    return
+                t += caught
+                e, r = -rest, v - speed_after(speed, caught, mass, contact.friction, contact.viscous)
+
+
+@compiled
+def displacement_of(v: float, stroke: float, rows: Samples, factor: Samples, part: Samples) -> Samples:
+    """Displacement (m) by one tap for each plant (k, b, mu_s, mu_k, k_v), friction times `factor`."""
+    strokes, out, moved = np.empty(1), np.empty(1), np.empty(factor.size)
+    strokes[0] = stroke
+    plant = np.empty(5)
+    for n in range(factor.size):
+        plant[:] = rows[n]
+        plant[2:4] *= factor[n]
+        displacements(v, strokes, plant, part, out)
+        moved[n] = out[0]
+    return moved
