@@ -7,7 +7,8 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
-ROUNDING = 1e-14  # of a diagonal element: what is left of it below this is rounding
+ROUNDING = 1e-14
+"""What is left of a diagonal element below this share of it is rounding: fifty units in the last place."""
 
 
 @compiled

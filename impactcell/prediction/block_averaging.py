@@ -15,10 +15,10 @@ from impactcell.features import CheckedChannel
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
-FORCE_BLOCK_S = 1e-4
-FINE_FORCE_BLOCK_S = 1e-5
-POSITION_BLOCK_S = 2.5e-4
-FINE_POSITION_BLOCK_S = 5e-5
+FORCE_BLOCK_S, FINE_FORCE_BLOCK_S = 1e-4, 1e-5
+"""Longest block of force, s, and about an event: there its bend costs less than the noise (see above)."""
+POSITION_BLOCK_S, FINE_POSITION_BLOCK_S = 2.5e-4, 5e-5
+"""The same of position, which bends less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

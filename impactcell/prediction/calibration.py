@@ -26,8 +26,11 @@ from impactcell.prediction.model import (
 from impactcell.records import Samples
 
 REGIME_GRID = 41
+"""Velocities at which the regime is told: a regime's end is known to a fortieth of the range. Our choice."""
 MIN_VELOCITIES = 4
+"""Fewest of them that make a regime worth coefficients of its own. Our choice."""
 RELATIVE_STEP = 0.01
+"""Relative change of k, b or mu_k/mu_s by which sensitivities are found. Our choice."""
 
 
 @dataclass(frozen=True, slots=True)

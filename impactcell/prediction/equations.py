@@ -17,6 +17,7 @@ from impactcell.prediction.model import REFERENCE_VELOCITY, DistanceForm, Model,
 from impactcell.records import Capture, Coefficient, Quality
 
 MIN_MU_S = 1e-3
+"""Least mu_s that (5) is solved for: a part without friction. Our choice."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from impactcell.records import Samples
 Indices = NDArray[np.intp]
 
 MAX_ITERATIONS = 25
+"""Steps after which a fit has not converged. Our choice."""
 STEP_TOLERANCE = 0.02
 """Length of a step, in posterior standard deviations, below which the fit is at its minimum. This and
 `COST_TOLERANCE` are for residuals of the size of the noise; where they are larger, so are these."""
@@ -29,8 +30,6 @@ MAX_STEP_STD = 4.0
 COST_TOLERANCE = 0.005
 """Change of half a sum of squares that means nothing: a kink that passes a sample makes Gauss-Newton go to
 and fro by less."""
-
-
 REFUSED_COST_TOLERANCE = 0.1
 """The same of a step that was refused: where the smaller ones after it mean nothing either, a kink passes
 samples, and the minimum lies within less than half a standard deviation."""
@@ -38,7 +37,7 @@ samples, and the minimum lies within less than half a standard deviation."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaussianPrior:
-    """Prior in theta: mean, and one over its standard deviation; 0 where nothing is prior.
+    """Prior in theta: mean, and one over its standard deviation; 0 where nothing is known.
 
     Attributes
     ----------

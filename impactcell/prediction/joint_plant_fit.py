@@ -35,19 +35,25 @@ from impactcell.prediction.waveform import fit
 from impactcell.records import Samples
 
 SHARED = slice(RATIO, DAMPING + 1)
+"""Parameters that all taps share: mu_k/mu_s, k and b."""
 MIN_MU_K = 1e-3
 """mu_k at which a fit starts at least: its logarithm is fitted."""
 INITIAL_RATIO = 0.76
+"""mu_k/mu_s from which a fit starts: that with which the paper's coefficients come back (own fit of them)."""
 WEAK_STD = np.array([0.3, 1.0, 1.0])
 """Standard deviations of ln(mu_k/mu_s, k, b) about the start: they only hold what no tap shows."""
 CONTACT_STD = np.array([0.3, 3e-4, 2e-3])
 """The same where k and b of the contact alone are believed more than the model of the whole tap."""
 MAX_ITERATIONS = 40
+"""Steps after which a fit has not converged. Our choice."""
 STEP_TOLERANCE = 0.02
+"""Length of a step, in posterior standard deviations, below which the fit is at its minimum."""
 COST_TOLERANCE = 0.05
 """Change of half a sum of squares over all taps that means nothing."""
 MIN_RATIO_STD = 1e-3
+"""Least standard deviation of mu_k/mu_s from tap to tap that a prior is given. Our choice."""
 REWEIGHTING_ROUNDS = 4
+"""Rounds of weighing the phases by what the model misses of them. Our choice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

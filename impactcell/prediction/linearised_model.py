@@ -24,15 +24,19 @@ from impactcell.prediction.block_averaging import (
 from impactcell.records import Capture, Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING = range(4)
+"""Places in theta."""
 PARAMETERS = 4
+"""Length of theta."""
 JUST_STICKING = 1e-7
 """z above which the model is that of a part that sticks first."""
 STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
 RELATIVE_STEP = 1e-5
+"""Step of a difference in theta: small against the noise, large against rounding. Our choice."""
 STEPS_OUT = STEP_SENSES * RELATIVE_STEP
 STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT)])
 KINK_SPAN_S = 1.5e-4
+"""How far to either side of an event of the start, s, blocks are short: there the fit's event is expected."""
 
 
 def tap_input(capture: Capture) -> TapInput:

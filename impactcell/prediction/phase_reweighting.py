@@ -16,12 +16,22 @@ Indices = NDArray[np.intp]
 MISFIT_THRESHOLD = 1.15
 """Misfit of blocks from which on the model is not believed in every phase alike."""
 FORCE_INTERVALS, CONTACT_INTERVALS, SLIDE_INTERVALS = 16, 8, 8
-LATE_FACTORS = np.full(FORCE_INTERVALS + CONTACT_INTERVALS + SLIDE_INTERVALS, 30.0)
-LATE_FACTORS[: FORCE_INTERVALS // 4] = LATE_FACTORS[
-    FORCE_INTERVALS : FORCE_INTERVALS + CONTACT_INTERVALS // 4
-] = 1.0
-"""Factor of the standard deviations of each phase once the model is doubted: mu_s is then left to the first
-quarter of the contact, where all is slow and laws that depend on speed say little."""
+"""Intervals that force, and position in the contact and in the slide, are cut into. Our choice."""
+LATE_FACTOR = 30.0
+"""Factor of the standard deviations of what comes after the first quarter of the contact, once the model is
+doubted: mu_s is then left to that quarter, where all is slow and laws that depend on speed say little. Our
+choice: a thousandth of the weight."""
+LATE_FACTORS = np.concatenate(
+    [
+        np.where(np.arange(count) < early, 1.0, LATE_FACTOR)
+        for count, early in (
+            (FORCE_INTERVALS, FORCE_INTERVALS // 4),
+            (CONTACT_INTERVALS, CONTACT_INTERVALS // 4),
+            (SLIDE_INTERVALS, 0),
+        )
+    ]
+)
+"""The same of each interval."""
 
 
 def interval_of_blocks(response: LinearisedModel, separation_s: float, stop_s: float) -> Indices:

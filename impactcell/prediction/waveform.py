@@ -40,8 +40,8 @@ from impactcell.records import Samples
 
 KINK_DISTANCE_STD = 6.0
 """Standard deviations of z beyond which the other side of the kink has no weight."""
-MU_K_FORM = np.array([1.0, 0.0, 0.0, 0.0])
-MU_S_FORM = np.array([1.0, -1.0, 0.0, 0.0])
+MU_K_FORM, MU_S_FORM = np.array([1.0, 0.0, 0.0, 0.0]), np.array([1.0, -1.0, 0.0, 0.0])
+"""How ln mu_k and ln mu_s follow theta."""
 KINK_FORM = np.array([1.0, -1.0, 0.0, -1.0])
 """How z, which tells the side of the kink, follows theta."""
 MAX_MISFIT = 4.0

@@ -11,7 +11,9 @@ from impactcell.records import Samples
 from impactcell.tracking.signature import friction_profile
 
 BUMP_WIDTHS_M = (0.2e-3, 0.3e-3, 0.45e-3, 0.7e-3)
+"""Standard deviations of the bells looked for, m: neighbours are a factor of 1.5 apart. Our choice."""
 MIN_WAVE_M = 0.4e-3
+"""Shortest wave of the ripples looked for, m. Our choice; on a coarse grid it is four points."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

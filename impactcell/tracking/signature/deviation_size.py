@@ -31,17 +31,21 @@ from impactcell.records import Samples
 from impactcell.tracking.signature import deviation_shapes, friction_profile, matched_filter_scan
 
 LEVEL, TILT, BUMP, RIPPLE = map(matched_filter_scan.FAMILIES.index, ("level", "tilt", "bump", "ripple"))
-HALF_WIDTH_OF_BELL = math.sqrt(
-    2.0 * math.log(2.0)
-)  # half width of a bell at half of its height, over its own
+"""Numbers of the families."""
+HALF_WIDTH_OF_BELL = math.sqrt(2.0 * math.log(2.0))
+"""Half width of a bell at half of its height, over its standard deviation."""
 ROUNDS = 3
-REFINED_STEPS = 7  # in place, width or wave, of every round but the first
-REFINED_REACH_STD = (
-    3.5  # standard deviations that a round goes to either side of what the one before it found
-)
-MAX_EXPONENT = 50.0  # |x / b|^q beyond which a bump is nothing
+"""Rounds of sums, each over what the one before left likely. Our choice."""
+REFINED_STEPS = 7
+"""Steps in place, width or wave, of every round but the first. Our choice."""
+REFINED_REACH_STD = 3.5
+"""Standard deviations that a round goes to either side of what the one before it found: all but 5e-4."""
+MAX_EXPONENT = 50.0
+"""|x / b|^q beyond which a bump is nothing: 2^-50 is rounding."""
 MIN_INFORMATION = 1e-30
-UNSEEN = (0.0, math.inf)  # size and standard deviation of what cannot be seen
+"""Information on a size, in 1 over friction squared, below which it is none; keeps a quotient finite."""
+UNSEEN = (0.0, math.inf)
+"""Size and standard deviation of what cannot be seen."""
 
 ShapeScores = tuple[Samples, Samples, Samples, Samples]
 """Of shapes at a noise of one: information on their sizes, scores squared, sizes, and variances of those."""

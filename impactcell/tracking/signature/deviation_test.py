@@ -32,14 +32,23 @@ from impactcell.tracking.signature import reference as references
 from impactcell.tracking.signature.pca_variation import MODES
 from impactcell.tracking.signature.reference import Reference
 
-COMPONENTS = 3  # principal components of T^2
+COMPONENTS = 3
+"""Principal components of T^2: level, tilt and bend are how cycles usually vary. Our choice."""
 KINDS = ("t_squared", "spe", *matched_filter_scan.FAMILIES)
+"""Parts of the test."""
 FALSE_ALARM_SHARES = (0.02, 0.02, 0.08, 0.08, 0.42, 0.38)
-MIN_INFORMATION = 400.0  # directions known worse than 1 / sqrt of this in friction say nothing
-MIN_COMPONENT_SIZE = 1e-9  # components smaller than this against the noise
-MIN_P_VALUE = 1e-300  # p-value
-SIZED_P_VALUE = 0.01  # p-value below which a shape is sized: no cell may be set to more false alarms
-MAX_RELATIVE_SIZE = 0.5  # shapes that even half of the friction would not show are not looked for
+"""Share of the false alarms that each part gets. Our choice: most where most shapes are looked for."""
+MIN_INFORMATION = 400.0
+"""Directions known worse than 1 / sqrt of this in friction, 0.05, say nothing."""
+MIN_COMPONENT_SIZE = 1e-9
+"""Components smaller than this against the noise are not seen."""
+MIN_P_VALUE = 1e-300
+"""Least p-value, so that its inverse is finite."""
+SIZED_P_VALUE = 0.01
+"""p-value below which a shape is sized: no cell may be set to more false alarms."""
+MAX_RELATIVE_SIZE, MIN_SCORE_SQUARED = 0.5, 30.0
+"""Shapes that even so large a share of the friction would not show, by a score of so much squared, are not
+looked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +129,7 @@ def _statistics(
     usual_spe = spe_sum / spe_count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * spe_count))
     scale = max(1.0, usual_spe)
     P, u = small_linalg.with_random_effects(C, G, y)
-    least = 30.0 / (MAX_RELATIVE_SIZE * references.mean_friction(reference.mean, n)) ** 2
+    least = MIN_SCORE_SQUARED / (MAX_RELATIVE_SIZE * references.mean_friction(reference.mean, n)) ** 2
     shown, wider = (
         small_linalg.block(rows, 0, len(rows), 0, n),
         scale * (1.0 + 2.0 * MODES / reference.cycles),

@@ -28,10 +28,10 @@ from impactcell.records import Samples
 
 Acceleration = Callable[[Samples], Samples]
 
-MIN_INTEGRATION_STEPS = 300  # of the double integral over a slide, at least
-SMOOTHING_STRENGTHS = np.logspace(
-    -9.0, 9.0, 37
-)  # of the smoothing searched, over that which weighs like the data
+MIN_INTEGRATION_STEPS = 300
+"""Steps of the double integral over a slide, at least. Our choice."""
+SMOOTHING_STRENGTHS = np.logspace(-9.0, 9.0, 37)
+"""Strengths of the smoothing searched, over that which weighs like the data: none to a straight line."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

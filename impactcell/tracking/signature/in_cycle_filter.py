@@ -16,7 +16,8 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
-GAIN_TOLERANCE = 1e-12  # relative change of the gain a sample, held for as many samples as follow
+GAIN_TOLERANCE = 1e-12
+"""Relative change of the gain a sample below which it is constant. Our choice."""
 STEADY_SAMPLES = 50
 """Samples for which the gain must not change before it is constant. Our choice."""
 

@@ -19,17 +19,20 @@ from impactcell.records import Samples
 from impactcell.tracking.signature import friction_profile, pca_variation
 from impactcell.tracking.signature.pca_variation import MODES, Variation
 
-MEMORY = 300.0  # cycles the mean remembers
-SMOOTHING_WEIGHTS = (0.0, 4.0, 16.0, 64.0)  # weights at which the mean's smoothing is settled anew
-MIN_CYCLES = 8.0  # cycles that have met a place before the mean is known there
-MIN_VARIATION_CYCLES = (
-    25.0  # cycles from which variation was learned at a place before cycles are judged there
-)
-RELATIVE_CONTINUATION_STEP = (
-    0.15  # of the friction itself: its steps from coefficient to coefficient where it is unknown
-)
-MIN_FRICTION = 1e-3  # friction below this is none
-PRIOR_INFORMATION = 1.0  # information on each coefficient beforehand: friction is known to about 1
+MEMORY = 300.0
+"""Cycles that the mean remembers: what is slower, as wear, is no deviance. Our choice."""
+SMOOTHING_WEIGHTS = (0.0, 4.0, 16.0, 64.0)
+"""Weights, in cycles, at which the mean's smoothing is fitted anew. Our choice."""
+MIN_CYCLES = 8.0
+"""Cycles that have met a place before the mean is known there. Our choice."""
+MIN_VARIATION_CYCLES = 25.0
+"""Cycles from which variation was learned at a place before cycles are judged there. Our choice."""
+RELATIVE_CONTINUATION_STEP = 0.15
+"""Steps of friction between coefficients where it is unknown, of the friction itself. Our choice."""
+MIN_FRICTION = 1e-3
+"""Friction below this is none."""
+PRIOR_INFORMATION = 1.0
+"""Information on each coefficient beforehand, 1 over friction squared: friction is known to about 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
