@@ -14,7 +14,8 @@ import numpy as np
 from impactcell.figures._style import COLOURS, GREY, write_figures
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
 from impactcell.prediction import Model, Prior, calibrate, estimate, printed_predictor
-from impactcell.prediction.equations import MassInterpolation, force_weight
+from impactcell.prediction.equations import force_weight
+from impactcell.prediction.mass_interpolation import MassInterpolation
 from impactcell.records import Capture, Channel, Samples
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from impactcell.errors import PhysicsError, PredictionError
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
-from impactcell.prediction.equations import MassInterpolation
+from impactcell.prediction.mass_interpolation import MassInterpolation
 from impactcell.prediction.model import (
     REFERENCE_VELOCITY,
     DistanceForm,

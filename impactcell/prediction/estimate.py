@@ -5,14 +5,8 @@ from dataclasses import dataclass
 
 from impactcell.errors import NotConvergedError, PredictionError
 from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract
-from impactcell.prediction.equations import (
-    beyond_calibration,
-    by_distance,
-    by_force,
-    combined,
-    interpolate_mass,
-    out_of_range,
-)
+from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
+from impactcell.prediction.mass_interpolation import interpolate_mass
 from impactcell.prediction.model import Model
 from impactcell.prediction.phase_reweighting import MISFIT_THRESHOLD
 from impactcell.prediction.waveform import WaveformFit, deceleration_friction, fit

@@ -13,7 +13,7 @@ from impactcell.features import extract
 from impactcell.physics import TapInput
 from impactcell.prediction import Model, calibrate, estimate, printed_predictor
 from impactcell.prediction.calibration import fit_predictor
-from impactcell.prediction.equations import sliding_distance
+from impactcell.prediction.mass_interpolation import sliding_distance
 from impactcell.prediction.waveform import fit
 from tests.benchmarks._prediction_shots import (
     FRICTIONS,

@@ -17,10 +17,9 @@ from impactcell.prediction.equations import (
     by_force,
     combined,
     force_weight,
-    interpolate_mass,
     out_of_range,
-    sliding_distance,
 )
+from impactcell.prediction.mass_interpolation import interpolate_mass, sliding_distance
 from impactcell.records import Quality
 from tests.taps import VISCOUS, Tap
 
