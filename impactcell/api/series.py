@@ -48,7 +48,7 @@ def track(
     >>> noise = np.random.default_rng(1).normal(0.0, 0.002, 400)
     >>> mu_s = 0.2 + 1e-5 * np.arange(400) + 0.02 * (np.arange(400) >= 250) + noise
     >>> series = track(np.arange(400), mu_s, np.full(400, 0.002))
-    >>> [(alarm.alarm.value, alarm.evidence.change_cycle) for alarm in series.alarms]
+    >>> [(alarm.alarm, alarm.evidence.change_cycle) for alarm in series.alarms]
     [('BatchShift', 250)]
     """
     cycles, values = np.atleast_1d(np.asarray(cycle, np.float64)), np.atleast_1d(np.asarray(mu_s, np.float64))
