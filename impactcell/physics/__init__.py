@@ -35,7 +35,7 @@ a `Plant`. Samples are smooth in the parameters while the sequence of events is 
 `impactcell.physics.effects.LIBRARY` holds every effect by its identifier; a new effect is one new file there.
 """
 
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, ParameterKind, Phase
 from impactcell.physics.ensemble import Ensemble, TapOutputs, Traces
 from impactcell.physics.motion import ChannelSamples, Motion, TapEvent, TapEventKind
 from impactcell.physics.plant import Plant, TapInput
@@ -49,6 +49,7 @@ __all__ = [
     "LawKind",
     "Motion",
     "Parameter",
+    "ParameterKind",
     "Phase",
     "Plant",
     "TapEvent",

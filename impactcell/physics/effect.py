@@ -71,6 +71,16 @@ class Phase(enum.Enum):
     DRIVEN = "driven"
 
 
+class ParameterKind(enum.Enum):
+    """What a parameter measures, where its unit does not say: a search lays its grid by it."""
+
+    VALUE = "a value"
+    POSITION = "a position on the table"
+    WIDTH = "the width of something on the table"
+    PERIOD = "the period of something on the table"
+    PHASE = "the phase angle of what repeats"
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A parameter of an effect.
@@ -85,6 +95,7 @@ class Parameter:
         Magnitude at which the effect is clearly visible in a tap: a scale for steps and starts.
     per_batch : bool
         One value for each batch after the first instead of one.
+    kind : ParameterKind
     """
 
     name: str
@@ -94,6 +105,7 @@ class Parameter:
     upper: float
     typical: float
     per_batch: bool = False
+    kind: ParameterKind = ParameterKind.VALUE
 
 
 class Covariates(NamedTuple):

@@ -1,11 +1,13 @@
 """Many taps at once: arrays of parameters in, samples and outputs out, without objects for each tap."""
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from impactcell.errors import PhysicsError
+from impactcell.numerics.jit import IntArray
 from impactcell.physics import memory_layout as at
 from impactcell.physics.batch_integration import (
     MAX_DURATION_S,
@@ -74,6 +76,10 @@ class Ensemble:
     gravity_m_s2 : float
     initial_speed_m_s : ndarray of shape (n,), optional
         Free slides: no contact, the part slides from t = 0 with this speed along the shot's direction.
+    batches : int, optional
+        How many batches there are, should the taps show fewer.
+    by_tap : bool
+        Samples lie tap after tap, in a tap channel after channel, instead of the other way round.
     drives : sequence of (time_s, force_n), optional
         Driven parts: no contact but a measured force along +1, linear between its ascending times; the part
         begins at the first of them with `initial_speed_m_s`, at rest where that is not given.
@@ -102,33 +108,41 @@ class Ensemble:
         gravity_m_s2: float = 9.81,
         initial_speed_m_s: Samples | None = None,
         drives: Sequence[tuple[Samples, Samples]] | None = None,
+        batches: int | None = None,
+        by_tap: bool = False,
     ) -> None:
         self._columns = tap_columns(taps)
         if initial_speed_m_s is not None:
             self._columns["initial_speed_m_s"] = np.asarray(initial_speed_m_s, dtype=np.float64)
-        self.batches = 1 + max((tap.batch for tap in taps), default=0)
+        self.batches = batches or 1 + max((tap.batch for tap in taps), default=0)
         self._table = build_law_table(tuple(effects), self.batches)
         self.names = self._table.names
         self.gravity_m_s2 = gravity_m_s2
         self._count = len(taps)
         self._sample_index = np.zeros((len(taps), at.SAMPLE_INDEX_COUNT), dtype=np.int64)
+        given = (force_time_s, position_time_s, actuator_time_s, velocity_time_s)
+        pairs = [(channel, i) for channel in range(at.CHANNEL_COUNT) for i in range(len(taps))]
         pieces: list[Samples] = []
-        self._channels: list[slice] = []
-        total = 0
-        for channel, given in enumerate((force_time_s, position_time_s, actuator_time_s, velocity_time_s)):
-            begin, checked = total, NO_SAMPLES
-            for i in range(len(taps)):
-                times = NO_SAMPLES if given is None else np.asarray(given[i], dtype=np.float64)
-                if times is not checked:  # taps may share theirs
-                    if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
-                        raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
-                    checked = times
-                pieces.append(times)
-                self._sample_index[i, channel] = total
-                total += times.size
-                self._sample_index[i, at.CHANNEL_COUNT + channel] = total
-            self._channels.append(slice(begin, total))
+        total, checked = 0, NO_SAMPLES
+        for channel, i in sorted(pairs, key=lambda pair: pair[1]) if by_tap else pairs:
+            of_taps = given[channel]
+            times = NO_SAMPLES if of_taps is None else np.asarray(of_taps[i], dtype=np.float64)
+            if times is not checked:  # taps may share theirs
+                if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
+                    raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
+                checked = times
+            pieces.append(times)
+            self._sample_index[i, channel] = total
+            total += times.size
+            self._sample_index[i, at.CHANNEL_COUNT + channel] = total
         self._times = np.concatenate(pieces) if pieces else NO_SAMPLES
+        spans = [self._sample_index[:, [k, at.CHANNEL_COUNT + k]] for k in range(at.CHANNEL_COUNT)]
+        self._channels: list[slice | IntArray] = [
+            np.concatenate([np.arange(begin, end) for begin, end in span])
+            if by_tap
+            else slice(int(span.min(initial=total)), int(span.max(initial=0)))
+            for span in spans
+        ]
         self._drives, self._drive_ends = NO_SAMPLES, np.zeros(len(taps) + 1, dtype=np.int64)
         if drives is not None:
             self._set_drives(drives, given_speed=initial_speed_m_s is not None)
@@ -141,6 +155,13 @@ class Ensemble:
         self._drives = np.concatenate([np.concatenate(drive).astype(np.float64) for drive in drives])
         if not given_speed:
             self._columns["initial_speed_m_s"] = np.zeros(self._count)
+
+    def with_effects(self, effects: Sequence[str]) -> "Ensemble":
+        """Return the same taps and samples with other effects at work."""
+        other = copy.copy(self)
+        table = build_law_table(tuple(effects), self.batches)
+        other._table, other.names = table, table.names  # noqa: SLF001 - of the same class
+        return other
 
     def parameters(self, plant: Plant) -> Samples:
         """Parameter vector of `plant`, shape (len(names),); its effects must be among the ensemble's."""
@@ -188,8 +209,20 @@ class Ensemble:
         mass_kg, initial_speed_m_s : ndarray of shape (n,), optional
             Instead of the taps' own.
         """
-        taps = self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s)
-        return self._split(self._sample(taps))
+        return self._split(
+            self.samples(values, friction_factor, mass_kg=mass_kg, initial_speed_m_s=initial_speed_m_s)
+        )
+
+    def samples(
+        self,
+        values: Samples,
+        friction_factor: Samples | float = 1.0,
+        *,
+        mass_kg: Samples | None = None,
+        initial_speed_m_s: Samples | None = None,
+    ) -> Samples:
+        """Return the samples of `traces` in one row, all taps and channels end to end."""
+        return self._sample(self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s))
 
     def _sample(self, parameters: Samples) -> Samples:
         taps = TapArrays(parameters, self._table.laws, self._drives, self._drive_ends)

@@ -5,12 +5,12 @@ mu_s, reciprocals of what vanishes at infinity. On these scales the residuals ar
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 
-from impactcell.physics import Parameter
+from impactcell.physics import Parameter, ParameterKind
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 
@@ -21,6 +21,10 @@ DAMPING_SCALE = 100.0
 """Unit [N s/m] in which a fit moves the damping, about a fifth of the source paper's."""
 MIN_TIME_CONSTANT_SHARE = 0.02
 """Time constants shorter than this share of the typical one act at once and only make the plant stiff."""
+MIN_RECIPROCAL_SHARE = 1e-3
+"""What vanishes at infinity is never looked for below this share of its typical value."""
+MAX_ANGLE = 1e3
+"""Range of an angle's coordinate: none, as a fit may go round."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +46,8 @@ class Coordinate:
         Range of the coordinate itself.
     initial : float
         Value of the coordinate where nothing better is known.
+    definition : Parameter or None
+        As the effect declares it; None for the nominal plant.
     """
 
     effect: str
@@ -52,6 +58,7 @@ class Coordinate:
     lower: float
     upper: float
     initial: float
+    definition: Parameter | None = field(default=None, compare=False)
 
     def value(self, coordinate: float) -> float:
         """Parameter at a coordinate."""
@@ -70,14 +77,6 @@ class Coordinate:
         if self.form == "reciprocal":
             return self.scale / value
         return value / self.scale
-
-    def slope(self, coordinate: float) -> float:
-        """Differentiate the parameter with respect to its coordinate."""
-        if self.form == "log":
-            return self.value(coordinate)
-        if self.form == "reciprocal":
-            return -self.scale / coordinate**2 if coordinate > 0.0 else math.inf
-        return self.scale
 
 
 NOMINAL_COORDINATES = (
@@ -105,48 +104,25 @@ def effect_coordinates(identifier: str, batches: int) -> tuple[Coordinate, ...]:
 
 
 def _coordinate(identifier: str, parameter: Parameter, batch: int) -> Coordinate:
+    form, scale, lower, upper, initial = _scaled(parameter)
+    return Coordinate(identifier, parameter.name, batch, form, scale, lower, upper, initial, parameter)
+
+
+def _scaled(parameter: Parameter) -> tuple[str, float, float, float, float]:
+    """Form, scale, range and first value of a parameter's coordinate."""
     typical = parameter.typical
     if math.isinf(parameter.null):
-        return Coordinate(
-            identifier,
-            parameter.name,
-            batch,
-            "reciprocal",
-            typical,
-            typical / parameter.upper,
-            typical / max(parameter.lower, 1e-3 * typical),
-            1.0,
-        )
-    positive = math.isnan(parameter.null) and parameter.lower > 0.0
-    if positive:
-        return Coordinate(
-            identifier,
-            parameter.name,
-            batch,
-            "log",
-            1.0,
-            math.log(
-                max(parameter.lower, MIN_TIME_CONSTANT_SHARE * typical)
-                if parameter.unit == "s"
-                else parameter.lower
-            ),
-            math.log(parameter.upper),
-            math.log(typical),
-        )
+        smallest = max(parameter.lower, MIN_RECIPROCAL_SHARE * typical)
+        return "reciprocal", typical, typical / parameter.upper, typical / smallest, 1.0
+    if math.isnan(parameter.null) and parameter.lower > 0.0:
+        is_time = parameter.unit == "s"
+        smallest = max(parameter.lower, MIN_TIME_CONSTANT_SHARE * typical) if is_time else parameter.lower
+        return "log", 1.0, math.log(smallest), math.log(parameter.upper), math.log(typical)
     start = typical if math.isnan(parameter.null) else parameter.null
-    if parameter.name.endswith("phase_rad"):
+    if parameter.kind is ParameterKind.PHASE:
         # An angle has no ends; a fit may go round.
-        return Coordinate(identifier, parameter.name, batch, "angle", typical, -1e3, 1e3, start / typical)
-    return Coordinate(
-        identifier,
-        parameter.name,
-        batch,
-        "linear",
-        typical,
-        parameter.lower / typical,
-        parameter.upper / typical,
-        start / typical,
-    )
+        return "angle", typical, -MAX_ANGLE, MAX_ANGLE, start / typical
+    return "linear", typical, parameter.lower / typical, parameter.upper / typical, start / typical
 
 
 def plant_parameters(

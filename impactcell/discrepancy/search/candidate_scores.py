@@ -20,7 +20,7 @@ from impactcell.discrepancy.model.phases import trajectory_of
 from impactcell.discrepancy.model.problem import Problem, remove_jumps
 from impactcell.discrepancy.search.effect_grid import SMALL_STRENGTH, GridPoint, VisitedRange, effect_grid
 from impactcell.errors import PhysicsError
-from impactcell.physics.effect import Covariates
+from impactcell.physics.effect import Covariates, ParameterKind
 from impactcell.physics.effects import LIBRARY
 from impactcell.physics.law_table import build_law_table
 from impactcell.records import Samples
@@ -199,7 +199,7 @@ def best_points(
 def phase_angle_index(identifier: str) -> int | None:
     """Place of an effect's phase angle among its parameters, if it has one."""
     for place, parameter in enumerate(LIBRARY[identifier].parameters):
-        if parameter.name.endswith("phase_rad"):
+        if parameter.kind is ParameterKind.PHASE:
             return place
     return None
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.model.parameters import Coordinate, effect_coordinates
+from impactcell.physics import ParameterKind
 from impactcell.records import Samples
 
 SMALL_STRENGTH = 2e-3
@@ -20,6 +21,14 @@ DECADE_FACTORS = (0.1, 0.316, 1.0, 3.16, 10.0)
 """Two decades about the typical value of a shape that nothing else bounds."""
 RECIPROCAL_POINTS = tuple(float(0.08 * 1.42**i) for i in range(16))
 """Of what vanishes at infinity, the typical value over these is tried."""
+POSITIONS = 18
+"""Positions over the range gone through, its ends left out."""
+WIDTH_SHARES = np.array([0.025, 0.08])
+"""Widths of a feature, over the span of positions gone through."""
+LENGTH_SHARES = np.array([0.005, 0.015, 0.05, 0.15, 0.5])
+"""Other lengths, over the same span."""
+SPEED_SHARES = np.array([0.03, 0.08, 0.2, 0.4, 0.8])
+"""Speeds, over the largest one."""
 MAX_CYCLES = 40
 """Largest number of periods over the range gone through."""
 CYCLE_STEP = 0.5
@@ -85,7 +94,7 @@ def effect_grid(identifier: str, batches: int, visited: VisitedRange) -> tuple[G
                 if coordinate.lower < value <= coordinate.upper
             ]
             continue
-        turns = any(coordinates[i].parameter.endswith("phase_rad") for i in shapes)
+        turns = any(coordinates[i].form == "angle" for i in shapes)
         side = 1 if coordinate.lower >= coordinate.initial and not turns else 0
         for point in itertools.product(*(_grid(coordinates[i], visited) for i in shapes)):
             theta = np.array([c.initial for c in coordinates])
@@ -97,35 +106,30 @@ def effect_grid(identifier: str, batches: int, visited: VisitedRange) -> tuple[G
 
 
 def _is_strength(coordinate: Coordinate) -> bool:
-    from impactcell.physics.effects import LIBRARY
-
-    for parameter in LIBRARY[coordinate.effect].parameters:
-        if parameter.name == coordinate.parameter:
-            return not math.isnan(parameter.null)
-    return False
+    return coordinate.definition is not None and not math.isnan(coordinate.definition.null)
 
 
 def _grid(coordinate: Coordinate, visited: VisitedRange) -> tuple[float, ...]:
-    if coordinate.parameter.startswith("period"):
+    """Coordinates of a shape: by what it measures, else by its unit, else about its typical value."""
+    parameter = coordinate.definition
+    if parameter is None:
+        raise AssertionError(coordinate)
+    if parameter.kind is ParameterKind.PERIOD:
         # Even in frequency: a relative error of the period counts once a cycle.
-        count = np.arange(0.5, MAX_CYCLES, CYCLE_STEP)
-        return tuple(coordinate.coordinate(visited.span_m / value) for value in count)
-    if coordinate.parameter.endswith("_rad"):
+        values = visited.span_m / np.arange(0.5, MAX_CYCLES, CYCLE_STEP)
+    elif parameter.kind is ParameterKind.PHASE:
         # Sine and cosine; a negative amplitude is a phase turned by half.
-        return (coordinate.coordinate(0.0), coordinate.coordinate(math.pi / 2))
-    if coordinate.form == "linear" and coordinate.parameter.endswith("_m"):
-        inside = np.linspace(visited.low_m, visited.high_m, 20)[1:-1]
-        return tuple(coordinate.coordinate(float(value)) for value in inside)
-    if coordinate.parameter.startswith("width"):
-        return tuple(coordinate.coordinate(visited.span_m * share) for share in (0.025, 0.08))
-    if coordinate.parameter.endswith("_m"):
-        return tuple(
-            coordinate.coordinate(visited.span_m * share) for share in (0.005, 0.015, 0.05, 0.15, 0.5)
-        )
-    if coordinate.parameter.endswith("_m_s"):
-        return tuple(
-            coordinate.coordinate(visited.speed_m_s * share) for share in (0.03, 0.08, 0.2, 0.4, 0.8)
-        )
-    if coordinate.form == "log":
+        values = np.array([0.0, math.pi / 2])
+    elif parameter.kind is ParameterKind.POSITION:
+        values = np.linspace(visited.low_m, visited.high_m, POSITIONS + 2)[1:-1]
+    elif parameter.kind is ParameterKind.WIDTH:
+        values = visited.span_m * WIDTH_SHARES
+    elif parameter.unit == "m":
+        values = visited.span_m * LENGTH_SHARES
+    elif parameter.unit == "m/s":
+        values = visited.speed_m_s * SPEED_SHARES
+    elif coordinate.form == "log":
         return tuple(coordinate.initial + math.log(factor) for factor in DECADE_FACTORS)
-    return tuple(coordinate.initial * factor for factor in DECADE_FACTORS)
+    else:
+        return tuple(coordinate.initial * factor for factor in DECADE_FACTORS)
+    return tuple(coordinate.coordinate(float(value)) for value in values)

@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, ParameterKind, Phase
 
 
 def factor(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -19,8 +19,18 @@ EFFECT = Effect(
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("amplitude", "1", null=0.0, lower=-0.9, upper=3.0, typical=0.3),
-        Parameter("position_m", "m", null=math.nan, lower=-0.1, upper=0.1, typical=0.003),
-        Parameter("width_m", "m", null=math.nan, lower=5e-05, upper=0.05, typical=0.0005),
+        Parameter(
+            "position_m",
+            "m",
+            null=math.nan,
+            lower=-0.1,
+            upper=0.1,
+            typical=0.003,
+            kind=ParameterKind.POSITION,
+        ),
+        Parameter(
+            "width_m", "m", null=math.nan, lower=5e-05, upper=0.05, typical=0.0005, kind=ParameterKind.WIDTH
+        ),
     ),
     laws={LawKind.SCALE: factor},
 )

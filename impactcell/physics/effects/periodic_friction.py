@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, ParameterKind, Phase
 
 
 def factor(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -19,8 +19,18 @@ EFFECT = Effect(
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("amplitude", "1", null=0.0, lower=0.0, upper=0.9, typical=0.1),
-        Parameter("period_m", "m", null=math.nan, lower=0.0001, upper=0.1, typical=0.002),
-        Parameter("phase_rad", "rad", null=math.nan, lower=-math.pi, upper=math.pi, typical=1.0),
+        Parameter(
+            "period_m", "m", null=math.nan, lower=0.0001, upper=0.1, typical=0.002, kind=ParameterKind.PERIOD
+        ),
+        Parameter(
+            "phase_rad",
+            "rad",
+            null=math.nan,
+            lower=-math.pi,
+            upper=math.pi,
+            typical=1.0,
+            kind=ParameterKind.PHASE,
+        ),
     ),
     laws={LawKind.SCALE: factor},
 )
