@@ -13,8 +13,7 @@ from typing import Any
 
 from impactcell.api.friction import calibrated
 from impactcell.campaign import Campaign, Excitation, read
-from impactcell.discrepancy.report.page import verdict_sentence, write_report
-from impactcell.discrepancy.report.result import json_text, result_document
+from impactcell.discrepancy.report import json_text, result_document, verdict_sentence, write_report
 from impactcell.discrepancy.workflow import DiscrepancyResult, extended_plant, investigate
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.prediction import Model

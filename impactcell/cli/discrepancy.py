@@ -12,8 +12,8 @@ from impactcell.api.findings import write_findings
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
 from impactcell.cli.paths import open_journal
-from impactcell.discrepancy.report.page import verdict_sentence
-from impactcell.discrepancy.search.context import Mapper
+from impactcell.discrepancy.report import verdict_sentence
+from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError, DiscrepancyError
 from impactcell.physics import Plant

@@ -6,21 +6,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.data import noise_floor
-from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign, prepare, shot_set, split_held_out
-from impactcell.discrepancy.data.shots import IndexArray, decimate
-from impactcell.discrepancy.model.block_selection import decided_blocks, usable_blocks
-from impactcell.discrepancy.model.fit import Fit, refit_shot_parameters
-from impactcell.discrepancy.model.initial_guess import fit_nominal
-from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
-from impactcell.discrepancy.model.linearisation import linearise
-from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.search.acceptance import SelectionResult
-from impactcell.discrepancy.search.context import Mapper, SearchContext
-from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
-from impactcell.discrepancy.search.model_selection import select_model
-from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
-from impactcell.discrepancy.search.validation import Validation, validate
+from impactcell.discrepancy.data import (
+    IndexArray,
+    NoiseFloor,
+    PreparedCampaign,
+    ReplicateSpread,
+    decimate,
+    prepare,
+    replicate_spread,
+    sensor_noise,
+    shot_set,
+    split_held_out,
+)
+from impactcell.discrepancy.model import (
+    Fit,
+    ParameterEstimate,
+    Problem,
+    decided_blocks,
+    estimate_parameters,
+    fit_nominal,
+    linearise,
+    refit_shot_parameters,
+    usable_blocks,
+)
+from impactcell.discrepancy.search import (
+    Mapper,
+    Proposal,
+    SearchContext,
+    SelectionResult,
+    UnexplainedGap,
+    Validation,
+    describe_gap,
+    propose_experiments,
+    select_model,
+    validate,
+)
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
 
@@ -51,8 +71,8 @@ class DiscrepancyResult:
 
     verdict: str
     prepared: PreparedCampaign
-    floor: noise_floor.NoiseFloor
-    replicates: noise_floor.ReplicateSpread
+    floor: NoiseFloor
+    replicates: ReplicateSpread
     training: IndexArray
     held_out: IndexArray
     problem: Problem
@@ -108,7 +128,7 @@ def investigate(
     """
     report_step = progress or (lambda _step: None)
     prepared = prepare(campaign)
-    floor = noise_floor.sensor_noise(prepared)
+    floor = sensor_noise(prepared)
     training, held_out = split_held_out(prepared, seed)
     report_step("fitting the nominal model")
     problem = _problem(prepared, floor, training)
@@ -165,7 +185,7 @@ def investigate(
     )
 
 
-def _problem(prepared: PreparedCampaign, floor: noise_floor.NoiseFloor, indices: IndexArray) -> Problem:
+def _problem(prepared: PreparedCampaign, floor: NoiseFloor, indices: IndexArray) -> Problem:
     return Problem(shot_set(prepared, indices, floor.noise_std), len(prepared.batches))
 
 
@@ -192,11 +212,11 @@ def _left_out(training: IndexArray, kept: IndexArray) -> str:
 
 def _replicates(
     prepared: PreparedCampaign, indices: tuple[IndexArray, IndexArray], fits: tuple[Fit, Fit]
-) -> noise_floor.ReplicateSpread:
+) -> ReplicateSpread:
     log_factor = np.empty(len(prepared.shots))
     for of_shots, model in zip(indices, fits, strict=True):
         log_factor[of_shots] = model.shot_parameters.log_factor
-    return noise_floor.replicate_spread(prepared.shots, log_factor, len(prepared.batches))
+    return replicate_spread(prepared.shots, log_factor, len(prepared.batches))
 
 
 def _verdict(selection: SelectionResult) -> str:

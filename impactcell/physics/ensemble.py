@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.numerics.jit import IntArray
 from impactcell.physics import memory_layout as at
 from impactcell.physics.batch_integration import (
     MAX_DURATION_S,
@@ -137,7 +136,7 @@ class Ensemble:
             self._sample_index[i, at.CHANNEL_COUNT + channel] = total
         self._times = np.concatenate(pieces) if pieces else NO_SAMPLES
         spans = [self._sample_index[:, [k, at.CHANNEL_COUNT + k]] for k in range(at.CHANNEL_COUNT)]
-        self._channels: list[slice | IntArray] = [
+        self._channels: list[slice | np.ndarray] = [
             np.concatenate([np.arange(begin, end) for begin, end in span])
             if by_tap
             else slice(int(span.min(initial=total)), int(span.max(initial=0)))

@@ -17,8 +17,8 @@ from scipy.stats import chi2
 
 from impactcell.discrepancy.data import noise_floor
 from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set, split_held_out
-from impactcell.discrepancy.model.fit import Fit, fit
 from impactcell.discrepancy.model.initial_guess import fit_nominal
+from impactcell.discrepancy.model.least_squares import Fit, fit
 from impactcell.discrepancy.model.linearisation import linearise, scores
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.search import candidate_scores

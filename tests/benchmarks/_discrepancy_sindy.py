@@ -24,7 +24,7 @@ from pysindy import STLSQ, SmoothedFiniteDifference
 
 from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, UNLOADING
 from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, PreparedShot
-from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.phases import sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 

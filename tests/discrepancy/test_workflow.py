@@ -11,7 +11,7 @@ from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.noise_floor import replicate_spread
-from impactcell.discrepancy.model.fit import fit
+from impactcell.discrepancy.model.least_squares import fit
 from impactcell.discrepancy.model.problem import remove_jumps
 from impactcell.discrepancy.model.shot_parameters import fit_shot_parameters
 from impactcell.discrepancy.report.result import json_text, result_document

@@ -1,1 +1,44 @@
-"""What the workflow works on: shots and blocks with covariates, checked, grouped and split."""
+"""What the workflow works on: shots and blocks, checked, grouped and split, and the noise floor."""
+
+from impactcell.discrepancy.data.excitation import ExcitationStrategy
+from impactcell.discrepancy.data.free_slide import FreeSlide
+from impactcell.discrepancy.data.noise_floor import (
+    NoiseFloor,
+    ReplicateSpread,
+    replicate_spread,
+    sensor_noise,
+)
+from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES, Trajectory
+from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign, prepare, shot_set, split_held_out
+from impactcell.discrepancy.data.shots import (
+    CHANNELS,
+    POSITION,
+    IndexArray,
+    PreparedShot,
+    ShotSet,
+    concatenate_shots,
+    decimate,
+)
+
+__all__ = [
+    "BETWEEN_SHOTS",
+    "CHANNELS",
+    "PHASES",
+    "POSITION",
+    "ExcitationStrategy",
+    "FreeSlide",
+    "IndexArray",
+    "NoiseFloor",
+    "PreparedCampaign",
+    "PreparedShot",
+    "ReplicateSpread",
+    "ShotSet",
+    "Trajectory",
+    "concatenate_shots",
+    "decimate",
+    "prepare",
+    "replicate_spread",
+    "sensor_noise",
+    "shot_set",
+    "split_held_out",
+]

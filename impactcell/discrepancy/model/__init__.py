@@ -1,1 +1,53 @@
 """A set of shots fitted by the plant: predictions, least squares, derivatives, intervals."""
+
+from impactcell.discrepancy.model.block_selection import decided_blocks, usable_blocks
+from impactcell.discrepancy.model.initial_guess import fit_nominal
+from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
+from impactcell.discrepancy.model.least_squares import Fit, fit, refit_shot_parameters
+from impactcell.discrepancy.model.linearisation import (
+    DirectionProducts,
+    LinearisedFit,
+    Scores,
+    concatenate_products,
+    direction_products,
+    linearise,
+    scores,
+)
+from impactcell.discrepancy.model.parameters import (
+    NOMINAL_PARAMETERS,
+    Coordinate,
+    effect_coordinates,
+    parameter_name,
+)
+from impactcell.discrepancy.model.phases import phase_positions, sample_phases, trajectory_of
+from impactcell.discrepancy.model.problem import Problem, remove_jumps
+from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
+
+__all__ = [
+    "NOMINAL_PARAMETERS",
+    "Coordinate",
+    "DirectionProducts",
+    "Fit",
+    "LinearisedFit",
+    "ParameterEstimate",
+    "Problem",
+    "Scores",
+    "SplitFits",
+    "concatenate_products",
+    "decided_blocks",
+    "direction_products",
+    "effect_coordinates",
+    "estimate_parameters",
+    "fit",
+    "fit_nominal",
+    "fit_split",
+    "linearise",
+    "parameter_name",
+    "phase_positions",
+    "refit_shot_parameters",
+    "remove_jumps",
+    "sample_phases",
+    "scores",
+    "trajectory_of",
+    "usable_blocks",
+]

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import IndexArray
-from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.data import IndexArray
+from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.problem import Problem
 
 FRICTION_CHANGE = 0.02

@@ -5,8 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from impactcell.discrepancy.data.phases import Trajectory
-from impactcell.discrepancy.data.shots import IndexArray, ShotSet
+from impactcell.discrepancy.data import IndexArray, ShotSet, Trajectory
 from impactcell.physics import Ensemble, TapInput
 from impactcell.records import Samples
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.model.fit import Fit, fit, initial_shot_parameters
+from impactcell.discrepancy.model.least_squares import Fit, fit, initial_shot_parameters
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import DiscrepancyError
 from impactcell.physics import Plant

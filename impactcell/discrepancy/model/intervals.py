@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.linearisation import LinearisedFit
 from impactcell.discrepancy.model.parameters import Coordinate
 from impactcell.records import Samples

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 

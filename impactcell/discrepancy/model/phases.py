@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from impactcell.discrepancy.data.phases import PHASES, Trajectory
-from impactcell.discrepancy.data.shots import IndexArray
-from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.data import PHASES, IndexArray, Trajectory
+from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 

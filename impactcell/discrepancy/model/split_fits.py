@@ -10,10 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.data.excitation import ExcitationStrategy
-from impactcell.discrepancy.data.free_slide import FreeSlide
-from impactcell.discrepancy.data.shots import POSITION, PreparedShot, concatenate_shots
-from impactcell.discrepancy.model.fit import Fit, fit, initial_shot_parameters
+from impactcell.discrepancy.data import (
+    POSITION,
+    ExcitationStrategy,
+    FreeSlide,
+    PreparedShot,
+    concatenate_shots,
+)
+from impactcell.discrepancy.model.least_squares import Fit, fit, initial_shot_parameters
 from impactcell.discrepancy.model.phases import trajectory_of
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import DiscrepancyError

@@ -7,10 +7,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from impactcell.discrepancy.data.phases import BETWEEN_SHOTS
-from impactcell.discrepancy.data.shots import CHANNELS
-from impactcell.discrepancy.search.evidence import ModelEvidence
-from impactcell.discrepancy.search.residual_map import ALL
+from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS
+from impactcell.discrepancy.search import ALL, ModelEvidence
 from impactcell.discrepancy.workflow import DiscrepancyResult
 
 UNITS = ("N", "mm", "mm")

@@ -6,11 +6,10 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
-from impactcell.discrepancy.model.intervals import ParameterEstimate
+from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report import figures
 from impactcell.discrepancy.report.result import locate_effect
-from impactcell.discrepancy.search.evidence import ALPHA
-from impactcell.discrepancy.search.validation import Validation
+from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import NAMED, NO_GAP, TIED, DiscrepancyResult
 from impactcell.physics.effects import LIBRARY
 

@@ -4,10 +4,9 @@ import json
 import math
 from typing import Any
 
-from impactcell.discrepancy.data.phases import BETWEEN_SHOTS
-from impactcell.discrepancy.model.intervals import ParameterEstimate
-from impactcell.discrepancy.search.evidence import ModelEvidence
-from impactcell.discrepancy.search.validation import Gap
+from impactcell.discrepancy.data import BETWEEN_SHOTS
+from impactcell.discrepancy.model import ParameterEstimate
+from impactcell.discrepancy.search import Gap, ModelEvidence
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model import Fit, Problem
 from impactcell.discrepancy.search.candidate_fits import is_at_bound
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.evidence import CandidateScan, ModelEvidence

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.model.fit import Fit, fit
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model import Fit, Problem, fit
 from impactcell.discrepancy.search import candidate_scores
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan

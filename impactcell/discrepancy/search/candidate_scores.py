@@ -6,18 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import IndexArray
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.linearisation import (
+from impactcell.discrepancy.data import IndexArray
+from impactcell.discrepancy.model import (
+    NOMINAL_PARAMETERS,
     DirectionProducts,
+    Fit,
     LinearisedFit,
+    Problem,
     Scores,
     concatenate_products,
     direction_products,
+    effect_coordinates,
+    parameter_name,
+    remove_jumps,
+    trajectory_of,
 )
-from impactcell.discrepancy.model.parameters import NOMINAL_PARAMETERS, effect_coordinates, parameter_name
-from impactcell.discrepancy.model.phases import trajectory_of
-from impactcell.discrepancy.model.problem import Problem, remove_jumps
 from impactcell.discrepancy.search.effect_grid import SMALL_STRENGTH, GridPoint, VisitedRange, effect_grid
 from impactcell.errors import PhysicsError
 from impactcell.physics.effect import Covariates, ParameterKind

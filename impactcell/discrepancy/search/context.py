@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.data import PreparedCampaign
+from impactcell.discrepancy.model import Fit, Problem
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence, test_model
 from impactcell.discrepancy.search.indistinguishability import total_log_likelihood
 from impactcell.discrepancy.search.policy import POLICY

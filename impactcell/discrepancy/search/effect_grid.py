@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.model.parameters import Coordinate, effect_coordinates
+from impactcell.discrepancy.model import Coordinate, effect_coordinates
 from impactcell.physics import ParameterKind
 from impactcell.records import Samples
 

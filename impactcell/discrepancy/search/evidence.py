@@ -5,10 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.linearisation import Scores, linearise, scores
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.data import PreparedCampaign
+from impactcell.discrepancy.model import Fit, Problem, Scores, linearise, scores
 from impactcell.discrepancy.search import candidate_scores, residual_map
 from impactcell.discrepancy.search.wild_bootstrap import BootstrapTests, wild_bootstrap
 

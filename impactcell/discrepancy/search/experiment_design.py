@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from impactcell.discrepancy.data.shots import PreparedShot, concatenate_shots
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.data import PreparedShot, concatenate_shots
+from impactcell.discrepancy.model import Fit, Problem
 from impactcell.errors import PhysicsError
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import IndexArray
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.linearisation import linearise
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.data import IndexArray
+from impactcell.discrepancy.model import Fit, Problem, linearise
 from impactcell.records import Samples
 
 MAX_DEVIATION = 2.2

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from impactcell.discrepancy.model.fit import Fit
+from impactcell.discrepancy.model import Fit
 from impactcell.discrepancy.search.acceptance import (
     SelectionResult,
     accept_pair,

@@ -9,18 +9,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES
-from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
-from impactcell.discrepancy.data.shots import CHANNELS, IndexArray
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.linearisation import (
+from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS, PHASES, IndexArray, PreparedCampaign
+from impactcell.discrepancy.model import (
     DirectionProducts,
+    Fit,
     LinearisedFit,
+    Problem,
     concatenate_products,
     direction_products,
+    phase_positions,
+    sample_phases,
+    trajectory_of,
 )
-from impactcell.discrepancy.model.phases import phase_positions, sample_phases, trajectory_of
-from impactcell.discrepancy.model.problem import Problem
 from impactcell.records import Samples
 
 ALL = "all"

@@ -4,11 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES
-from impactcell.discrepancy.data.shots import CHANNELS
-from impactcell.discrepancy.model.phases import sample_phases, trajectory_of
-from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
+from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS, PHASES
+from impactcell.discrepancy.model import Problem, SplitFits, fit_split, sample_phases, trajectory_of
 from impactcell.discrepancy.search.evidence import ModelEvidence
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.records import Samples

@@ -5,12 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.noise_floor import NoiseFloor, ReplicateSpread
-from impactcell.discrepancy.data.phases import PHASES
-from impactcell.discrepancy.data.shots import CHANNELS
-from impactcell.discrepancy.model.fit import Fit
-from impactcell.discrepancy.model.phases import sample_phases, trajectory_of
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.data import CHANNELS, PHASES, NoiseFloor, ReplicateSpread
+from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
 from impactcell.records import Samples
 
 MIN_OPEN_GAP = 1.05

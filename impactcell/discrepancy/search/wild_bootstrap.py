@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from impactcell.discrepancy.data.shots import IndexArray
-from impactcell.discrepancy.model.linearisation import LinearisedFit, Scores
+from impactcell.discrepancy.data import IndexArray
+from impactcell.discrepancy.model import LinearisedFit, Scores
 from impactcell.records import Samples
 
 DRAWS = 1999

@@ -15,6 +15,7 @@ def test_what_the_package_offers() -> None:
         "LawKind",
         "Motion",
         "Parameter",
+        "ParameterKind",
         "Phase",
         "Plant",
         "ChannelSamples",
@@ -50,7 +51,7 @@ def test_what_the_records_hold() -> None:
         "shots",
         "batch",
     )
-    assert fields(Parameter) == ("name", "unit", "null", "lower", "upper", "typical", "per_batch")
+    assert fields(Parameter) == ("name", "unit", "null", "lower", "upper", "typical", "per_batch", "kind")
     assert {"identifier", "kind", "equation", "reference", "phases", "parameters", "dissipates"} <= set(
         fields(Effect)
     )

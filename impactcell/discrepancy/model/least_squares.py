@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import IndexArray, ShotSet
+from impactcell.discrepancy.data import IndexArray, ShotSet
 from impactcell.discrepancy.model.forward import ShotParameters
 from impactcell.discrepancy.model.gauss_newton import gauss_newton
 from impactcell.discrepancy.model.parameters import Coordinate
