@@ -24,6 +24,8 @@ _NUMBERS: Final = (
     "Float",
     "Double",
 )
+MAX_DIGITS: Final = 10
+"""Longest number of an index range: it is a UInt32 (Part 4, 7.27)."""
 NUMERIC: Final = frozenset(ua.VariantType[name] for name in _NUMBERS)
 
 
@@ -136,7 +138,8 @@ def parse_range(text: str | None) -> tuple[int, int] | None:
     if not text:
         return None
     first, colon, last = text.partition(":")
-    if not (first.isascii() and first.isdigit() and (not colon or (last.isascii() and last.isdigit()))):
+    numbers = (first, last) if colon else (first,)
+    if not all(len(n) <= MAX_DIGITS and n.isascii() and n.isdigit() for n in numbers):
         raise StatusCodeError(ua.StatusCodes.BadIndexRangeInvalid)
     low, high = int(first), int(last) if colon else int(first)
     if colon and high <= low:

@@ -138,7 +138,7 @@ class ViewService:
     def _translate(self, path: ua.BrowsePath) -> ua.BrowsePathResult:
         result = ua.BrowsePathResult()
         try:
-            nodes = self._follow(path)
+            nodes = self.follow(path)
         except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
@@ -151,7 +151,14 @@ class ViewService:
         ]
         return result
 
-    def _follow(self, path: ua.BrowsePath) -> list[ua.NodeId]:
+    def follow(self, path: ua.BrowsePath) -> list[ua.NodeId]:
+        """Follow one path of browse names to all nodes that it leads to.
+
+        Raises
+        ------
+        StatusCodeError
+            BadNoMatch, or that of a path that is none.
+        """
         elements = path.RelativePath.Elements
         if path.StartingNode not in self._space:
             raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
@@ -164,18 +171,21 @@ class ViewService:
             if not element.TargetName.Name:
                 raise StatusCodeError(ua.StatusCodes.BadBrowseNameInvalid)
             reference_types = self._reference_types(element.ReferenceTypeId, subtypes=element.IncludeSubtypes)
-            nodes = [
-                reference.NodeId
-                for node in nodes
-                if (data := self._space.get(node)) is not None
-                for reference in data.references
-                if reference.BrowseName == element.TargetName
-                and reference.IsForward != element.IsInverse
-                and (reference_types is None or reference.ReferenceTypeId in reference_types)
-            ]
+            # Each node once: where many ways lead to one, following each would take their product.
+            nodes = list(
+                dict.fromkeys(
+                    reference.NodeId
+                    for node in nodes
+                    if (data := self._space.get(node)) is not None
+                    for reference in data.references
+                    if reference.BrowseName == element.TargetName
+                    and reference.IsForward != element.IsInverse
+                    and (reference_types is None or reference.ReferenceTypeId in reference_types)
+                )
+            )
         if not nodes:
             raise StatusCodeError(ua.StatusCodes.BadNoMatch)
-        return list(dict.fromkeys(nodes))
+        return nodes
 
     async def register_nodes(
         self, _context: RequestContext, parameters: ua.RegisterNodesParameters

@@ -14,6 +14,7 @@ import numpy as np
 
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
+from tests.benchmarks._filter_cost import table as filter_costs
 from tests.benchmarks._opcua_clients import Listener, connected
 from tests.benchmarks.table import Table
 from tests.integration.processes import simulator, started, write_cell
@@ -182,4 +183,4 @@ def tables(quick: bool = False) -> list[Table]:
         "with full captures at 2 a second. Fifty clients: Basic256Sha256, signed and encrypted, in two "
         "processes. Interval: bootstrap over notifications; beside it how late a bare timer was meanwhile."
     )
-    return [Table("OPC UA", COLUMNS, rows, note)]
+    return [Table("OPC UA", COLUMNS, rows, note), filter_costs()]
