@@ -57,6 +57,33 @@ def test_equation_6_weighs_by_gradients_and_spans() -> None:
     assert both.value == pytest.approx(weight * 0.19 + (1 - weight) * 0.21, rel=1e-6)
 
 
+@pytest.mark.parametrize("v", [2000.0, 3000.0, 4500.0, 6000.0])
+@pytest.mark.parametrize("mu", [0.15, 0.165, 0.18, 0.22, 0.24, 0.25])
+def test_equation_6_away_from_equal_weights_is_its_closed_form(mu: float, v: float) -> None:
+    """Printed: w_F = 1 / (1 + 2 (0.3415 - mu) / (2 0.3415 - 0.15 - 0.25)), one half at 0.2 only."""
+    mixed = interpolate_mass(PRINTED, 18.9, v / 6e4)
+    weight = 1.0 / (1.0 + 2.0 * (0.3415 - mu) / (2.0 * 0.3415 - 0.15 - 0.25))
+    assert abs(weight - 0.5) > 0.025
+    assert force_weight(mixed, mu, v / 6e4) == pytest.approx(weight, rel=1e-9)
+    by_peak, by_length = mu + 0.004, mu - 0.004
+    peak = MeasuredFeature(146.2 * by_peak + 0.0529 * v, 0.1)
+    micrometres = 0.07379 * v**1.6428 * (0.3415 - by_length) ** 2 + 0.00041 * v**1.8997
+    length = MeasuredFeature(1e-6 * micrometres, 1e-6)
+    one = by_force(PRINTED, mixed, v / 6e4, peak)
+    two = by_distance(PRINTED, mixed, v / 6e4, length)
+    both = combined(PRINTED, mixed, v / 6e4, (one, peak), (two, length))
+    assert both.value == pytest.approx(weight * by_peak + (1.0 - weight) * by_length, rel=1e-9)
+
+
+@pytest.mark.parametrize(("mu", "held_at"), [(0.12, 0.15), (0.29, 0.25)])
+def test_the_weights_of_equation_6_stay_as_at_the_end_of_the_calibrated_range(
+    mu: float, held_at: float
+) -> None:
+    mixed = interpolate_mass(PRINTED, 18.9, 0.075)
+    weight = 1.0 / (1.0 + 2.0 * (0.3415 - held_at) / (2.0 * 0.3415 - 0.15 - 0.25))
+    assert force_weight(mixed, mu, 0.075) == pytest.approx(weight, rel=1e-9)
+
+
 def test_the_printed_coefficients_come_back_out_of_the_reference_plant() -> None:
     tap = TapInput(0.1, 18.9, halts_at_separation=True)
     found = fit_predictor(PLANT, tap, np.linspace(0.05, 0.1, 9), FRICTIONS)
