@@ -15,19 +15,22 @@ from typing import Final, Self
 from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.backoff import Backoff
-from impactcell.fieldbus.capture_reader import CaptureReader
-from impactcell.fieldbus.capture_ring import cycles_after, next_capture
+from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
+from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_consistent, next_capture
 from impactcell.fieldbus.decoding import StatusBlock
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.poll_schedule import PollSchedule
 from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import RegisterMap, Value
+from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId, ModuleStatus
 
 __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
 
+_DISAGREEMENTS: Final = 5
+"""So often status block and window may disagree about the oldest cycle; then the next one is tried."""
 _NOT_THIS_DEVICE: Final = (1, 2, 3, 10, 11)
 """Exceptions that say that there are no such registers, or nobody with this device id behind a gateway."""
 
@@ -123,18 +126,23 @@ class ModuleAcquisition:
             except FieldbusError as error:
                 self._log.info("the acknowledgement will be repeated: %s", error, cycle=cycle_id.cycle)
 
-    async def captures(self, after: CycleId | None = None) -> AsyncGenerator[ReceivedCycle]:
+    async def captures(
+        self, after: CycleId | None = None, after_time_ns: int = 0
+    ) -> AsyncGenerator[ReceivedCycle]:
         """Yield each cycle after `after` once, in order; ends only when it is closed.
 
         Parameters
         ----------
         after : CycleId or None
             Last cycle that is durable; None: begin with the oldest that the module still has.
+        after_time_ns : int
+            Its own time; 0 where that is not known.
         """
-        last, backoff, schedule = after, Backoff(), PollSchedule()
+        taken = TakenCycles(after, after_time_ns, self.registers.slots)
+        backoff, schedule = Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
         newest = CycleId(0, 0)
-        overwritten = 0
+        overwritten = disagreements = 0
         while True:
             try:
                 sent_s = loop.time()
@@ -143,26 +151,26 @@ class ModuleAcquisition:
                 newest_now = CycleId(status.session, status.cycle_counter)
                 schedule.record_poll(sent_s, loop.time(), new=newest_now != newest)
                 newest = newest_now
-                target = next_capture(
-                    last,
-                    status.session,
-                    status.cycle_counter,
-                    status.ring,
-                    overwritten // 2,
-                )
+                target = self._target(taken.last, status, overwritten // 2 + disagreements // _DISAGREEMENTS)
                 if target is None:
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
-                fetched = await self._reader.fetch(target)
+                fetched = await self._reader.fetch(target, taken)
             except FieldbusError as error:
                 await self._disconnect(error)
                 await asyncio.sleep(backoff.next_delay_s())
                 continue
-            if fetched is None:  # look at the ring again, and then further from its end
+            if fetched is NotFetched.OVERWRITTEN:  # look at the ring again, and then further from its end
                 overwritten = min(max(1, 2 * overwritten), self.registers.slots)
                 continue
-            overwritten //= 2
+            if isinstance(fetched, NotFetched):
+                self._log.debug("%s", fetched.value, cycle=target.cycle_id.cycle)
+                disagreements += not target.restarted and fetched is NotFetched.NOT_SHOWN
+                await asyncio.sleep(schedule.delay_s(loop.time()))
+                continue
+            overwritten, disagreements = overwritten // 2, 0
             capture = replace(fetched.capture, session=target.cycle_id.session)
+            last = taken.last
             schedule.update(
                 1e-9 * capture.time_ns or loop.time(),
                 cycles_after(last.cycle, target.cycle_id.cycle)
@@ -170,14 +178,20 @@ class ModuleAcquisition:
                 else 0,
                 newest=target.cycle_id == newest,
             )
-            last = target.cycle_id
+            taken.add(target.cycle_id, fetched.header, capture.time_ns)
             received = ReceivedCycle(
                 capture, target.cycle_id, target.missed, target.restarted, fetched.faults
             )
             self._count(received, readable=fetched.readable)
             yield received
-            if last == newest:  # nothing waits behind it
+            if taken.last == newest:  # nothing waits behind it
                 await asyncio.sleep(schedule.delay_s(loop.time()))
+
+    def _target(self, last: CycleId | None, status: StatusBlock, skip: int) -> NextCapture | None:
+        """Choose the cycle to read; None where there is none, or the status block contradicts itself."""
+        if not is_consistent(status.cycle_counter, status.ring):
+            return None
+        return next_capture(last, status.session, status.cycle_counter, status.ring, skip)
 
     async def _connect(self) -> None:
         """Connect and check who answers."""

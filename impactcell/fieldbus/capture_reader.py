@@ -7,16 +7,18 @@ there is a CRC to prove the whole.
 """
 
 import asyncio
+import enum
 from dataclasses import dataclass
 from typing import Final
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
-from impactcell.fieldbus.capture_ring import NextCapture
+from impactcell.fieldbus.capture_ring import NextCapture, is_after
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import Value, Words, capture_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
-from impactcell.records import Capture
+from impactcell.fieldbus.taken_cycles import TakenCycles
+from impactcell.records import Capture, CycleId
 
 _MOST_ATTEMPTS: Final = 5
 """Readings of one cycle that may be discarded before it is given up."""
@@ -29,12 +31,22 @@ _REQUEST_FAULTS: Final = (1, 2, 3)
 _ARRAYS: Final = ("force", "position", "actuator")
 
 
+class NotFetched(enum.Enum):
+    """Why a cycle was not read although the status block has it; none of these is a fault of the link."""
+
+    OVERWRITTEN = "the module has put a newer cycle in its place"
+    NOT_SHOWN = "its slot shows another cycle: the status block is wrong, or the window"
+    TAKEN = "it has been taken before: the status block is old, or wrong"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FetchedCapture:
     """What came of reading one cycle.
 
     Attributes
     ----------
+    header : bytes
+        Words of the header, for telling whether the same is read again; empty where there was none.
     readable : bool
         False if it has no content but its number.
     faults : tuple of str
@@ -42,6 +54,7 @@ class FetchedCapture:
     """
 
     capture: Capture
+    header: bytes
     readable: bool
     faults: tuple[str, ...]
 
@@ -80,8 +93,8 @@ class CaptureReader:
         self._link_failures = 0
         self._fewest_missing = 0
 
-    async def fetch(self, target: NextCapture) -> FetchedCapture | None:
-        """Read the cycle `target`; None if it was overwritten before it could be read.
+    async def fetch(self, target: NextCapture, taken: TakenCycles) -> FetchedCapture | NotFetched:
+        """Read the cycle `target`, if that is what its slot shows and it has not been taken before.
 
         A cycle that cannot be read however often it is tried comes back without content, and `faults` says
         why.
@@ -97,13 +110,9 @@ class CaptureReader:
         reason = "it kept changing while it was read; does another client select slots?"
         while self._attempts < _MOST_ATTEMPTS:
             try:
-                partial = await self._read_header(target)
-                if partial is None:
-                    self._attempts += 1
-                    reason = f"slot {target.slot} does not show it, although ring_cycle says so"
-                    if self._attempts < _MOST_ATTEMPTS:
-                        return None
-                    break
+                partial = await self._read_header(target, taken)
+                if isinstance(partial, NotFetched):
+                    return partial
                 fault = await self._read_samples(partial)
                 if fault is None:
                     self._target = self._partial = None
@@ -128,8 +137,11 @@ class CaptureReader:
             self.discarded += 1
             await asyncio.sleep(_PAUSE_S * 2**self._attempts)
         self._target = self._partial = None
-        fault = f"{self._cell}: cycle {target.cycle_id.cycle} could not be read: {reason}"
-        return FetchedCapture(decoding.empty_capture(target.cycle_id.cycle), readable=False, faults=(fault,))
+        if taken.is_behind(target.cycle_id):  # no header has proved that there is such a cycle at all
+            return NotFetched.NOT_SHOWN
+        cycle = target.cycle_id.cycle
+        fault = f"{self._cell}: cycle {cycle} could not be read: {reason}"
+        return FetchedCapture(decoding.empty_capture(cycle), b"", readable=False, faults=(fault,))
 
     def _progressed(self) -> bool:
         """Whether the interrupted reading got further than the one before."""
@@ -138,7 +150,7 @@ class CaptureReader:
         before, self._fewest_missing = self._fewest_missing, self._partial.missing_requests
         return self._fewest_missing < before
 
-    async def _read_header(self, target: NextCapture) -> _PartialCapture | None:
+    async def _read_header(self, target: NextCapture, taken: TakenCycles) -> _PartialCapture | NotFetched:
         """Show the slot and read its header, or go on with the reading that was interrupted."""
         client, registers = self._client, self._registers
         if self._partial is not None:
@@ -151,14 +163,22 @@ class CaptureReader:
         if header["window_slot"] != target.slot:
             header, words = await client.read_header()
         if _at_rest(header["window_sequence"]) and header["window_slot"] == target.slot:
-            identity = (header["window_session"], header["window_cycle"])
-            if identity != (target.cycle_id.session, target.cycle_id.cycle):
-                return None
+            integer, wanted = decoding.integer, target.cycle_id
+            shown = CycleId(integer(header["window_session"]), integer(header["window_cycle"]))
+            if taken.holds(shown, self._identifying(words), integer(header["cycle_time"]), target):
+                return NotFetched.TAKEN
+            if shown != wanted:
+                newer = shown.session == wanted.session and is_after(shown.cycle, wanted.cycle)
+                return NotFetched.OVERWRITTEN if newer else NotFetched.NOT_SHOWN
         counts = decoding.sample_counts(registers, header)
         blocks = {name: client.partial_block(name, count) for name, count in counts.items()}
         self._partial = _PartialCapture(target, header, words, blocks)
         self._fewest_missing = self._partial.missing_requests
         return self._partial
+
+    def _identifying(self, words: Words) -> bytes:
+        """Words of a header that stay the same while its capture does."""
+        return words[self._registers["window_sequence"].words :].tobytes()
 
     async def _read_samples(self, partial: _PartialCapture) -> str | None:
         """Read the samples and what follows them; return why the reading is of no use, None if it is good."""
@@ -192,8 +212,9 @@ class CaptureReader:
     def _assemble(self, partial: _PartialCapture) -> FetchedCapture:
         samples = {name: block.words() for name, block in partial.blocks.items()}
         capture, faults = decoding.capture_from_words(self._registers, partial.header, samples)
+        identifying = self._identifying(partial.words)
         named = tuple(f"{self._cell}: cycle {capture.cycle}: {fault}" for fault in faults)
-        return FetchedCapture(capture, readable=True, faults=named)
+        return FetchedCapture(capture, identifying, readable=True, faults=named)
 
 
 def _at_rest(sequence: Value) -> bool:

@@ -21,6 +21,8 @@ class NextCapture:
     ----------
     slot : int
         Where the ring has it.
+    counter : int
+        The module's last complete cycle, as the status block has it.
     missed : int
         Cycles between the last one taken and this one, which the ring no longer has.
     restarted : bool
@@ -30,6 +32,7 @@ class NextCapture:
 
     cycle_id: CycleId
     slot: int
+    counter: int
     missed: int
     restarted: bool
 
@@ -41,6 +44,20 @@ def cycles_after(after: int, to: int) -> int:
     (2, 3, 0)
     """
     return to if after == 0 or to == 0 else (to - after) % CYCLE_PERIOD
+
+
+def is_after(cycle: int, other: int) -> bool:
+    """Whether `cycle` was made after `other`, both in one life of the module.
+
+    >>> is_after(3, 2), is_after(2, 3), is_after(3, 3), is_after(1, 4294967295)
+    (True, False, False, True)
+    """
+    return 0 < cycles_after(other, cycle) <= CYCLE_PERIOD // 2
+
+
+def is_consistent(counter: int, ring: Sequence[int]) -> bool:
+    """Whether the ring of a status block holds the cycle that its counter says was completed last."""
+    return counter == 0 or counter in ring
 
 
 def next_capture(
@@ -78,4 +95,4 @@ def next_capture(
     missed = 0 if last is None else max(0, behind - age - 1)
     if restarted and missed > CYCLE_PERIOD // 2:
         missed = 0  # no module makes so many cycles between two polls: its counter was set
-    return NextCapture(CycleId(session, ring[slot]), slot, missed, restarted)
+    return NextCapture(CycleId(session, ring[slot]), slot, counter, missed, restarted)

@@ -79,7 +79,8 @@ def _code_name(register: Register, value: Value) -> str:
     return register.codes.get(code, f"unknown ({code})")
 
 
-def _integer(value: Value) -> int:
+def integer(value: Value) -> int:
+    """Give a value that is an integer; 0 for any other."""
     return value if isinstance(value, int) else 0
 
 
@@ -92,8 +93,8 @@ def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> Status
     batch = positioning = None
     if all(name in values for name in _BATCH):
         batch = BatchAnnouncement(
-            _integer(values["batch_sequence"]),
-            _integer(values["batch_from_cycle"]),
+            integer(values["batch_sequence"]),
+            integer(values["batch_from_cycle"]),
             str(values["batch_announced"]),
         )
     if all(name in values for name in _POSITIONING):
@@ -102,15 +103,15 @@ def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> Status
             result=_code_name(registers["command_result"], values["command_result"]),
             position_m=_number(values["part_position"]),
             target_m=_number(values["target_position"]),
-            target_sequence=_integer(values["target_sequence"]),
+            target_sequence=integer(values["target_sequence"]),
             mass_kg=_number(values["part_mass"]),
-            accepted_command=_integer(values["command_accepted"]),
-            cycle=_integer(values["command_cycle"]),
+            accepted_command=integer(values["command_accepted"]),
+            cycle=integer(values["command_cycle"]),
         )
     return StatusBlock(
         state=_code_name(registers["state"], values["state"]),
-        session=_integer(values["session"]),
-        cycle_counter=_integer(values["cycle_counter"]),
+        session=integer(values["session"]),
+        cycle_counter=integer(values["cycle_counter"]),
         ring=tuple(int(cycle) for cycle in np.atleast_1d(np.asarray(values["ring_cycle"]))),
         batch=batch,
         positioning=positioning,
@@ -120,7 +121,7 @@ def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> Status
 def sample_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, int]:
     """Return how many samples of each array are used: what the header says, at most what the map has."""
     return {
-        name: min(_integer(header.get(f"{name}_count", 0)), registers[name].count)
+        name: min(integer(header.get(f"{name}_count", 0)), registers[name].count)
         for name in ("force", "position", "actuator")
         if name in registers
     }
@@ -132,7 +133,7 @@ def excessive_counts(registers: RegisterMap, header: Mapping[str, Value]) -> lis
         f"register {name}_count ({registers[f'{name}_count'].address}): {header[f'{name}_count']} samples, "
         f"but the map has room for {registers[name].count}"
         for name in ("force", "position", "actuator")
-        if name in registers and _integer(header.get(f"{name}_count", 0)) > registers[name].count
+        if name in registers and integer(header.get(f"{name}_count", 0)) > registers[name].count
     ]
 
 
@@ -161,13 +162,13 @@ def capture_from_words(
     if not math.isnan(mass) and not LIGHTEST_KG <= mass <= HEAVIEST_KG:
         faults.append(f"register mass ({registers['mass'].address}): {mass:g} kg cannot be")
         mass = math.nan
-    time_ns = _integer(header["cycle_time"])
+    time_ns = integer(header["cycle_time"])
     if time_ns > LATEST_NS:
         faults.append(f"register cycle_time ({registers['cycle_time'].address}): {time_ns} ns is no date")
         time_ns = 0
     stroke = checked.positive("stroke", math.inf, also=lambda value: value == math.inf)
     dwell = checked.positive("dwell", math.nan, also=lambda value: value == 0.0 or math.isnan(value))
-    direction = _integer(header.get("direction", 1))
+    direction = integer(header.get("direction", 1))
     if direction not in (-1, 1):
         faults.append(
             f"register direction ({registers['direction'].address}): {direction} instead of 1 or -1"
@@ -185,7 +186,7 @@ def capture_from_words(
                 faults.append(f"register {name} ({registers[name].address}): not a number")
     start = _number(header.get("start_position", 0.0))
     return Capture(
-        cycle=_integer(header["window_cycle"]),
+        cycle=integer(header["window_cycle"]),
         velocity_m_s=velocity,
         mass_kg=mass,
         force=channels.get("force"),

@@ -182,7 +182,10 @@ class CellTask:
     async def _acquire(self) -> None:
         await self.worker.warm_up()
         async with contextlib.aclosing(
-            self._module.captures(after=self.worker.last or self.worker.durable)
+            self._module.captures(
+                self.worker.last or self.worker.durable,
+                0 if self.worker.snapshot is None else self.worker.snapshot.time_ns,
+            )
         ) as received_cycles:
             async for received in received_cycles:
                 await self._process(received)

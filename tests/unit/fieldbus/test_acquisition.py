@@ -65,7 +65,7 @@ def assert_whole(received: ReceivedCycle) -> None:
 async def running(
     fpga: RegisterMap,
     device: ScriptedDevice,
-    after: CycleId | None = None,
+    after: CycleId | tuple[CycleId, int] | None = None,
     statuses: list[ModuleStatus] | None = None,
     **link: Any,
 ) -> AsyncIterator[tuple[ModbusServer, ModuleAcquisition, AsyncIterator[ReceivedCycle]]]:
@@ -78,7 +78,9 @@ async def running(
             fpga,
             statuses and statuses.append,
         ) as module,
-        contextlib.aclosing(module.captures(after)) as receptions,
+        contextlib.aclosing(
+            module.captures(*(after if isinstance(after, tuple) else (after,)))
+        ) as receptions,
     ):
         yield server, module, receptions
 

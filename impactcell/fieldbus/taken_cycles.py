@@ -1,0 +1,72 @@
+"""Which cycles have been taken, so that none is taken twice whatever a status block says. Pure.
+
+A status block can be old, from a gateway that answers out of a store, or have a wrong bit. So neither a cycle
+counter that goes back nor another session is proof that the module was started anew: what the header of the
+capture shows decides, for the capture's CRC covers it.
+"""
+
+from collections import OrderedDict
+
+from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
+from impactcell.records import CycleId
+
+
+class TakenCycles:
+    """The last cycle taken, and what the headers of those before it looked like.
+
+    Parameters
+    ----------
+    last : CycleId or None
+        Last cycle taken; None: none ever.
+    last_time_ns : int
+        Its own time; 0 where that is not known.
+    slots : int
+        Cycles that the module's ring holds.
+    """
+
+    def __init__(self, last: CycleId | None, last_time_ns: int, slots: int) -> None:
+        self.last = last
+        self._last_time_ns = last_time_ns
+        self._slots = slots
+        self._headers: OrderedDict[CycleId, bytes] = OrderedDict()
+        self._first_behind: CycleId | None = None
+
+    def add(self, cycle_id: CycleId, header: bytes, time_ns: int) -> None:
+        """Take note of a cycle that has been taken, its header as it stands on the wire, and its own time."""
+        self.last, self._last_time_ns, self._first_behind = cycle_id, time_ns, None
+        self._headers.pop(cycle_id, None)
+        self._headers[cycle_id] = header
+        while len(self._headers) > 2 * self._slots:
+            self._headers.popitem(last=False)
+
+    def is_behind(self, cycle_id: CycleId) -> bool:
+        """Whether it lies before the last one, if the module was not started anew without a new session."""
+        if self.last is None or cycle_id.session != self.last.session:
+            return False
+        return not is_after(cycle_id.cycle, self.last.cycle)
+
+    def holds(self, shown: CycleId, header: bytes, time_ns: int, target: NextCapture) -> bool:
+        """Whether the capture that the window shows has been taken before, as far as can be known.
+
+        Parameters
+        ----------
+        shown : CycleId
+            As the header says.
+        header : bytes
+            Its words.
+        time_ns : int
+            Its own time; 0 where the module's clock is not set.
+        target : NextCapture
+            Where the status block has led to.
+        """
+        if shown in self._headers:
+            return self._headers[shown] == header
+        if not self.is_behind(shown):
+            return False
+        if time_ns > self._last_time_ns > 0:
+            return False
+        # Nobody knows this cycle, and no clock tells. One that goes on and on behind the last cycle is no old
+        # reply any more; the ring still holds what came meanwhile.
+        if self._first_behind is None or self._first_behind.session != shown.session:
+            self._first_behind = CycleId(shown.session, target.counter)
+        return cycles_after(self._first_behind.cycle, target.counter) < self._slots // 2

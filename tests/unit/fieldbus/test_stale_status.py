@@ -1,0 +1,187 @@
+"""A status block that is old or has a wrong bit: each cycle still comes once. Truth: what the device made."""
+
+import asyncio
+import contextlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from impactcell.fieldbus.registers import RegisterMap, Words
+from impactcell.records import CycleId
+from simulator.scripted import ScriptedDevice
+from tests.unit.fieldbus.test_acquisition import assert_whole, make, running
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+POLLS = 600
+
+
+class Mangler:
+    """Stands between a device and its server and changes what is read of some registers."""
+
+    def __init__(self, device: ScriptedDevice, first: str, last: str) -> None:
+        self.device = device
+        self.first, self.end = device.registers[first].address, device.registers[last].end
+        self.polls = 0
+        self.change: Callable[[Words, int], Words] = lambda words, _: words
+        self._read = device.read
+        device.read = self.read  # type: ignore[method-assign]
+
+    def read(self, table: str, address: int, count: int) -> Words:
+        words = self._read(table, address, count)
+        if self.first <= address < self.end:
+            self.polls += 1
+            return self.change(words.copy(), self.polls)
+        return words
+
+
+async def received_of(
+    fpga: RegisterMap, device: ScriptedDevice, mangler: Mangler, cycles: int
+) -> list[CycleId]:
+    """Let the device make a cycle at every fifth poll, until all of `cycles` have come or nothing comes."""
+    received: list[CycleId] = []
+    async with running(fpga, device) as (_, module, receptions):
+
+        async def collect() -> None:
+            async for each in receptions:
+                assert_whole(each)
+                received.append(each.cycle_id)
+                assert each.missed == 0
+
+        collecting = asyncio.create_task(collect())
+        made = mangler.polls
+        while int(device.get("cycle_counter")) < cycles and not collecting.done():
+            if mangler.polls >= made + 5:
+                made = mangler.polls
+                make(device)
+            await asyncio.sleep(0)
+        enough = mangler.polls + POLLS
+        while len(received) < cycles and mangler.polls < enough and not collecting.done():
+            await asyncio.sleep(0)
+        quiet = mangler.polls + 40
+        while mangler.polls < quiet and not collecting.done():
+            await asyncio.sleep(0)
+        assert (module.status.missed, module.status.restarts, module.status.unreadable) == (0, 0, 0)
+        collecting.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await collecting
+    return received
+
+
+@pytest.fixture(autouse=True)
+def _polls_follow_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No wait between polls: what is tried here does not depend on when they come."""
+    monkeypatch.setattr("impactcell.fieldbus.poll_schedule.PollSchedule.delay_s", lambda *_: 0.0)
+
+
+@pytest.mark.parametrize("age", [1, 2, 5])
+async def test_status_replies_that_are_old_make_no_cycle_come_twice(fpga: RegisterMap, age: int) -> None:
+    """Three polls running show the status block as it was `age` cycles ago, again and again."""
+    device = ScriptedDevice(fpga, session=7)
+    mangler = Mangler(device, "state", "command_cycle")
+    past: dict[int, Words] = {}
+
+    def stale(words: Words, poll: int) -> Words:
+        counter = int(device.get("cycle_counter"))
+        past.setdefault(counter, words)
+        return past.get(counter - age, words) if poll % 7 < 3 else words
+
+    mangler.change = stale
+    received = await received_of(fpga, device, mangler, 60)
+    assert received == [CycleId(7, cycle) for cycle in range(1, 61)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+async def test_a_wrong_bit_in_a_status_block_makes_no_cycle_come_twice_or_missing(
+    fpga: RegisterMap, seed: int
+) -> None:
+    device = ScriptedDevice(fpga, session=7)
+    mangler = Mangler(device, "state", "command_cycle")
+    draw = np.random.default_rng(seed)
+
+    def flip(words: Words, _: int) -> Words:
+        if draw.random() < 0.3:
+            words[draw.integers(2, 42)] ^= np.uint16(1 << draw.integers(16))  # session, counter or ring
+        return words
+
+    mangler.change = flip
+    received = await received_of(fpga, device, mangler, 60)
+    assert received == [CycleId(7, cycle) for cycle in range(1, 61)]
+
+
+@pytest.mark.parametrize("register", ["session", "cycle_counter"])
+async def test_a_status_register_with_a_bit_that_stays_wrong_makes_up_no_cycle(
+    fpga: RegisterMap, register: str
+) -> None:
+    """So long that every retry sees it, and no longer than the ring: nothing is made up, nothing lost."""
+    device = ScriptedDevice(fpga, session=7)
+    mangler = Mangler(device, "state", "command_cycle")
+    make(device, 3)
+    at = fpga[register].address + 1 - mangler.first
+
+    def flip(words: Words, poll: int) -> Words:
+        if 20 < poll < 80:
+            words[at] ^= np.uint16(1 << 4)
+        return words
+
+    mangler.change = flip
+    received = await received_of(fpga, device, mangler, 40)
+    assert received == [CycleId(7, cycle) for cycle in range(1, 41)]
+
+
+async def test_a_restart_within_one_session_is_still_seen(fpga: RegisterMap) -> None:
+    """The counter goes back, and the captures are others: that is no old status block."""
+    device = ScriptedDevice(fpga, session=7)
+    make(device, 10)
+    async with running(fpga, device) as (_, module, receptions):
+        before = [(await anext(receptions)).cycle_id.cycle for _ in range(10)]
+        device.start(session=7)
+        make(device, 9, velocity=0.06)
+        again = [await anext(receptions) for _ in range(9)]
+        assert before == list(range(1, 11))
+        assert [each.cycle_id.cycle for each in again] == list(range(1, 10))
+        assert [each.restarted for each in again] == [True] + [False] * 8
+        assert module.status.restarts == 1
+
+
+@pytest.mark.parametrize("clock_ns", [0, 10**18])
+async def test_an_old_status_block_after_a_start_of_the_service_is_no_restart(
+    fpga: RegisterMap, clock_ns: int
+) -> None:
+    """The service knows the last cycle from its journal, and no more of it than its time."""
+    device = ScriptedDevice(fpga, session=7)
+    for cycle in range(1, 11):
+        make(device, cycle_time=clock_ns and clock_ns + cycle)
+    old = device.image.copy()
+    make(device, 2, cycle_time=clock_ns and clock_ns + 11)
+    mangler = Mangler(device, "state", "command_cycle")
+    mangler.change = lambda words, poll: old[mangler.first :][: words.size] if poll < 20 else words
+    after = (CycleId(7, 12), clock_ns and clock_ns + 12)
+    async with running(fpga, device, after=after) as (_, module, receptions):
+        coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
+        while mangler.polls < 40:
+            await asyncio.sleep(0)
+        assert not coming.done()
+        make(device)
+        assert ((await coming).cycle_id, module.status.restarts) == (CycleId(7, 13), 0)
+
+
+async def test_a_restart_that_no_clock_and_no_memory_proves_is_seen_before_the_ring_is_full(
+    fpga: RegisterMap,
+) -> None:
+    """The same session, cycles without a time, and a service that has just been started."""
+    device = ScriptedDevice(fpga, session=7)
+    mangler = Mangler(device, "state", "command_cycle")
+    make(device, 2, cycle_time=0)
+    async with running(fpga, device, after=(CycleId(7, 1000), 0)) as (_, module, receptions):
+        coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
+        while not coming.done():
+            polls = mangler.polls
+            while mangler.polls < polls + 3 and not coming.done():
+                await asyncio.sleep(0)
+            make(device, cycle_time=0)
+        assert int(device.get("cycle_counter")) < 16
+        assert ((await coming).cycle_id, module.status.restarts) == (CycleId(7, 1), 1)
+        assert (await anext(receptions)).cycle_id == CycleId(7, 2)
