@@ -59,7 +59,7 @@ def estimate_size(
     Parameters
     ----------
     family : int
-        Number in `scan.FAMILIES`.
+        Number in `matched_filter_scan.FAMILIES`.
     P, u : ndarray, shapes (s, s), (s,)
         Information and scores of the coefficients that were seen.
     reached_m : float

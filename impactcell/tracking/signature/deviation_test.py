@@ -67,8 +67,9 @@ class DeviationTest:
     at_m : float
         Where the cycle deviates most.
     size, size_std : float
-        Friction of the likeliest family of shapes, and its standard deviation, by `sizing`; nan where the
-        p-value is not below `SIZED_P_VALUE`. A cycle that T^2 or SPE says most of is sized as a bump.
+        Friction of the likeliest family of shapes, and its standard deviation, by `deviation_size`; nan
+        where the p-value is not below `SIZED_P_VALUE`. A cycle that T^2 or SPE says most of is sized as a
+        bump.
     """
 
     p_value: float
