@@ -75,7 +75,7 @@ class LoginThrottle:
     def delay(failures: int) -> float:
         """Delay of the answer when `wrong` passwords, this one included, were wrong.
 
-        >>> [Throttle.delay(n) for n in (4, 5, 6, 50)]
+        >>> [LoginThrottle.delay(n) for n in (4, 5, 6, 50)]
         [0.0, 0.25, 0.5, 8.0]
         """
         if failures <= UNDELAYED_FAILURES:

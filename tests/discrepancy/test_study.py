@@ -196,7 +196,7 @@ def _only_key(job: Job) -> dict[str, Any]:
 
 
 def test_rivals_get_every_third_campaign_of_each_kind_with_its_strengths() -> None:
-    plan = jobs(p_single=1, subtle=1, removed=1, outside=1, two=6, none=9)
+    plan = jobs(single=1, subtle=1, removed=1, outside=1, two=6, none=9)
     found = [{"key": job.key, "multiples": [0.5] * len(job.hidden)} for job in plan if job.seed != 60_003]
     tasks = subset(plan, found)
     kinds = Counter(task.job.kind for task in tasks)
