@@ -45,8 +45,8 @@ def check_units(ratios_of_shots: Iterable[Mapping[PlausibleRatio, float]]) -> No
     for ratios in ratios_of_shots:
         for ratio, value in ratios.items():
             values.setdefault(ratio, []).append(value)
-    for ratio, found in values.items():
-        median = float(np.median(found))
+    for ratio, of_shots in values.items():
+        median = float(np.median(of_shots))
         if not ratio.low < median < ratio.high:
             power = round(math.log10(max(median, 1e-300)) / 3.0) * 3
             message = (

@@ -79,7 +79,7 @@ class Problem:
         self.sizes = np.diff(shots.bounds)
         self.coordinates: tuple[Coordinate, ...] = nominal_coordinates(
             shots.excitation.free_plant_parameters
-        ) + tuple(one for effect in effects for one in effect_coordinates(effect, self.batches))
+        ) + tuple(coordinate for effect in effects for coordinate in effect_coordinates(effect, self.batches))
         self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items])
         self.unknown_mass &= shots.excitation.mass_is_visible
         self.shot_parameter_names = (

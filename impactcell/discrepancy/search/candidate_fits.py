@@ -120,7 +120,8 @@ def refit_on_all_samples(context: SearchContext, fits: Sequence[Fit]) -> list[Ca
 def _continue(context: SearchContext, problem: Problem, fits: Sequence[Fit], steps: int) -> list[Fit]:
     """Fit models further from where they stand."""
     return _run(
-        context, [FitTask(problem.with_effects(one.effects), (AS_IT_STANDS,), one, steps) for one in fits]
+        context,
+        [FitTask(problem.with_effects(model.effects), (AS_IT_STANDS,), model, steps) for model in fits],
     )
 
 
