@@ -15,70 +15,80 @@ VALUES_PER_PAGE: Final = 1_000
 """Values, events or aggregates in one answer; more come by continuation point."""
 BEGINNING: Final = ua.get_win_epoch()
 """Times up to here mean that none was given (Part 6, 5.2.2.5)."""
-NO_BOUND: Final = ua.StatusCode(ua.StatusCodes.BadBoundNotFound)
+NO_BOUND: Final = int(ua.StatusCodes.BadBoundNotFound)
 
 
 @dataclass(frozen=True, slots=True)
 class ReadRange:
-    """A question about a span of time, both ends included.
+    """A question about a span of time, both ends included, and how far it has been answered.
 
     Attributes
     ----------
-    left : int or None
-        Number of values still wanted, None for all.
-    bounds : tuple of int, or None
-        Start and end in the direction of the question, where the values that bound it are wanted too.
+    remaining : int or None
+        Number of values still wanted; None for all of the span.
+    per_answer : int or None
+        Most values in one answer, as the client asks; None leaves that to the server.
+    first_bound_ns, last_bound_ns : int or None
+        Start and end in the direction of the question, while the values that bound it there are still wanted.
+    is_read : bool
+        Whether nothing but the last bound is left.
     """
 
     start_ns: int | None
     end_ns: int | None
     newest_first: bool
-    remaining: int | None
+    remaining: int | None = None
+    per_answer: int | None = None
     resume: bytes | None = None
-    bounds: tuple[int, int] | None = None
+    first_bound_ns: int | None = None
+    last_bound_ns: int | None = None
+    is_read: bool = False
 
-    def request(self) -> HistoryRequest:
+    @property
+    def limit(self) -> int:
+        """Most values in the next answer."""
+        return min(VALUES_PER_PAGE, self.remaining or VALUES_PER_PAGE, self.per_answer or VALUES_PER_PAGE)
+
+    def request(self, limit: int) -> HistoryRequest:
         """Ask for the next page."""
-        limit = VALUES_PER_PAGE if self.remaining is None else min(VALUES_PER_PAGE, self.remaining)
         return HistoryRequest(self.start_ns, self.end_ns, limit, self.newest_first, self.resume)
 
-
-def remaining_range(current: ReadRange, returned: int, resume: bytes | None) -> ReadRange | None:
-    """Say what is left to ask after a page; None at the end."""
-    remaining = None if current.remaining is None else current.remaining - returned
-    if resume is None or remaining == 0:
-        return None
-    return replace(current, remaining=remaining, resume=resume)
+    def after(self, returned: int, resume: bytes | None) -> "ReadRange | None":
+        """Say what is left to ask after a page; None at the end."""
+        remaining = None if self.remaining is None else self.remaining - returned
+        if resume is None or remaining == 0:
+            return None
+        return replace(self, remaining=remaining, resume=resume)
 
 
 def read_range(
     start: datetime | None, end: datetime | None, max_values: int, *, bounds: bool = False
 ) -> ReadRange:
-    """Read the bounds of a question: two of start, end and number are needed.
+    """Read the bounds of a question: two of start, end and number are needed (Part 11, 6.5.3.2).
 
-    The start belongs to the span and the end does not, in whichever direction time runs.
+    The start belongs to the span and the end does not, in whichever direction time runs. With both ends the
+    number is that of one answer, and more come by continuation point; with one it is that of all.
 
     Raises
     ------
-    FaultError
+    StatusCodeError
         BadInvalidTimestampArgument.
     """
     start_ns = nanoseconds(start) if start is not None and start > BEGINNING else None
     end_ns = nanoseconds(end) if end is not None and end > BEGINNING else None
-    remaining = max_values or None
-    if (start_ns is None) + (end_ns is None) + (remaining is None) > 1:
+    number = max_values or None
+    if (start_ns is None) + (end_ns is None) + (number is None) > 1:
         raise StatusCodeError(ua.StatusCodes.BadInvalidTimestampArgument)
     if start_ns is None:
         # Backwards from the end, which is where the question begins and so belongs to it.
-        return ReadRange(None, end_ns, newest_first=True, remaining=remaining)
+        return ReadRange(None, end_ns, newest_first=True, remaining=number)
     if end_ns is None:
-        return ReadRange(start_ns, None, newest_first=False, remaining=remaining)
-    ends = (start_ns, end_ns) if bounds else None
+        return ReadRange(start_ns, None, newest_first=False, remaining=number)
     if start_ns > end_ns:
-        return ReadRange(end_ns + 1, start_ns, newest_first=True, remaining=remaining, bounds=ends)
-    return ReadRange(
-        start_ns, max(end_ns - 1, start_ns), newest_first=False, remaining=remaining, bounds=ends
-    )
+        current = ReadRange(end_ns + 1, start_ns, newest_first=True, per_answer=number)
+    else:
+        current = ReadRange(start_ns, max(end_ns - 1, start_ns), newest_first=False, per_answer=number)
+    return replace(current, first_bound_ns=start_ns, last_bound_ns=end_ns) if bounds else current
 
 
 class HistoricalVariable:
@@ -88,10 +98,37 @@ class HistoricalVariable:
         self._history = history
         self._node = node
 
+    async def read(self, current: ReadRange) -> tuple[list[HistoricalValue], ReadRange | None]:
+        """Read what one answer holds, bounds included, and say what is left."""
+        limit, values = current.limit, list[HistoricalValue]()
+        if not current.is_read:
+            # A value at the very start is its bound; else one place is for the bound.
+            places = limit if current.first_bound_ns is None else max(limit - 1, 1)
+            page = await self._history.read_values(self._node, current.request(places))
+            left = current.after(len(page.values), page.resume)
+            values += page.values
+            first_ns = current.first_bound_ns
+            if first_ns is not None:
+                current = replace(current, first_bound_ns=None)
+                left = None if left is None else replace(left, first_bound_ns=None)
+                if not values or values[0].time_ns != first_ns:
+                    bound = await self._bound(first_ns, later=current.newest_first)
+                    if values and limit == 1:
+                        return [bound], current
+                    values.insert(0, bound)
+            if left is not None or current.last_bound_ns is None:
+                return values, left
+        last_ns = current.last_bound_ns
+        if last_ns is not None and len(values) == limit:
+            return values, replace(current, is_read=True)
+        if last_ns is not None:
+            values.append(await self._bound(last_ns, later=not current.newest_first))
+        return values, None
+
     async def page(self, current: ReadRange) -> tuple[Sequence[HistoricalValue], ReadRange | None]:
         """Read a page, and say what is left."""
-        page = await self._history.read_values(self._node, current.request())
-        return page.values, remaining_range(current, len(page.values), page.resume)
+        page = await self._history.read_values(self._node, current.request(current.limit))
+        return page.values, current.after(len(page.values), page.resume)
 
     async def ends(self) -> tuple[int, int] | None:
         """Find the times of the first and the last stored value."""
@@ -101,12 +138,10 @@ class HistoricalVariable:
             return None
         return first.values[0].time_ns, last.values[0].time_ns
 
-    async def bound(self, time_ns: int, *, later: bool) -> ua.DataValue:
+    async def _bound(self, time_ns: int, *, later: bool) -> HistoricalValue:
         """Find the value at a time, or the nearest on one side; BadBoundNotFound where there is none."""
         page = await self._nearest(time_ns, later=later)
-        if page.values:
-            return data_value(page.values[0])
-        return ua.DataValue(None, NO_BOUND, moment(time_ns), moment(time_ns))
+        return page.values[0] if page.values else HistoricalValue(time_ns, None, NO_BOUND)
 
     async def _nearest(self, time_ns: int | None, *, later: bool) -> HistoricalValues:
         start_ns, end_ns = (time_ns, None) if later else (None, time_ns)
@@ -116,5 +151,5 @@ class HistoricalVariable:
 
 def data_value(value: HistoricalValue) -> ua.DataValue:
     """Make the DataValue of a stored value."""
-    variant = ua.Variant(value.value, ua.VariantType.Double)
+    variant = None if value.value is None else ua.Variant(value.value, ua.VariantType.Double)
     return ua.DataValue(variant, ua.StatusCode(value.status), moment(value.time_ns), moment(value.time_ns))

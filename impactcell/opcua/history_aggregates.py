@@ -132,7 +132,7 @@ def aggregate_interval(
         return AggregateValue(interval.start_ns, None, NO_DATA if not values else BAD)
     status = _status(len(good), len(values), configuration)
     if aggregate is AggregateFunction.AVERAGE:
-        mean = sum(value.value for value in good) / len(good)
+        mean = sum(value.value or 0.0 for value in good) / len(good)
         return AggregateValue(interval.start_ns, mean, status | CALCULATED)
     pick = min if aggregate is AggregateFunction.MINIMUM else max
     return _extreme(pick, interval, values, good, status)

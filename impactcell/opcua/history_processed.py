@@ -1,6 +1,5 @@
 """ReadProcessedDetails: aggregates of a stored series, interval by interval (Part 11, 6.5.4)."""
 
-from dataclasses import replace
 from typing import Final
 
 from asyncua import ua
@@ -75,14 +74,13 @@ async def _aggregate(
         min(min(interval.start_ns, interval.end_ns) for interval in intervals),
         max(max(interval.start_ns, interval.end_ns) for interval in intervals),
         newest_first=intervals[0].start_ns > intervals[0].end_ns,
-        remaining=None,
     )
     values_ahead: list[HistoricalValue] = []
     results = []
     for interval in intervals:
         # Values come in the order of the intervals: read on until one lies beyond this interval.
         while unread is not None and (not values_ahead or not _beyond(values_ahead[-1], interval)):
-            values, unread = await series.page(replace(unread, remaining=None))
+            values, unread = await series.page(unread)
             values_ahead.extend(values)
         inside = [value for value in values_ahead if value.time_ns in interval]
         values_ahead = [value for value in values_ahead if _beyond(value, interval)]

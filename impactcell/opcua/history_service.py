@@ -16,7 +16,6 @@ from impactcell.opcua.historical_variable import (
     ReadRange,
     data_value,
     read_range,
-    remaining_range,
 )
 from impactcell.opcua.history_processed import read_processed
 from impactcell.opcua.host_interface import AccessPolicy, HistoryProvider, Permission, RefusedError
@@ -97,7 +96,7 @@ class HistoryService:
             empty = not data.Events
         result.HistoryData = data
         result.ContinuationPoint = continuation_points.keep(remaining) if remaining is not None else None
-        if empty:
+        if empty and remaining is None:
             result.StatusCode = ua.StatusCode(ua.StatusCodes.GoodNoData)
         return result
 
@@ -127,15 +126,9 @@ class HistoryService:
         current = state or read_range(
             details.StartTime, details.EndTime, details.NumValuesPerNode, bounds=details.ReturnBounds
         )
-        values, remaining = await series.page(current)
+        values, remaining = await series.read(current)
         data = ua.HistoryData()
         data.DataValues = [data_value(value) for value in values]
-        if current.bounds is not None:
-            start, end = current.bounds
-            if state is None and (not values or values[0].time_ns != start):
-                data.DataValues.insert(0, await series.bound(start, later=current.newest_first))
-            if remaining is None:
-                data.DataValues.append(await series.bound(end, later=not current.newest_first))
         return data, remaining
 
     async def _read_processed(
@@ -152,8 +145,14 @@ class HistoryService:
     ) -> tuple[ua.HistoryEvent, ReadRange | None]:
         event_filter = EventFilter(self._space, details.Filter)
         current = state or read_range(details.StartTime, details.EndTime, details.NumValuesPerNode)
-        page = await self._history.read_events(node, current.request())
+        events: list[ua.HistoryEventFieldList] = []
+        remaining: ReadRange | None = current
+        while remaining is not None and len(events) < current.limit:
+            request = remaining.request(current.limit - len(events))
+            page = await self._history.read_events(node, request)
+            passed = [event_filter.select(event) for event in page.events if event_filter.passes(event)]
+            events += [ua.HistoryEventFieldList(fields.EventFields) for fields in passed]
+            remaining = remaining.after(len(passed), page.resume)
         data = ua.HistoryEvent()
-        passed = [event for event in page.events if event_filter.passes(event)]
-        data.Events = [ua.HistoryEventFieldList(event_filter.select(event).EventFields) for event in passed]
-        return data, remaining_range(current, len(passed), page.resume)
+        data.Events = events
+        return data, remaining

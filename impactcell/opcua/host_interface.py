@@ -189,10 +189,10 @@ class HistoryRequest:
 
 @dataclass(frozen=True, slots=True)
 class HistoricalValue:
-    """One stored value; `status` is an OPC UA status code."""
+    """One stored value, None where there is none; `status` is an OPC UA status code."""
 
     time_ns: int
-    value: float
+    value: float | None
     status: int = 0
 
 
