@@ -95,7 +95,7 @@ def processing_intervals(start_ns: int, end_ns: int, step_ns: int) -> Iterator[P
 
     >>> [(i.start_ns, i.end_ns, i.partial) for i in processing_intervals(0, 25, 10)]
     [(0, 10, False), (10, 20, False), (20, 25, True)]
-    >>> [(i.start_ns, i.end_ns, i.partial) for i in intervals(20, 0, 10)]
+    >>> [(i.start_ns, i.end_ns, i.partial) for i in processing_intervals(20, 0, 10)]
     [(20, 10, False), (10, 0, False)]
     """
     sign = 1 if end_ns >= start_ns else -1
