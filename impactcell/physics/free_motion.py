@@ -8,6 +8,9 @@ from impactcell.physics.law_table import build_law_table, parameter_vector
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
+CHORD_SPEED_M_S = 2.0**-4
+"""Speed of a slide at which resistance is looked at; a power of two, so that viscous friction is exact."""
+
 
 def acts_on_speed(identifier: str) -> bool:
     """Whether an effect accelerates a free part, friction that changes from place to place apart."""
@@ -46,3 +49,21 @@ def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
         if kinetic is not None:
             total -= [g * kinetic(v, 0.0, 0.0, 0.0, p) for v in speed_m_s.tolist()]
     return total
+
+
+def linear_resistance(plant: Plant) -> float:
+    """Resistance of a plant's effects that grows with speed, as one viscous coefficient (N s/m).
+
+    The chord from rest to `CHORD_SPEED_M_S` of the laws of `LawKind.BODY`, k_v = (F(0) - F(v)) / v: exact
+    where they are linear in speed, at the middle of a slide where they are not.
+    """
+    table = build_law_table(tuple(plant.effects))
+    values = parameter_vector(plant, table)
+    total = 0.0
+    for identifier, spans in zip(table.effects, table.parameter_spans, strict=True):
+        body = LIBRARY[identifier].laws.get(LawKind.BODY)
+        if body is not None:
+            p = [values[first] for first, _ in spans]
+            force = [body(0.0, v, 1.0, plant.gravity_m_s2, p) for v in (0.0, CHORD_SPEED_M_S)]
+            total += (force[0] - force[1]) / CHORD_SPEED_M_S
+    return float(total)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from impactcell.errors import PositioningError
-from impactcell.physics import Plant
+from impactcell.physics import Plant, free_motion
 from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning import planner_posterior
 from impactcell.positioning.action_selection import select_action
@@ -47,7 +47,7 @@ class TapPlanner:
         Bound for a whole task, learning included.
     plant : Plant or mapping, optional
         Nominal plant, or its fields by name; contact within some 10 % and friction within a factor of 1.4
-        of what the cell turns out to be. Of its effects, viscous friction is planned with.
+        of what the cell turns out to be. Of its effects, resistance that grows with speed is planned with.
     max_force_n : float
         Contact force that no tap may exceed.
     two_sided : bool
@@ -86,7 +86,6 @@ class TapPlanner:
             plant = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.25, mu_k=0.19)
         elif isinstance(plant, Mapping):
             plant = Plant(**plant)  # type: ignore[arg-type]
-        viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
         self._gravity = plant.gravity_m_s2
         self._limits = PlannerLimits(
             self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
@@ -94,7 +93,11 @@ class TapPlanner:
         )  # fmt: skip
         _ready()
         self._posterior = planner_posterior.prior(
-            plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, float(np.max(viscous))
+            plant.stiffness_n_per_m,
+            plant.damping_n_s_per_m,
+            plant.mu_s,
+            plant.mu_k,
+            max(free_motion.linear_resistance(plant), 0.0),
         )
 
     @property

@@ -18,6 +18,7 @@ import numpy as np
 from impactcell.records import Samples
 
 FRICTION, STIFFNESS, DAMPING, RATIO, VISCOUS = range(5)
+"""Where each parameter lies in theta."""
 LEARNED_STD = np.array([0.015, 0.03, 0.05, 0.02, 3.0])  # left after a handful of taps
 BATCH_STD = 0.08  # of friction, after a batch step whose size the tracker has not measured yet
 LEVEL_STD = 0.007  # the tracker's level is believed no better than this: successive levels are correlated

@@ -18,13 +18,13 @@ from impactcell.positioning.planner_posterior import BATCH_STD, FRICTION, STIFFN
 from impactcell.records import Samples
 
 DEGREES = 8.0  # of freedom of the likelihood
-POSITION_NOISE_M = 0.5e-6
+POSITION_NOISE_M = 0.5e-6  # standard deviation of a displacement by an encoder of 1 um: 1 um / sqrt 12, twice
 MODEL_ERROR = 2e-3  # of a displacement: what the nominal model leaves out
 # Random walk a tap, in units of the parameters: wear of friction, a slow change of the contact.
 WALK = np.array([1.5e-3, 3e-4, 6e-4, 3e-4, 0.02])
 NARROW = {FRICTION: 0.05, STIFFNESS: 0.04}  # standard deviations that one Gaussian is trusted with
 NEGLIGIBLE = 1e-4  # weight of a component that is dropped
-ITERATIONS = 4
+ITERATIONS = 4  # of the linearisation; the last change is below a twentieth of a standard deviation
 CLIPPED = 3.5  # standard deviations of a tap's factor, beyond which more does not count as scatter
 CROOKED = 0.1  # of the first regression's remainder that stays, whatever the later ones leave over
 
@@ -167,3 +167,4 @@ def _spread_evenly(count: int, seed: int) -> Samples:
 
 
 POINTS = _spread_evenly(48, 8)
+"""At which the displacement is made linear: eight a dimension; the seed is any that spreads them well."""

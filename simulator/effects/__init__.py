@@ -16,15 +16,17 @@ __all__ = ["LIBRARY", "UNLISTED", "Effect", "Parameter", "Shot", "build", "check
 
 
 def _discover(package: str, path: Sequence[str]) -> Mapping[str, type[Effect]]:
-    found: dict[str, type[Effect]] = {}
+    library: dict[str, type[Effect]] = {}
     for module in sorted(pkgutil.iter_modules(path), key=lambda entry: entry.name):
         if module.ispkg or module.name == "law":
             continue
         content = vars(importlib.import_module(f"{package}.{module.name}"))
         for value in content.values():
             if isinstance(value, type) and issubclass(value, Effect) and value is not Effect:
-                found[value.identifier] = value
-    return MappingProxyType(found)
+                if value.identifier != module.name:
+                    raise ValueError(f"effects/{module.name}.py calls its effect {value.identifier!r}")
+                library[value.identifier] = value
+    return MappingProxyType(library)
 
 
 UNLISTED = _discover(unlisted.__name__, unlisted.__path__)

@@ -3,13 +3,13 @@
 import itertools
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from impactcell.physics.effects import LIBRARY as PRODUCT
 from simulator.effects import LIBRARY, UNLISTED, build
 from simulator.plant import Motion, Plant, Shot, TapInput, simulate_free_slide, simulate_tap
 
@@ -18,24 +18,14 @@ PLANT = Plant(6.5e5, 465.0, 0.2, 0.152)
 STRIKE = TapInput(0.06, 18.9, stroke_m=0.0015, start_m=0.002, dwell_s=20.0, shot=3, shots=10, batch=1)
 TIME = np.arange(1, 1200) * 1e-4
 
-VOCABULARY = {
-    *("viscous_friction", "stribeck_friction", "quadratic_drag", "surface_tilt", "hertz_contact"),
-    *("hunt_crossley_damping", "actuator_droop", "actuator_ramp", "position_dependent_friction"),
-    *("periodic_friction", "friction_patch", "adhesion", "presliding_compliance", "restoring_force"),
-    *("mass_error", "force_sensor_lag", "force_sensor_gain", "force_sensor_offset", "force_saturation"),
-    *("channel_skew", "stiction_ageing", "friction_drift", "batch_shift", "direction_asymmetry"),
-}
-NULL = {
-    "hertz_contact": {"exponent": 1.0},
-    "force_saturation": {"limit_n": 1e9},
-    "presliding_compliance": {"stiffness_n_per_m": 1e12},
-    "batch_shift": {"relative_change": (0.0,)},
-    "stribeck_friction": {"friction_increase": 0.0, "stribeck_velocity_m_s": 0.04},
-    "adhesion": {"force_n": 0.0, "range_m": 3e-4},
-    "actuator_droop": {"speed_loss_m_per_s_n": 0.0, "time_constant_s": 0.003},
-    "periodic_friction": {"amplitude": 0.0, "period_m": 0.001, "phase_rad": 0.0},
-    "friction_patch": {"amplitude": 0.0, "position_m": 0.003, "width_m": 0.001},
-}
+
+def null_of(identifier: str) -> dict[str, float | tuple[float, ...]]:
+    """Values at which an effect vanishes, as the product's library has them; large for those without end."""
+    values: dict[str, float | tuple[float, ...]] = {}
+    for parameter in PRODUCT[identifier].parameters:
+        null = parameter.typical if math.isnan(parameter.null) else min(parameter.null, 1e12)
+        values[parameter.name] = (null,) if parameter.per_batch else null
+    return values
 
 
 def struck(effects: dict[str, dict[str, object]], strike: TapInput = STRIKE) -> Motion:
@@ -46,20 +36,17 @@ def slid(name: str, speed: float = 0.15, shot: Shot | None = None, **parameters:
     return simulate_free_slide(replace(PLANT, effects={name: parameters}), 18.9, speed, shot)
 
 
-def test_the_whole_vocabulary_and_nothing_else() -> None:
-    assert set(LIBRARY) == VOCABULARY
+def test_every_effect_of_the_product_and_nothing_else() -> None:
+    assert {name: set(effect.defaults) for name, effect in LIBRARY.items()} == {
+        name: {parameter.name for parameter in effect.parameters} for name, effect in PRODUCT.items()
+    }
     assert len(UNLISTED) >= 6
-    assert not set(UNLISTED) & VOCABULARY
+    assert not set(UNLISTED) & set(PRODUCT)
 
 
-def test_one_file_an_effect() -> None:
-    root = Path(__file__).parents[3] / "simulator" / "effects"
-    assert {file.stem for file in root.glob("*.py")} - {"__init__", "law"} == VOCABULARY
-
-
-@pytest.mark.parametrize("name", sorted(VOCABULARY))
+@pytest.mark.parametrize("name", sorted(PRODUCT))
 def test_vanishes_at_its_null_value(name: str) -> None:
-    null = NULL.get(name) or dict.fromkeys(LIBRARY[name].defaults, 0.0)
+    null = null_of(name)
     # The damper's first jolt b v makes elastic stick ring at any stiffness: without b the limit is rigid.
     elastic = name == "presliding_compliance"
     plant = replace(PLANT, damping_n_s_per_m=0.0) if elastic else PLANT
@@ -84,7 +71,7 @@ def test_shows_at_its_default_strength(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in sorted(VOCABULARY) if name.startswith(("force_s", "channel"))]
+    "name", [name for name in sorted(PRODUCT) if name.startswith(("force_s", "channel"))]
 )
 def test_sensors_move_nothing(name: str) -> None:
     motion = struck({name: dict(LIBRARY[name].defaults)})

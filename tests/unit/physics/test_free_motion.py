@@ -1,0 +1,38 @@
+"""What effects do to a free part, against the laws themselves and against motion."""
+
+import numpy as np
+import pytest
+
+from impactcell.physics import Plant, TapInput, free_motion, simulate_free_slide
+
+NOMINAL = (6.5e5, 465.0, 0.2, 0.15)
+
+
+@pytest.mark.parametrize("k_v", [0.0, 0.1, 85.0, 85.1])
+def test_viscous_friction_is_its_own_resistance(k_v: float) -> None:
+    plant = Plant(*NOMINAL, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": k_v}})
+    assert free_motion.linear_resistance(plant) == k_v
+
+
+def test_drag_resists_as_at_the_chord() -> None:
+    effects = {"quadratic_drag": {"drag_coefficient_n_s2_per_m2": 40.0}, "surface_tilt": {"tilt_rad": 0.01}}
+    assert free_motion.linear_resistance(Plant(*NOMINAL, effects=effects)) == pytest.approx(40.0 / 16.0)
+
+
+def test_no_effect_resists_nothing() -> None:
+    assert free_motion.linear_resistance(Plant(*NOMINAL)) == 0.0
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_acceleration_is_that_of_the_motion(direction: int) -> None:
+    effects = {
+        "viscous_friction": {"viscous_coefficient_n_s_per_m": 60.0},
+        "surface_tilt": {"tilt_rad": 0.01},
+        "stribeck_friction": {"friction_increase": 0.02, "stribeck_velocity_m_s": 0.05},
+    }
+    plant, tap = Plant(*NOMINAL, effects=effects), TapInput(0.05, 20.0, direction=direction)
+    time = np.linspace(0.001, 0.03, 30)
+    speed = direction * simulate_free_slide(plant, tap, 0.12).sample(time).velocity_m_s
+    measured = np.gradient(speed, time, edge_order=2)[1:-1]
+    own = free_motion.acceleration(plant, tap, speed)[1:-1]
+    np.testing.assert_allclose(measured, own - 0.15 * plant.gravity_m_s2, rtol=2e-4)
