@@ -101,21 +101,18 @@ class HistoricalVariable:
     async def read(self, current: ReadRange) -> tuple[list[HistoricalValue], ReadRange | None]:
         """Read what one answer holds, bounds included, and say what is left."""
         limit, values = current.limit, list[HistoricalValue]()
+        first_ns = current.first_bound_ns
+        if first_ns is not None:
+            current = replace(current, first_bound_ns=None)
+            bound = await self._bound(first_ns, later=current.newest_first)
+            if bound.value is None or bound.time_ns != first_ns:  # else it is the first value itself
+                values.append(bound)
+            if len(values) == limit:
+                return values, current
         if not current.is_read:
-            # A value at the very start is its bound; else one place is for the bound.
-            places = limit if current.first_bound_ns is None else max(limit - 1, 1)
-            page = await self._history.read_values(self._node, current.request(places))
+            page = await self._history.read_values(self._node, current.request(limit - len(values)))
             left = current.after(len(page.values), page.resume)
             values += page.values
-            first_ns = current.first_bound_ns
-            if first_ns is not None:
-                current = replace(current, first_bound_ns=None)
-                left = None if left is None else replace(left, first_bound_ns=None)
-                if not values or values[0].time_ns != first_ns:
-                    bound = await self._bound(first_ns, later=current.newest_first)
-                    if values and limit == 1:
-                        return [bound], current
-                    values.insert(0, bound)
             if left is not None or current.last_bound_ns is None:
                 return values, left
         last_ns = current.last_bound_ns
