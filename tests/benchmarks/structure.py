@@ -9,10 +9,10 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from tests.benchmarks import _syntax
+from tests.benchmarks._lists import Count, alarms, effects, values
 from tests.benchmarks.table import Table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -20,15 +20,11 @@ BEFORE = Path(__file__).with_name("rows") / "structure-before.json"
 """As this script measured the last tree before the rooms were set up."""
 MANY_ARGUMENTS = 8
 COMPLEX = 20
-GENERATED = re.compile(r"generated (from|by)", re.IGNORECASE)
-"""What a file that nobody edits says in its first lines."""
-SOURCES = {".py", ".xml", ".j2", ".js"}
-
 DEFINITIONS: Mapping[str, tuple[str, ...]] = {
     "integrators of a tap in the product": (
-        "physics.(course|integrator):integrate_all",
+        "physics.(course|integrator):(integrate_all|integrate_taps)",
         "physics.modified_euler:strike_modified_euler",
-        "positioning.(response|displacement_model):displacements",
+        "(positioning.response|positioning.displacement_model|physics.closed_form):displacements",
     ),
     "noise estimators of a channel": (
         "(prediction.reading|prediction.feature_extraction|features.noise):noise_std",
@@ -48,14 +44,6 @@ One that calls another of its row is not counted: it does not do the work again.
 and a row of which nothing is found fails. `features.segment` is not listed: it averages the slide from the
 separation on that it is given, though where rest begins it judges by itself.
 """
-
-
-@dataclass(frozen=True, slots=True)
-class Count:
-    """One measured figure and what was counted."""
-
-    value: int
-    items: tuple[str, ...] = ()
 
 
 def duplicate_names(parsed: Sequence[_syntax.Module]) -> Count:
@@ -100,64 +88,6 @@ def retired_names(parsed: Sequence[_syntax.Module], retired: Iterable[str]) -> C
         nodes = (*_syntax.classes(module), *_syntax.functions(module))
         items.extend(f"{module.name}:{node.lineno} {node.name}" for node in nodes if node.name in gone)
     return Count(len(items), tuple(items))
-
-
-def files_that_list(root: Path, kind: Sequence[tuple[str, ...]], homes: int) -> Count:
-    """Files that a new item must be written into: its homes, and every file that lists its kind.
-
-    A file of product, simulator or tests lists a kind if it names more than half of its items, in any of
-    their spellings.
-    """
-    patterns = [re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b") for names in kind]
-    items = []
-    for package in ("impactcell", "simulator", "tests"):
-        for path in sorted((root / package).rglob("*")):
-            below = path.relative_to(root)
-            if path.suffix not in SOURCES or {"node_modules", "benchmarks"} & set(below.parts):
-                continue
-            text = path.read_text(encoding="utf-8")
-            if GENERATED.search(text[:400]):
-                continue
-            if 2 * sum(bool(pattern.search(text)) for pattern in patterns) > len(kind):
-                items.append(str(below))
-    return Count(homes + len(items), tuple(items))
-
-
-def alarms(root: Path) -> Count:
-    """Files to edit for an alarm rule, by those that list the rules there are."""
-    names = ("WearLimit", "BatchShift", "DeviantCycle", "ModuleConnection", "ModelGap", "PositioningFault")
-    spellings = []
-    for name in names:
-        snake = re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
-        spellings.append((name, snake, snake.upper()))
-    one_file_a_rule = any((root / "impactcell" / "alarms").rglob("deviant_cycle.py"))
-    return files_that_list(root, spellings, int(one_file_a_rule))
-
-
-def values(root: Path) -> Count:
-    """Files to edit for a published value, by those that list values of all origins."""
-    probes = (
-        ("peak_force_n", "PeakForce"),
-        ("sliding_distance_m", "SlidingDistance"),
-        ("by_distance", "mu_s_distance", "StaticFrictionByDistance"),
-        ("mu_k", "KineticFriction"),
-        ("rate_per_cycle", "wear_rate_per_cycle", "RatePer1000Cycles"),
-        ("cycles_to_limit", "CyclesToLimit"),
-        ("cycles_to_limit_low", "CyclesToLimitLow"),
-        ("offset_std", "batch_offset_std", "OffsetStdDev"),
-        ("last_shift", "LastShift"),
-        ("t_squared", "TSquared"),
-        ("spe", "Spe"),
-        ("round_trip_ms", "round_trip_s", "RoundTripTime"),
-    )
-    return files_that_list(root, probes, 0)
-
-
-def effects(root: Path) -> Count:
-    """Files to edit for an effect: its own, its independent law, and those that list the effects."""
-    folder = root / "impactcell" / "physics" / "effects"
-    names = [(path.stem,) for path in sorted(folder.glob("*.py")) if path.stem != "__init__"]
-    return files_that_list(root, names, 2)
 
 
 def definitions(parsed: Sequence[_syntax.Module], patterns: Sequence[str]) -> Count:

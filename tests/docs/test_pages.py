@@ -9,10 +9,12 @@ from tests.docs.snippets import run, snippets
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
+INCLUDED = ("impactcell/physics/effects/README.md", "impactcell/scada/README.md", "CONTRIBUTING.md")
+"""Pages that lie elsewhere; README itself is run by tests/integration/test_readme.py."""
 PAGES = sorted(
     page
-    for page in DOCS.rglob("*.md")
-    if not {"_build", "_generated"} & set(page.relative_to(DOCS).parts) and snippets(page)
+    for page in (*DOCS.rglob("*.md"), *(ROOT / name for name in INCLUDED))
+    if not {"_build", "_generated"} & set(page.parts) and snippets(page)
 )
 
 
@@ -29,7 +31,7 @@ def test_there_are_pages_with_code() -> None:
 
 
 @pytest.mark.timeout(400)
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_a_page_does_what_it_says(page: Path, workspace: Path) -> None:
     for block, printed in run(page, workspace):
         assert block.printed in {None, printed}, f"{page.name}:{block.line} printed\n{printed}"

@@ -1,0 +1,120 @@
+"""One file is all that a new effect or a new published value takes: tried on a copy of the tree.
+
+For an alarm rule `tests/unit/alarms/test_new_rule.py` does the same. In the copy the tests that know what
+there is (of the library, the nodes, the stored columns) have to pass as they are.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EFFECT = '''
+"""A constant force along +1."""
+
+from impactcell.numerics.jit import FloatPointer
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+
+
+def pull(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """P."""
+    return p[0]
+
+
+EFFECT = Effect(
+    identifier="constant_pull",
+    kind=Kind.BODY,
+    equation="+P",
+    reference="a weight on a string",
+    phases=(Phase.FREE_SLIDE,),
+    parameters=(Parameter("pull_n", "N", null=0.0, lower=-10.0, upper=10.0, typical=1.0),),
+    laws={LawKind.BODY: pull},
+)
+'''
+LAW = '''
+"""A constant force along +1."""
+
+from simulator.effects.law import Effect
+
+
+class ConstantPull(Effect):
+    """P."""
+
+    identifier = "constant_pull"
+    defaults = {"pull_n": 1.0}
+
+    def __init__(self, pull_n: float) -> None:
+        self._pull_n = pull_n
+
+    def body_force(self, x: float, v: float, t: float) -> float:
+        return self._pull_n
+'''
+QUANTITY = '''    _Q("Model/CombinedFriction", 6901, "mu_s by equation (6).",
+       lambda s: s.friction.combined.value, lambda s: s.friction.combined.quality, ONE, _friction_range,
+       column="mu_combined", quality_column="mu_combined_quality", has_history=True),
+)
+"""Quantities that each cycle writes."""
+'''
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    for package in ("impactcell", "simulator", "tests", "config"):
+        ignored = shutil.ignore_patterns("__pycache__", "node", "node_modules")
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=ignored)
+    shutil.copy2(ROOT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def run(copy: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=copy,
+        env={**os.environ, "PYTHONPATH": str(copy)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def run_tests(copy: Path, *which: str) -> str:
+    return run(copy, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *which)
+
+
+@pytest.mark.timeout(300)
+def test_an_effect_is_one_file_and_one_independent_law(copy: Path) -> None:
+    (copy / "impactcell" / "physics" / "effects" / "constant_pull.py").write_text(EFFECT, encoding="utf-8")
+    contract = "tests/contract/test_effects.py"
+    told = run_tests(copy, f"{contract}::test_it_says_what_it_is", f"{contract}::test_published_names_stay")
+    assert "25 passed" in told or "26 passed" in told, told
+    with pytest.raises(AssertionError, match="constant_pull"):
+        run_tests(copy, "tests/unit/simulator/test_effects.py", "-k", "every_effect")
+    (copy / "simulator" / "effects" / "constant_pull.py").write_text(LAW, encoding="utf-8")
+    run_tests(copy, "tests/unit/simulator/test_effects.py", "-k", "every_effect or null")
+
+
+@pytest.mark.timeout(300)
+def test_a_published_value_is_one_row(copy: Path) -> None:
+    table = copy / "impactcell" / "quantities.py"
+    text = table.read_text(encoding="utf-8")
+    end = ')\n"""Quantities that each cycle writes."""\n'
+    assert text.count(end) == 1
+    table.write_text(text.replace(end, QUANTITY), encoding="utf-8")
+    run(copy, "-m", "impactcell.scada.nodeset")
+    assert "CombinedFriction" in (copy / "impactcell/scada/model/ImpactCell.NodeSet2.xml").read_text(
+        encoding="utf-8"
+    )
+    run_tests(
+        copy,
+        "tests/unit/scada/test_model.py",
+        "tests/unit/journal/test_store.py",
+        "tests/unit/journal/test_history.py",
+        "tests/unit/journal/test_upgrade.py",
+        "tests/integration/test_opcua_values.py",
+    )
