@@ -11,9 +11,7 @@ people do to a condition; `start_batch` and `reset_wear_level` what they do to t
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 from impactcell import alarms
 from impactcell.alarms import (
@@ -33,8 +31,8 @@ from impactcell.cell.preprocessing import (
     fill_defaults,
     update_period,
 )
-from impactcell.features import Features, extract
-from impactcell.physics import Plant, TapInput, free_motion
+from impactcell.features import extract
+from impactcell.physics import free_motion
 from impactcell.prediction import Model, estimate_from_features
 from impactcell.records import (
     Alarm,
@@ -43,7 +41,6 @@ from impactcell.records import (
     FrictionEstimate,
     PositioningState,
     Quality,
-    Samples,
     Snapshot,
 )
 from impactcell.tracking import wear_batch
@@ -51,7 +48,6 @@ from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker as signature
 from impactcell.tracking.signature.tracker import (
     CycleConditions,
-    SignatureResult,
     SignatureSettings,
     SignatureState,
 )
@@ -155,7 +151,14 @@ def step(
             capture.cycle, capture.time_ns, friction, named.batch_id, expected=named.expected
         ),
     )
-    signed = _sign(design, state, features, tracked, period_s)
+    conditions = CycleConditions(
+        batch_id=tracked.batch.batch_id,
+        restart=tracked.shift is not None,
+        acceleration=free_motion.model_acceleration(design.model.plant, capture),
+        gravity_m_s2=design.model.plant.gravity_m_s2,
+        period_s=period_s,
+    )
+    signed = signature.update(design.signature, state.signature, features, conditions)
     gapped = gap_cusum.update(state.gap, friction.gap, capture.cycle, design.false_alarm_cycles, period_s)
     inputs = CycleInputs(
         cycle=capture.cycle,
@@ -237,41 +240,6 @@ def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState
 def reset_wear_level(state: CellState) -> CellState:
     """Learn the wear level anew from the next cycle on, after worn parts were replaced."""
     return replace(state, tracker=wear_batch.reset_wear_level(state.tracker))
-
-
-def _sign(
-    design: CellDesign, state: CellState, features: Features, tracked: TrackingResult, period_s: float
-) -> SignatureResult:
-    """Friction along the stroke, with what the model knows to depend on the speed taken out."""
-    plant, capture = design.model.plant, features.capture
-    viscous = plant.effects.get("viscous_friction", {}).get("viscous_coefficient_n_s_per_m", 0.0)
-    slope = viscous / capture.mass_kg if isinstance(viscous, float) and capture.mass_kg > 0.0 else 0.0
-    return signature.update(
-        design.signature,
-        state.signature,
-        features,
-        CycleConditions(
-            batch_id=tracked.batch.batch_id,
-            restart=tracked.shift is not None,
-            viscous_per_mass=slope,
-            acceleration=_known(plant, capture),
-            gravity_m_s2=plant.gravity_m_s2,
-            period_s=period_s,
-        ),
-    )
-
-
-def _known(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | None:
-    """Give what the model's effects, viscous friction apart, do to the free part; None if they do nothing."""
-    others = {
-        name: given
-        for name, given in plant.effects.items()
-        if name != "viscous_friction" and free_motion.acts_on_speed(name)
-    }
-    if not others or not capture.mass_kg > 0.0:
-        return None
-    tap = TapInput(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
-    return partial(free_motion.acceleration, replace(plant, effects=others), tap)
 
 
 def _gap_quality(friction: FrictionEstimate, gapped: gap_cusum.GapResult) -> Quality:

@@ -1,12 +1,16 @@
 """Acceleration of a part that slides freely, by what depends on its speed and not on where it is."""
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
 from impactcell.physics.effect import LawKind
 from impactcell.physics.effects import LIBRARY
 from impactcell.physics.law_table import build_law_table, parameter_vector
 from impactcell.physics.plant import Plant, TapInput
-from impactcell.records import Samples
+from impactcell.records import Capture, Samples
 
 CHORD_SPEED_M_S = 2.0**-4
 """Speed of a slide at which resistance is looked at; a power of two, so that viscous friction is exact."""
@@ -15,6 +19,21 @@ CHORD_SPEED_M_S = 2.0**-4
 def acts_on_speed(identifier: str) -> bool:
     """Whether an effect accelerates a free part, friction that changes from place to place apart."""
     return not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(LIBRARY[identifier].laws)
+
+
+def model_acceleration(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | None:
+    """Give what a plant's effects do to the free part of a cycle; None where they do nothing.
+
+    Returns
+    -------
+    callable or None
+        Speeds along the tap, m/s, to `acceleration` along it, m/s².
+    """
+    effects = {name: given for name, given in plant.effects.items() if acts_on_speed(name)}
+    if not effects or not capture.mass_kg > 0.0:
+        return None
+    tap = TapInput(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
+    return partial(acceleration, replace(plant, effects=effects), tap)
 
 
 def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:

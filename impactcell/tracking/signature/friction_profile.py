@@ -1,12 +1,11 @@
 """Friction along one slide as a linear Gaussian problem, solved exactly.
 
-While the part slides, x'' = -g mu(x) - (k_v / m) x' + a, with a what else the model knows of. Position
-itself is measured to a micrometre, where friction changes over tenths of a millimetre, so the measured x may
-stand as the argument of mu. With mu(x) = sum_j beta_j B_j(x), cubic B-splines on the grid, position is linear
-in what is unknown::
+While the part slides, x'' = -g mu(x) + a(x'), with a what the model's effects do to it. Position itself is
+measured to a micrometre, where friction changes over tenths of a millimetre, so the measured x may stand as
+the argument of mu. With mu(x) = sum_j beta_j B_j(x), cubic B-splines on the grid, position is linear in what
+is unknown::
 
-    x(t) + (k_v / m) int (x - x_0) dt - int int a dt dt
-        = x_0 + v_0 t - g sum_j beta_j W_j(t) + e,   W_j'' = B_j(x(t))
+    x(t) - int int a(x') dt dt = x_0 + v_0 t - g sum_j beta_j W_j(t) + e,   W_j'' = B_j(x(t))
 
 x_0 and v_0 are integrated out; what is left of the slide are an information matrix G and vector h:
 log likelihood = -1/2 beta' G beta + h' beta. This is the Rauch-Tung-Striebel smoother of an integrated
@@ -28,6 +27,7 @@ from impactcell.records import Samples
 from impactcell.tracking.signature import spline_integrals
 
 Acceleration = Callable[[Samples], Samples]
+"""Speeds along the tap, m/s, to the acceleration along it, m/s², that a model knows beside friction."""
 
 SMOOTHING_STRENGTHS = np.logspace(-9.0, 9.0, 37)
 """Strengths of the smoothing searched, over that which weighs like the data: none to a straight line."""
@@ -70,7 +70,6 @@ def information(
     slide: SlideSegment,
     grid_m: Samples,
     gravity_m_s2: float,
-    viscous_per_mass: float = 0.0,
     acceleration: Acceleration | None = None,
 ) -> SplineInformation:
     """Turn a slide into information on the coefficients of the cubic B-splines of a uniform grid.
@@ -79,29 +78,36 @@ def information(
     ----------
     grid_m : ndarray, shape (g,)
         Uniform; friction beyond its ends is that at the ends. There are g + 2 coefficients.
-    viscous_per_mass : float
-        k_v / m where the model knows it, 1/s.
     acceleration : callable, optional
-        Speeds along the tap, m/s, to the acceleration along it, m/s², that the model knows beside friction
-        and k_v.
+        What the model's effects do to the part at a speed: one cycle cannot tell it from mu(x).
     """
     moved_m = (
         np.zeros(len(slide.time_s)) if acceleration is None else _known_displacement(slide, acceleration)
     )
     seen = spline_integrals.information(
-        slide.time_s, slide.distance_m, moved_m, slide.variance, grid_m, gravity_m_s2, viscous_per_mass
+        slide.time_s, slide.distance_m, moved_m, slide.variance, grid_m, gravity_m_s2
     )
     return SplineInformation(*seen)
 
 
 def _known_displacement(slide: SlideSegment, acceleration: Acceleration) -> Samples:
-    """Distance that an acceleration makes in the time of a slide, which passes a parabola's speeds or so."""
+    """Integrate a known acceleration twice over the time of a slide, up to a line in time.
+
+    The part of it that is proportional to the speed needs no speed: its double integral is that of the
+    measured position, exact for viscous friction. What is left is taken at the speeds of a cubic in time, for
+    a slide passes a parabola's speeds or so.
+    """
     t, span = slide.time_s, slide.time_s[-1]
     cubic = np.polynomial.Polynomial.fit(t, slide.distance_m, 3, domain=[0.0, span], window=[0.0, 1.0])
-    a = acceleration(np.maximum(cubic.deriv()(t), 0.0))
+    speed = np.maximum(cubic.deriv()(t), 0.0)
+    a = acceleration(speed)
+    about = speed - speed.mean()
+    rate = float(about @ a) / max(float(about @ about), np.finfo(float).tiny)
+    a = a - rate * speed
     step = np.diff(t)
-    speed = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * step)])
-    ahead = speed[:-1] * step + (2.0 * a[:-1] + a[1:]) * step**2 / 6.0
+    gained = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * step)])
+    ahead = gained[:-1] * step + (2.0 * a[:-1] + a[1:]) * step**2 / 6.0
+    ahead += rate * 0.5 * (slide.distance_m[1:] + slide.distance_m[:-1]) * step
     moved: Samples = np.concatenate([[0.0], np.cumsum(ahead)])
     return moved
 

@@ -17,12 +17,11 @@ def information(
     variance: float,
     grid: Samples,
     gravity: float,
-    viscous_per_mass: float,
 ) -> tuple[Samples, Samples, float, int]:
     """Give the fields of a `friction_profile.SplineInformation`."""
     points, first = len(grid), grid[0]
     spacing = grid[1] - first
-    columns = _columns(t, x, first, spacing, points, gravity, viscous_per_mass)
+    columns = _columns(t, x, first, spacing, points, gravity)
     columns[:, -1] -= moved
     _remove_line(t, columns)
     seen = columns.shape[1] - 1
@@ -36,9 +35,7 @@ def information(
 
 
 @compiled
-def _columns(
-    t: Samples, x: Samples, first: float, spacing: float, points: int, gravity: float, viscous_per_mass: float
-) -> Samples:
+def _columns(t: Samples, x: Samples, first: float, spacing: float, points: int, gravity: float) -> Samples:
     """Columns of the coefficients met, and position last, at the blocks, shape (n, s + 1).
 
     Every B-spline is integrated twice along the path: trapezium, then the exact second integral of it.
@@ -53,7 +50,6 @@ def _columns(
     speed, place = np.zeros(seen), np.zeros(seen)
     before, now = np.empty(4), np.empty(4)
     parts = max(1, MIN_INTEGRATION_STEPS // n)
-    travelled = 0.0
     cell = _splines(x[0], first, spacing, points, before)
     for k in range(n):
         if k > 0:
@@ -71,10 +67,9 @@ def _columns(
                     speed[other + i] += step / 2.0 * now[i]
                     before[i] = now[i]
                 cell = other
-            travelled += (x[k] + x[k - 1]) / 2.0 * (t[k] - t[k - 1])
         for i in range(seen):
             columns[k, i] = -gravity * place[i]
-        columns[k, seen] = x[k] + viscous_per_mass * travelled
+        columns[k, seen] = x[k]
     return columns
 
 

@@ -99,10 +99,8 @@ class CycleConditions:
         Material; another one restarts the reference.
     restart : bool
         The tracker found a batch shift: restart the reference.
-    viscous_per_mass : float
-        k_v / m of the model, 1/s: one cycle cannot tell it from mu(x).
     acceleration : callable, optional
-        What else the model knows to depend on the speed, see `friction_profile.information`.
+        What the model knows to depend on the speed, see `friction_profile.information`.
     gravity_m_s2 : float
     period_s : float
         Time between cycles.
@@ -110,7 +108,6 @@ class CycleConditions:
 
     batch_id: str = ""
     restart: bool = False
-    viscous_per_mass: float = 0.0
     acceleration: friction_profile.Acceleration | None = None
     gravity_m_s2: float = 9.81
     period_s: float = math.nan
@@ -129,9 +126,7 @@ def update(
         nothing = np.full(settings.points, math.nan)
         signature = Signature(grid, nothing, nothing, math.nan, math.nan, math.nan, Quality.BAD, str(slide))
         return SignatureResult(state, signature, None, judged=False)
-    information = friction_profile.information(
-        slide, grid, conditions.gravity_m_s2, conditions.viscous_per_mass, conditions.acceleration
-    )
+    information = friction_profile.information(slide, grid, conditions.gravity_m_s2, conditions.acceleration)
     friction, std = friction_profile.friction(information, grid)
     missing = _missing_cycles(settings, state.reference)
     if missing:

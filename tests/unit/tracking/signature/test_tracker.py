@@ -70,6 +70,11 @@ def test_what_the_model_knows_to_depend_on_the_speed_is_taken_out():
         assert np.abs(without.friction[inner] - 0.2).max() > 0.008
 
 
+def viscous(speed):
+    """k_v / m = 4.5 / s."""
+    return -4.5 * speed
+
+
 @pytest.fixture(scope="module")
 def learned():
     state = tracker.initial_state(SETTINGS)
@@ -115,7 +120,7 @@ def test_viscous_friction_of_the_model_is_taken_out():
     noisy = path.sol(t)[0] + NOISE * np.random.default_rng(0).normal(size=len(t))
     capture = replace(capture, position=Channel(t, noisy, NOISE))
     with_model = tracker.update(
-        SETTINGS, tracker.initial_state(SETTINGS), extract(capture), CycleConditions(viscous_per_mass=4.5)
+        SETTINGS, tracker.initial_state(SETTINGS), extract(capture), CycleConditions(acceleration=viscous)
     )
     inner = slice(2, 13)
     assert with_model.signature.friction[inner] == pytest.approx(0.2, abs=0.002)
@@ -164,7 +169,7 @@ def test_another_velocity_is_no_alarm_where_viscous_friction_is_known(speeds):
     state, odd = tracker.initial_state(SETTINGS), []
     for cycle, speed in enumerate(speeds):
         capture, _ = slide(varying(cycle), speed, 2e3, NOISE, cycle, viscous_per_mass=4.5)
-        done = tracker.update(SETTINGS, state, extract(capture), CycleConditions(viscous_per_mass=4.5))
+        done = tracker.update(SETTINGS, state, extract(capture), CycleConditions(acceleration=viscous))
         state = done.state
         if done.deviation is not None:
             odd.append(cycle)
@@ -183,7 +188,7 @@ def test_a_place_is_judged_only_once_its_variation_is_known():
             return 0.2 * (1.0 + 0.03 * np.sin(2.0 * np.pi * x / 1.3e-3 + phase) + shape)
 
         capture, _ = slide(friction, speed, 2e3, NOISE, cycle, viscous_per_mass=4.5)
-        done = tracker.update(SETTINGS, state, extract(capture), CycleConditions(viscous_per_mass=4.5))
+        done = tracker.update(SETTINGS, state, extract(capture), CycleConditions(acceleration=viscous))
         state = done.state
         if done.deviation is not None:
             odd.append(cycle)
