@@ -18,6 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from impactcell.numerics.jit import compiled
+from impactcell.physics.half_wave import Oscillator, separation_time, stop_time, swing
 from impactcell.physics.linear_slide import (
     CONVERGED,
     NEVER,
@@ -37,14 +38,6 @@ TURNS: Final = 0  # how a half wave ends: compression turns into departure or ba
 STOPS: Final = 1  # the part comes to rest against the actuator
 SEPARATES: Final = 2  # contact is lost
 FADES: Final = 3  # departure turns back, and will never again separate
-
-
-class Oscillator(NamedTuple):
-    """Indentation about its static value while contact and slip last: z, w² and sqrt(w² - z²)."""
-
-    decay: float
-    squared_frequency: float
-    frequency: float
 
 
 class Contact(NamedTuple):
@@ -79,16 +72,6 @@ def contact_of(v: float, plant: Samples, part: Samples) -> Contact:
     off = math.sqrt(w2 - z_off * z_off)
     rest = (kinetic + viscous * v) / k
     return Contact(v, k, kinetic, viscous, rest, Oscillator(z_on, w2, on), Oscillator(z_off, w2, off), part)
-
-
-@compiled
-def swing(s: float, e: float, r: float, of: Oscillator) -> tuple[float, float]:
-    """Indentation about its static value and approach speed, a time s after they were e and r."""
-    z, wd = of.decay, of.frequency
-    c = (of.squared_frequency * e + z * r) / wd
-    f = (r + z * e) / wd
-    decay, cosine, sine = math.exp(-z * s), math.cos(wd * s), math.sin(wd * s)
-    return decay * (e * cosine + f * sine), decay * (r * cosine - c * sine)
 
 
 @compiled
@@ -127,52 +110,6 @@ def travel_after_halt(indentation: float, speed: float, contact: Contact) -> flo
             break
     departure = math.exp(-z * t) * (speed * math.cos(wd * t) + p * math.sin(wd * t))
     return indentation + along_profile(slide_distance(max(departure, 0.0), mass, friction, viscous), part)
-
-
-@compiled
-def stop_time(e: float, r: float, v: float, of: Oscillator) -> float:
-    """When the approach speed r(t), rising from `r`, reaches `v`: the part stops; NEVER if it does not."""
-    z, w2, wd = of.decay, of.squared_frequency, of.frequency
-    c = (w2 * e + z * r) / wd
-    p = -(w2 * e + 2.0 * z * r)
-    if p <= 0.0:
-        return NEVER
-    high = math.atan2(p, r * wd - z * c) / wd
-    if math.exp(-z * high) * (r * math.cos(wd * high) - c * math.sin(wd * high)) < v:
-        return NEVER
-    low = 0.0
-    t = 0.5 * high
-    for _ in range(NEWTON_STEPS):
-        decay, cosine, sine = math.exp(-z * t), math.cos(wd * t), math.sin(wd * t)
-        excess = decay * (r * cosine - c * sine) - v
-        slope = decay * (p * cosine + (z * c - r * wd) * sine)
-        new, low, high = narrowed(t, -excess, -slope, low, high)
-        if abs(new - t) <= CONVERGED * (t + 1e-9):
-            return new
-        t = new
-    return t
-
-
-@compiled
-def separation_time(e: float, ends: float, rest: float, of: Oscillator) -> float:
-    """When contact is lost in a half wave of departure from e that lasts `ends`; NEVER if it only fades."""
-    z, w2, wd = of.decay, of.squared_frequency, of.frequency
-    if e * math.exp(-z * ends) * -1.0 >= -rest:
-        return NEVER
-    low, high = 0.0, ends
-    s = math.acos(max(-rest / e, -1.0)) / wd
-    if z == 0.0:
-        return s
-    for _ in range(NEWTON_STEPS):
-        decay, cosine, sine = math.exp(-z * s), math.cos(wd * s), math.sin(wd * s)
-        value = e * decay * (cosine + z / wd * sine) + rest
-        slope = -e * decay * w2 / wd * sine
-        new, low, high = narrowed(s, value, slope, low, high)
-        converged = abs(new - s) <= CONVERGED * ends
-        s = new
-        if converged:
-            break
-    return s
 
 
 @compiled

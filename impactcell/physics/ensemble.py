@@ -2,7 +2,6 @@
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,48 +16,9 @@ from impactcell.physics.batch_integration import (
 )
 from impactcell.physics.law_table import build_law_table, parameter_range, parameter_vector, tap_columns
 from impactcell.physics.memory_layout import TapArrays
+from impactcell.physics.motion import TapOutputs, Traces
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Traces:
-    """Samples of every tap, end to end; empty where a channel was not asked for.
-
-    Attributes
-    ----------
-    force_n, position_m, actuator_m, velocity_m_s : ndarray
-        Shape (samples,), or (q, samples) for derivatives.
-    """
-
-    force_n: Samples
-    position_m: Samples
-    actuator_m: Samples
-    velocity_m_s: Samples
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TapOutputs:
-    """Outputs of every tap, each of shape (n,); nan where a tap has no such output.
-
-    Attributes
-    ----------
-    peak_force_n : as the sensor shows it, over all contacts
-    displacement_m : first contact to rest, along the tap
-    sliding_distance_m, separation_s : from, and time of, the last loss of contact
-    breakaway_s, peak_s, halt_s, stop_s : times
-    at_rest : bool; False for a part that was still moving at the end of the allowed time
-    """
-
-    peak_force_n: Samples
-    displacement_m: Samples
-    sliding_distance_m: Samples
-    breakaway_s: Samples
-    peak_s: Samples
-    separation_s: Samples
-    halt_s: Samples
-    stop_s: Samples
-    at_rest: Samples
 
 
 class Ensemble:
@@ -119,12 +79,12 @@ class Ensemble:
         self.gravity_m_s2 = gravity_m_s2
         self._count = len(taps)
         self._sample_index = np.zeros((len(taps), at.SAMPLE_INDEX_COUNT), dtype=np.int64)
-        given = (force_time_s, position_time_s, actuator_time_s, velocity_time_s)
+        times_by_channel = (force_time_s, position_time_s, actuator_time_s, velocity_time_s)
         pairs = [(channel, i) for channel in range(at.CHANNEL_COUNT) for i in range(len(taps))]
         pieces: list[Samples] = []
         total, checked = 0, NO_SAMPLES
         for channel, i in sorted(pairs, key=lambda pair: pair[1]) if by_tap else pairs:
-            of_taps = given[channel]
+            of_taps = times_by_channel[channel]
             times = NO_SAMPLES if of_taps is None else np.asarray(of_taps[i], dtype=np.float64)
             if times is not checked:  # taps may share theirs
                 if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
@@ -164,9 +124,9 @@ class Ensemble:
 
     def parameters(self, plant: Plant) -> Samples:
         """Parameter vector of `plant`, shape (len(names),); its effects must be among the ensemble's."""
-        foreign = set(plant.effects) - set(self._table.effects)
-        if foreign:
-            raise PhysicsError(f"the ensemble was made without {', '.join(sorted(foreign))}")
+        unknown = set(plant.effects) - set(self._table.effects)
+        if unknown:
+            raise PhysicsError(f"the ensemble was made without {', '.join(sorted(unknown))}")
         return parameter_vector(plant, self._table, self.batches)
 
     def _tap_parameters(
@@ -247,7 +207,7 @@ class Ensemble:
         to its own value. Central differences; one-sided where a step would leave the parameter's range.
         """
         table = np.array(np.broadcast_to(np.asarray(values, np.float64), (self._count, len(self.names))))
-        made = np.empty((len(wrt), self._times.size))
+        derivatives = np.empty((len(wrt), self._times.size))
         for q, name in enumerate(wrt):
             ends: list[Samples] = []
             if name in {"friction_factor", "initial_speed_m_s"}:
@@ -262,7 +222,7 @@ class Ensemble:
                     ends.append(self._sample(self._tap_parameters(table, factor, mass_kg, moved)))
                 base = friction_factor if name == "friction_factor" else speed
                 width = 2.0 * relative_step * np.broadcast_to(np.asarray(base, np.float64), self._count)
-                made[q] = (ends[0] - ends[1]) / self._each_sample(width)
+                derivatives[q] = (ends[0] - ends[1]) / self._each_sample(width)
                 continue
             column = self.names.index(name)
             lower, upper, typical = parameter_range(name)
@@ -277,17 +237,17 @@ class Ensemble:
                         self._tap_parameters(moved_table, friction_factor, mass_kg, initial_speed_m_s)
                     )
                 )
-            made[q] = (ends[0] - ends[1]) / (above + below)
-        return self._split(made)
+            derivatives[q] = (ends[0] - ends[1]) / (above + below)
+        return self._split(derivatives)
 
     def _each_sample(self, values: Samples) -> Samples:
-        spread = np.empty(self._times.size)
+        by_sample = np.empty(self._times.size)
         for channel in range(at.CHANNEL_COUNT):
             for i in range(self._count):
-                spread[self._sample_index[i, channel] : self._sample_index[i, at.CHANNEL_COUNT + channel]] = (
-                    values[i]
-                )
-        return spread
+                by_sample[
+                    self._sample_index[i, channel] : self._sample_index[i, at.CHANNEL_COUNT + channel]
+                ] = values[i]
+        return by_sample
 
     def outputs(
         self,

@@ -1,4 +1,4 @@
-"""The course of one tap: smooth phases, each taken in large steps, joined at located events."""
+"""The motion of one tap: smooth phases, each taken in large steps, joined at located events."""
 
 import math
 from typing import Final

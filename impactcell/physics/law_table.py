@@ -15,8 +15,8 @@ from impactcell.physics.effects import LIBRARY
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
-NOMINAL_NAMES = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
-MOST_STATES = at.STATE_WIDTH - at.FIRST_EXTRA_STATE
+NOMINAL_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
+MAX_EFFECT_STATES = at.STATE_WIDTH - at.FIRST_EXTRA_STATE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,30 +86,30 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
     PhysicsError
         For an effect that the library does not have, or one named twice.
     """
-    names = list(NOMINAL_NAMES)
+    names = list(NOMINAL_PARAMETERS)
     spans: list[tuple[tuple[int, int], ...]] = []
     lists: dict[int, list[tuple[int, int, int]]] = {kind: [] for kind in range(at.LAW_KINDS)}
     if len(set(effects)) != len(effects):
         raise PhysicsError(f"an effect is named twice among {', '.join(effects)}")
     for identifier in effects:
         effect = find_effect(identifier)
-        mine: list[tuple[int, int]] = []
+        spans_of_effect: list[tuple[int, int]] = []
         for parameter in effect.parameters:
             begin = len(names)
             if parameter.per_batch:
                 names += [f"{identifier}.{parameter.name}[{i}]" for i in range(1, batches)]
             else:
                 names.append(f"{identifier}.{parameter.name}")
-            mine.append((begin, len(names)))
-        spans.append(tuple(mine))
+            spans_of_effect.append((begin, len(names)))
+        spans.append(tuple(spans_of_effect))
         for place, law in effect.laws.items():
-            first = mine[0][0] - len(NOMINAL_NAMES) + at.FIRST_EFFECT_PARAMETER
+            first = spans_of_effect[0][0] - len(NOMINAL_PARAMETERS) + at.FIRST_EFFECT_PARAMETER
             lists[int(place)].append((effect.order, address(law), first))
     for single in (LawKind.REACH, LawKind.LAG, LawKind.DELAY, LawKind.STICK):
         if len(lists[single]) > 1:
             raise PhysicsError(f"two effects both set the plant's {single.name.lower()}; use one of them")
-    if len(lists[LawKind.LOSS]) > MOST_STATES:
-        raise PhysicsError(f"at most {MOST_STATES} effects with a state of their own")
+    if len(lists[LawKind.LOSS]) > MAX_EFFECT_STATES:
+        raise PhysicsError(f"at most {MAX_EFFECT_STATES} effects with a state of their own")
     starts: list[int] = []
     entries: list[int] = []
     for kind in range(at.LAW_KINDS):
@@ -123,7 +123,7 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
         names=tuple(names),
         parameter_spans=tuple(spans),
         laws=np.array(starts + entries, dtype=np.int64),
-        width=at.FIRST_EFFECT_PARAMETER + len(names) - len(NOMINAL_NAMES),
+        width=at.FIRST_EFFECT_PARAMETER + len(names) - len(NOMINAL_PARAMETERS),
     )
 
 
@@ -159,10 +159,10 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
             if parameter.per_batch:
                 several += [neutral] * (batches - 1 - len(several))
                 several = several[: batches - 1]
-            for one in several:
-                if not parameter.lower <= one <= parameter.upper:
+            for number in several:
+                if not parameter.lower <= number <= parameter.upper:
                     raise PhysicsError(
-                        f"{identifier}: {parameter.name} is {one}, outside "
+                        f"{identifier}: {parameter.name} is {number}, outside "
                         f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
                     )
             values += several
@@ -171,7 +171,7 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
 
 def tap_columns(taps: Sequence[TapInput]) -> dict[str, Samples]:
     """Columns of `LawTable.tap_parameters`, each of shape (n,), of taps that strike: no initial speed."""
-    made = {
+    columns = {
         name: np.array([getattr(tap, name) for tap in taps], dtype=np.float64)
         for name in (
             "velocity_m_s",
@@ -186,8 +186,8 @@ def tap_columns(taps: Sequence[TapInput]) -> dict[str, Samples]:
             "batch",
         )
     }
-    made["initial_speed_m_s"] = np.full(len(taps), np.nan)
-    return made
+    columns["initial_speed_m_s"] = np.full(len(taps), np.nan)
+    return columns
 
 
 def parameter_range(name: str) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""The course of one tap: its events, its figures, and its samples at any times."""
+"""What comes out of taps: events, outputs, and samples at any times."""
 
 import enum
 import math
@@ -113,3 +113,43 @@ class Motion:
     def sample(self, time_s: ArrayLike) -> ChannelSamples:
         """Channels at `time_s`, shape (n,), in any order; 0 is first contact, before it all is at rest."""
         return self.sampler(np.atleast_1d(np.asarray(time_s, dtype=np.float64)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traces:
+    """Samples of every tap, end to end; empty where a channel was not asked for.
+
+    Attributes
+    ----------
+    force_n, position_m, actuator_m, velocity_m_s : ndarray
+        Shape (samples,), or (q, samples) for derivatives.
+    """
+
+    force_n: Samples
+    position_m: Samples
+    actuator_m: Samples
+    velocity_m_s: Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TapOutputs:
+    """Outputs of every tap, each of shape (n,); nan where a tap has no such output.
+
+    Attributes
+    ----------
+    peak_force_n : as the sensor shows it, over all contacts
+    displacement_m : first contact to rest, along the tap
+    sliding_distance_m, separation_s : from, and time of, the last loss of contact
+    breakaway_s, peak_s, halt_s, stop_s : times
+    at_rest : bool; False for a part that was still moving at the end of the allowed time
+    """
+
+    peak_force_n: Samples
+    displacement_m: Samples
+    sliding_distance_m: Samples
+    breakaway_s: Samples
+    peak_s: Samples
+    separation_s: Samples
+    halt_s: Samples
+    stop_s: Samples
+    at_rest: Samples

@@ -1,21 +1,19 @@
 """The tap of least expected cost, first among the table's, then refined in its stroke or velocity."""
 
 import math
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from impactcell.numerics.jit import compiled
-from impactcell.positioning.displacement_quantiles import COARSE_Z, Scenarios, Z, displacement_quantiles
+from impactcell.positioning.displacement_quantiles import Scenarios, displacement_quantiles
 from impactcell.positioning.dynamic_programming import (
     AIMS,
     Goal,
-    Quadrature,
     ValueFunction,
     expected_cost,
-    quadrature,
 )
+from impactcell.positioning.quadrature import Quadrature, coarse_nodes, fine_nodes
 from impactcell.records import Samples
 
 KEPT = 5  # taps of the table that are refined
@@ -37,18 +35,6 @@ class SelectedAction(NamedTuple):
     stroke_m: float
     cost: float
     overshoot: float
-
-
-@cache
-def coarse_nodes() -> Quadrature:
-    """Nodes at which the taps of a table are evaluated."""
-    return quadrature(COARSE_Z)
-
-
-@cache
-def fine_nodes() -> Quadrature:
-    """Nodes at which taps that are refined are evaluated."""
-    return quadrature(Z)
 
 
 @compiled

@@ -15,10 +15,6 @@ from impactcell.physics.closed_form import displacements
 from impactcell.positioning.planner_posterior import FRICTION, PlannerPosterior
 from impactcell.records import Samples
 
-Z = np.array([-4.2, -3.3, -2.6, -1.9, -1.2, -0.6, 0.0, 0.6, 1.2, 1.9, 2.6, 3.3, 4.2])
-"""Nodes along the line, in standard deviations: beyond the last lies one case in 40 000."""
-COARSE_Z = np.array([-3.8, -2.8, -1.8, -0.85, 0.0, 0.85, 1.8, 2.8, 3.8])
-"""The same for tables of many taps."""
 ACROSS = 4
 """Directions across the line: parameters other than friction."""
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.numerics.jit import compiled
+from impactcell.positioning.quadrature import Quadrature, normal_tail
 from impactcell.records import Samples
 
 STALL_PENALTY = 60.0  # taps that a tap which moves nothing costs: it stops a task
@@ -25,13 +26,6 @@ AIMS = np.array([-0.4, 0.0, 0.4, 0.8, 1.4, 2.2])  # short of the target, in tole
 WORTH_TRYING = 0.7  # taps; one whose median leaves this much more to do than the best is not evaluated
 SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
 MOSTLY_STALLED = 0.9  # probability of no progress above which a tap is no way forward
-
-
-class Quadrature(NamedTuple):
-    """Nodes of a standard normal variable, shape (q,), and the probability between neighbours, (q - 1,)."""
-
-    z: Samples
-    probability: Samples
 
 
 class Goal(NamedTuple):
@@ -59,13 +53,6 @@ class Actions(NamedTuple):
     displacements: Samples
     taps: Samples
     aims: Samples
-
-
-@compiled
-def normal_tail(z: float) -> float:
-    """P(Z > z) of a standard normal Z."""
-    half: float = 0.5 * math.erfc(0.7071067811865476 * z)
-    return half
 
 
 @compiled
@@ -279,13 +266,6 @@ def graded_grid(first: float, last: float, step: float, ratio: float) -> Samples
     while points[-1] < last:
         points.append(points[-1] + max(step, ratio * points[-1]))
     return np.array(points)
-
-
-def quadrature(z: Samples) -> Quadrature:
-    """Nodes with the probability between neighbours; the tails go to the outermost intervals."""
-    below = np.array([1.0 - normal_tail(float(v)) for v in z])
-    below[0], below[-1] = 0.0, 1.0
-    return Quadrature(z, np.diff(below))
 
 
 def solve_value_function(table: Samples, nodes: Quadrature, goal: Goal) -> ValueFunction:

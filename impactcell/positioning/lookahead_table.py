@@ -6,15 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from impactcell.positioning.action_selection import ActionSpace, coarse_nodes
+from impactcell.positioning.action_selection import ActionSpace
 from impactcell.positioning.displacement_quantiles import (
-    COARSE_Z,
     parameter_scenarios,
     plant_parameters,
     quantile_table,
 )
 from impactcell.positioning.dynamic_programming import Goal, ValueFunction, solve_value_function
 from impactcell.positioning.planner_posterior import PlannerPosterior, anticipate_learning
+from impactcell.positioning.quadrature import COARSE_Z, coarse_nodes
 from impactcell.positioning.safety_limits import allowed_strokes
 from impactcell.records import Samples
 

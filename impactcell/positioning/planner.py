@@ -13,7 +13,6 @@ from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning import planner_posterior
 from impactcell.positioning.action_selection import select_action
 from impactcell.positioning.displacement_quantiles import (
-    Z,
     displacement_quantiles,
     parameter_scenarios,
     plant_parameters,
@@ -23,6 +22,7 @@ from impactcell.positioning.friction_along_stroke import StrokeFriction, update_
 from impactcell.positioning.lookahead_table import LookaheadTable, PlannerLimits, build_lookahead, stiffest
 from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.posterior_update import update_posterior
+from impactcell.positioning.quadrature import Z
 from impactcell.positioning.safety_limits import largest_force
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.records import Quality, Samples, Signature

@@ -24,3 +24,4 @@ EFFECT = Effect(
     ),
     laws={LawKind.LOSS: loss},
 )
+"""At 100 N the upper end takes away 0.1 m/s, all the speed of a fast tap; typical takes 5 mm/s."""

@@ -23,3 +23,4 @@ EFFECT = Effect(
     parameters=(Parameter("ramp_time_s", "s", null=0.0, lower=0.0, upper=0.05, typical=0.002),),
     laws={LawKind.SPEED: run_up, LawKind.UNTIL: end},
 )
+"""Up to 50 ms, longer than a part is in contact; typical is a quarter of its loading."""

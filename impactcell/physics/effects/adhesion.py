@@ -29,3 +29,4 @@ EFFECT = Effect(
     ),
     laws={LawKind.PULL: pull, LawKind.REACH: reach},
 )
+"""Up to the weight of a part of 20 kg, over up to 10 mm; typical is a twentieth of it over 0.3 mm."""

@@ -27,3 +27,4 @@ EFFECT = Effect(
     ),
     between=factors,
 )
+"""Friction stays above zero; typical is 5 % from batch to batch."""

@@ -18,3 +18,4 @@ EFFECT = Effect(
     parameters=(Parameter("delay_s", "s", null=0.0, lower=-0.01, upper=0.01, typical=0.0003),),
     laws={LawKind.DELAY: delay},
 )
+"""Up to the duration of a loading either way; typical is three samples at 10 kHz."""

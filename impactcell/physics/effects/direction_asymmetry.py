@@ -22,3 +22,4 @@ EFFECT = Effect(
     parameters=(Parameter("relative_amplitude", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
     between=factors,
 )
+"""Up to three times the friction one way as the other; typical is 3 % each way."""

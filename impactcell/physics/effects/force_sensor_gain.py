@@ -19,3 +19,4 @@ EFFECT = Effect(
     laws={LawKind.READING: shown},
     order=1,
 )
+"""Half to one and a half of the force; typical is 3 %."""

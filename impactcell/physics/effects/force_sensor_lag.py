@@ -18,3 +18,4 @@ EFFECT = Effect(
     parameters=(Parameter("time_constant_s", "s", null=0.0, lower=0.0, upper=0.02, typical=0.0003),),
     laws={LawKind.LAG: time_constant},
 )
+"""Up to 20 ms, beyond which a loading of 8 ms leaves no peak; typical is a bandwidth of 530 Hz."""

@@ -19,3 +19,4 @@ EFFECT = Effect(
     laws={LawKind.READING: shown},
     order=2,
 )
+"""Up to the force of a slow tap either way; typical is 1 % of a fast one."""

@@ -21,3 +21,4 @@ EFFECT = Effect(
     parameters=(Parameter("relative_change", "1", null=0.0, lower=-0.9, upper=0.9, typical=0.05),),
     between=factors,
 )
+"""Friction stays above zero; typical is 5 % over a campaign."""

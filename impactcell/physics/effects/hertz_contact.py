@@ -20,3 +20,4 @@ EFFECT = Effect(
     parameters=(Parameter("exponent", "1", null=1.0, lower=0.7, upper=1.8, typical=1.1),),
     laws={LawKind.CONTACT: stiffening},
 )
+"""From softening to beyond a sphere on a plane, 1.5; typical is slightly curved."""

@@ -22,3 +22,4 @@ EFFECT = Effect(
     laws={LawKind.CONTACT: damping},
     dissipates=True,
 )
+"""Indented by 0.3 mm, the upper end damps like 6000 N s/m, nearly critically; typical like 150."""

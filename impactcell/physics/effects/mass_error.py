@@ -20,3 +20,4 @@ EFFECT = Effect(
     parameters=(Parameter("relative_error", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
     between=factors,
 )
+"""Half to one and a half of the stated mass; typical is 3 %."""

@@ -24,3 +24,4 @@ EFFECT = Effect(
     laws={LawKind.KINETIC: excess},
     dissipates=True,
 )
+"""Up to 0.5 in slow slip, fading over 0.1 mm/s to 1 m/s; typical is 0.03 over 20 mm/s."""

@@ -20,3 +20,4 @@ EFFECT = Effect(
     parameters=(Parameter("tilt_rad", "rad", null=0.0, lower=-0.1, upper=0.1, typical=0.005),),
     laws={LawKind.BODY: downhill},
 )
+"""Up to where a slope takes half of a friction of 0.2; typical is 5 mm/m."""

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from impactcell.positioning.displacement_quantiles import COARSE_Z as Z
 from impactcell.positioning.dynamic_programming import (
     Goal,
     ValueFunction,
     expected_cost,
     interpolate_value,
-    quadrature,
     solve_value_function,
 )
+from impactcell.positioning.quadrature import COARSE_Z as Z
+from impactcell.positioning.quadrature import quadrature
 
 
 def table_of(displacements: np.ndarray, spread: float) -> np.ndarray:
