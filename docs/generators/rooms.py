@@ -26,7 +26,8 @@ def tables() -> str:
     """Write one section a room."""
     package = ROOT / "impactcell"
     rooms = sorted(path.parent for path in package.glob("*/__init__.py"))
-    parts = []
+    top = [(code(name), _summary(package / f"{name}.py")) for name in ("errors", "quantities")]
+    parts = ["## impactcell", _summary(package / "__init__.py"), table(("module", "what is in it"), top)]
     for room in [*rooms, ROOT / "simulator"]:
         parts += [
             f"## {room.name}",

@@ -33,6 +33,23 @@ def test_every_room_is_drawn_once_and_below_what_imports_it(pages: dict[str, str
     assert not {"cell", "physics", "tracking", "records"} & set(edge)
 
 
+def test_every_room_is_described_with_files_that_are_there() -> None:
+    page = (ROOT / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`\w[^|]*) \|[^|]*\|([^|]*)\|$", page, flags=re.MULTILINE)
+    described = {
+        room: re.findall(r"`([^`]+)`", files)
+        for rooms, files in rows
+        for room in re.findall(r"`([\w.]+)`", rooms)
+    }
+    rooms = {path.parent.name for path in (ROOT / "impactcell").glob("*/__init__.py")}
+    assert rooms | {"simulator", "errors.py", "quantities.py"} == set(described)
+    for room, files in described.items():
+        home = ROOT if room == "simulator" else ROOT / "impactcell"
+        assert (home / room).exists(), room
+        for file in files:
+            assert (home / room / file).exists() or (home / file).exists(), (room, file)
+
+
 def test_every_module_has_its_line(pages: dict[str, str]) -> None:
     for path in (ROOT / "impactcell").rglob("*.py"):
         if path.name != "__init__.py" and path.parent.name != "effects" and path.parent.name != "impactcell":
