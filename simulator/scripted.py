@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from impactcell.fieldbus.registers import REGISTER_SPACE, WIRE, RegisterMap, Words, capture_crc32
+from impactcell.fieldbus.registers import REGISTER_SPACE, WIRE, RegisterMap, Words, registers_crc32
 
 _ARRAYS: Final = ("force", "position", "actuator")
 LAST_CYCLE: Final = 2**32 - 1
@@ -47,6 +47,9 @@ class ScriptedDevice:
                 self._writable[register.address : register.end] = True
             if register.expect is not None:
                 self.put(register.name, register.expect)
+        self._status: slice | None = None
+        if "status_crc32" in registers:
+            self._status = slice(registers["state"].address, registers["status_crc32"].address)
         self._slots: list[_Slot] = []
         self._sequence = 2
         self.put("state", 1)
@@ -124,7 +127,7 @@ class ScriptedDevice:
         if "capture_crc32" in self.registers and "capture_crc32" not in header:
             register = self.registers["capture_crc32"]
             at = register.address - self._window
-            words[at : at + 2] = register.encode(capture_crc32(words[:at], *used))
+            words[at : at + 2] = register.encode(registers_crc32(words[:at], *used))
         return words
 
     def _show(self) -> None:
@@ -138,10 +141,20 @@ class ScriptedDevice:
         """Return registers; LookupError beyond the map."""
         if address + count > self._end:
             raise LookupError(address)
+        self._show_status_crc(address, count)
         for hook in [hook for hook in self.on_read if address <= hook[0] < address + count]:
             self.on_read.remove(hook)
             hook[1]()
         return self.image[address : address + count]
+
+    def _show_status_crc(self, address: int, count: int) -> None:
+        """Bring the CRC of the status block up to date where a reading of it begins or goes on."""
+        if (
+            self._status is not None
+            and address < self._status.stop + 2
+            and address + count > self._status.start
+        ):
+            self.put("status_crc32", registers_crc32(self.image[self._status]))
 
     def write(self, address: int, words: Words) -> None:
         """Write registers; LookupError where the map does not let them be, ValueError for a bad slot."""

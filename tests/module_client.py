@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from impactcell.fieldbus.decoding import capture_from_words, sample_counts
-from impactcell.fieldbus.registers import RegisterMap, capture_crc32
+from impactcell.fieldbus.registers import RegisterMap, registers_crc32
 from impactcell.records import Capture
 from simulator.device import Device, Truth
 from simulator.scenario import Scenario
@@ -63,7 +63,7 @@ class Client:
         first = self.registers["window_slot"].address
         last = self.registers["capture_crc32"].address
         words = self.device.read("holding", first, last - first)
-        assert header["capture_crc32"] == capture_crc32(words, *samples.values())
+        assert header["capture_crc32"] == registers_crc32(words, *samples.values())
         assert header["window_sequence"] == self.get("window_sequence_after")
         assert header["window_sequence"] % 2 == 0
         got, self.faults = capture_from_words(self.registers, header, samples)

@@ -7,13 +7,12 @@ the link does: that is said in `Module.status` and in the `faults` of a `Receive
 
 import asyncio
 import logging
-from collections.abc import AsyncGenerator, Callable, Mapping
+from collections.abc import AsyncGenerator, Callable
 from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceError
-from impactcell.fieldbus import decoding
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_consistent, next_capture
@@ -22,7 +21,8 @@ from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.poll_schedule import PollSchedule
 from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
-from impactcell.fieldbus.registers import RegisterMap, Value
+from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.status_reader import StatusReader
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId, ModuleStatus
@@ -66,9 +66,9 @@ class ModuleAcquisition:
         self._log = CellLogger(logging.getLogger(__name__), cell)
         self.status_block: StatusBlock | None = None
         """What the module said at the last poll; None before the first."""
-        self._status_values: Mapping[str, Value] = {}
         self._client = client
         self.register_client = RegisterClient(client, registers)
+        self._status_reader = StatusReader(self.register_client)
         self._reader = CaptureReader(cell, self.register_client)
         self._status = ModuleStatus()
         self._on_change = on_change
@@ -109,9 +109,7 @@ class ModuleAcquisition:
 
     async def read_status(self) -> StatusBlock:
         """Read the status block now; raises FieldbusError where `captures` would only note it."""
-        values = await self.register_client.read_values(decoding.STATUS_REGISTERS)
-        if self.status_block is None or values is not self._status_values:
-            self.status_block, self._status_values = decoding.decode_status(self.registers, values), values
+        self.status_block = await self._status_reader.read()
         return self.status_block
 
     async def acknowledge(self, cycle_id: CycleId) -> None:
@@ -206,7 +204,7 @@ class ModuleAcquisition:
             name for name, register in self.registers.registers.items() if register.expect is not None
         )
         try:
-            values = await self.register_client.read_values(pinned)
+            values = (await self.register_client.read_image(pinned)).values
         except ModbusExceptionError as error:
             if error.code not in _NOT_THIS_DEVICE:
                 raise

@@ -15,7 +15,7 @@ from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.capture_ring import NextCapture, is_after
 from impactcell.fieldbus.register_client import RegisterClient
-from impactcell.fieldbus.registers import Value, Words, capture_crc32
+from impactcell.fieldbus.registers import Value, Words, registers_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.records import Capture, CycleId
@@ -205,7 +205,7 @@ class CaptureReader:
             first = registers["window_sequence"]
             covered = partial.words[first.words : crc.address - first.address]
             samples = [partial.blocks[name].words() for name in _ARRAYS if name in partial.blocks]
-            if header["capture_crc32"] != capture_crc32(covered, *samples):
+            if header["capture_crc32"] != registers_crc32(covered, *samples):
                 return f"register capture_crc32 ({crc.address}) does not fit what was read"
         return None
 

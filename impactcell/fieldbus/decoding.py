@@ -60,7 +60,7 @@ STATUS_REGISTERS = (
     "state", "session", "cycle_counter", "ring_cycle",
     "batch_sequence", "batch_from_cycle", "batch_announced",
     "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
-    "command_accepted", "command_cycle",
+    "command_accepted", "command_cycle", "status_crc32",
 )  # fmt: skip
 """Registers of a poll, where the map has them."""
 
@@ -70,7 +70,7 @@ LATEST_NS = 2**63 - 1
 """The year 2262."""
 
 _BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
-_POSITIONING = STATUS_REGISTERS[7:]
+_POSITIONING = STATUS_REGISTERS[7:-1]
 """Those of a positioning cell."""
 
 

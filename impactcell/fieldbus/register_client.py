@@ -26,6 +26,11 @@ class RegisterBlock:
     count: int
     fields: tuple[tuple[Register, slice], ...]
 
+    @property
+    def end(self) -> int:
+        """First address after it."""
+        return self.address + self.count
+
     @classmethod
     def of(cls, registers: Sequence[Register]) -> Self:
         """Make the block from the first to the last of `registers`, which are in the order of addresses."""
@@ -53,32 +58,54 @@ def group_registers(registers: Iterable[Register], max_registers: int) -> tuple[
     return tuple(RegisterBlock.of(group) for group in blocks)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RegisterImage:
+    """What registers showed when they were read.
+
+    Attributes
+    ----------
+    values : mapping
+        Name to value, in SI.
+    """
+
+    blocks: tuple[RegisterBlock, ...]
+    raw: tuple[bytes, ...]
+    values: Mapping[str, Value]
+
+    def words(self, first: Register, end: int) -> Words:
+        """Words from register `first` up to address `end`, as on the wire; 0 between those that were read."""
+        words = np.zeros(end - first.address, dtype=WIRE)
+        for block, raw in zip(self.blocks, self.raw, strict=True):
+            if block.table == first.table and first.address <= block.address < end:
+                part = np.frombuffer(raw, WIRE)[: end - block.address]
+                words[block.address - first.address :][: part.size] = part
+        return words
+
+
 class RegisterClient:
     """A device whose registers have names."""
 
     def __init__(self, modbus: ModbusClient, registers: RegisterMap) -> None:
         self.modbus = modbus
         self.registers = registers
-        self._header = RegisterBlock.of(registers.header())
+        self._header = tuple(register.name for register in registers.header())
         self._groups: dict[tuple[str, ...], tuple[RegisterBlock, ...]] = {}
-        self._last: dict[tuple[str, ...], tuple[list[bytes], dict[str, Value]]] = {}
+        self._images: dict[tuple[str, ...], RegisterImage] = {}
 
-    async def read_values(self, names: tuple[str, ...]) -> Mapping[str, Value]:
-        """Read registers and decode them, in SI; those that the map does not have are left out.
+    async def read_image(self, names: tuple[str, ...]) -> RegisterImage:
+        """Read registers; those that the map does not have are left out.
 
-        What shows the same words as before comes back as the very same mapping.
+        What shows the same words as before comes back as the very same image.
         """
         blocks = self._blocks(names)
         raw = [words.tobytes() for words in await self._read(blocks)]
-        last = self._last.get(names)
-        if last is None or last[0] != raw:  # nearly always a poll finds all unchanged
-            decoded: dict[str, Value] = {}
-            for i, block in enumerate(blocks):
-                if block.count > self.modbus.link.max_registers:
-                    raw[i] = await self._read_until_stable(block, raw[i])
-                decoded |= block.decode(np.frombuffer(raw[i], WIRE))
-            last = self._last[names] = (raw, decoded)
-        return last[1]
+        for i, block in enumerate(blocks):
+            if block.count > self.modbus.link.max_registers:
+                raw[i] = await self._read_until_stable(block, raw[i])
+        image = self._images.get(names)
+        if image is None or image.raw != tuple(raw):  # nearly always a poll finds all unchanged
+            image = self._images[names] = _decoded(blocks, raw)
+        return image
 
     def partial_block(self, name: str, values: int) -> PartialBlock:
         """Give the first `values` values of a register as a block that is still to be read."""
@@ -96,14 +123,10 @@ class RegisterClient:
 
         With `slot` that is selected right before; a device that is busy meanwhile may still show another.
         """
-        header = self._header
-        words = np.zeros(header.count, dtype=WIRE)
-        blocks = self._blocks(tuple(register.name for register, _ in header.fields))
-        select = self.registers["slot_select"]
+        select, blocks = self.registers["slot_select"], self._blocks(self._header)
         write = None if slot is None else (select.address, select.encode(slot))
-        for block, partial_block in zip(blocks, await self._read(blocks, write), strict=True):
-            words[block.address - header.address :][: block.count] = partial_block
-        return header.decode(words), words
+        image = _decoded(blocks, [words.tobytes() for words in await self._read(blocks, write)])
+        return dict(image.values), image.words(self.registers["window_sequence"], blocks[-1].end)
 
     async def write_values(self, values: Mapping[str, ArrayLike | str]) -> None:
         """Write registers; neighbours go out in one request, so that the device takes them together."""
@@ -136,6 +159,13 @@ class RegisterClient:
             f"{self.modbus.link}: {block.count} registers from {block.address} "
             "change faster than they can be read"
         )
+
+
+def _decoded(blocks: tuple[RegisterBlock, ...], raw: Sequence[bytes]) -> RegisterImage:
+    values: dict[str, Value] = {}
+    for block, data in zip(blocks, raw, strict=True):
+        values |= block.decode(np.frombuffer(data, WIRE))
+    return RegisterImage(blocks, tuple(raw), values)
 
 
 def _adjacent_runs(registers: list[Register]) -> list[list[Register]]:

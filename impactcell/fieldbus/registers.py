@@ -16,7 +16,16 @@ from impactcell.errors import MapError
 from impactcell.fieldbus.map_validation import validate_map
 from impactcell.fieldbus.register import KINDS, SI_FACTOR, WIRE, Register, Value, Words
 
-__all__ = ["REGISTER_SPACE", "REQUIRED", "WIRE", "Register", "RegisterMap", "Value", "Words", "capture_crc32"]
+__all__ = [
+    "REGISTER_SPACE",
+    "REQUIRED",
+    "WIRE",
+    "Register",
+    "RegisterMap",
+    "Value",
+    "Words",
+    "registers_crc32",
+]
 
 REGISTER_SPACE: Final = 65_536
 """Addresses of a table: 16 bits."""
@@ -79,6 +88,14 @@ class RegisterMap:
         """Captures the module's ring holds."""
         return self["ring_cycle"].count
 
+    def status(self) -> tuple[Register, ...]:
+        """Return the registers that `status_crc32` covers, and itself; none where the map has none."""
+        if "status_crc32" not in self:
+            return ()
+        first, last = self["state"], self["status_crc32"]
+        inside = (r for r in self.registers.values() if r.table == first.table)
+        return tuple(r for r in inside if first.address <= r.address <= last.address)
+
     def header(self) -> tuple[Register, ...]:
         """Return the window's registers before its arrays, from the sequence number on, by address."""
         first = self["window_sequence"].address
@@ -88,14 +105,15 @@ class RegisterMap:
         return tuple(sorted(inside, key=lambda register: register.address))
 
 
-def capture_crc32(header: Words, *arrays: Words) -> int:
-    """CRC-32 (IEEE 802.3) of a capture as its bytes stand on the wire.
+def registers_crc32(*blocks: Words) -> int:
+    """CRC-32 (IEEE 802.3) of registers as their bytes stand on the wire, block after block.
 
-    Covers `header`, the window's registers after `window_sequence` up to the one before `capture_crc32`, then
-    the used part of force, of position and of actuator, in this order.
+    Of a capture it covers the window's registers after `window_sequence` up to the one before
+    `capture_crc32`, then the used part of force, of position and of actuator, in this order; of the status
+    block all registers from `state` up to the one before `status_crc32`.
     """
     crc = 0
-    for words in (header, *arrays):
+    for words in blocks:
         crc = zlib.crc32(np.ascontiguousarray(words, dtype=WIRE).data, crc)
     return crc
 

@@ -13,7 +13,7 @@ from pymodbus.client import ModbusTcpClient
 
 from impactcell.errors import MapError
 from impactcell.fieldbus.register import SI_FACTOR
-from impactcell.fieldbus.registers import REQUIRED, WIRE, Register, RegisterMap, capture_crc32
+from impactcell.fieldbus.registers import REQUIRED, WIRE, Register, RegisterMap, registers_crc32
 
 FORMATS = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "f64": "d"}
 PYMODBUS = {
@@ -250,8 +250,8 @@ def test_other_word_order_for_a_cell(fpga: RegisterMap) -> None:
 
 
 def test_crc_is_that_of_the_bytes_on_the_wire() -> None:
-    assert capture_crc32(words_of(b"12345678")) == 0x9AE0_DAAF  # CRC-32/ISO-HDLC of "12345678"
-    assert capture_crc32(words_of(b"1234"), words_of(b"5678")) == 0x9AE0_DAAF
+    assert registers_crc32(words_of(b"12345678")) == 0x9AE0_DAAF  # CRC-32/ISO-HDLC of "12345678"
+    assert registers_crc32(words_of(b"1234"), words_of(b"5678")) == 0x9AE0_DAAF
 
 
 def test_unknown_register_is_named(fpga: RegisterMap) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from impactcell.errors import ProtocolError
 from impactcell.fieldbus.registers import RegisterMap, Words
 from impactcell.records import CycleId
 from simulator.scripted import ScriptedDevice
@@ -16,6 +17,19 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 POLLS = 600
+
+
+@pytest.fixture(params=["with a CRC", "without"])
+def layout(request: pytest.FixtureRequest, fpga: RegisterMap) -> RegisterMap:
+    """The map of a module that proves its status block, and of one that does not."""
+    left_out = "status_crc32" if request.param == "without" else ""
+    registers = {name: register for name, register in fpga.registers.items() if name != left_out}
+    return RegisterMap(fpga.name, registers)
+
+
+def last_of(device: ScriptedDevice) -> str:
+    """Name of the last register of the status block."""
+    return "status_crc32" if "status_crc32" in device.registers else "command_cycle"
 
 
 class Mangler:
@@ -77,10 +91,10 @@ def _polls_follow_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("age", [1, 2, 5])
-async def test_status_replies_that_are_old_make_no_cycle_come_twice(fpga: RegisterMap, age: int) -> None:
+async def test_status_replies_that_are_old_make_no_cycle_come_twice(layout: RegisterMap, age: int) -> None:
     """Three polls running show the status block as it was `age` cycles ago, again and again."""
-    device = ScriptedDevice(fpga, session=7)
-    mangler = Mangler(device, "state", "command_cycle")
+    device = ScriptedDevice(layout, session=7)
+    mangler = Mangler(device, "state", last_of(device))
     past: dict[int, Words] = {}
 
     def stale(words: Words, poll: int) -> Words:
@@ -89,16 +103,16 @@ async def test_status_replies_that_are_old_make_no_cycle_come_twice(fpga: Regist
         return past.get(counter - age, words) if poll % 7 < 3 else words
 
     mangler.change = stale
-    received = await received_of(fpga, device, mangler, 60)
+    received = await received_of(layout, device, mangler, 60)
     assert received == [CycleId(7, cycle) for cycle in range(1, 61)]
 
 
 @pytest.mark.parametrize("seed", range(4))
 async def test_a_wrong_bit_in_a_status_block_makes_no_cycle_come_twice_or_missing(
-    fpga: RegisterMap, seed: int
+    layout: RegisterMap, seed: int
 ) -> None:
-    device = ScriptedDevice(fpga, session=7)
-    mangler = Mangler(device, "state", "command_cycle")
+    device = ScriptedDevice(layout, session=7)
+    mangler = Mangler(device, "state", last_of(device))
     draw = np.random.default_rng(seed)
 
     def flip(words: Words, _: int) -> Words:
@@ -107,19 +121,19 @@ async def test_a_wrong_bit_in_a_status_block_makes_no_cycle_come_twice_or_missin
         return words
 
     mangler.change = flip
-    received = await received_of(fpga, device, mangler, 60)
+    received = await received_of(layout, device, mangler, 60)
     assert received == [CycleId(7, cycle) for cycle in range(1, 61)]
 
 
 @pytest.mark.parametrize("register", ["session", "cycle_counter"])
 async def test_a_status_register_with_a_bit_that_stays_wrong_makes_up_no_cycle(
-    fpga: RegisterMap, register: str
+    layout: RegisterMap, register: str
 ) -> None:
     """So long that every retry sees it, and no longer than the ring: nothing is made up, nothing lost."""
-    device = ScriptedDevice(fpga, session=7)
-    mangler = Mangler(device, "state", "command_cycle")
+    device = ScriptedDevice(layout, session=7)
+    mangler = Mangler(device, "state", last_of(device))
     make(device, 3)
-    at = fpga[register].address + 1 - mangler.first
+    at = layout[register].address + 1 - mangler.first
 
     def flip(words: Words, poll: int) -> Words:
         if 20 < poll < 80:
@@ -127,7 +141,7 @@ async def test_a_status_register_with_a_bit_that_stays_wrong_makes_up_no_cycle(
         return words
 
     mangler.change = flip
-    received = await received_of(fpga, device, mangler, 40)
+    received = await received_of(layout, device, mangler, 40)
     assert received == [CycleId(7, cycle) for cycle in range(1, 41)]
 
 
@@ -148,18 +162,18 @@ async def test_a_restart_within_one_session_is_still_seen(fpga: RegisterMap) -> 
 
 @pytest.mark.parametrize("clock_ns", [0, 10**18])
 async def test_an_old_status_block_after_a_start_of_the_service_is_no_restart(
-    fpga: RegisterMap, clock_ns: int
+    layout: RegisterMap, clock_ns: int
 ) -> None:
     """The service knows the last cycle from its journal, and no more of it than its time."""
-    device = ScriptedDevice(fpga, session=7)
+    device = ScriptedDevice(layout, session=7)
     for cycle in range(1, 11):
         make(device, cycle_time=clock_ns and clock_ns + cycle)
     old = device.image.copy()
     make(device, 2, cycle_time=clock_ns and clock_ns + 11)
-    mangler = Mangler(device, "state", "command_cycle")
+    mangler = Mangler(device, "state", last_of(device))
     mangler.change = lambda words, poll: old[mangler.first :][: words.size] if poll < 20 else words
     after = (CycleId(7, 12), clock_ns and clock_ns + 12)
-    async with running(fpga, device, after=after) as (_, module, receptions):
+    async with running(layout, device, after=after) as (_, module, receptions):
         coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
         while mangler.polls < 40:
             await asyncio.sleep(0)
@@ -173,7 +187,7 @@ async def test_a_restart_that_no_clock_and_no_memory_proves_is_seen_before_the_r
 ) -> None:
     """The same session, cycles without a time, and a service that has just been started."""
     device = ScriptedDevice(fpga, session=7)
-    mangler = Mangler(device, "state", "command_cycle")
+    mangler = Mangler(device, "state", last_of(device))
     make(device, 2, cycle_time=0)
     async with running(fpga, device, after=(CycleId(7, 1000), 0)) as (_, module, receptions):
         coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
@@ -185,3 +199,46 @@ async def test_a_restart_that_no_clock_and_no_memory_proves_is_seen_before_the_r
         assert int(device.get("cycle_counter")) < 16
         assert ((await coming).cycle_id, module.status.restarts) == (CycleId(7, 1), 1)
         assert (await anext(receptions)).cycle_id == CycleId(7, 2)
+
+
+async def test_a_target_of_the_plc_with_a_wrong_bit_is_not_believed(layout: RegisterMap) -> None:
+    """Every register of the status block, not only those that lead to a cycle."""
+    device = ScriptedDevice(layout, session=7)
+    make(device)
+    device.put("target_position", 0.0123)
+    device.put("part_position", 0.001)
+    mangler = Mangler(device, "state", last_of(device))
+    at, draw = layout["target_position"].address - mangler.first, np.random.default_rng(3)
+
+    def flip(words: Words, _: int) -> Words:
+        if draw.random() < 0.1:
+            words[at + draw.integers(4)] ^= np.uint16(1 << draw.integers(16))  # target, or its sequence
+        return words
+
+    async with running(layout, device) as (_, module, receptions):
+        await anext(receptions)
+        mangler.change = flip
+        for _ in range(200):
+            with contextlib.suppress(ProtocolError):
+                positioning = (await module.read_status()).positioning
+                assert positioning is not None
+                assert (positioning.target_sequence, positioning.target_m) == (0, pytest.approx(0.0123))
+
+
+async def test_a_part_that_moves_does_not_keep_the_status_block_from_being_read(fpga: RegisterMap) -> None:
+    registers = {name: register for name, register in fpga.registers.items() if name != "status_crc32"}
+    device = ScriptedDevice(RegisterMap(fpga.name, registers), session=7)
+    make(device)
+    mangler = Mangler(device, "state", "command_cycle")
+    at = fpga["part_position"].address + 1 - mangler.first
+
+    def moving(words: Words, poll: int) -> Words:
+        words[at] = poll
+        return words
+
+    mangler.change = moving
+    async with running(device.registers, device) as (_, module, receptions):
+        await anext(receptions)
+        positioning = (await module.read_status()).positioning
+        assert positioning is not None
+        assert positioning.position_m == pytest.approx(1e-9 * mangler.polls)

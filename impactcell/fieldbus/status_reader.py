@@ -1,0 +1,76 @@
+"""The status block of a module, believed only once it is proved: by its CRC, or by being read twice."""
+
+from typing import Final
+
+from impactcell.errors import ProtocolError
+from impactcell.fieldbus import decoding
+from impactcell.fieldbus.decoding import StatusBlock
+from impactcell.fieldbus.register_client import RegisterClient, RegisterImage
+from impactcell.fieldbus.registers import registers_crc32
+
+_ATTEMPTS: Final = 8
+"""Readings until one is proved, before the link counts as broken."""
+_MAY_MOVE: Final = "part_position"
+"""It may change with every reading, so two need not agree about it."""
+
+
+class StatusReader:
+    """Reads the status block of one module.
+
+    A reply with a wrong bit looks like any other. A module whose map has `status_crc32`, and that fills it,
+    proves its status block by it. Of others, one that shows anything new is read again until two readings
+    agree.
+    """
+
+    def __init__(self, client: RegisterClient) -> None:
+        self._client = client
+        self._registers = client.registers
+        covered = (register.name for register in client.registers.status())
+        self._names = tuple(dict.fromkeys((*decoding.STATUS_REGISTERS, *covered)))
+        self._proved: tuple[RegisterImage, StatusBlock] | None = None
+
+    async def read(self) -> StatusBlock:
+        """Read the status block.
+
+        Raises
+        ------
+        LinkError, ProtocolError, ModbusExceptionError
+            If the link fails, the module refuses, or no reading can be proved.
+        """
+        before: RegisterImage | None = None
+        for _ in range(_ATTEMPTS):
+            image = await self._client.read_image(self._names)
+            if self._proved is not None and image is self._proved[0]:
+                return self._proved[1]
+            if self._fits_crc(image) or (before is not None and self._agree(before, image)):
+                self._proved = image, decoding.decode_status(self._registers, image.values)
+                return self._proved[1]
+            before = image
+        raise ProtocolError(
+            f"{self._client.modbus.link}: {_ATTEMPTS} readings of the status block "
+            + ("do not fit its CRC" if self._has_crc(image) else "all differ")
+        )
+
+    def _has_crc(self, image: RegisterImage) -> bool:
+        return image.values.get("status_crc32", 0) != 0
+
+    def _fits_crc(self, image: RegisterImage) -> bool:
+        if not self._has_crc(image):
+            return False
+        words = image.words(self._registers["state"], self._registers["status_crc32"].address)
+        return registers_crc32(words) == image.values["status_crc32"]
+
+    def _agree(self, before: RegisterImage, image: RegisterImage) -> bool:
+        """Whether two readings show the same; never where a CRC says that they are wrong."""
+        if self._has_crc(before) or self._has_crc(image):
+            return False
+        moving = self._registers.registers.get(_MAY_MOVE)
+        for block, one, other in zip(image.blocks, before.raw, image.raw, strict=True):
+            if one == other:
+                continue
+            if moving is None or not (block.address <= moving.address and moving.end <= block.end):
+                return False
+            first, end = 2 * (moving.address - block.address), 2 * (moving.end - block.address)
+            if one[:first] != other[:first] or one[end:] != other[end:]:
+                return False
+        return True
