@@ -42,17 +42,17 @@ class AlarmSettings:
 
 @dataclass(frozen=True, slots=True)
 class AlarmSetState:
-    """Alarms of a cell with their delays, in the order of `NAMES`.
+    """Alarms of a cell with their counters, in the order of `NAMES`.
 
     Attributes
     ----------
-    announced : int
+    suppressed_cycles : int
         Cycles for which conditions stay suppressed after an announced batch change.
     """
 
     alarms: tuple[Alarm, ...] = field(metadata=stored(by=NAMES))
-    delays: tuple[DebounceCounters, ...] = field(metadata=stored(by=NAMES))
-    announced: int = 0
+    counters: tuple[DebounceCounters, ...] = field(metadata=stored(by=NAMES))
+    suppressed_cycles: int = 0
 
     def alarm(self, name: str) -> Alarm:
         """One alarm by its name."""
@@ -113,7 +113,7 @@ def update(
     for result in results:
         index = _INDEX[result.name]
         # nearly always there is nothing to do
-        if result.holds or state.alarms[index].active or state.delays[index] is not ZERO_COUNTS:
+        if result.holds or state.alarms[index].active or state.counters[index] is not ZERO_COUNTS:
             state, change = apply_rule_result(settings, state, result, cycle, time_ns)
             transitions = (*transitions, *([change] if change.notifications else []))
     return state, transitions
@@ -123,15 +123,17 @@ def _suppress(
     settings: AlarmSettings, state: AlarmSetState, cycle: int, time_ns: int, *, announced: bool
 ) -> tuple[AlarmSetState, tuple[Transition, ...]]:
     """Suppress rules for a while after an announced batch change, and end it."""
-    remaining = settings.announced_cycles if announced else max(state.announced - 1, 0)
+    remaining = settings.announced_cycles if announced else max(state.suppressed_cycles - 1, 0)
     transitions: tuple[Transition, ...] = ()
-    if announced or (state.announced and not remaining):
+    if announced or (state.suppressed_cycles and not remaining):
         event = AlarmEvent(EventKind.SUPPRESS if announced else EventKind.UNSUPPRESS, cycle, time_ns)
         for name, rule in RULES.items():
             if rule.suppressed_by_announcement:
                 state, change = apply_event(state, name, event)
                 transitions = (*transitions, *([change] if change.notifications else []))
-    return (replace(state, announced=remaining) if remaining != state.announced else state), transitions
+    return (
+        replace(state, suppressed_cycles=remaining) if remaining != state.suppressed_cycles else state
+    ), transitions
 
 
 def apply_rule_result(
@@ -140,9 +142,9 @@ def apply_rule_result(
     """Move one alarm by one result: of a cycle, or of what happens beside the cycles."""
     index = _INDEX[result.name]
     alarm, rule = state.alarms[index], settings.rule(result.name)
-    counters, kind = debounce(rule, alarm, state.delays[index], result)
-    if counters is not state.delays[index]:
-        state = AlarmSetState(state.alarms, _with(state.delays, index, counters), state.announced)
+    counters, kind = debounce(rule, alarm, state.counters[index], result)
+    if counters is not state.counters[index]:
+        state = AlarmSetState(state.alarms, _with(state.counters, index, counters), state.suppressed_cycles)
     if kind is None:
         if alarm.active and result.holds and result.evidence != alarm.evidence:
             message = result.message
@@ -165,7 +167,7 @@ def apply_event(state: AlarmSetState, name: str, event: AlarmEvent) -> tuple[Ala
     index = _INDEX[name]
     change = transition(state.alarms[index], event)
     if event.kind in (EventKind.ENABLE, EventKind.DISABLE) and change.refusal is None:
-        state = replace(state, delays=_with(state.delays, index, ZERO_COUNTS))
+        state = replace(state, counters=_with(state.counters, index, ZERO_COUNTS))
     return replace(state, alarms=_with(state.alarms, index, change.alarm)), change
 
 

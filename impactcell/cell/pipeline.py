@@ -60,7 +60,7 @@ class CellDesign:
 
     Attributes
     ----------
-    known : Known
+    defaults : Known
         What holds where the module says nothing.
     false_alarm_cycles : float
         Designed mean number of cycles between two false alarms of one rule.
@@ -71,7 +71,7 @@ class CellDesign:
     tracker: TrackerSettings
     signature: SignatureSettings
     alarms: AlarmSettings
-    known: CaptureDefaults = field(default_factory=CaptureDefaults)
+    defaults: CaptureDefaults = field(default_factory=CaptureDefaults)
     false_alarm_cycles: float = 100_000.0
 
 
@@ -139,7 +139,7 @@ def step(
     faults: tuple[str, ...] = (),
 ) -> StepResult:
     """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
-    capture = fill_defaults(design.known, capture)
+    capture = fill_defaults(design.defaults, capture)
     features = extract(capture)
     named = assign_batch(state.batch, capture, announcement)
     friction = degrade_quality(estimate_from_features(features, design.model), faults)
@@ -184,7 +184,7 @@ def step(
     )
     after = replace(
         state,
-        batch=named.said,
+        batch=named.naming,
         tracker=tracked.state,
         signature=signed.state,
         gap=gapped.state,
@@ -234,7 +234,7 @@ def apply_event(state: CellState, name: str, event: AlarmEvent) -> tuple[CellSta
 def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState:
     """Name the batch from the next cycle on; an expected change raises no alarm and re-baselines."""
     named = OperatorBatch(batch_id, state.batch.by_module, expected)
-    return replace(state, batch=replace(state.batch, by_person=named))
+    return replace(state, batch=replace(state.batch, by_operator=named))
 
 
 def reset_wear_level(state: CellState) -> CellState:

@@ -32,7 +32,7 @@ class OperatorBatch:
     """A batch named by a person: holds until the module names another than it did then."""
 
     batch_id: str
-    module_said: str | None
+    module_batch_id: str | None
     expected: bool
 
 
@@ -40,16 +40,16 @@ class OperatorBatch:
 class BatchNaming:
     """What has been said of the batch so far: by a person, by the module, by announcements of the PLC."""
 
-    by_person: OperatorBatch | None = None
+    by_operator: OperatorBatch | None = None
     by_module: str | None = None
-    announcement_seen: int = 0
+    last_announcement: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class CycleBatch:
     """The batch of a cycle, whether its change was expected, and what has been said after it."""
 
-    said: BatchNaming
+    naming: BatchNaming
     batch_id: str | None
     expected: bool
 
@@ -86,27 +86,27 @@ def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
     )
 
 
-def assign_batch(said: BatchNaming, capture: Capture, announcement: BatchAnnouncement | None) -> CycleBatch:
+def assign_batch(naming: BatchNaming, capture: Capture, announcement: BatchAnnouncement | None) -> CycleBatch:
     """Decide which batch a cycle belongs to, and whether its change was expected.
 
     The batch is what the module wrote down with the cycle itself. Of announcements only the newest can be
     seen: after an outage with several of them, each change of the module's batch before the newest applies
     counts as one of those between, as many as its sequence says there were.
     """
-    by_person, batch_id, expected = said.by_person, capture.batch_id, False
-    if by_person is not None and by_person.module_said == capture.batch_id:
-        batch_id, expected = by_person.batch_id, by_person.expected
-        by_person = replace(by_person, expected=False)
+    by_operator, batch_id, expected = naming.by_operator, capture.batch_id, False
+    if by_operator is not None and by_operator.module_batch_id == capture.batch_id:
+        batch_id, expected = by_operator.batch_id, by_operator.expected
+        by_operator = replace(by_operator, expected=False)
     else:
-        by_person = None
-    seen = said.announcement_seen
+        by_operator = None
+    seen = naming.last_announcement
     if announcement is not None and announcement.sequence != seen:
-        changed = said.by_module is not None and capture.batch_id not in (None, said.by_module)
+        changed = naming.by_module is not None and capture.batch_id not in (None, naming.by_module)
         if capture.cycle >= announcement.from_cycle:
             expected, seen = True, announcement.sequence
         elif changed and 0 < seen < announcement.sequence - 1:
             expected, seen = True, seen + 1
-    return CycleBatch(BatchNaming(by_person, capture.batch_id, seen), batch_id, expected)
+    return CycleBatch(BatchNaming(by_operator, capture.batch_id, seen), batch_id, expected)
 
 
 def update_period(before_s: float, since: tuple[int, int], capture: Capture) -> float:

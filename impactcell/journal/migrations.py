@@ -77,12 +77,32 @@ _ALARM_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.records.Alarm`, as "evidence.size": "magnitude"; they hold for the state too."""
 _ALARM_2_ADDED: Final[Mapping[str, Tree]] = {"message_de": ""}
 """The German message; like those above, they hold for the state too."""
+_NOISE_2_RENAMED: Final[Mapping[str, str]] = {"belief": "exponent_posterior", "rough": "winsorised_factor"}
+"""Of the tracker's scale of the noise, wherever it is kept."""
+_TRACKER_2_RENAMED: Final[Mapping[str, str]] = {
+    "shift": "change_point",
+    "shift.found_at": "detected_at",
+    "monitor": "innovation_correlation",
+    "replayed": "replayed_noise",
+    "history": "commissioning",
+    "first": "first_index",
+    **_under("noise", _NOISE_2_RENAMED),
+    **_under("replayed", _NOISE_2_RENAMED),
+}
+"""Of the state of wear and batch."""
 _STATE_2_RENAMED: Final[Mapping[str, str]] = {
     "state": "cell",
     "belief": "planner",
+    "state.alarms.delays": "counters",
+    "state.alarms.announced": "suppressed_cycles",
+    "state.batch.by_person": "by_operator",
+    "state.batch.by_person.module_said": "module_batch_id",
+    "state.batch.announcement_seen": "last_announcement",
+    "state.gap.squares": "squared_deviations",
+    **_under("state.tracker", _TRACKER_2_RENAMED),
     **_under("state.alarms.alarms.*", _ALARM_2_RENAMED),
 }
-"""Of all that `StoredState` holds, as "state.tracker.noise.belief": "posterior"."""
+"""Of all that `StoredState` holds."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
 

@@ -45,7 +45,7 @@ def cell_design(cell: CellConfig) -> CellDesign:
             false_alarm_cycles=settings.alarms.false_alarm_cycles,
         ),
         alarms=alarm_settings(cell),
-        known=CaptureDefaults(
+        defaults=CaptureDefaults(
             mass_kg=settings.part.mass_kg,
             stroke_m=None if stroke_mm is None else stroke_mm * MM,
             force_noise_std_n=settings.sensors.force_noise_std_n,

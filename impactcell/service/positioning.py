@@ -69,7 +69,7 @@ class PositioningTask:
         if worker.belief is not None:
             self._planner.resume(worker.belief)
         self._design = design
-        self._mass_kg = design.known.mass_kg
+        self._mass_kg = design.defaults.mass_kg
         self._module = module
         self._positioner = TapCommander(module)
         self._worker = worker

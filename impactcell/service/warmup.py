@@ -28,7 +28,7 @@ def warm_up(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> Non
     Once a process is enough for all cells that need the same code: many that start together are not kept from
     their modules by each other.
     """
-    kind = (*design.model.plant.effects, design.tracker.batch, design.known.stroke_m is None)
+    kind = (*design.model.plant.effects, design.tracker.batch, design.defaults.stroke_m is None)
     with _lock:
         if kind not in _warm and _run_cycles(design, stop):
             _warm.add(kind)
@@ -53,17 +53,19 @@ def _run_cycles(design: CellDesign, stop: Callable[[], bool]) -> bool:
 def _capture(design: CellDesign, cycle: int) -> Capture:
     tap = TapInput(
         velocity_m_s=0.06,
-        mass_kg=design.known.mass_kg or 18.9,
-        stroke_m=design.known.stroke_m or float("inf"),
-        halts_at_separation=design.known.stroke_m is None,
+        mass_kg=design.defaults.mass_kg or 18.9,
+        stroke_m=design.defaults.stroke_m or float("inf"),
+        halts_at_separation=design.defaults.stroke_m is None,
     )
     motion = simulate_tap(design.model.plant, tap)
     random = np.random.default_rng(cycle)
     force_s = uniform_times(0.0, FORCE_HZ, int(motion.separation_s * 1.2 * FORCE_HZ))
     position_s = uniform_times(0.0, POSITION_HZ, int((motion.stop_s * 1.1 + 0.005) * POSITION_HZ))
-    force = motion.sample(force_s).force_n + random.normal(0.0, design.known.force_noise_std_n, len(force_s))
+    force = motion.sample(force_s).force_n + random.normal(
+        0.0, design.defaults.force_noise_std_n, len(force_s)
+    )
     position = motion.sample(position_s).position_m + random.normal(
-        0.0, design.known.position_noise_std_m, len(position_s)
+        0.0, design.defaults.position_noise_std_m, len(position_s)
     )
     return Capture(
         cycle=cycle,

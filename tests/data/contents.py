@@ -50,7 +50,7 @@ def described(durable: StoredState, journal: Journal) -> dict[str, Any]:
 
 def _cycle(durable: StoredState) -> dict[str, Any]:
     state = durable.cell
-    person = state.batch.by_person
+    person = state.batch.by_operator
     assert person is not None
     return {
         "number": state.cycle,
@@ -59,17 +59,17 @@ def _cycle(durable: StoredState) -> dict[str, Any]:
         "batch named by the module": state.batch.by_module,
         "batch named by a person": {
             "id": person.batch_id,
-            "while the module says": person.module_said,
+            "while the module says": person.module_batch_id,
             "expected": person.expected,
         },
-        "announcement seen": state.batch.announcement_seen,
+        "announcement seen": state.batch.last_announcement,
         "signature grid": {"length_m": state.grid[0].hex(), "points": state.grid[1]},
     }
 
 
 def _wear_and_batch(durable: StoredState) -> dict[str, Any]:
     state = durable.cell.tracker
-    known, shift = state.filter, state.shift
+    known, shift = state.filter, state.change_point
     assert known is not None
     assert shift is not None
     return {
@@ -83,7 +83,7 @@ def _wear_and_batch(durable: StoredState) -> dict[str, Any]:
             "cycle": shift.cycle,
             "size": shift.size.hex(),
             "size_std": shift.size_std.hex(),
-            "found at": shift.found_at,
+            "found at": shift.detected_at,
             "statistic": shift.statistic.hex(),
             "threshold": shift.threshold.hex(),
         },
@@ -100,13 +100,13 @@ def _wear_and_batch(durable: StoredState) -> dict[str, Any]:
             "usual_std": state.noise.usual_std.hex(),
             "last": _floats([state.noise.last_value, state.noise.last_std]),
             "identical": state.noise.identical,
-            "posterior": _floats(state.noise.belief),
+            "posterior": _floats(state.noise.exponent_posterior),
         },
         "batch as the PLC names it": [state.batch_id, state.previous_batch],
         "batches so far": state.batch_count,
         "batch since": state.batch_start,
         "shifts reported at": [state.accepted, state.accepted_before],
-        "first cycle": state.first,
+        "first cycle": state.first_index,
         "process noise": _floats([state.level_variance, state.slope_variance]),
     }
 
@@ -133,7 +133,7 @@ def _model_gap(durable: StoredState) -> dict[str, Any]:
     return {
         "count": gap.count,
         "mean": gap.mean.hex(),
-        "squares": gap.squares.hex(),
+        "squares": gap.squared_deviations.hex(),
         "excess": gap.excess.hex(),
         "since": gap.since,
     }
@@ -141,7 +141,7 @@ def _model_gap(durable: StoredState) -> dict[str, Any]:
 
 def _alarms(durable: StoredState) -> dict[str, Any]:
     book = durable.cell.alarms
-    counters = dict(zip((alarm.name for alarm in book.alarms), book.delays, strict=True))
+    counters = dict(zip((alarm.name for alarm in book.alarms), book.counters, strict=True))
     conditions = {
         alarm.name: {
             **_alarm(alarm),
@@ -153,7 +153,10 @@ def _alarms(durable: StoredState) -> dict[str, Any]:
         }
         for alarm in book.alarms
     }
-    return {"conditions": conditions, "cycles for which a batch change stays announced": book.announced}
+    return {
+        "conditions": conditions,
+        "cycles for which a batch change stays announced": book.suppressed_cycles,
+    }
 
 
 def _alarm(alarm: Alarm) -> dict[str, Any]:

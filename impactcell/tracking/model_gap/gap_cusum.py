@@ -38,8 +38,8 @@ class GapState:
     Attributes
     ----------
     count : int
-        Captures that mean and squares are learned from.
-    mean, squares : float
+        Captures that mean and squared_deviations are learned from.
+    mean, squared_deviations : float
         Mean of the logarithms, and the sum of their squared deviations from it (Welford).
     excess : float
         Detection statistic of the CUSUM.
@@ -49,7 +49,7 @@ class GapState:
 
     count: int = 0
     mean: float = 0.0
-    squares: float = 0.0
+    squared_deviations: float = 0.0
     excess: float = 0.0
     since: int = 0
 
@@ -80,13 +80,13 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
     value = math.log(gap)
     excess = min(max(0.0, state.excess + _score(state, value) - SLACK), CAP * limit)
     since = cycle if state.excess == 0.0 else state.since
-    count, mean, squares = state.count, state.mean, state.squares
+    count, mean, squared_deviations = state.count, state.mean, state.squared_deviations
     if count < LEARNED and state.excess <= limit:
         count += 1
         step = value - mean
         mean += step / count
-        squares += step * (value - mean)
-    updated = GapState(count, mean, squares, excess, since)
+        squared_deviations += step * (value - mean)
+    updated = GapState(count, mean, squared_deviations, excess, since)
     if count < FIRST:
         return GapResult(updated, None, Evidence(), "the usual residual is being learned")
     usual = math.exp(mean)
@@ -95,7 +95,7 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         limit,
         since if excess > 0.0 else 0,
         gap - usual,
-        usual * math.sqrt(squares / max(count - 1, 1)),
+        usual * math.sqrt(squared_deviations / max(count - 1, 1)),
         false_alarm_cycles,
         false_alarm_cycles * period_s / SECONDS_A_DAY,
     )
@@ -121,9 +121,9 @@ def threshold(false_alarm_cycles: float) -> float:
 def _score(state: GapState, value: float) -> float:
     """Give the standard normal score of a logarithm after those before, by the small tail for its digits."""
     n = state.count
-    if n < 2 or state.squares <= 0.0:
+    if n < 2 or state.squared_deviations <= 0.0:
         return 0.0
-    t = math.sqrt(n / (n + 1.0)) * (value - state.mean) / math.sqrt(state.squares / (n - 1))
+    t = math.sqrt(n / (n + 1.0)) * (value - state.mean) / math.sqrt(state.squared_deviations / (n - 1))
     tail = float(stdtr(n - 1, -abs(t)))
     score = LARGEST_SCORE if tail <= 0.0 else min(float(-ndtri(tail)), LARGEST_SCORE)
     return math.copysign(score, t)

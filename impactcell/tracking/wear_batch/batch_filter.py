@@ -87,7 +87,7 @@ def detect_change(
         return state, None
     first, size, std = run_length_bank.locate_change_point(updated.bank, state.accepted, index)
     change = ChangePoint(first, size, std, index, updated.statistic, threshold)
-    return replace(state, accepted_before=state.accepted, accepted=index, shift=change), change
+    return replace(state, accepted_before=state.accepted, accepted=index, change_point=change), change
 
 
 def innovation(state: TrackerState, cycle: UsableCycle) -> float:
@@ -115,15 +115,15 @@ def compare_with_previous_batch(
     size, std = wear_filter.contrast(current, current.current, previous)
     prior = settings.step_std * math.sqrt(cycle.variance)
     statistic = 0.5 * (size / std) ** 2 + math.log(std / prior)
-    length = max(1.0, (state.batch_start - state.first) / max(state.batch_count - 1, 1))
+    length = max(1.0, (state.batch_start - state.first_index) / max(state.batch_count - 1, 1))
     threshold = math.log(max(WAYS_KNOWN * settings.false_alarm_cycles / length, SMALLEST_ODDS))
     change = ChangePoint(state.batch_start, size, std, cycle.timing.index, statistic, threshold)
     if state.tested:
-        is_reported = state.shift is not None and state.shift.cycle == state.batch_start
-        return (replace(state, shift=change) if is_reported else state), None
+        is_reported = state.change_point is not None and state.change_point.cycle == state.batch_start
+        return (replace(state, change_point=change) if is_reported else state), None
     if statistic <= threshold or not _scale_is_known(state, cycle.noise):
         return state, None
-    return replace(state, shift=change, tested=True), change
+    return replace(state, change_point=change, tested=True), change
 
 
 def reason_not_ready(state: TrackerState) -> str:
@@ -137,6 +137,6 @@ def _scale_is_known(state: TrackerState, noise: NoiseScale) -> bool:
     """Whether the scale of the noise is known well enough to tell a change from noise."""
     if noise.weight < FEWEST_DIFFERENCES:
         return False
-    if state.history is None or noise.weight >= LEARNING_DIFFERENCES:
+    if state.commissioning is None or noise.weight >= LEARNING_DIFFERENCES:
         return True
-    return scale_change(noise, state.replayed, np.array([noise.last_std]))[0] < SETTLED
+    return scale_change(noise, state.replayed_noise, np.array([noise.last_std]))[0] < SETTLED

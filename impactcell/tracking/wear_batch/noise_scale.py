@@ -58,7 +58,7 @@ class NoiseScale:
         kappa squared.
     weight : float
         Number of differences it rests on.
-    rough : float
+    winsorised_factor : float
         The winsorised one.
     usual_std : float
         Mean of those declared, over so many; nan before one was.
@@ -68,19 +68,19 @@ class NoiseScale:
         How many values in a row have been the same.
     guessed : bool
         No standard deviation was ever declared; the scale was guessed and is learned.
-    belief : ndarray
+    exponent_posterior : ndarray
         How far the declared standard deviations are believed, see `declared_std_calibration`.
     """
 
     factor: float = 1.0
     weight: float = DECLARED_WEIGHT
-    rough: float = 1.0
+    winsorised_factor: float = 1.0
     usual_std: float = math.nan
     last_value: float = math.nan
     last_std: float = math.nan
     identical: int = 0
     guessed: bool = False
-    belief: Samples = field(default_factory=declared_std_calibration.prior_posterior)
+    exponent_posterior: Samples = field(default_factory=declared_std_calibration.prior_posterior)
 
 
 def identical_run(noise: NoiseScale, value: float) -> int:
@@ -118,19 +118,31 @@ def _update_factor(noise: NoiseScale, before: NoiseScale) -> NoiseScale:
     square, weight = (noise.last_value - before.last_value) ** 2, min(noise.weight + 1.0, MEMORY)
     stds, usual = (noise.last_std, before.last_std), noise.usual_std
     squared = square / sum(
-        declared_std_calibration.calibrated_std(noise.belief, std, usual) ** 2 for std in stds
+        declared_std_calibration.calibrated_std(noise.exponent_posterior, std, usual) ** 2 for std in stds
     )
     if noise.guessed and weight <= UNSCALED:
         # nothing to judge outliers by yet: the plain mean
         factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
-        return replace(noise, factor=factor, rough=factor, weight=weight)
-    clipped = min(squared, CLIP**2 * noise.rough) / CONSISTENCY
-    rough = max(noise.rough + (clipped - noise.rough) / weight, SMALLEST_FACTOR)
+        return replace(noise, factor=factor, winsorised_factor=factor, weight=weight)
+    clipped = min(squared, CLIP**2 * noise.winsorised_factor) / CONSISTENCY
+    winsorised_factor = max(
+        noise.winsorised_factor + (clipped - noise.winsorised_factor) / weight, SMALLEST_FACTOR
+    )
     weighted = squared * declared_std_calibration.outlier_weight(squared, noise.factor)
-    factor = max(noise.factor + (weighted - noise.factor) / weight, rough / ROUGH_BIAS, SMALLEST_FACTOR)
+    factor = max(
+        noise.factor + (weighted - noise.factor) / weight, winsorised_factor / ROUGH_BIAS, SMALLEST_FACTOR
+    )
     usual_square = square / (2.0 * noise.factor * usual**2)
-    belief = declared_std_calibration.update(noise.belief, usual_square, *stds, usual, weight)
-    return replace(noise, factor=factor, rough=rough, weight=weight, belief=belief)
+    exponent_posterior = declared_std_calibration.update(
+        noise.exponent_posterior, usual_square, *stds, usual, weight
+    )
+    return replace(
+        noise,
+        factor=factor,
+        winsorised_factor=winsorised_factor,
+        weight=weight,
+        exponent_posterior=exponent_posterior,
+    )
 
 
 def variance(noise: NoiseScale, std: float) -> float:
@@ -139,7 +151,7 @@ def variance(noise: NoiseScale, std: float) -> float:
     return float(
         noise.factor
         * doubt
-        * declared_std_calibration.calibrated_std(noise.belief, std, noise.usual_std) ** 2
+        * declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std) ** 2
     )
 
 
@@ -158,7 +170,10 @@ def _calibrated_variances(noise: NoiseScale, stds: Samples) -> Samples:
     """Variances before the factor."""
     return (
         np.array(
-            [declared_std_calibration.calibrated_std(noise.belief, std, noise.usual_std) for std in stds]
+            [
+                declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std)
+                for std in stds
+            ]
         )
         ** 2
     )
@@ -174,7 +189,7 @@ def refit(noise: NoiseScale, values: Samples, stds: Samples) -> NoiseScale:
     if not 1.0 / CONTRADICTED < factor < CONTRADICTED:
         # what was declared is plainly wrong, and is no longer to weigh against the data
         factor = _maximum_likelihood_factor(squared, start, 0.0)
-    return replace(noise, factor=factor, rough=factor)
+    return replace(noise, factor=factor, winsorised_factor=factor)
 
 
 @compiled

@@ -14,13 +14,13 @@ def update_process_noise(
 ) -> tuple[TrackerState, list[str]]:
     """Commission the process noise from the first cycles, later multiply it by `factor`; say what changed."""
     state, notes = _adapted(state, factor)
-    if state.history is None:
+    if state.commissioning is None:
         return state, notes
-    record = noise_identification.append_cycle(state.history, cycle, cycle.observation.batch_id)
+    record = noise_identification.append_cycle(state.commissioning, cycle, cycle.observation.batch_id)
     cycles = len(record.rows)
     is_ended = cycles >= settings.commissioning_cycles
     identifies = is_ended or cycles in noise_identification.IDENTIFIED_AT
-    state = replace(state, history=None if is_ended else record)
+    state = replace(state, commissioning=None if is_ended else record)
     if cycles in noise_identification.REFITTED_AT:
         values, stds = record.rows[:, noise_identification.VALUE], record.rows[:, noise_identification.STD]
         state = replace(state, noise=noise_scale.refit(state.noise, values, stds))
@@ -44,7 +44,7 @@ def _replayed(
 ) -> TrackerState:
     """Go over the first cycles again where the scale of the noise, or the random walks, are other by now."""
     stds = record.rows[:, noise_identification.STD]
-    together, apart = noise_scale.scale_change(state.noise, state.replayed, stds)
+    together, apart = noise_scale.scale_change(state.noise, state.replayed_noise, stds)
     is_rescaled = together > noise_identification.RESCALED or apart > noise_identification.RESHAPED
     if not (identifies or is_rescaled):
         return state
@@ -65,7 +65,7 @@ def _replayed(
         filter=known,
         level_variance=level,
         slope_variance=slope,
-        replayed=state.noise,
+        replayed_noise=state.noise,
     )
 
 

@@ -73,7 +73,7 @@ class ChangePoint:
 
     Attributes
     ----------
-    cycle, found_at : int
+    cycle, detected_at : int
         Indices of the first cycle after it, and of the one at which it was certain enough.
     size, size_std : float
         mu_s after it minus mu_s before, and its standard deviation.
@@ -84,7 +84,7 @@ class ChangePoint:
     cycle: int
     size: float
     size_std: float
-    found_at: int = 0
+    detected_at: int = 0
     statistic: float = math.nan
     threshold: float = math.nan
 
@@ -109,7 +109,7 @@ class TrackerState:
         Index at which the PLC's present batch began, and how many there have been.
     tested : bool
         The present known batch has been reported as shifted, or was expected to be.
-    replayed : Noise
+    replayed_noise : Noise
         As it was when the first cycles were last gone over with it.
     """
 
@@ -125,11 +125,11 @@ class TrackerState:
     batch_start: int = 0
     batch_count: int = 0
     tested: bool = True
-    shift: ChangePoint | None = None
-    first: int = 0
-    replayed: NoiseScale = field(default_factory=NoiseScale)
-    history: CommissioningRecord | None = None
-    monitor: InnovationCorrelation = field(default_factory=InnovationCorrelation)
+    change_point: ChangePoint | None = None
+    first_index: int = 0
+    replayed_noise: NoiseScale = field(default_factory=NoiseScale)
+    commissioning: CommissioningRecord | None = None
+    innovation_correlation: InnovationCorrelation = field(default_factory=InnovationCorrelation)
     level_variance: float = 0.0
     slope_variance: float = 0.0
 

@@ -59,7 +59,7 @@ def tracking_result(
     state = _refine_change_point(state)
     walks = (state.level_variance, state.slope_variance)
     wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes))
-    change = state.shift
+    change = state.change_point
     not_ready = batch_filter.reason_not_ready(state)
     batch = BatchState(
         observation.batch_id or state.batch_id or "",
@@ -111,10 +111,10 @@ def _bank_moments(bank: Samples) -> tuple[WearMoments, float, float]:
 
 def _refine_change_point(state: TrackerState) -> TrackerState:
     """Let the cycles since say more of the bank's last change: when it was and how large."""
-    if state.shift is None or state.shift.found_at != state.accepted:
+    if state.change_point is None or state.change_point.detected_at != state.accepted:
         return state
     cycle, size, std = run_length_bank.locate_change_point(state.bank, state.accepted_before, state.accepted)
-    return replace(state, shift=replace(state.shift, cycle=cycle, size=size, size_std=std))
+    return replace(state, change_point=replace(state.change_point, cycle=cycle, size=size, size_std=std))
 
 
 def _evidence(settings: TrackerSettings, state: TrackerState, change: ChangePoint) -> Evidence:

@@ -71,13 +71,16 @@ def update(
         first = _first_state(settings, replace(state, clock=clock, noise=noise), cycle)
         return _report(settings, first, observation, CycleOutcome(notes, used=True))
     state, announced = _follow_batch_id(settings, state, observation, timing)
-    if state.batch_count > JUDGED_BATCHES and timing.index - state.first < SHORTEST_BATCH * state.batch_count:
+    if (
+        state.batch_count > JUDGED_BATCHES
+        and timing.index - state.first_index < SHORTEST_BATCH * state.batch_count
+    ):
         notes.append("the batch id changes too often to say anything of batches")
     cycle = UsableCycle(observation, timing, noise, std, variance, announced)
     updated = batch_filter.update_bank(settings, state, cycle)
     before, change = batch_filter.detect_change(settings, state, cycle, updated)
     state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
-    correlation, factor = state.monitor, 1.0
+    correlation, factor = state.innovation_correlation, 1.0
     if timing.lag == 0:
         correlation, factor = process_noise_adaptation.update(correlation, innovation)
     state = replace(
@@ -87,7 +90,7 @@ def update(
         filter=known,
         bank=updated.bank,
         outliers=updated.outliers,
-        monitor=correlation,
+        innovation_correlation=correlation,
     )
     if timing.lag == 0:
         state, raised = update_process_noise(settings, state, cycle, factor)
@@ -120,14 +123,16 @@ def _first_state(settings: TrackerSettings, state: TrackerState, cycle: UsableCy
         else wear_filter.initial_state(observation.mu_s, variance, slope_std, batch),
         accepted=index,
         accepted_before=index,
-        first=index,
-        replayed=state.noise,
+        first_index=index,
+        replayed_noise=state.noise,
         level_variance=settings.level_noise**2 * variance,
         slope_variance=settings.slope_noise**2 * variance,
         batch_id=observation.batch_id,
         batch_start=index,
         batch_count=1,
-        history=noise_identification.append_cycle(noise_identification.CommissioningRecord(), cycle, batch),
+        commissioning=noise_identification.append_cycle(
+            noise_identification.CommissioningRecord(), cycle, batch
+        ),
     )
 
 
@@ -140,7 +145,7 @@ def _follow_batch_id(
         return state, UNSAID
     is_expected = observation.expected_change
     if batch_id is None or batch_id == state.batch_id:
-        otherwise = RULED_OUT if index < state.first + EARLIEST_CHANGE else UNSAID
+        otherwise = RULED_OUT if index < state.first_index + EARLIEST_CHANGE else UNSAID
         return state, ANNOUNCED if is_expected else otherwise
     state = replace(
         state,
@@ -179,7 +184,7 @@ def _update_filter(
     elif change is not None:
         current = wear_filter.restart_after_change(current, *run_length_bank.moments(updated.bank))
         # what was learned of the noise from here on would be learned from a mix of two materials
-        state = replace(state, tested=True, history=None)
+        state = replace(state, tested=True, commissioning=None)
     return state, current, change, innovation
 
 

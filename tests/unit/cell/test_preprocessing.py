@@ -17,7 +17,7 @@ def follow(
     for cycle, batch_id in cycles.items():
         named = assign_batch(said, replace(make_capture(cycle), batch_id=batch_id), announcement)
         assert named.batch_id == batch_id
-        said = named.said
+        said = named.naming
         if named.expected:
             expected.append(cycle)
     return expected
@@ -51,7 +51,7 @@ def test_a_person_s_batch_holds_until_the_module_names_another() -> None:
     said = BatchNaming(OperatorBatch("by hand", "A", expected=True), "A", 0)
     first = assign_batch(said, replace(make_capture(5), batch_id="A"), None)
     assert (first.batch_id, first.expected) == ("by hand", True)
-    second = assign_batch(first.said, replace(make_capture(6), batch_id="A"), None)
+    second = assign_batch(first.naming, replace(make_capture(6), batch_id="A"), None)
     assert (second.batch_id, second.expected) == ("by hand", False)
-    third = assign_batch(second.said, replace(make_capture(7), batch_id="B"), None)
+    third = assign_batch(second.naming, replace(make_capture(7), batch_id="B"), None)
     assert (third.batch_id, third.expected) == ("B", False)

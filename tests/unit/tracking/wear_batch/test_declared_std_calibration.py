@@ -52,9 +52,9 @@ def test_velocities_that_change_late_change_the_belief_late():
         std = float(DECLARED[cycle % 4]) if cycle >= 600 else float(DECLARED[2])
         noise, _ = noise_scale.update(noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False)
         if cycle == 599:
-            assert np.exp(noise.belief[:, declared_std_calibration.LOG_PROBABILITY]) == pytest.approx(
-                declared_std_calibration.PRIOR
-            )
+            assert np.exp(
+                noise.exponent_posterior[:, declared_std_calibration.LOG_PROBABILITY]
+            ) == pytest.approx(declared_std_calibration.PRIOR)
     used = [noise_scale.variance(noise, std) for std in DECLARED]
     assert used == pytest.approx([0.0028**2] * 4, rel=0.3)
 
