@@ -190,8 +190,10 @@ class CaptureReader:
         if identity != (target.slot, target.cycle_id.session, target.cycle_id.cycle):
             address = registers["window_slot"].address
             return f"register window_slot ({address}) shows {identity[0]} instead of {target.slot}"
+        provable = "capture_crc32" in registers
+        if provable and (excessive := decoding.excessive_counts(registers, header)):
+            return excessive[0]  # no CRC can cover samples that the map has no room for
         complete, last = self._client.modbus.complete, self._client.partial_block("window_sequence_after", 1)
-        provable = "capture_crc32" in registers and not decoding.excessive_counts(registers, header)
         if provable:  # in whatever order the device answers
             await complete(*partial.blocks.values(), last)
         else:
