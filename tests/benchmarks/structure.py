@@ -90,16 +90,20 @@ def retired_names(parsed: Sequence[_syntax.Module], retired: Iterable[str]) -> C
     return Count(len(items), tuple(items))
 
 
+def homes(parsed: Sequence[_syntax.Module], pattern: str) -> list[_syntax.Module]:
+    """Modules in which a listed definition may stand."""
+    home, _, _ = pattern.partition(":")
+    return [module for module in parsed if re.fullmatch(rf"impactcell\.({home})", module.name)]
+
+
 def definitions(parsed: Sequence[_syntax.Module], patterns: Sequence[str]) -> Count:
     """Which of the listed definitions do their work themselves, and do not call another of the list."""
     listed = {}
     for pattern in patterns:
-        home, name = pattern.split(":")
-        for module in parsed:
-            if re.fullmatch(rf"impactcell\.({home})", module.name):
-                for node in _syntax.functions(module):
-                    if re.fullmatch(name, node.name):
-                        listed[f"{module.name}:{node.name}"] = node
+        for module in homes(parsed, pattern):
+            for node in _syntax.functions(module):
+                if re.fullmatch(pattern.split(":")[1], node.name):
+                    listed[f"{module.name}:{node.name}"] = node
     names = {node.name for node in listed.values()}
     items = [place for place, node in listed.items() if not (_syntax.called(node) & names) - {node.name}]
     return Count(len(items), tuple(items))
