@@ -19,11 +19,11 @@ class SlideFeatures:
 
     Attributes
     ----------
-    distance : Reading
+    distance : MeasuredFeature
         From the last loss of contact to rest, m, positive along the tap.
     separation_s, stop_s : float
         Times of the last loss of contact and of rest.
-    deceleration : Reading
+    deceleration : MeasuredFeature
         Mean deceleration of the slide, m/s².
     """
 

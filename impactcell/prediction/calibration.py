@@ -203,7 +203,7 @@ def calibrate(
     ----------
     plant : Plant
         Its mu_k / mu_s is kept, mu_s is swept.
-    tap : Strike
+    tap : TapInput
         Stroke, direction and halt of the cell; its velocity and mass are swept.
     masses_kg, velocities_m_s, frictions : array_like
         In ascending order.

@@ -95,7 +95,7 @@ class LinearisedModel:
     ----------
     plant : Plant
         Its effects and gravity are kept; its four nominal parameters are those asked for.
-    tap : Strike
+    tap : TapInput
     force, position : Blocks
     """
 

@@ -118,11 +118,11 @@ class CellWorker:
             try:
                 warm_up(self._design, self._closing.is_set)
             except Exception:
-                self.log.exception("the rehearsal failed; the first cycle will be slow")
+                self.log.exception("the warm-up failed; the first cycle will be slow")
             if not self._closing.is_set():
                 loop.call_soon_threadsafe(transition.set)
 
-        threading.Thread(target=work, name=f"rehearsal-{self._design.name}", daemon=True).start()
+        threading.Thread(target=work, name=f"warm-up-{self._design.name}", daemon=True).start()
         await transition.wait()
 
     async def process(

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.benchmarks.structure import glossary
+
 ROOT = Path(__file__).resolve().parents[2]
 FILE = re.compile(r"`((?:[\w.-]+/)*\w+\.py)`")
 MODULE = re.compile(r"`((?:impactcell|simulator|tests)(?:\.\w+)+)`")
@@ -63,6 +65,20 @@ def test_docstrings_name_what_is_there() -> None:
         names = [name for name in FILE.findall(text) if not is_there(name)]
         names += [name for name in MODULE.findall(text) if not exists(name)]
         gone += [f"{path.relative_to(ROOT)}: {name}" for name in names]
+    assert gone == []
+
+
+def test_docstrings_use_no_retired_type() -> None:
+    _, retired = glossary(ROOT)
+    typed = re.compile(
+        rf"^\s*[\w, ]+ : .*\b({'|'.join(name for name in retired if name[0].isupper())})\b", re.MULTILINE
+    )
+    assert typed.search("    tap : Strike\n")
+    gone = [
+        f"{path.relative_to(ROOT)}: {match[0]}"
+        for path in SOURCES
+        for match in typed.finditer(docstrings(path))
+    ]
     assert gone == []
 
 
