@@ -25,6 +25,7 @@
     │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry, if busy)
     ├── JournalError
     │   ├── ForeignJournalError   not our file, or of another version; never overwritten
+    │   ├── JournalGoneError      the file was removed or replaced while it was in use (retry)
     │   └── JournalFullError      the disk is full, or the file cannot be used now    (retry)
     └── AccessError               users, certificates and rights of the OPC UA server
 
@@ -153,6 +154,12 @@ class JournalError(ImpactCellError):
 
 class ForeignJournalError(JournalError):
     """A file that is not this cell's journal, or of another format version; it is never overwritten."""
+
+
+class JournalGoneError(JournalError):
+    """The journal's file was removed or replaced while it was in use; what is written goes nowhere."""
+
+    retry: ClassVar[bool] = True
 
 
 class JournalFullError(JournalError):

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -19,6 +20,7 @@ from impactcell.journal.capture_codec import decode_capture, encode_capture
 from impactcell.journal.database import Upgrade, errors, open_database
 from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
 from impactcell.journal.lock import lock_journal
+from impactcell.journal.presence import FilePresence
 from impactcell.journal.retention import Retention, prune
 from impactcell.journal.schema import COLUMNS
 from impactcell.journal.stored_forms import ALARM
@@ -74,12 +76,15 @@ class Journal:
             if read_only and not path.is_file():
                 raise JournalError(f"{path}: there is no such journal")
             self._lock = None if read_only else lock_journal(path)
+        self._open = partial(open_database, path, cell, read_only=read_only, upgrade=upgrade)
         try:
-            self._db = open_database(path, cell, read_only=read_only, upgrade=upgrade)
+            self._db = self._open()
         except BaseException:
             if self._lock is not None:
                 self._lock.close()
             raise
+        self._presence = FilePresence(path)
+        self._presence.check()
 
     def __enter__(self) -> Self:
         return self
@@ -94,6 +99,20 @@ class Journal:
         self._db.close()
         if self._lock is not None:
             self._lock.close()
+
+    def begin_anew(self) -> None:
+        """Open what is at the path now, after a `JournalGoneError`: a file that was put back, or a new one.
+
+        Raises
+        ------
+        JournalError
+            As on opening; the next call tries again.
+        """
+        self._db.close()
+        self._db = self._open()
+        self._last_stored = None
+        self._presence = FilePresence(self.path)
+        self._presence.check()
 
     @property
     def cell(self) -> str:
@@ -119,6 +138,8 @@ class Journal:
         ------
         JournalFullError
             If the disk or a quota is full; nothing of the cycle is stored.
+        JournalGoneError
+            If the file is no longer there; nothing counts as stored.
         JournalError
             If the cycle is stored already, or the file cannot be written.
         """
@@ -226,6 +247,7 @@ class Journal:
                 if self._db.in_transaction:
                     self._db.execute("ROLLBACK")
                 raise
+            self._presence.check()
 
     def _errors(self) -> AbstractContextManager[None]:
         return errors(self.path)

@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from impactcell.errors import JournalError
+from impactcell.errors import JournalError, JournalGoneError
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.process.cell_logger import CellLogger
@@ -43,7 +43,11 @@ class JournalWriter:
         self.fault = ""
         self._keep = keep
         self._log = CellLogger(logging.getLogger(__name__), cell)
-        self._waiting: deque[Entry] = deque()
+        self._waiting: deque[tuple[CycleId | None, Entry]] = deque()
+        self._model = ""
+        self._gone = False
+        self._saved: CycleId | None = None
+        """Last cycle of a journal begun anew: what was written last may be in it after all, by its log."""
         self._since_pruned, self._since_checkpoint = PRUNE_EVERY, CHECKPOINT_EVERY
 
     @property
@@ -61,11 +65,16 @@ class JournalWriter:
         """Whether `maintain` is due."""
         return self.journal is not None and self._since_checkpoint >= CHECKPOINT_EVERY and not self._waiting
 
-    def cycle(self, entry: Entry) -> None:
+    def store_model(self, model: str) -> None:
+        """Write the model that the cell runs with; a journal that is begun anew gets it first."""
+        self._model = model
+        self.store(lambda journal: journal.store_model(model))
+
+    def cycle(self, cycle_id: CycleId, entry: Entry) -> None:
         """Write a cycle."""
         self._since_pruned += 1
         self._since_checkpoint += 1
-        self.store(entry)
+        self.store(entry, cycle_id)
 
     def maintain(self, time_ns: int) -> None:
         """Do what no cycle has to wait for: empty the log, and drop what has become too old or too much."""
@@ -84,11 +93,11 @@ class JournalWriter:
         except JournalError as error:
             self.fault = str(error)
 
-    def store(self, entry: Entry) -> None:
+    def store(self, entry: Entry, cycle_id: CycleId | None = None) -> None:
         """Write `entry` after all that could not be written before: no state may be ahead of its cycles."""
         if self.journal is None:
             return
-        self._waiting.append(entry)
+        self._waiting.append((cycle_id, entry))
         if len(self._waiting) > BACKLOG:
             self._waiting.popleft()
             self._log.error("the journal cannot be written; its oldest waiting entry is lost")
@@ -99,7 +108,15 @@ class JournalWriter:
         fault = ""
         while self._waiting and self.journal is not None:
             try:
-                self._waiting[0](self.journal)
+                if self._gone:
+                    self._begin_anew(self.journal)
+                cycle_id, entry = self._waiting[0]
+                if cycle_id is None or cycle_id != self._saved:
+                    entry(self.journal)
+            except JournalGoneError as error:
+                self._gone, self.fault = True, str(error)
+                self._log.error("%s", error)
+                return
             except JournalError as error:
                 if error.retry:
                     self.fault = str(error)
@@ -109,6 +126,16 @@ class JournalWriter:
                 self._log.error("an entry of the journal is lost: %s", error)
             self._waiting.popleft()
         self.fault = fault
+
+    def _begin_anew(self, journal: Journal) -> None:
+        try:
+            journal.begin_anew()
+            journal.store_model(self._model)
+        except JournalError as error:
+            raise JournalGoneError(f"{journal.path}: cannot be begun anew: {error}") from error
+        self._gone = False
+        self._saved = journal.last_cycle_id()
+        self._log.warning("%s: the journal is begun anew", journal.path)
 
     def close(self) -> None:
         """Close the journal."""

@@ -192,8 +192,7 @@ class CellWorker:
 
     def _store_model(self) -> None:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
-        model = MODEL.dumps(self._design.model)
-        self._journal_writer.store(lambda journal: journal.store_model(model))
+        self._journal_writer.store_model(MODEL.dumps(self._design.model))
 
     def _fitted(self, design: CellDesign, state: CellState) -> CellState:
         """Make the state fit the design; what that costs is told, here and by the signature's quality."""
@@ -230,9 +229,9 @@ class CellWorker:
         self._state, self._snapshot = step_result.state, step_result.snapshot
         if self._journal_writer.journal is None:
             return CycleResult(step_result, self.last)
-        blob = self._blob()
+        blob, snapshot, changed = self._blob(), step_result.snapshot, step_result.changed
         self._journal_writer.cycle(
-            lambda journal: journal.append(capture, step_result.snapshot, blob, step_result.changed)
+            self.last, lambda journal: journal.append(capture, snapshot, blob, changed)
         )
         return CycleResult(step_result, self.durable)
 
