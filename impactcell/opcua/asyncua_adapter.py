@@ -20,6 +20,7 @@ from asyncua import Server as StandardServer
 from asyncua import ua
 from asyncua.common.connection import SecureConnection, TransportLimits
 from asyncua.common.utils import Buffer, NotEnoughData
+from asyncua.crypto import uacrypto
 from asyncua.crypto.security_policies import (
     SecurityPolicyAes128Sha256RsaOaep,
     SecurityPolicyAes256Sha256RsaPss,
@@ -27,21 +28,22 @@ from asyncua.crypto.security_policies import (
     SecurityPolicyFactory,
     SecurityPolicyNone,
 )
-from asyncua.crypto.uacrypto import InvalidSignature, verify_pss_sha256, verify_sha256, x509_from_der
+from asyncua.crypto.uacrypto import verify_pss_sha256, verify_sha256
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 from asyncua.ua import ua_binary
 from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, struct_to_binary, uatcp_to_binary
 from asyncua.ua.uaprotocol_auto import DataChangeFilter as DecodedDataChangeFilter
 from asyncua.ua.uatypes import datetime_to_win_epoch
+from cryptography import exceptions
 
 __all__ = [
+    "INVALID_SIGNATURE",
     "SECURITY_POLICIES",
     "SIGNATURE_CHECKS",
     "AddressSpace",
     "AttributeValue",
     "Buffer",
     "DecodedDataChangeFilter",
-    "InvalidSignature",
     "NodeData",
     "NotEnoughData",
     "SecureConnection",
@@ -59,7 +61,6 @@ __all__ = [
     "struct_from_binary",
     "struct_to_binary",
     "uatcp_to_binary",
-    "x509_from_der",
 ]
 
 SECURITY_POLICIES: Final = {
@@ -77,6 +78,10 @@ SIGNATURE_CHECKS: Final = {
     "http://opcfoundation.org/UA/security/rsa-pss-sha2-256": verify_pss_sha256,
 }
 """Check of a signature, `(certificate, data, signature)`, by the URI of its algorithm (Part 7)."""
+
+INVALID_SIGNATURE: Final = (uacrypto.InvalidSignature, exceptions.InvalidSignature)
+"""What a signature that does not fit raises: asyncua's own where keys are shared, that of the library below
+where they are public."""
 
 MAX_NULLS: Final = 10_000
 """Longest array of nulls that is decoded: its elements take no bytes, so that its length bounds nothing.

@@ -16,10 +16,10 @@ from asyncua import ua
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import padding, rsa
 
-from impactcell.opcua.asyncua_adapter import SIGNATURE_CHECKS, InvalidSignature, x509_from_der
+from impactcell.opcua.asyncua_adapter import INVALID_SIGNATURE, SIGNATURE_CHECKS
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import Actor, UserDirectory
-from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain
+from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain, parse_certificate
 
 _log = logging.getLogger(__name__)
 
@@ -182,7 +182,7 @@ class Authenticator:
     ) -> Actor:
         try:
             data = first_of_chain(token.CertificateData or b"")
-            certificate = x509_from_der(data)
+            certificate = parse_certificate(data)
         except ValueError:
             raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid) from None
         check = SIGNATURE_CHECKS.get(signature.Algorithm or "")
@@ -190,7 +190,7 @@ class Authenticator:
             raise StatusCodeError(ua.StatusCodes.BadUserSignatureInvalid)
         try:
             check(certificate, self._trust.own_certificate + nonce, signature.Signature)
-        except (InvalidSignature, ValueError, TypeError, AttributeError):
+        except (*INVALID_SIGNATURE, ValueError, TypeError, AttributeError):
             raise StatusCodeError(ua.StatusCodes.BadUserSignatureInvalid) from None
         user = self._users.find_by_certificate(fingerprint(data))
         if user is None or not self._trust.is_valid_now(certificate):

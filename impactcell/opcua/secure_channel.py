@@ -13,8 +13,8 @@ from typing import Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import (
+    INVALID_SIGNATURE,
     Buffer,
-    InvalidSignature,
     SecureConnection,
     SecurityPolicyFactory,
     SecurityPolicyNone,
@@ -148,7 +148,7 @@ class SecureChannel:
             if code == ua.StatusCodes.BadRequestTooLarge:
                 code = ua.StatusCodes.BadTcpMessageTooLarge
             raise SecureChannelError(code, "a message beyond the limits") from error
-        except (InvalidSignature, ua.UaError, ValueError, TypeError, OverflowError, IndexError) as error:
+        except (*INVALID_SIGNATURE, ua.UaError, ValueError, TypeError, OverflowError, IndexError) as error:
             raise SecureChannelError(
                 ua.StatusCodes.BadSecurityChecksFailed, f"security checks: {error}"
             ) from error

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from asyncua import ua
 
-from impactcell.opcua.asyncua_adapter import InvalidSignature, StrictBuffer
+from impactcell.opcua.asyncua_adapter import INVALID_SIGNATURE, StrictBuffer
 from impactcell.opcua.authentication import Authenticator
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.discovery_service import DiscoveryService
@@ -146,7 +146,7 @@ class SessionService:
             policy.asymmetric_cryptography.verify(
                 self._trust.own_certificate + session.nonce, signature.Signature or b""
             )
-        except (InvalidSignature, ValueError, TypeError):
+        except (*INVALID_SIGNATURE, ValueError, TypeError):
             raise StatusCodeError(ua.StatusCodes.BadApplicationSignatureInvalid) from None
 
     async def close_session(self, context: RequestContext, body: StrictBuffer) -> ua.CloseSessionResponse:

@@ -35,10 +35,23 @@ _log = logging.getLogger(__name__)
 FOLDERS: Final = ("own", "trusted", "issuers", "revoked", "rejected")
 MAX_REJECTED: Final = 100
 """Refused certificates kept for review."""
+MAX_NAME: Final = 80
+"""Longest part of a subject in the name of a file, characters."""
 MIN_KEY_BITS: Final = 2048
 """Shortest RSA key of the policies on offer (Part 7)."""
 MAX_CHAIN_LENGTH: Final = 5
 """Certificates from a client's to a trusted authority."""
+
+
+UNREADABLE: Final = (
+    ValueError,
+    TypeError,
+    UnsupportedAlgorithm,
+    x509.InvalidVersion,
+    x509.DuplicateExtension,
+    x509.UnsupportedGeneralNameType,
+)
+"""What reading a certificate that somebody else has made may raise."""
 
 
 class UntrustedError(Exception):
@@ -64,7 +77,7 @@ def read_certificate(path: Path) -> x509.Certificate:
         The file is absent or holds no certificate.
     """
     try:
-        return _parse(path.read_bytes())
+        return parse_certificate(path.read_bytes())
     except OSError as error:
         raise AccessError(f"{path}: {error.strerror}") from error
     except ValueError as error:
@@ -72,17 +85,33 @@ def read_certificate(path: Path) -> x509.Certificate:
 
 
 @lru_cache(maxsize=1024)
-def _parse(data: bytes) -> x509.Certificate:
-    if data.lstrip().startswith(b"-----BEGIN"):
-        return x509.load_pem_x509_certificate(data)
-    return x509.load_der_x509_certificate(data)
+def parse_certificate(data: bytes) -> x509.Certificate:
+    """Read a certificate in PEM or DER.
+
+    Raises
+    ------
+    ValueError
+        It cannot be read, or has a key that cannot be used.
+    """
+    is_pem = data.lstrip().startswith(b"-----BEGIN")
+    try:
+        certificate = (x509.load_pem_x509_certificate if is_pem else x509.load_der_x509_certificate)(data)
+        # What is looked at later is read now: each has errors of its own.
+        certificate.public_key()
+        _ = certificate.signature_hash_algorithm, certificate.subject, certificate.issuer
+        _ = certificate.extensions, certificate.not_valid_before_utc, certificate.not_valid_after_utc
+    except UNREADABLE as error:
+        raise ValueError(f"not a certificate: {error}") from error
+    return certificate
 
 
 @lru_cache(maxsize=64)
 def _parse_revocations(data: bytes) -> x509.CertificateRevocationList:
-    if data.lstrip().startswith(b"-----BEGIN"):
-        return x509.load_pem_x509_crl(data)
-    return x509.load_der_x509_crl(data)
+    is_pem = data.lstrip().startswith(b"-----BEGIN")
+    try:
+        return (x509.load_pem_x509_crl if is_pem else x509.load_der_x509_crl)(data)
+    except UNREADABLE as error:
+        raise ValueError(f"not a revocation list: {error}") from error
 
 
 def der(certificate: x509.Certificate) -> bytes:
@@ -152,7 +181,7 @@ class TrustList:
             With the reason, for the log.
         """
         try:
-            certificate = _parse(first_of_chain(data))
+            certificate = parse_certificate(first_of_chain(data))
         except ValueError as error:
             raise UntrustedError("not a certificate") from error
         try:
@@ -191,7 +220,7 @@ class TrustList:
                     continue
                 try:
                     certificate.verify_directly_issued_by(candidate)
-                except (ValueError, TypeError, InvalidSignature):
+                except (*UNREADABLE, InvalidSignature):
                     continue
                 return candidate
         return None
@@ -210,7 +239,7 @@ class TrustList:
     def _certificates(self, folder: str) -> Iterator[x509.Certificate]:
         for path, data in self._files(folder):
             try:
-                yield _parse(data)
+                yield parse_certificate(data)
             except ValueError:
                 _log.warning("%s: no certificate in PEM or DER; ignored", path)
 
@@ -221,7 +250,8 @@ class TrustList:
 
     def _reject(self, certificate: x509.Certificate) -> None:
         folder = self._directory / "rejected"
-        name = certificate.subject.rfc4514_string().replace("/", "_").replace("\\", "_")[:80]
+        subject = certificate.subject.rfc4514_string()[:MAX_NAME]
+        name = "".join(c if c.isascii() and c.isprintable() and c not in "/\\" else "_" for c in subject)
         path = folder / f"{name} [{thumbprint(der(certificate))}].der"
         try:
             rejected = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
@@ -250,7 +280,7 @@ def first_of_chain(data: bytes) -> bytes:
 
 def application_uris(data: bytes) -> list[str]:
     """Application URIs that a certificate was made out to."""
-    certificate = _parse(first_of_chain(data))
+    certificate = parse_certificate(first_of_chain(data))
     try:
         names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except x509.ExtensionNotFound:

@@ -2,6 +2,7 @@
 
 import datetime as dt
 import io
+import random
 import stat
 import sys
 from pathlib import Path
@@ -139,6 +140,27 @@ def test_what_is_refused(pki: Path, what: str) -> None:
         found = b"\x30\x03abc"
     with pytest.raises(UntrustedError):
         trust.check(found)
+
+
+@pytest.mark.filterwarnings("ignore::cryptography.utils.CryptographyDeprecationWarning")
+def test_a_certificate_that_is_no_certificate_is_untrusted_and_nothing_else(tmp_path: Path) -> None:
+    """Bytes of a good one changed at random: whatever the library below thinks of them, they are refused."""
+    trust, rng, good = TrustList(tmp_path / "pki", URI), random.Random(1), der(certificate("client", 0))
+    for _ in range(3_000):
+        data = bytearray(good)
+        for _ in range(rng.randint(1, 3)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        with pytest.raises(UntrustedError):
+            trust.check(bytes(data[: rng.randrange(len(data))] if rng.random() < 0.1 else data))
+
+
+def test_a_rejected_certificate_is_kept_whatever_its_subject(tmp_path: Path) -> None:
+    pki = tmp_path / "pki"
+    trust = TrustList(pki, URI)
+    for number, name in enumerate(("a/../../b", "a\\b", "a\x00b", "a\nb", "\u00e4" * 32, "..")):
+        with pytest.raises(UntrustedError):
+            trust.check(der(certificate(name, 0)))
+        assert len(list((pki / "rejected").iterdir())) == number + 1, repr(name)
 
 
 def test_rejected_certificates_do_not_pile_up(pki: Path, monkeypatch: pytest.MonkeyPatch) -> None:
