@@ -21,7 +21,8 @@ Who uses the server gives it an address space, methods and the answers of `host_
 `discovery_service`          GetEndpoints, FindServers
 `session_service`            CreateSession, ActivateSession, CloseSession: no session without encryption,
                              certificates and signatures compared
-`authentication`             identity tokens into users; guessing becomes slow
+`authentication`             identity tokens into users
+`login_throttle`             guessing passwords becomes slow, for who guesses alone
 `session_table`              tokens that cannot be guessed, bound to their channel; limits; timeouts;
                              continuation points
 `attribute_service`          Read, Write: index ranges, encodings, timestamps, the reader's own rights

@@ -1,15 +1,14 @@
-"""Logins: identity tokens in, actors out; guessing passwords becomes slow.
+"""Logins: identity tokens in, actors out.
 
-Checking a password takes tens of milliseconds on purpose. It happens in threads of its own, one at a time
-for each address, so that somebody who guesses neither stops the server nor delays others.
+Checking a password takes tens of milliseconds on purpose. It happens in threads of its own, so that nobody
+who guesses stops the server; `login_throttle` says when.
 """
 
 import asyncio
 import logging
 import struct
-import time
-from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any, Final
 
 from asyncua import ua
@@ -19,22 +18,15 @@ from cryptography.hazmat.primitives.asymmetric import padding, rsa
 from impactcell.opcua.asyncua_adapter import INVALID_SIGNATURE, SIGNATURE_CHECKS
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import Actor, UserDirectory
+from impactcell.opcua.login_throttle import LoginThrottle
 from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain, parse_certificate
 
 _log = logging.getLogger(__name__)
 
-UNDELAYED_FAILURES: Final = 4
-"""Wrong passwords an address may send without a delay: people mistype."""
-FIRST_DELAY_S: Final = 0.25
-"""Delay of the answer to the next one; it doubles with each."""
-MAX_DELAY_S: Final = 8.0
-"""Longest delay, seconds: one address then tries fewer than 11 000 passwords a day."""
-FORGET_AFTER_S: Final = 900.0
-"""An address that has been silent for so long begins anew."""
-MAX_ADDRESSES: Final = 4_096
-"""Addresses remembered at once, some 1 MB."""
 MAX_PASSWORD_BYTES: Final = 1_024
 """Longest password that is hashed."""
+MAX_NAME: Final = 256
+"""Longest user name, characters."""
 
 _OAEP: Final = {
     "http://www.w3.org/2001/04/xmlenc#rsa-oaep": hashes.SHA1,
@@ -42,46 +34,19 @@ _OAEP: Final = {
 }
 
 
-class _AddressRecord:
-    """What is known of one address: wrong passwords since the last right one, by user name."""
+@dataclass(frozen=True, slots=True)
+class ClientApplication:
+    """The client that a user logs in with.
 
-    __slots__ = ("failures", "last_attempt_s", "lock")
+    Attributes
+    ----------
+    address : str
+    certificate : bytes or None
+        Its certificate, of which it has proved that it has the key; None without security.
+    """
 
-    def __init__(self) -> None:
-        self.failures: dict[str, int] = {}
-        self.last_attempt_s = 0.0
-        self.lock = asyncio.Lock()
-
-
-class LoginThrottle:
-    """Delays answers to an address from its fifth wrong password on: 0.25 s, doubled each time, up to 8 s."""
-
-    def __init__(self) -> None:
-        self._addresses: OrderedDict[str, _AddressRecord] = OrderedDict()
-
-    def record_of(self, address: str) -> _AddressRecord:
-        """Look up an address; the longest unseen is forgotten when there are too many."""
-        record = self._addresses.setdefault(address, _AddressRecord())
-        self._addresses.move_to_end(address)
-        now = time.monotonic()
-        if now - record.last_attempt_s > FORGET_AFTER_S:
-            record.failures.clear()
-        record.last_attempt_s = now
-        while len(self._addresses) > MAX_ADDRESSES:
-            self._addresses.popitem(last=False)
-        return record
-
-    @staticmethod
-    def delay(failures: int) -> float:
-        """Delay of the answer when `wrong` passwords, this one included, were wrong.
-
-        >>> [LoginThrottle.delay(n) for n in (4, 5, 6, 50)]
-        [0.0, 0.25, 0.5, 8.0]
-        """
-        if failures <= UNDELAYED_FAILURES:
-            return 0.0
-        doublings = min(failures - UNDELAYED_FAILURES - 1, 16)
-        return min(FIRST_DELAY_S * 2.0**doublings, MAX_DELAY_S)
+    address: str
+    certificate: bytes | None
 
 
 class Authenticator:
@@ -98,13 +63,7 @@ class Authenticator:
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     async def identify(
-        self,
-        token: Any,
-        signature: ua.SignatureData,
-        nonce: bytes,
-        address: str,
-        *,
-        encrypted: bool,
+        self, token: Any, signature: ua.SignatureData, nonce: bytes, client: ClientApplication
     ) -> Actor:
         """Find out who a token stands for.
 
@@ -116,29 +75,31 @@ class Authenticator:
             user).
         """
         if isinstance(token, ua.UserNameIdentityToken):
-            return await self._identify_by_password(token, nonce, address, encrypted=encrypted)
+            return await self._identify_by_password(token, nonce, client)
         if isinstance(token, ua.X509IdentityToken):
-            return self._identify_by_certificate(token, signature, nonce, address)
+            return self._identify_by_certificate(token, signature, nonce, client.address)
         raise StatusCodeError(ua.StatusCodes.BadIdentityTokenRejected)
 
     async def _identify_by_password(
-        self, token: ua.UserNameIdentityToken, nonce: bytes, address: str, *, encrypted: bool
+        self, token: ua.UserNameIdentityToken, nonce: bytes, client: ClientApplication
     ) -> Actor:
-        password = self._decrypt(token, nonce, encrypted=encrypted)
-        name = token.UserName or ""
-        record = self._throttle.record_of(address)
-        async with record.lock:
+        password = self._decrypt(token, nonce, encrypted=client.certificate is not None)
+        name, address = token.UserName or "", client.address
+        if len(name) > MAX_NAME:
+            raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid)
+        certificate = fingerprint(client.certificate) if client.certificate else ""
+        async with self._throttle.attempt(address, name, certificate) as attempt:
             user = self._users.find(name)
             matches = await asyncio.get_running_loop().run_in_executor(
                 self._pool, self._users.verify_password, user, password
             )
             if matches and user is not None:
-                record.failures.pop(name, None)
+                attempt.succeeded()
+                self._throttle.remember(name, certificate)
                 return Actor(user.name, user.role, address)
-            record.failures[name] = record.failures.get(name, 0) + 1
-            failures = sum(record.failures.values())
-            _log.warning("wrong password for %r from %s, number %d", name, address, failures)
-            await asyncio.sleep(LoginThrottle.delay(failures))
+            number = attempt.failed()
+            _log.warning("wrong password for %r from %s, number %d", name, address, number)
+        await asyncio.sleep(attempt.delay_s)
         raise StatusCodeError(ua.StatusCodes.BadUserAccessDenied)
 
     def _decrypt(self, token: ua.UserNameIdentityToken, nonce: bytes, *, encrypted: bool) -> str:

@@ -11,7 +11,7 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import INVALID_SIGNATURE, StrictBuffer
-from impactcell.opcua.authentication import Authenticator
+from impactcell.opcua.authentication import Authenticator, ClientApplication
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.discovery_service import DiscoveryService
 from impactcell.opcua.host_interface import ServerLimits
@@ -118,8 +118,7 @@ class SessionService:
             parameters.UserIdentityToken,
             parameters.UserTokenSignature,
             nonce,
-            context.connection.address,
-            encrypted=channel.is_encrypted,
+            ClientApplication(context.connection.address, channel.peer_certificate),
         )
         if session.closed:
             raise StatusCodeError(ua.StatusCodes.BadSessionIdInvalid)

@@ -1,17 +1,20 @@
 """The door: passwords, certificates, trust, sessions and their limits, tried by a client."""
 
 import asyncio
-import time
+import contextlib
+from collections.abc import AsyncIterator, Awaitable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from asyncua import Client, ua
 from asyncua.crypto import uacrypto
 
 from impactcell.errors import AccessError
+from impactcell.opcua import login_throttle
 from impactcell.scada import Role, SecurityPolicy, ServerLimits
-from impactcell.scada.users import User, read_users, with_password, write_users
-from tests.opcua_server import CLIENT_URI, PASSWORDS, site
+from impactcell.scada.users import User, read_users, verify, with_password, write_users
+from tests.opcua_server import CLIENT_URI, PASSWORDS, Site, site
 
 codes = ua.StatusCodes
 
@@ -26,26 +29,6 @@ async def refusal(client: Client) -> int:
     except (TimeoutError, ConnectionError, ua.UaError):
         return int(codes.BadConnectionClosed)
     return 0
-
-
-async def login(client: Client) -> float:
-    """Seconds a login takes, its connection and channel not counted."""
-    await client.connect_socket()
-    try:
-        await client.send_hello()
-        await client.open_secure_channel()
-        await client.create_session()
-        begin = time.monotonic()
-        try:
-            await client.activate_session(client._username, client._password)
-        finally:
-            taken = time.monotonic() - begin
-        await client.close_session()
-    except ua.UaStatusCodeError:
-        await client.close_secure_channel()
-    finally:
-        client.disconnect_socket()
-    return taken
 
 
 async def test_every_policy_with_password() -> None:
@@ -81,30 +64,81 @@ async def test_allowed_without_encryption_with_a_warning(caplog: pytest.LogCaptu
         assert await refusal(nobody) == codes.BadIdentityTokenRejected, "anonymous"
 
 
-async def test_wrong_passwords_slow_down_and_others_do_not_wait() -> None:
+@pytest.fixture
+def slow_answers(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Let the answer to a wrong password take an hour from the second on; the names that are checked."""
+    monkeypatch.setattr(login_throttle, "UNDELAYED_FAILURES", 1)
+    monkeypatch.setattr(login_throttle, "FIRST_DELAY_S", 3600.0)
+    monkeypatch.setattr(login_throttle, "MAX_DELAY_S", 3600.0)
+    checked: list[str] = []
+
+    def check(user: User | None, password: str) -> bool:
+        checked.append(user.name if user else "")
+        return verify(user, password)
+
+    monkeypatch.setattr("impactcell.scada.users.Users.verify_password", staticmethod(check))
+    return checked
+
+
+@contextlib.asynccontextmanager
+async def guessing(
+    here: Site, user: str, times: int, checked: list[str], certificate: tuple[Path, Path] | None = None
+) -> AsyncIterator[list[asyncio.Task[int]]]:
+    """Guess on several connections at once, until as many guesses have been checked as will be."""
+    assert await refusal(await here.client(user, "guess", certificate=certificate)) != 0
+    before = len(checked)
+    clients = [await here.client(user, "guess", certificate=certificate) for _ in range(times)]
+    tasks = [asyncio.create_task(refusal(client)) for client in clients]
+    while len(checked) < before + min(times, login_throttle.TURNS_PER_NAME):
+        await asyncio.sleep(0)
+    try:
+        yield tasks
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def in_time(work: Awaitable[int]) -> int:
+    """Wait for what must not wait for a guesser's hour."""
+    return await asyncio.wait_for(work, 60)
+
+
+async def test_only_the_guesser_waits(slow_answers: list[str]) -> None:
+    """From one address, with one certificate: right passwords are answered while wrong ones wait."""
+    async with site() as here, guessing(here, "operator", 2, slow_answers) as guesses:
+        assert await in_time(refusal(await here.client("operator"))) == 0, "the guessed user"
+        assert await in_time(refusal(await here.client("engineer"))) == 0, "another user"
+        assert not any(guess.done() for guess in guesses), "a wrong password was answered at once"
+
+
+async def test_a_client_that_is_known_does_not_wait_for_one_that_guesses(slow_answers: list[str]) -> None:
+    """All turns of a name at an address are taken by guesses; who has logged in before has its own."""
     async with site() as here:
-        delays = [await login(await here.client("operator", "guess")) for _ in range(6)]
-        assert min(delays[4:]) >= 0.25, delays
-        assert delays[5] > delays[4], "the delay grows"
-        guessing = asyncio.create_task(login(await here.client("operator", "guess")))
-        port = here.server.endpoint.split(":")[2].split("/")[0]
-        elsewhere = await here.client("observer")
-        # Another address of this machine stands for another machine.
-        begin = time.monotonic()
-        loop = asyncio.get_running_loop()
-        uaclient = elsewhere.uaclient
+        stranger = here.untrusted()
+        (here.directory / "pki" / "trusted" / "second.der").write_bytes(stranger[0].read_bytes())
+        assert await refusal(await here.client("operator")) == 0
+        async with guessing(here, "operator", 8, slow_answers, stranger) as guesses:
+            assert await in_time(refusal(await here.client("operator"))) == 0
+            assert not any(guess.done() for guess in guesses)
 
-        async def connect(host: str, _port: int) -> None:
-            await loop.create_connection(
-                uaclient._make_protocol, "127.0.0.1", int(port), local_addr=("127.0.0.2", 0)
-            )
 
-        uaclient.connect_socket = connect
-        taken = await login(elsewhere)
-        assert not guessing.done(), "the guess was answered first"
-        assert taken < 0.25, f"a correct login from elsewhere took {taken:.3f} s"
-        assert time.monotonic() - begin < 5
-        await guessing
+async def test_hanging_up_does_not_shorten_the_delay(slow_answers: list[str]) -> None:
+    """A guesser who does not wait for the answer finds no turn on the next connection."""
+    async with site() as here:
+        async with guessing(here, "operator", 3, slow_answers):
+            pass
+        checked = len(slow_answers)
+        again = asyncio.create_task(refusal(await here.client("operator", "another guess")))
+        assert await in_time(refusal(await here.client("engineer"))) == 0
+        assert slow_answers[checked:] == ["engineer"], "a fourth guess was checked"
+        again.cancel()
+        await asyncio.gather(again, return_exceptions=True)
+
+
+def test_the_delay_grows() -> None:
+    delays = [login_throttle.delay_s(number) for number in range(1, 12)]
+    assert delays == [0, 0, 0, 0, 0.25, 0.5, 1, 2, 4, 8, 8]
 
 
 async def test_trust_list_is_read_without_a_restart() -> None:
