@@ -147,9 +147,7 @@ def step(
     tracked = wear_batch.update(
         design.tracker,
         state.tracker,
-        FrictionObservation.of(
-            capture.cycle, capture.time_ns, friction, named.batch_id, expected=named.expected
-        ),
+        FrictionObservation.of(capture, friction, named.batch_id, expected=named.expected),
     )
     conditions = CycleConditions(
         batch_id=tracked.batch.batch_id,

@@ -103,6 +103,8 @@ _STATE_2_RENAMED: Final[Mapping[str, str]] = {
     **_under("state.alarms.alarms.*", _ALARM_2_RENAMED),
 }
 """Of all that `StoredState` holds."""
+_STATE_2_ADDED: Final[Mapping[str, Tree]] = {"state.tracker.clock.session": 0}
+"""What a state did not keep before."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
 
@@ -110,7 +112,7 @@ STATE_MIGRATIONS: Final = (
     Migration(
         _state_2,
         renamed=_STATE_2_RENAMED,
-        added=_under("state.alarms.alarms.*", _ALARM_2_ADDED),
+        added={**_under("state.alarms.alarms.*", _ALARM_2_ADDED), **_STATE_2_ADDED},
     ),
 )
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)

@@ -1,7 +1,7 @@
 """Is an estimate usable, and where in time does its cycle belong? Says why where something is wrong."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 LARGEST_FRICTION = 10.0
 """mu_s beyond this is a fault of the measurement: no dry pair of materials comes near."""
@@ -29,6 +29,8 @@ class CycleClock:
         Time of the newest cycle.
     period_s : float
         Present time between cycles; nan while unknown.
+    session : int
+        That of the newest cycle: changes when the module has restarted and counts anew; 0 while unknown.
     """
 
     base: int = 0
@@ -36,6 +38,7 @@ class CycleClock:
     seen: tuple[int, ...] = ()
     time_ns: int = 0
     period_s: float = math.nan
+    session: int = 0
 
     def number(self, index: int) -> int:
         """Cycle number as the module counts."""
@@ -54,30 +57,40 @@ class CycleTiming:
 
 
 def update_clock(
-    clock: CycleClock, cycle: int, time_ns: int, reorder_limit: int
+    clock: CycleClock, cycle: int, time_ns: int, reorder_limit: int, session: int = 0
 ) -> tuple[CycleClock, CycleTiming]:
-    """Find where a cycle belongs and move the clock there."""
-    index = cycle + clock.base
+    """Find where a cycle belongs and move the clock there.
+
+    Parameters
+    ----------
+    reorder_limit : int
+        A cycle that comes at most this many cycles late is one that comes late; numbers farther back are
+        those of a module that counts anew.
+    session : int
+        The module's; another one than before says that it counts anew, 0 says nothing.
+    """
+    index, session = cycle + clock.base, session or clock.session
     if not clock.seen:
-        return CycleClock(clock.base, index, (index,), time_ns), CycleTiming(index, 0, 0, repeated=False)
-    if index == clock.last or index in clock.seen:
+        timing = CycleTiming(index, 0, 0, repeated=False)
+        return CycleClock(clock.base, index, (index,), time_ns, session=session), timing
+    is_new_session = clock.session not in (0, session)
+    lag = clock.last - index
+    if not is_new_session and (index == clock.last or index in clock.seen):
         note = f"cycle {cycle} came twice, the second is ignored"
         return clock, CycleTiming(index, 0, 0, repeated=True, note=note)
-    seen, lag = (*clock.seen[-reorder_limit:], index), clock.last - index
-    if 0 < lag <= reorder_limit:
-        clock = CycleClock(clock.base, clock.last, seen, clock.time_ns, clock.period_s)
+    seen = clock.seen[-reorder_limit:]
+    if not is_new_session and 0 < lag <= reorder_limit:
+        clock = replace(clock, seen=(*seen, index), session=session)
         return clock, CycleTiming(index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late")
-    has_restarted = lag > 0
+    has_restarted = is_new_session or lag > 0
     base = clock.last + 1 - cycle if has_restarted else clock.base
     index = cycle + base
     passed = index - clock.last
     time_ns, period_s, note = _update_period(clock, time_ns, passed)
     if has_restarted:
-        seen = (*seen[:-1], index)
         note = "; ".join(filter(None, (f"cycle numbers restarted at {cycle}", note)))
-    return CycleClock(base, index, seen, time_ns, period_s), CycleTiming(
-        index, passed, 0, repeated=False, note=note
-    )
+    timing = CycleTiming(index, passed, 0, repeated=False, note=note)
+    return CycleClock(base, index, (*seen, index), time_ns, period_s, session), timing
 
 
 def validate_estimate(value: float, std: float) -> tuple[str, bool]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from impactcell.records import BatchState, Evidence, FrictionEstimate, Samples, WearState
+from impactcell.records import BatchState, Capture, Evidence, FrictionEstimate, Samples, WearState
 from impactcell.tracking.wear_batch.input_validation import CycleClock, CycleTiming
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
@@ -16,7 +16,15 @@ from impactcell.tracking.wear_batch.wear_filter import WearFilter
 
 @dataclass(frozen=True, slots=True)
 class FrictionObservation:
-    """What one cycle brings: mu_s, its standard deviation (nan where there is none), what the PLC says."""
+    """What one cycle brings: mu_s, its standard deviation (nan where there is none), what the PLC says.
+
+    Attributes
+    ----------
+    expected_change : bool
+        What the estimate is of changes with this cycle, and somebody said so: another batch, another model.
+    session : int
+        The module's; another one than before counts its cycles anew. 0 where it is not known.
+    """
 
     cycle: int
     mu_s: float
@@ -24,19 +32,15 @@ class FrictionObservation:
     time_ns: int = 0
     batch_id: str | None = None
     expected_change: bool = False
+    session: int = 0
 
     @classmethod
     def of(
-        cls,
-        cycle: int,
-        time_ns: int,
-        estimate: FrictionEstimate,
-        batch_id: str | None,
-        *,
-        expected: bool = False,
+        cls, capture: Capture, estimate: FrictionEstimate, batch_id: str | None, *, expected: bool = False
     ) -> "FrictionObservation":
-        """Take the published mu_s of an estimate."""
-        return cls(cycle, estimate.mu_s.value, estimate.mu_s.std, time_ns, batch_id, expected)
+        """Take the published mu_s of the estimate from a capture."""
+        mu_s = estimate.mu_s
+        return cls(capture.cycle, mu_s.value, mu_s.std, capture.time_ns, batch_id, expected, capture.session)
 
 
 ANNOUNCED, UNSAID, RULED_OUT = 1.0, 0.0, -1.0

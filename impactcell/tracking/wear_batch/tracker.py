@@ -46,7 +46,11 @@ def update(
     is used. Cycle numbers may be missing, late, repeated or restart; the clock may go back.
     """
     clock, timing = input_validation.update_clock(
-        state.clock, observation.cycle, observation.time_ns, settings.reorder_limit
+        state.clock,
+        observation.cycle,
+        observation.time_ns,
+        settings.reorder_limit,
+        observation.session,
     )
     fault, is_unusable = input_validation.validate_estimate(observation.mu_s, observation.mu_s_std)
     notes = [note for note in (timing.note, fault) if note]

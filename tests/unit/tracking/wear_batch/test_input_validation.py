@@ -43,3 +43,28 @@ def test_the_last_cycle_that_was_used_is_known_to_have_come_however_many_were_of
         clock = replace(update_clock(clock, cycle, 0, LIMIT)[0], last=100)
     _, where = update_clock(clock, 100, 10**18 + 10**12, LIMIT)
     assert where.repeated
+
+
+def test_a_module_that_restarts_counts_anew_from_its_first_cycle_on():
+    """Sixty cycles after a restart, told by the session alone: none came twice, none came late."""
+    clock, timings = CycleClock(), []
+    for session, cycle in [*((7, c) for c in range(1, 60)), *((8, c) for c in range(1, 60))]:
+        clock, timing = update_clock(clock, cycle, 0, LIMIT, session)
+        timings.append(timing)
+    assert not any(timing.repeated or timing.lag for timing in timings)
+    assert [timing.index for timing in timings] == list(range(1, 119))
+    assert timings[59].note == "cycle numbers restarted at 1"
+    assert clock.number(clock.last) == 59
+    # the same cycle of the same session is one that came twice
+    assert update_clock(clock, 59, 0, LIMIT, 8)[1].repeated
+
+
+def test_a_session_that_was_not_known_before_is_no_restart():
+    clock, _ = come([10, 11])
+    clock, timing = update_clock(clock, 11, 0, LIMIT, 5)
+    assert timing.repeated
+    clock, timing = update_clock(clock, 14, 0, LIMIT, 5)
+    assert (timing.index, timing.passed, clock.session) == (14, 3, 5)
+    # nor is one that says nothing
+    clock, timing = update_clock(clock, 15, 0, LIMIT)
+    assert (timing.passed, clock.session) == (1, 5)
