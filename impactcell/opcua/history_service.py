@@ -19,6 +19,7 @@ from impactcell.opcua.historical_variable import (
 )
 from impactcell.opcua.history_processed import read_processed
 from impactcell.opcua.host_interface import AccessPolicy, HistoryProvider, Permission, RefusedError
+from impactcell.opcua.method_service import status_of
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
 from impactcell.opcua.variable_store import with_timestamps
 
@@ -85,7 +86,7 @@ class HistoryService:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
         except RefusedError as refused:
-            result.StatusCode = ua.StatusCode(getattr(ua.StatusCodes, refused.code))
+            result.StatusCode = status_of(refused)
             return result
         if isinstance(data, ua.HistoryData):
             data.DataValues = [

@@ -166,6 +166,13 @@ class AccessPolicy(Protocol):
         """Whether a role has a permission on a node; for `CALL` the node is the method."""
 
 
+class AuditLog(Protocol):
+    """What people have done."""
+
+    def method_called(self, actor: Actor, request: "ua.CallMethodRequest", status: int, reason: str) -> None:
+        """Write down the call of a method, refused ones too; `reason` is in words, or empty."""
+
+
 @dataclass(frozen=True, slots=True)
 class HistoryRequest:
     """Which part of the past is wanted: nanoseconds since 1970, both ends inclusive, None is open.
@@ -235,4 +242,5 @@ class Host:
     product: Product
     users: UserDirectory
     access: AccessPolicy
+    audit: AuditLog
     history: HistoryProvider

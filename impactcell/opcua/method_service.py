@@ -12,7 +12,7 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
-from impactcell.opcua.host_interface import AccessPolicy, Permission, RefusedError, Role
+from impactcell.opcua.host_interface import AccessPolicy, AuditLog, Permission, RefusedError, Role
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
 
 MAX_CALLS = 100
@@ -50,9 +50,10 @@ class Method:
 class MethodService:
     """Answers Call. Methods are bound to (object, method) pairs; anything else is no method of the object."""
 
-    def __init__(self, space: AddressSpace, access: AccessPolicy) -> None:
+    def __init__(self, space: AddressSpace, access: AccessPolicy, audit: AuditLog) -> None:
         self._space = space
         self._access = access
+        self._audit = audit
         self._bound: dict[tuple[ua.NodeId, ua.NodeId], Method] = {}
 
     def services(self) -> dict[str, Service]:
@@ -73,22 +74,23 @@ class MethodService:
         return response
 
     async def _call(self, context: RequestContext, request: ua.CallMethodRequest) -> ua.CallMethodResult:
-        result = ua.CallMethodResult()
+        result, reason = ua.CallMethodResult(), ""
         arguments = list(request.InputArguments or [])
         try:
             method = self._find(request, context.actor.role)
             result.InputArgumentResults = _check_arguments(method, arguments)
             if any(not code.is_good() for code in result.InputArgumentResults):
                 result.StatusCode = ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
-                return result
-            await method.handler(context, [argument.Value for argument in arguments])
+            else:
+                await method.handler(context, [argument.Value for argument in arguments])
         except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
         except InvalidArgumentError as error:
             result.InputArgumentResults[error.index] = ua.StatusCode(error.code)
             result.StatusCode = ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
         except RefusedError as refused:
-            result.StatusCode = ua.StatusCode(getattr(ua.StatusCodes, refused.code))
+            result.StatusCode, reason = status_of(refused), str(refused)
+        self._audit.method_called(context.actor, request, result.StatusCode.value, reason)
         return result
 
     def _find(self, request: ua.CallMethodRequest, role: Role) -> Method:
@@ -100,6 +102,11 @@ class MethodService:
         if request.ObjectId not in self._space:
             raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
         raise StatusCodeError(ua.StatusCodes.BadMethodInvalid)
+
+
+def status_of(refused: RefusedError) -> ua.StatusCode:
+    """Status code that the host refuses with."""
+    return ua.StatusCode(getattr(ua.StatusCodes, refused.code, ua.StatusCodes.BadUnexpectedError))
 
 
 def _check_arguments(method: Method, arguments: list[ua.Variant]) -> list[ua.StatusCode]:

@@ -65,7 +65,7 @@ class ServiceHost:
         self._clock: asyncio.Task[None] | None = None
         self._started = datetime.now(UTC)
         self.subscription_service = SubscriptionService(settings.limits)
-        self.method_service = MethodService(space, host.access)
+        self.method_service = MethodService(space, host.access, host.audit)
         self._dispatcher: RequestDispatcher | None = None
 
     @property

@@ -1,6 +1,5 @@
 """Methods of cells and conditions: from a Call to the service, with rights, ranges and an audit trail."""
 
-import logging
 import math
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, Final
@@ -9,19 +8,17 @@ from asyncua import ua
 
 from impactcell.alarms import EventKind
 from impactcell.opcua.binary_codec import StatusCodeError
-from impactcell.opcua.host_interface import RefusedError
 from impactcell.opcua.method_service import InputArgument, InvalidArgumentError, Method, MethodService
 from impactcell.opcua.request_dispatch import RequestContext
 from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.quantities import BY_PATH, MILLIMETRE
 from impactcell.records import Alarm
 from impactcell.scada.access_policy import CellAccess
+from impactcell.scada.audit_trail import AuditTrail
 from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition, refresh_event
 from impactcell.scada.interface import Actions, CellDescription
 from impactcell.scada.rights import CONDITION_AREAS, Area
-
-_audit: Final = logging.getLogger("impactcell.audit")
 
 MAX_BATCH_ID: Final = 64
 """Longest name of a batch, characters."""
@@ -65,16 +62,20 @@ ShowAlarm = Callable[[str, Alarm], None]
 
 
 class MethodTable:
-    """Makes methods callable, and tells the access policy which area they lie in."""
+    """Makes methods callable; tells the access policy in which area they lie, and the audit their names."""
 
-    def __init__(self, methods: MethodService, access: CellAccess) -> None:
+    def __init__(self, methods: MethodService, access: CellAccess, audit: AuditTrail) -> None:
         self._methods = methods
         self._access = access
+        self._audit = audit
 
-    def bind(self, owner: ua.NodeId, method: ua.NodeId, area: Area, bound: Method) -> None:
-        """Make a method callable on an object."""
-        self._methods.bind(owner, method, bound)
-        self._access.add_method(method, area)
+    def bind(
+        self, owner: ua.NodeId, method_id: ua.NodeId, area: Area, method: Method, audit_name: str = ""
+    ) -> None:
+        """Make a method callable on an object; without a name it is not audited."""
+        self._methods.bind(owner, method_id, method)
+        self._access.add_method(method_id, area)
+        self._audit.add_method(owner, method_id, audit_name)
 
 
 def _text(value: object, index: int) -> str:
@@ -83,18 +84,6 @@ def _text(value: object, index: int) -> str:
     if len(text) > MAX_COMMENT:
         raise InvalidArgumentError(index, ua.StatusCodes.BadOutOfRange)
     return text
-
-
-async def _audited(context: RequestContext, what: str, work: Awaitable[Any]) -> Any:
-    actor = context.actor
-    who = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
-    try:
-        result = await work
-    except RefusedError as refused:
-        _audit.warning("%s: %s: refused, %s: %s", who, what, refused.code, refused)
-        raise
-    _audit.info("%s: %s: done", who, what)
-    return result
 
 
 def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeId], actions: Actions) -> None:
@@ -106,24 +95,19 @@ def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeI
         batch, expected = (arguments[0] or "").strip(), arguments[1]
         if not 0 < len(batch) <= MAX_BATCH_ID or not batch.isprintable():
             raise InvalidArgumentError(0, ua.StatusCodes.BadOutOfRange)
-        work = actions.start_batch(cell, batch, expected=expected, actor=context.actor)
-        await _audited(context, f"{cell}: StartBatch({batch!r}, expected={expected})", work)
+        await actions.start_batch(cell, batch, expected=expected, actor=context.actor)
 
     async def reset_wear(context: RequestContext, arguments: Sequence[Any]) -> None:
-        comment = _text(arguments[0], 0)
-        await _audited(
-            context, f"{cell}: ResetWear({comment!r})", actions.reset_wear(cell, comment, context.actor)
-        )
+        await actions.reset_wear(cell, _text(arguments[0], 0), context.actor)
 
     async def set_target(context: RequestContext, arguments: Sequence[Any]) -> None:
         target, allowed = arguments[0], BY_PATH["Positioning/Target"].node_range(description.ranges)
         if not math.isfinite(target) or allowed is None or not allowed[0] <= target <= allowed[1]:
             raise InvalidArgumentError(0, ua.StatusCodes.BadOutOfRange)
-        work = actions.set_target(cell, target / MILLIMETRE.per_si, context.actor)
-        await _audited(context, f"{cell}: SetTarget({target} mm)", work)
+        await actions.set_target(cell, target / MILLIMETRE.per_si, context.actor)
 
-    async def abort(context: RequestContext, _given: Sequence[Any]) -> None:
-        await _audited(context, f"{cell}: AbortPositioning()", actions.abort_positioning(cell, context.actor))
+    async def abort(context: RequestContext, _arguments: Sequence[Any]) -> None:
+        await actions.abort_positioning(cell, context.actor)
 
     text, flag = ua.VariantType.String, ua.VariantType.Boolean
     for name, area, arguments, handler in (
@@ -138,8 +122,8 @@ def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeI
         ("AbortPositioning", Area.ABORT_POSITIONING, (), abort),
     ):
         method = Method(arguments, handler)
-        table.bind(space.node, space.path(name), area, method)
-        table.bind(space.node, types[name], area, method)
+        for method_id in (space.path(name), types[name]):
+            table.bind(space.node, method_id, area, method, f"{cell}: {name}")
 
 
 def bind_condition(
@@ -150,9 +134,10 @@ def bind_condition(
     for event, (name, type_ids, arguments) in _CONDITION_METHODS.items():
         method = Method(arguments, _action(condition, event, actions, show_alarm))
         instance_method = space.path(f"{condition.name}/{name}")
+        audit_name = f"{condition.cell}: {condition.name}: {name.rpartition('/')[2]}"
         for owner in (condition.node, shelving) if "/" in name else (condition.node,):
             for method_id in (instance_method, *(ua.NodeId(number) for number in type_ids)):
-                table.bind(owner, method_id, CONDITION_AREAS[event], method)
+                table.bind(owner, method_id, CONDITION_AREAS[event], method, audit_name)
 
 
 def _action(
@@ -170,15 +155,10 @@ def _action(
                 raise StatusCodeError(ua.StatusCodes.BadShelvingTimeOutOfRange)
         elif event is EventKind.SHELVE_ONE_SHOT:
             shelve_s = MAX_SHELVE_S
-        what = f"{condition.cell}: {condition.name}: {event.value}"
-        if comment:
-            what += f" ({comment!r})"
-        if event is EventKind.SHELVE_TIMED:
-            what += f" ({shelve_s:g} s)"
-        work = actions.act_on_condition(
+        alarm = await actions.act_on_condition(
             condition.cell, condition.name, event, context.actor, comment=comment, shelve_s=shelve_s
         )
-        show_alarm(condition.cell, await _audited(context, what, work))
+        show_alarm(condition.cell, alarm)
 
     return act
 

@@ -21,6 +21,7 @@ from impactcell.opcua.variable_store import VariableStore
 from impactcell.quantities import HISTORY
 from impactcell.records import Alarm, ModuleStatus, Snapshot
 from impactcell.scada.access_policy import CellAccess
+from impactcell.scada.audit_trail import AuditTrail
 from impactcell.scada.cell_history import CellHistory
 from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
 from impactcell.scada.conditions import Condition
@@ -97,11 +98,11 @@ class Server:
         space = address_space(model)
         _offer_aggregates(space)
         uris = await model.get_namespace_array()
-        values, access = VariableStore(space), CellAccess()
+        values, access, audit = VariableStore(space), CellAccess(), AuditTrail()
         cells = [CellSpace(model, uris, description) for description in self._descriptions]
         history = self._history_of(cells)
-        host = ServiceHost(self._settings, Host(PRODUCT, users, access, history), space, values)
-        table = MethodTable(host.method_service, access)
+        host = ServiceHost(self._settings, Host(PRODUCT, users, access, audit, history), space, values)
+        table = MethodTable(host.method_service, access, audit)
         for cell in cells:
             name = cell.description.name
             self._cells[name] = CellValues(cell, values, space, datetime.now(UTC))

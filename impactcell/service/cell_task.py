@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from functools import partial
 
@@ -160,17 +160,26 @@ class CellTask:
         PositioningError
             The cell has no positioning, or refuses the target; nothing has been commanded.
         """
-        try:
-            await self._positioning_task().begin(target_m)
-        except PositioningError as error:
-            await self.worker.record_audit(replace(audit, result=str(error)))
-            raise
-        await self.worker.record_audit(audit)
+        await self._audited(lambda task: task.begin(target_m), audit)
 
     async def abort_positioning(self, audit: AuditEntry) -> None:
-        """End the positioning task that runs."""
-        await self._positioning_task().abort(audit.user)
-        await self.worker.record_audit(audit)
+        """End the positioning task that runs.
+
+        Raises
+        ------
+        PositioningError
+            The cell has no positioning.
+        """
+        await self._audited(lambda task: task.abort(audit.user), audit)
+
+    async def _audited(self, act: Callable[[PositioningTask], Awaitable[None]], audit: AuditEntry) -> None:
+        try:
+            await act(self._positioning_task())
+        except PositioningError as error:
+            audit = replace(audit, result=str(error))
+            raise
+        finally:
+            await self.worker.record_audit(audit)
 
     def _positioning_task(self) -> PositioningTask:
         if self._positioning is None:

@@ -62,7 +62,7 @@ class OperatorCommands:
         shelve_s: float = 0.0,
     ) -> Alarm:
         """Apply an action through the life cycle in `impactcell.alarms`; the new state of the condition."""
-        audit = _audit(actor, event.value, Condition=alarm, Comment=comment, Seconds=shelve_s)
+        audit = _audit(actor, event.value, Condition=alarm, Comment=comment or None, Seconds=shelve_s or None)
         alarm_event = AlarmEvent(
             event, time_ns=audit.time_ns, user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
         )
@@ -73,6 +73,6 @@ class OperatorCommands:
 
 
 def _audit(actor: Actor, action: str, **arguments: object) -> AuditEntry:
-    stated = {name: value for name, value in arguments.items() if value not in ("", 0.0)}
+    stated = {name: value for name, value in arguments.items() if value is not None}
     user = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
     return AuditEntry(time.time_ns(), user, action, json.dumps(stated), "Good")

@@ -1,0 +1,69 @@
+"""Whatever is done over OPC UA is written down: by whom, in which role, from where, and what came of it."""
+
+import logging
+
+import pytest
+from asyncua import ua
+
+from tests.opcua_server import Site, site
+
+
+async def call(here: Site, user: str, owner: str, method: str, *arguments: ua.Variant) -> int:
+    async with await here.client(user) as client:
+        request = ua.CallMethodRequest(
+            ObjectId=(await here.node(client, owner)).nodeid,
+            MethodId=(await here.node(client, method)).nodeid,
+            InputArguments=list(arguments),
+        )
+        return (await client.uaclient.call([request]))[0].StatusCode.value
+
+
+async def test_commands_and_acknowledgements_are_audited(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "impactcell.audit")
+
+    def written() -> list[str]:
+        lines = [r.getMessage() for r in caplog.records if r.name == "impactcell.audit"]
+        caplog.clear()
+        return lines
+
+    async with site() as here:
+        here.publish()
+        here.raise_alarm()
+        comment = ua.Variant(ua.LocalizedText("seen by me"))
+        async with await here.client("observer") as client:
+            known = ua.Variant(await (await here.node(client, "WearLimit/EventId")).read_value())
+        written()
+        acknowledge = ("WearLimit", "WearLimit/Acknowledge", known, comment)
+        assert await call(here, "operator", *acknowledge) == 0
+        who, what = "operator (operator) from 127.0.0.1", f"Acknowledge({known.Value.hex()}, 'seen by me')"
+        assert written() == [f"{who}: press-1: WearLimit: {what}: done"]
+        assert await call(here, "operator", *acknowledge) != 0
+        (line,) = written()
+        assert line.endswith(
+            "'seen by me'): refused, BadConditionBranchAlreadyAcked BadConditionBranchAlreadyAcked"
+        )
+        assert await call(here, "observer", *acknowledge) != 0
+        (line,) = written()
+        assert line.startswith("observer (observer) from 127.0.0.1: press-1: WearLimit: Acknowledge(")
+        assert "): refused, BadUserAccessDenied" in line, "what a role may not is not written down"
+        assert await call(here, "operator", "", "StartBatch", ua.Variant("B-7"), ua.Variant(True)) == 0
+        assert written() == ["operator (operator) from 127.0.0.1: press-1: StartBatch('B-7', True): done"]
+        assert await call(here, "engineer", "", "SetTarget", ua.Variant(1e9)) != 0
+        assert "SetTarget(1000000000.0): refused, BadInvalidArgument" in written()[0]
+        assert await call(here, "engineer", "", "ResetWear", ua.Variant(ua.LocalizedText("x" * 999))) == 0
+        assert "x" * 150 in (line := written()[0])
+        assert len(line) < 400
+        assert await call(here, "engineer", "Wear", "ResetWear", comment) != 0
+        assert "refused, BadMethodInvalid" in written()[0]
+
+
+async def test_a_refresh_is_no_act(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "impactcell.audit")
+    async with site() as here, await here.client("observer") as client:
+        request = ua.CallMethodRequest(
+            ObjectId=ua.NodeId(ua.ObjectIds.ConditionType),
+            MethodId=ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh),
+            InputArguments=[ua.Variant(1, ua.VariantType.UInt32)],
+        )
+        await client.uaclient.call([request])
+    assert [r for r in caplog.records if r.name == "impactcell.audit"] == []
