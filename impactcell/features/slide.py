@@ -69,30 +69,30 @@ def _rest_and_deceleration(
     if np.count_nonzero(sliding) < 8:
         raise NoStopError("the slide is too short for its position samples")
     last = len(times) - 1 - int(sliding[::-1].argmax())
-    inside = slice(first, last + 1)
+    slid = slice(first, last + 1)
     origin, span = separation_s, float(times[last] - separation_s)
-    cubic, factor, _ = fit_polynomial(times[inside], moved[inside], origin, span, 3)
+    cubic, factor, _ = fit_polynomial(times[slid], moved[slid], origin, span, 3)
     _, c1, c2, c3 = cubic.tolist()
     last_speed, braking = c1 + 2.0 * c2 + 3.0 * c3, -(2.0 * c2 + 6.0 * c3)
     # The zero of the speed next after the last sample that still moved is the stop.
-    near = [root.real for root in _complex_roots(c1, 2.0 * c2, 3.0 * c3) if abs(root.imag) < 0.2]
-    near = [root for root in near if 0.7 < root < 1.6]
-    if near:
-        stop = min(near, key=lambda root: abs(root - 1.0))
+    stops = [root.real for root in _complex_roots(c1, 2.0 * c2, 3.0 * c3) if abs(root.imag) < 0.2]
+    stops = [root for root in stops if 0.7 < root < 1.6]
+    if stops:
+        stop = min(stops, key=lambda root: abs(root - 1.0))
     else:  # cut off on the way, or braked otherwise than a cubic says
         stop = 1.0 + (last_speed / braking if braking > 0.0 else math.inf if last_speed > 0.0 else 0.0)
     stop_s = origin + span * max(stop, 1.0)
-    quiet = (last + len(times)) // 2  # what lies after it is at rest, if anything is
-    if stop_s > times[-1] and not _is_at_rest(times[quiet:], moved[quiet:], sigma):
-        left = 1e3 * last_speed / span
-        raise NoStopError(f"the part was still moving at {left:.3g} mm/s when the record ended")
+    first_quiet = (last + len(times)) // 2  # what lies after it is at rest, if anything is
+    if stop_s > times[-1] and not _is_at_rest(times[first_quiet:], moved[first_quiet:], sigma):
+        speed_mm_per_s = 1e3 * last_speed / span
+        raise NoStopError(f"the part was still moving at {speed_mm_per_s:.3g} mm/s when the record ended")
     stop_s = min(stop_s, float(times[-1]))
-    after = moved[times.searchsorted(stop_s, "right") if stop_s < times[-1] else quiet :]
-    if len(after) >= 3:
-        rest = MeasuredFeature(mean(after), sigma / math.sqrt(len(after)))
+    at_rest = moved[times.searchsorted(stop_s, "right") if stop_s < times[-1] else first_quiet :]
+    if len(at_rest) >= 3:
+        rest = MeasuredFeature(mean(at_rest), sigma / math.sqrt(len(at_rest)))
     else:
         rest = MeasuredFeature(value_at(cubic, stop), sigma * value_std(factor, 1.0))
-    parabola, factor, _ = fit_polynomial(times[inside], moved[inside], origin, span, 2)
+    parabola, factor, _ = fit_polynomial(times[slid], moved[slid], origin, span, 2)
     # The inverse of the normal equations has 1 / L² in its last place: the variance of the highest power.
     deceleration = MeasuredFeature(
         -2.0 * float(parabola[2]) / span**2, 2.0 * sigma / float(factor[2, 2]) / span**2

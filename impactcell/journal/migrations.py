@@ -100,6 +100,8 @@ _STATE_2_RENAMED: Final[Mapping[str, str]] = {
     "state.batch.announcement_seen": "last_announcement",
     "state.gap.squares": "squared_deviations",
     **_under("state.tracker", _TRACKER_2_RENAMED),
+    **_under("state.signature.reference", {"met": "cycles_met", "varied": "cycles_varied"}),
+    "state.signature.reference.variation.seen": "signal",
     **_under("state.alarms.alarms.*", _ALARM_2_RENAMED),
 }
 """Of all that `StoredState` holds."""

@@ -132,7 +132,7 @@ def fit_polynomial(
         Sum of squares of the residuals.
     """
     size = degree + 1
-    power, right = np.zeros(7), np.zeros(4)
+    power, moments = np.zeros(7), np.zeros(4)
     base, total = values[0], 0.0  # taken off first: what is left is small, and so are its squares' errors
     for i in range(len(times)):
         u = (times[i] - origin_s) / scale_s
@@ -146,30 +146,30 @@ def fit_polynomial(
         power[4] += u2 * u2
         power[5] += u2 * u3
         power[6] += u3 * u3
-        right[0] += y
-        right[1] += u * y
-        right[2] += u2 * y
-        right[3] += u3 * y
+        moments[0] += y
+        moments[1] += u * y
+        moments[2] += u2 * y
+        moments[3] += u3 * y
         total += y * y
     factor = np.zeros((size, size))
     for j in range(size):
         for k in range(j + 1):
-            left = power[j + k]
+            pivot = power[j + k]
             for m in range(k):
-                left -= factor[j, m] * factor[k, m]
-            factor[j, k] = math.sqrt(left) if j == k else left / factor[k, k]
-    solved = right[:size].copy()
+                pivot -= factor[j, m] * factor[k, m]
+            factor[j, k] = math.sqrt(pivot) if j == k else pivot / factor[k, k]
+    coefficients = moments[:size].copy()
     for j in range(size):
         for k in range(j):
-            solved[j] -= factor[j, k] * solved[k]
-        solved[j] /= factor[j, j]
-        total -= solved[j] * solved[j]
+            coefficients[j] -= factor[j, k] * coefficients[k]
+        coefficients[j] /= factor[j, j]
+        total -= coefficients[j] * coefficients[j]
     for j in range(size - 1, -1, -1):
         for k in range(j + 1, size):
-            solved[j] -= factor[k, j] * solved[k]
-        solved[j] /= factor[j, j]
-    solved[0] += base
-    return solved, factor, max(total, 0.0)
+            coefficients[j] -= factor[k, j] * coefficients[k]
+        coefficients[j] /= factor[j, j]
+    coefficients[0] += base
+    return coefficients, factor, max(total, 0.0)
 
 
 @compiled
@@ -238,16 +238,16 @@ def widest_cubic(
 
     Returns
     -------
-    found : bool
+    is_fitted : bool
     value, std : float
         The maximum and its standard deviation.
     """
     (at_s, left, right), (narrowest_s, widest_s, step_s) = start, widths_s
-    found, value, std = False, np.nan, np.nan
+    is_fitted, value, std = False, np.nan, np.nan
     highest, lowest = np.inf, -np.inf
     half, centre = narrowest_s, at_s
     for _ in range(MAX_WINDOWS):
-        if half > widest_s and found:
+        if half > widest_s and is_fitted:
             break
         first = np.searchsorted(times, centre - left * half - 0.01 * step_s)
         last = np.searchsorted(times, centre + right * half + 0.01 * step_s, side="right")
@@ -264,9 +264,9 @@ def widest_cubic(
         top = value_at(cubic, u)
         if top > highest or top < lowest:
             break
-        found, value, std = True, top, sigma * value_std(factor, u)
+        is_fitted, value, std = True, top, sigma * value_std(factor, u)
         highest, lowest = min(highest, top + 2.0 * std), max(lowest, top - 2.0 * std)
         if left == 1.0 and right == 1.0:
             centre = min(max(centre + half * u, at_s - half), at_s + half)
         half *= GROWTH
-    return found, value, std
+    return is_fitted, value, std

@@ -21,56 +21,56 @@ def cholesky(matrix: Samples) -> Samples:
     lower = np.zeros((n, n))
     for i in range(n):
         for j in range(i + 1):
-            left = matrix[i, j]
+            pivot = matrix[i, j]
             for k in range(j):
-                left -= lower[i, k] * lower[j, k]
+                pivot -= lower[i, k] * lower[j, k]
             if i == j:
-                lower[i, i] = math.sqrt(left) if left > ROUNDING * matrix[i, i] else math.inf
+                lower[i, i] = math.sqrt(pivot) if pivot > ROUNDING * matrix[i, i] else math.inf
             else:
-                lower[i, j] = left / lower[j, j]
+                lower[i, j] = pivot / lower[j, j]
     return lower
 
 
 @compiled
 def block(matrix: Samples, top: int, bottom: int, left: int, right: int) -> Samples:
     """Copy of the rows `top` .. `bottom` - 1 in the columns `left` .. `right` - 1."""
-    found = np.empty((bottom - top, right - left))
+    copy = np.empty((bottom - top, right - left))
     for i in range(bottom - top):
         for j in range(right - left):
-            found[i, j] = matrix[top + i, left + j]
-    return found
+            copy[i, j] = matrix[top + i, left + j]
+    return copy
 
 
 @compiled
 def transposed_product(A: Samples, B: Samples) -> Samples:
     """Give A' B, shapes (k, n) and (k, m)."""
-    found = np.zeros((A.shape[1], B.shape[1]))
+    product = np.zeros((A.shape[1], B.shape[1]))
     for k in range(len(A)):
         for i in range(A.shape[1]):
             for j in range(B.shape[1]):
-                found[i, j] += A[k, i] * B[k, j]
-    return found
+                product[i, j] += A[k, i] * B[k, j]
+    return product
 
 
 @compiled
 def pack_triangle(matrix: Samples) -> Samples:
     """Lower triangle of a symmetric matrix, by rows: what is kept of one between cycles."""
-    kept, p = np.empty(len(matrix) * (len(matrix) + 1) // 2), 0
+    triangle, p = np.empty(len(matrix) * (len(matrix) + 1) // 2), 0
     for i in range(len(matrix)):
         for j in range(i + 1):
-            kept[p] = matrix[i, j]
+            triangle[p] = matrix[i, j]
             p += 1
-    return kept
+    return triangle
 
 
 @compiled
-def unpack_triangle(kept: Samples) -> Samples:
+def unpack_triangle(triangle: Samples) -> Samples:
     """Symmetric matrix of a lower triangle."""
-    n, p = int(math.sqrt(2.0 * len(kept))), 0
+    n, p = int(math.sqrt(2.0 * len(triangle))), 0
     matrix = np.empty((n, n))
     for i in range(n):
         for j in range(i + 1):
-            matrix[i, j] = matrix[j, i] = kept[p]
+            matrix[i, j] = matrix[j, i] = triangle[p]
             p += 1
     return matrix
 
@@ -79,30 +79,30 @@ def unpack_triangle(kept: Samples) -> Samples:
 def solve_lower(lower: Samples, right: Samples) -> Samples:
     """Solve L X = R, shapes (n, n) and (n, k)."""
     n, width = right.shape
-    found = right.copy()
+    solution = right.copy()
     for i in range(n):
         for k in range(i):
-            share = lower[i, k]
+            factor = lower[i, k]
             for c in range(width):
-                found[i, c] -= share * found[k, c]
+                solution[i, c] -= factor * solution[k, c]
         for c in range(width):
-            found[i, c] /= lower[i, i]
-    return found
+            solution[i, c] /= lower[i, i]
+    return solution
 
 
 @compiled
 def solve_upper(lower: Samples, right: Samples) -> Samples:
     """Solve L' X = R, shapes (n, n) and (n, k)."""
     n, width = right.shape
-    found = right.copy()
+    solution = right.copy()
     for i in range(n - 1, -1, -1):
         for c in range(width):
-            found[i, c] /= lower[i, i]
+            solution[i, c] /= lower[i, i]
         for k in range(i):
-            share = lower[i, k]
+            factor = lower[i, k]
             for c in range(width):
-                found[k, c] -= share * found[i, c]
-    return found
+                solution[k, c] -= factor * solution[i, c]
+    return solution
 
 
 @compiled
@@ -121,37 +121,37 @@ def inverse(matrix: Samples) -> Samples:
 
 @compiled
 def marginalise(
-    matrix: Samples, vector: Samples, inner: Samples, cross: Samples, along: Samples
+    matrix: Samples, vector: Samples, inner: Samples, cross: Samples, inner_vector: Samples
 ) -> tuple[Samples, Samples]:
-    """Information on some unknowns with others, of which `inner`, `cross` and `along` tell, integrated out.
+    """Information on some unknowns, with the others integrated out.
 
     Parameters
     ----------
     matrix, vector : ndarray, shapes (n, n), (n,)
         Information on the unknowns kept.
-    inner, cross, along : ndarray, shapes (k, k), (k, n), (k,)
+    inner, cross, inner_vector : ndarray, shapes (k, k), (k, n), (k,)
         Information on the others, that which both share, and its vector.
 
     Returns
     -------
-    matrix, vector : ndarray
+    marginal, marginal_vector : ndarray
         M - X' N^-1 X and h - X' N^-1 a.
     """
-    n, k = len(vector), len(along)
+    n, k = len(vector), len(inner_vector)
     right = np.empty((k, n + 1))
     for c in range(k):
         for i in range(n):
             right[c, i] = cross[c, i]
-        right[c, n] = along[c]
-    half = solve_lower(cholesky(inner), right)
-    left, rest = matrix.copy(), vector.copy()
+        right[c, n] = inner_vector[c]
+    whitened = solve_lower(cholesky(inner), right)
+    marginal, marginal_vector = matrix.copy(), vector.copy()
     for c in range(k):
         for i in range(n):
-            share = half[c, i]
-            rest[i] -= share * half[c, n]
+            factor = whitened[c, i]
+            marginal_vector[i] -= factor * whitened[c, n]
             for j in range(n):
-                left[i, j] -= share * half[c, j]
-    return left, rest
+                marginal[i, j] -= factor * whitened[c, j]
+    return marginal, marginal_vector
 
 
 @compiled
@@ -161,10 +161,10 @@ def with_random_effects(components: Samples, matrix: Samples, vector: Samples) -
     Shapes (n, k), (n, n) and (n,).
     """
     k = components.shape[1]
-    cross, inner, along = transposed_product(components, matrix), np.eye(k), np.zeros(k)
+    cross, inner, inner_vector = transposed_product(components, matrix), np.eye(k), np.zeros(k)
     for c in range(k):
         for i in range(len(vector)):
-            along[c] += components[i, c] * vector[i]
+            inner_vector[c] += components[i, c] * vector[i]
             for d in range(k):
                 inner[c, d] += cross[c, i] * components[i, d]
-    return marginalise(matrix, vector, inner, cross, along)
+    return marginalise(matrix, vector, inner, cross, inner_vector)

@@ -61,17 +61,17 @@ class Regime(enum.Enum):
 def regimes(plant: Plant, tap: TapInput, velocities: Samples, frictions: Samples) -> list[Regime]:
     """Tell the regime of each velocity over all frictions."""
     ratio = plant.mu_k / plant.mu_s
-    found = []
+    by_velocity = []
     for velocity in velocities.tolist():
         kinds = {
             _regime(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity))
             for mu in frictions.tolist()
         }
         if Regime.CAUGHT in kinds:
-            found.append(Regime.CAUGHT)
+            by_velocity.append(Regime.CAUGHT)
         else:
-            found.append(kinds.pop() if len(kinds) == 1 else Regime.EITHER)
-    return found
+            by_velocity.append(kinds.pop() if len(kinds) == 1 else Regime.EITHER)
+    return by_velocity
 
 
 def _regime(plant: Plant, tap: TapInput) -> Regime:
@@ -85,22 +85,24 @@ def _regime(plant: Plant, tap: TapInput) -> Regime:
     return Regime.HALTED if tap.stroke_m / tap.velocity_m_s < separations[0] else Regime.CLEAN
 
 
-def velocity_spans(found: Sequence[Regime], velocities: Samples) -> list[tuple[float, float]]:
+def velocity_spans(by_velocity: Sequence[Regime], velocities: Samples) -> list[tuple[float, float]]:
     """Velocities between which one describable regime holds; neighbours meet where it changes."""
-    kept: list[tuple[float, float]] = []
-    for caught, run in groupby(range(len(found)), key=lambda index: found[index] is Regime.CAUGHT):
+    spans: list[tuple[float, float]] = []
+    for caught, run in groupby(
+        range(len(by_velocity)), key=lambda index: by_velocity[index] is Regime.CAUGHT
+    ):
         indices = list(run)
         if caught or len(indices) < MIN_VELOCITIES:
             continue
-        clean = [index for index in indices if found[index] is Regime.CLEAN]
-        halted = [index for index in indices if found[index] is Regime.HALTED]
+        clean = [index for index in indices if by_velocity[index] is Regime.CLEAN]
+        halted = [index for index in indices if by_velocity[index] is Regime.HALTED]
         low, high = float(velocities[indices[0]]), float(velocities[indices[-1]])
         if min(len(clean), len(halted)) < MIN_VELOCITIES:
-            kept.append((low, high))
+            spans.append((low, high))
         else:
-            meet = 0.5 * float(velocities[clean[-1]] + velocities[halted[0]])
-            kept += [(low, meet), (meet, high)]
-    return kept
+            border = 0.5 * float(velocities[clean[-1]] + velocities[halted[0]])
+            spans += [(low, border), (border, high)]
+    return spans
 
 
 def sweep(plant: Plant, tap: TapInput, velocities: Samples, frictions: Samples) -> Sweep:
@@ -151,14 +153,14 @@ def fit_distance(swept: Sweep) -> DistanceForm:
         shape: Samples = np.exp(p[1]) * u ** p[2] * (p[0] - mu) ** 2 + np.exp(p[3]) * u ** p[4]
         return shape
 
-    def miss(p: Samples) -> Samples:
+    def residual(p: Samples) -> Samples:
         error: Samples = ((form(p) - slide) / slope).ravel()
         return error
 
     start = printed_predictor().distance
     scale = float(np.median(slide / form(_packed(start))))
     first = _packed(replace(start, square_m=start.square_m * scale, offset_m=start.offset_m * scale))
-    fit = least_squares(miss, first, method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=20_000)
+    fit = least_squares(residual, first, method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=20_000)
     limit, square, square_power, offset, offset_power = fit.x.tolist()
     rms = float(np.sqrt(np.mean(fit.fun**2)))
     return DistanceForm(limit, math.exp(square), square_power, math.exp(offset), offset_power, rms)
@@ -174,14 +176,14 @@ def fit_predictor(plant: Plant, tap: TapInput, velocities: Samples, frictions: S
         force=fit_force(swept),
         distance=fit_distance(swept),
     )
-    changed = {
+    changes = {
         "stiffness": replace(plant, stiffness_n_per_m=plant.stiffness_n_per_m * (1.0 + RELATIVE_STEP)),
         "damping": replace(plant, damping_n_s_per_m=plant.damping_n_s_per_m * (1.0 + RELATIVE_STEP)),
         "ratio": replace(plant, mu_k=plant.mu_k * (1.0 + RELATIVE_STEP)),
     }
     force, slide = {}, {}
-    for name, other in changed.items():
-        force[name], slide[name] = _sensitivities(fitted, plant, other, tap)
+    for name, plant_changed in changes.items():
+        force[name], slide[name] = _sensitivities(fitted, plant, plant_changed, tap)
     return replace(fitted, force_sensitivity=Sensitivity(**force), distance_sensitivity=Sensitivity(**slide))
 
 
@@ -215,24 +217,24 @@ def calibrate(
     PredictionError
         The part slides free at too few velocities.
     """
-    found = []
+    predictors = []
     grid = np.linspace(velocities_m_s[0], velocities_m_s[-1], REGIME_GRID)
-    for done, mass in enumerate(masses_kg):
+    for index, mass in enumerate(masses_kg):
         if progress is not None:
-            progress(done, len(masses_kg))
-        mine = replace(tap, mass_kg=float(mass))
-        for low, high in velocity_spans(regimes(plant, mine, grid, frictions), grid):
-            inside = np.linspace(low, high, len(velocities_m_s))
-            found.append(fit_predictor(plant, mine, inside, frictions))
+            progress(index, len(masses_kg))
+        tap_of_mass = replace(tap, mass_kg=float(mass))
+        for low, high in velocity_spans(regimes(plant, tap_of_mass, grid, frictions), grid):
+            within = np.linspace(low, high, len(velocities_m_s))
+            predictors.append(fit_predictor(plant, tap_of_mass, within, frictions))
     if progress is not None:
         progress(len(masses_kg), len(masses_kg))
-    if not found:
+    if not predictors:
         raise PredictionError(
             f"no part of {masses_kg[0]:.4g}-{masses_kg[-1]:.4g} kg slides free of the actuator between "
             f"{6e4 * velocities_m_s[0]:.4g} and {6e4 * velocities_m_s[-1]:.4g} mm/min; "
             "tap faster, or with another stroke"
         )
-    return tuple(found)
+    return tuple(predictors)
 
 
 def _sensitivities(fitted: Predictor, plant: Plant, other: Plant, tap: TapInput) -> tuple[float, float]:

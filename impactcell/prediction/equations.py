@@ -35,8 +35,9 @@ def by_force(
         raise PredictionError(
             f"peak force {peak.value:.4g} N is below that of a part without friction; check mass and velocity"
         )
-    known = _relative_calibration_std(model, _sensitivity(mixed, lambda one: one.force_sensitivity))
-    std = math.hypot(peak.std / slope, mixed.mean(lambda one: one.force.rms), value * known)
+    sensitivity = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
+    rms = mixed.mean(lambda predictor: predictor.force.rms)
+    std = math.hypot(peak.std / slope, rms, value * _relative_calibration_std(model, sensitivity))
     return _graded(model, mixed, velocity_m_s, value, std)
 
 
@@ -74,9 +75,10 @@ def by_distance(
             )
         )  # fmt: skip
     slope = abs(mixed.slope_of_distance(value, velocity_m_s))
-    known = _relative_calibration_std(model, _sensitivity(mixed, lambda one: one.distance_sensitivity))
-    rms = mixed.mean(lambda one: one.distance.rms)
-    std = math.hypot(slide.std / max(slope, 1e-12), rms, value * known)
+    sensitivity = _sensitivity(mixed, lambda predictor: predictor.distance_sensitivity)
+    rms = mixed.mean(lambda predictor: predictor.distance.rms)
+    relative_std = _relative_calibration_std(model, sensitivity)
+    std = math.hypot(slide.std / max(slope, 1e-12), rms, value * relative_std)
     return _graded(model, mixed, velocity_m_s, value, std)
 
 
@@ -92,24 +94,24 @@ def combined(
     w_F = dF/dmu / (dF/dmu + dd/dmu ΔF/Δd) and w_d = 1 - w_F, with ΔF and Δd the spans of peak force and
     sliding distance over the calibrated range of mu_s at this velocity.
     """
-    (mu_force, peak), (mu_dist, distance_read) = force, slide
+    (mu_force, peak), (mu_dist, distance) = force, slide
     weight = force_weight(mixed, 0.5 * (mu_force.value + mu_dist.value), velocity_m_s)
     value = weight * mu_force.value + (1.0 - weight) * mu_dist.value
-    one = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
-    two = _sensitivity(mixed, lambda predictor: predictor.distance_sensitivity)
-    rest = 1.0 - weight
-    both = Sensitivity(
-        weight * one.stiffness + rest * two.stiffness,
-        weight * one.damping + rest * two.damping,
-        weight * one.ratio + rest * two.ratio,
+    of_force = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
+    of_distance = _sensitivity(mixed, lambda predictor: predictor.distance_sensitivity)
+    distance_weight = 1.0 - weight
+    sensitivity = Sensitivity(
+        weight * of_force.stiffness + distance_weight * of_distance.stiffness,
+        weight * of_force.damping + distance_weight * of_distance.damping,
+        weight * of_force.ratio + distance_weight * of_distance.ratio,
     )
     slope = abs(mixed.slope_of_distance(mu_dist.value, velocity_m_s))
     std = math.hypot(
         weight * peak.std / mixed.friction_n,
-        weight * mixed.mean(lambda one: one.force.rms),
-        rest * distance_read.std / max(slope, 1e-12),
-        rest * mixed.mean(lambda one: one.distance.rms),
-        value * _relative_calibration_std(model, both),
+        weight * mixed.mean(lambda predictor: predictor.force.rms),
+        distance_weight * distance.std / max(slope, 1e-12),
+        distance_weight * mixed.mean(lambda predictor: predictor.distance.rms),
+        value * _relative_calibration_std(model, sensitivity),
     )
     return _graded(model, mixed, velocity_m_s, value, std)
 
@@ -160,9 +162,9 @@ def beyond_calibration(model: Model, capture: Capture, mu_s: float) -> str:
     """Say in which ways a tap lies outside all that was calibrated, whatever the regime."""
     if not model.predictors:
         return ""
-    masses = [one.mass_kg for one in model.predictors]
-    velocities = [end for one in model.predictors for end in one.velocity_range_m_s]
-    frictions = [end for one in model.predictors for end in one.mu_s_range]
+    masses = [predictor.mass_kg for predictor in model.predictors]
+    velocities = [end for predictor in model.predictors for end in predictor.velocity_range_m_s]
+    frictions = [end for predictor in model.predictors for end in predictor.mu_s_range]
     reasons = []
     for name, value, ends, unit, scale in (
         ("mass", capture.mass_kg, masses, " kg", 1.0),
@@ -197,9 +199,9 @@ def _relative_calibration_std(model: Model, sensitivity: Sensitivity) -> float:
 
 def _sensitivity(mixed: MassInterpolation, of: Callable[[Predictor], Sensitivity]) -> Sensitivity:
     return Sensitivity(
-        mixed.mean(lambda one: of(one).stiffness),
-        mixed.mean(lambda one: of(one).damping),
-        mixed.mean(lambda one: of(one).ratio),
+        mixed.mean(lambda predictor: of(predictor).stiffness),
+        mixed.mean(lambda predictor: of(predictor).damping),
+        mixed.mean(lambda predictor: of(predictor).ratio),
     )
 
 

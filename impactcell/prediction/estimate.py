@@ -171,13 +171,15 @@ def _reported(value: float) -> MeasuredFeature:
     return MeasuredFeature(value, SUMMARY_RELATIVE_STD * value)
 
 
-def _with_warnings(given: Coefficient, *warnings: str) -> Coefficient:
+def _with_warnings(coefficient: Coefficient, *warnings: str) -> Coefficient:
     """Mark a coefficient uncertain for each warning that says something."""
     texts = [text for text in warnings if text]
     if not texts:
-        return given
-    reasons = dict.fromkeys([*filter(None, given.reason.split("; ")), *"; ".join(texts).split("; ")])
-    return Coefficient(given.value, given.std, max(given.quality, Quality.UNCERTAIN), "; ".join(reasons))
+        return coefficient
+    reasons = dict.fromkeys([*filter(None, coefficient.reason.split("; ")), *"; ".join(texts).split("; ")])
+    return Coefficient(
+        coefficient.value, coefficient.std, max(coefficient.quality, Quality.UNCERTAIN), "; ".join(reasons)
+    )
 
 
 def _select_published(capture: Capture, equations: _Equations) -> tuple[Coefficient, Estimator]:

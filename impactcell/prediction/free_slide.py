@@ -30,8 +30,8 @@ def free_slide_friction(capture: Capture, gravity_m_s2: float) -> Coefficient:
     def residual(p: Samples) -> Samples:
         start, speed, braking = p
         sliding = np.minimum(times, max(speed, 0.0) / max(braking, 1e-9))
-        away: Samples = start + speed * sliding - 0.5 * braking * sliding**2 - moved
-        return away
+        misfit: Samples = start + speed * sliding - 0.5 * braking * sliding**2 - moved
+        return misfit
 
     early = times <= 0.6 * times[-1]
     curve = np.polyfit(

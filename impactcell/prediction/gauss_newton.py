@@ -52,8 +52,8 @@ class GaussianPrior:
 
     def cost(self, theta: Samples) -> float:
         """Half the sum of squares of the prior."""
-        away = self.weight * (theta - self.mean)
-        return 0.5 * float(away @ away)
+        deviation = self.weight * (theta - self.mean)
+        return 0.5 * float(deviation @ deviation)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,9 +95,9 @@ class Minimum:
         LinAlgError
             The data and the prior do not determine it.
         """
-        away = self.theta - prior.mean
+        deviation = self.theta - prior.mean
         step, covariance, length, log_determinant = _solve_step(
-            self.linear.normal, self.linear.slope, prior.weight, away, prior.free, misfit, 0.0
+            self.linear.normal, self.linear.slope, prior.weight, deviation, prior.free, misfit, 0.0
         )
         if not math.isfinite(log_determinant):
             raise np.linalg.LinAlgError("the curvature is not positive")
@@ -110,12 +110,12 @@ def _solve_step(
     normal: Samples,
     slope: Samples,
     weight: Samples,
-    away: Samples,
+    deviation: Samples,
     free: IntArray,
     misfit: float,
     damping: float,
 ) -> tuple[Samples, Samples, float, float]:
-    """Gauss-Newton step from a point that lies `away` from the prior's mean.
+    """Gauss-Newton step from a point at a `deviation` from the prior's mean.
 
     The diagonal is damped after Levenberg and Marquardt, the data's weight divided by `misfit` squared.
 
@@ -136,16 +136,16 @@ def _solve_step(
     log_determinant = 0.0
     for j in range(size):
         row = free[j]
-        gradient[j] = slope[row] / misfit**2 + weight[row] ** 2 * away[row]
+        gradient[j] = slope[row] / misfit**2 + weight[row] ** 2 * deviation[row]
         for k in range(size):
             curvature[j, k] = normal[row, free[k]] / misfit**2
         curvature[j, j] += weight[row] ** 2
     for j in range(size):  # Cholesky's factor L
         for k in range(j + 1):
-            left = curvature[j, k] * (1.0 + damping if j == k else 1.0)
+            pivot = curvature[j, k] * (1.0 + damping if j == k else 1.0)
             for m in range(k):
-                left -= factor[j, m] * factor[k, m]
-            factor[j, k] = math.sqrt(left) if j == k else left / factor[k, k]
+                pivot -= factor[j, m] * factor[k, m]
+            factor[j, k] = math.sqrt(pivot) if j == k else pivot / factor[k, k]
         log_determinant += 2.0 * math.log(factor[j, j])
     columns = np.zeros((size, size))
     for j in range(size):  # of the inverse of L
@@ -177,9 +177,9 @@ def fit(model: LinearisedModel, prior: GaussianPrior, start: Samples, side: int)
     best = _linearise(model, prior, start, side)
     damping, refused = 0.0, math.inf
     for _ in range(MAX_ITERATIONS):
-        found, away = best.linear, best.theta - prior.mean
+        linear, deviation = best.linear, best.theta - prior.mean
         step, _, length, _ = _solve_step(
-            found.normal, found.slope, prior.weight, away, prior.free, 1.0, damping
+            linear.normal, linear.slope, prior.weight, deviation, prior.free, 1.0, damping
         )
         if not math.isfinite(length):
             break
@@ -215,5 +215,5 @@ def _linearise(model: LinearisedModel, prior: GaussianPrior, theta: Samples, sid
     if side > 0 and (below := model.kink_coordinate(theta) - JUST_STICKING) < 0.0:
         at, beyond = theta.copy(), -below
         at[RATIO] += below
-    found = model.linearise(at, side, beyond)
-    return Minimum(theta, side, found, 0.5 * found.chi2 + prior.cost(theta))
+    linear = model.linearise(at, side, beyond)
+    return Minimum(theta, side, linear, 0.5 * linear.chi2 + prior.cost(theta))

@@ -113,15 +113,15 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
             faults.append(f"shot {tap.capture.cycle}: {fault}")
     if not responses:
         raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
-    found, covariance, chi2 = _fit_shared(responses, np.array(thetas), thetas[0][SHARED], WEAK_STD)
+    thetas_fitted, covariance, chi2 = _fit_shared(responses, np.array(thetas), thetas[0][SHARED], WEAK_STD)
     count = sum(response.size for response in responses)
-    misfit = math.sqrt(chi2 / max(count - len(found) - 3, 1))
+    misfit = math.sqrt(chi2 / max(count - len(thetas_fitted) - 3, 1))
     if misfit > MISFIT_THRESHOLD:
-        anchored = found.copy()
+        anchored = thetas_fitted.copy()
         anchored[:, STIFFNESS], anchored[:, DAMPING] = math.log(stiffness), math.log(max(damping, 1.0))
-        found, covariance = _fit_reweighted(responses, anchored, parts)
-    mu_k = float(np.exp(found[:, MU_K]).mean())
-    ratio, stiffness, damping = np.exp(found[0, SHARED]).tolist()
+        thetas_fitted, covariance = _fit_reweighted(responses, anchored, parts)
+    mu_k = float(np.exp(thetas_fitted[:, MU_K]).mean())
+    ratio, stiffness, damping = np.exp(thetas_fitted[0, SHARED]).tolist()
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
     plant = Plant(stiffness, damping, mu_k / ratio, mu_k, gravity_m_s2)
     prior = Prior(stds[1] * stiffness, stds[2] * damping, max(stds[0] * ratio, MIN_RATIO_STD))
@@ -180,12 +180,12 @@ def ratio_scatter(taps: Sequence[Features], model: Model) -> float:
     values, variances = [], []
     for tap in taps:
         try:
-            found = fit(tap, wide)
+            waveform = fit(tap, wide)
         except (PredictionError, PhysicsError):
             continue
-        std = found.mu_s_std / found.mu_s
-        if found.immediate < 0.01 and std < 0.05:
-            values.append(found.mu_k / found.mu_s)
+        std = waveform.mu_s_std / waveform.mu_s
+        if waveform.immediate < 0.01 and std < 0.05:
+            values.append(waveform.mu_k / waveform.mu_s)
             variances.append((std * values[-1]) ** 2)
     if len(values) < 5:
         return 0.0

@@ -138,9 +138,11 @@ class LinearisedModel:
         ):
             if len(times) > 2:
                 sums = scatter.count, scatter.times, scatter.values, scatter.both, scatter.noise_std
-                squares, used = _sample_squares(times, model[part], residual[part], self._weights[part], sums)
+                squares, counted = _sample_squares(
+                    times, model[part], residual[part], self._weights[part], sums
+                )
                 total += squares
-                count += used
+                count += counted
         return math.sqrt(total / count)
 
     def kink_coordinate(self, theta: Samples) -> float:
@@ -174,10 +176,10 @@ class LinearisedModel:
         table = self._table.copy()
         table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
         traces = self._ensemble.traces(table)
-        found = _linearise(traces.force_n, traces.position_m, self._values, self._weights, STEPS_OUT, beyond)
-        if not math.isfinite(found[3]):
+        fields = _linearise(traces.force_n, traces.position_m, self._values, self._weights, STEPS_OUT, beyond)
+        if not math.isfinite(fields[3]):
             raise PhysicsError("the motion is not finite with these parameters")
-        return Linearisation(*found)
+        return Linearisation(*fields)
 
 
 def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
@@ -259,22 +261,22 @@ def _sample_squares(
     The model's slope in a block comes from its neighbours; beside a jump from the one this side of it.
     `sums` are the fields of `WithinBlockSums`.
     """
-    count, spread, scatter, both, noise_std = sums
+    count, spread, scatter, products, noise_std = sums
     last = len(model) - 1
-    total, used = 0.0, 0.0
+    total, counted = 0.0, 0.0
     for i in range(last + 1):
         if not weights[i] * noise_std > 0.5 * math.sqrt(count[i]):
             continue
         before, after = max(i - 1, 0), min(i + 1, last)
-        left = (model[before + 1] - model[before]) / (times[before + 1] - times[before])
-        right = (model[after] - model[after - 1]) / (times[after] - times[after - 1])
+        slope_before = (model[before + 1] - model[before]) / (times[before + 1] - times[before])
+        slope_after = (model[after] - model[after - 1]) / (times[after] - times[after - 1])
         across = (model[after] - model[before]) / (times[after] - times[before])
-        least = 2.0 * min(abs(left), abs(right))
-        slope = min(max(across, -least), least) if left * right > 0.0 else 0.0
-        within = scatter[i] - 2.0 * slope * both[i] + slope * slope * spread[i]
+        least = 2.0 * min(abs(slope_before), abs(slope_after))
+        slope = min(max(across, -least), least) if slope_before * slope_after > 0.0 else 0.0
+        within = scatter[i] - 2.0 * slope * products[i] + slope * slope * spread[i]
         total += residual[i] * residual[i] + within / noise_std**2
-        used += count[i]
-    return total, used
+        counted += count[i]
+    return total, counted
 
 
 def _std_factors_at_jumps(times: Samples, jumps: list[float]) -> Samples:

@@ -24,14 +24,14 @@ class MassInterpolation:
     @property
     def friction_n(self) -> float:
         """Coefficient of mu_s in equation (4); between masses it goes with a power of the mass."""
-        return math.exp(sum(share * math.log(one.force.friction_n) for share, one in self.parts))
+        return math.exp(sum(share * math.log(predictor.force.friction_n) for share, predictor in self.parts))
 
     @property
     def velocity_n_s_per_m(self) -> float:
         """Coefficient of v in equation (4); between masses it goes with a power of the mass."""
-        slopes = [one.force.velocity_n_s_per_m for _, one in self.parts]
+        slopes = [predictor.force.velocity_n_s_per_m for _, predictor in self.parts]
         if min(slopes) <= 0.0:
-            return self.mean(lambda one: one.force.velocity_n_s_per_m)
+            return self.mean(lambda predictor: predictor.force.velocity_n_s_per_m)
         return math.exp(
             sum(share * math.log(slope) for (share, _), slope in zip(self.parts, slopes, strict=True))
         )
@@ -80,7 +80,7 @@ def interpolate_mass(model: Model, mass_kg: float, velocity_m_s: float) -> MassI
         raise PredictionError("the part's mass is not known")
     if not (math.isfinite(velocity_m_s) and velocity_m_s > 0.0):
         raise PredictionError("the actuator's velocity is not known")
-    masses = sorted({one.mass_kg for one in model.predictors})
+    masses = sorted({predictor.mass_kg for predictor in model.predictors})
     close = min(masses, key=lambda mass: abs(mass - mass_kg))
     if abs(close / mass_kg - 1.0) < 1e-3:
         return MassInterpolation(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=True)
@@ -98,8 +98,10 @@ def interpolate_mass(model: Model, mass_kg: float, velocity_m_s: float) -> MassI
 def _for_velocity(model: Model, mass_kg: float, velocity_m_s: float) -> Predictor:
     """Predictor of a mass whose velocities contain this one, or come nearest to it."""
 
-    def away(one: Predictor) -> float:
-        low, high = one.velocity_range_m_s
+    def distance_to_range(predictor: Predictor) -> float:
+        low, high = predictor.velocity_range_m_s
         return max(low - velocity_m_s, velocity_m_s - high, 0.0)
 
-    return min((one for one in model.predictors if one.mass_kg == mass_kg), key=away)
+    return min(
+        (predictor for predictor in model.predictors if predictor.mass_kg == mass_kg), key=distance_to_range
+    )

@@ -160,11 +160,11 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
         raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
     if not best.converged:
         raise NotConvergedError("the waveform fit did not settle", gap)
-    sides = tuple(one.truncated(prior, widening) for one in fits)
+    sides = tuple(minimum.truncated(prior, widening) for minimum in fits)
     if len(sides) == 1:
         sides = (replace(sides[0], sign=0),)
     posterior = mixture(sides, KINK_FORM, offset)
-    slips_at_once = [one.side < 0 for one in fits]
+    slips_at_once = [minimum.side < 0 for minimum in fits]
     (mu_s, mu_s_std), (mu_k, mu_k_std) = (_log_normal_moments(posterior, of) for of in (MU_S_FORM, MU_K_FORM))
     return WaveformFit(
         mu_s=mu_s,
@@ -181,22 +181,22 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
 
 def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samples) -> list[Minimum]:
     """Descend on the side of the start, and on the other where the kink is near."""
-    first = 1 if response.kink_coordinate(start) >= 0.0 else -1
-    found = gauss_newton.fit(response, prior, start, first)
-    spread = math.sqrt(float(KINK_FORM @ found.truncated(prior).covariance @ KINK_FORM))
-    if first * response.kink_coordinate(found.theta) >= KINK_DISTANCE_STD * spread:
-        return [found]
-    return [found, gauss_newton.fit(response, prior, found.theta, -first)]
+    side = 1 if response.kink_coordinate(start) >= 0.0 else -1
+    minimum = gauss_newton.fit(response, prior, start, side)
+    spread = math.sqrt(float(KINK_FORM @ minimum.truncated(prior).covariance @ KINK_FORM))
+    if side * response.kink_coordinate(minimum.theta) >= KINK_DISTANCE_STD * spread:
+        return [minimum]
+    return [minimum, gauss_newton.fit(response, prior, minimum.theta, -side)]
 
 
 def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> tuple[Minimum, float]:
     """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
     freedom = max(len(fits[0].residual) - len(prior.free), 1)
-    misfit = math.sqrt(min(one.chi2 for one in fits) / freedom)
+    misfit = math.sqrt(min(minimum.chi2 for minimum in fits) / freedom)
     if len(fits) == 1:
         return fits[0], misfit
     weights = mixture(
-        tuple(one.truncated(prior, max(misfit, 1.0)) for one in fits), KINK_FORM, offset
+        tuple(minimum.truncated(prior, max(misfit, 1.0)) for minimum in fits), KINK_FORM, offset
     ).weights
     best = fits[int(np.argmax(weights))]
     return best, math.sqrt(best.chi2 / freedom)

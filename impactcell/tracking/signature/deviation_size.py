@@ -96,16 +96,16 @@ def _level_or_tilt(
 ) -> tuple[float, float]:
     """Size of the level alone, or of the tilt with the level free, as the scan looks for them."""
     image, slope = K.sum(axis=0), grid / grid[-1]
-    known, score = float(image.sum()), float(v.sum())
-    if family == TILT and known > 0.0:
-        turn = float(slope @ image) / known
+    information, score = float(image.sum()), float(v.sum())
+    if family == TILT and information > 0.0:
+        turn = float(slope @ image) / information
         score = float(slope @ v) - turn * score
-        known = float(slope @ K @ slope) - turn * turn * known
-    return (score / known, math.sqrt(scale / known)) if known >= least else UNSEEN
+        information = float(slope @ K @ slope) - turn * turn * information
+    return (score / information, math.sqrt(scale / information)) if information >= least else UNSEEN
 
 
 def _average_over_shapes(
-    told: Callable[[Samples], ShapeScores],
+    score_shapes: Callable[[Samples], ShapeScores],
     low: Samples,
     high: Samples,
     steps: tuple[int, ...],
@@ -114,17 +114,18 @@ def _average_over_shapes(
 ) -> tuple[float, float]:
     """Size and standard deviation from all shapes between `low` and `high`, shapes (d,).
 
-    `told` is given shapes as rows, shape (n, d), and answers for n of them or for n of each of several kinds.
+    `score_shapes` is given shapes as rows, shape (n, d), and answers for n of them or for n of each of
+    several kinds.
     """
     first, last, size, std = low, high, 0.0, 0.0
     for _ in range(ROUNDS):
         at = first + (last - first) * _lattice(steps)
-        known, squared, sizes, variances = told(at)
-        gain = np.where(known >= least, squared / (2.0 * scale), -math.inf)
-        most = gain.max()
-        if most == -math.inf:
+        information, squared, sizes, variances = score_shapes(at)
+        gain = np.where(information >= least, squared / (2.0 * scale), -math.inf)
+        highest_gain = gain.max()
+        if highest_gain == -math.inf:
             return UNSEEN
-        weight = np.exp(gain - most)
+        weight = np.exp(gain - highest_gain)
         weight /= weight.sum()
         size = float(np.vdot(weight, sizes))
         std = math.sqrt(np.vdot(weight, scale * variances + (sizes - size) ** 2))
@@ -155,19 +156,19 @@ def _bumps(K: Samples, v: Samples, grid: Samples, at: Samples) -> ShapeScores:
     square = off * off
     powers = np.concatenate([square, square * off, (square * square) ** 2])
     rows = np.exp(-math.log(2.0) * np.minimum(powers, MAX_EXPONENT))
-    known, score = np.maximum(np.einsum("ij,ij->i", rows @ K, rows), MIN_INFORMATION), rows @ v
-    return known, score**2 / known, score / known, 1.0 / known
+    information, score = np.maximum(np.einsum("ij,ij->i", rows @ K, rows), MIN_INFORMATION), rows @ v
+    return information, score**2 / information, score / information, 1.0 / information
 
 
 def _ripples(K: Samples, v: Samples, grid: Samples, at: Samples) -> ShapeScores:
     """Ripples of so many waves on the grid, known as well as at their worst phase, shape (n,) each."""
     phase = 2.0 * math.pi / grid[-1] * at * grid
     x, y = np.cos(phase), np.sin(phase)
-    image, one, other = x @ K, x @ v, y @ v
+    image, of_cosine, of_sine = x @ K, x @ v, y @ v
     cc, cs, ss = (image * x).sum(axis=1), (image * y).sum(axis=1), ((y @ K) * y).sum(axis=1)
-    known = (cc + ss) / 2.0 - np.hypot((cc - ss) / 2.0, cs)
+    information = (cc + ss) / 2.0 - np.hypot((cc - ss) / 2.0, cs)
     solid = np.maximum(cc * ss - cs * cs, MIN_INFORMATION)
-    a, b = (ss * one - cs * other) / solid, (cc * other - cs * one) / solid
+    a, b = (ss * of_cosine - cs * of_sine) / solid, (cc * of_sine - cs * of_cosine) / solid
     square = np.maximum(a * a + b * b, MIN_INFORMATION)
     variance = (ss * a * a - 2.0 * cs * a * b + cc * b * b) / (solid * square)
-    return known, a * one + b * other, np.sqrt(square), variance
+    return information, a * of_cosine + b * of_sine, np.sqrt(square), variance

@@ -87,60 +87,58 @@ def test_deviation(
 ) -> DeviationTest:
     """Test one cycle against its material's reference."""
     cycles = reference.variation.cycles
-    looked = deviation_shapes.deviation_shapes(float(grid_m[-1]), len(grid_m))
-    rows, across, waves = looked.within(slide.reached_m, len(slide.vector))
-    spe_usual = reference.spe_sum, float(max(reference.spe_count, 1))
+    shapes = deviation_shapes.deviation_shapes(float(grid_m[-1]), len(grid_m))
+    rows, across, waves = shapes.within(slide.reached_m, len(slide.vector))
+    spe_of_normal = reference.spe_sum, float(max(reference.spe_count, 1))
     statistics = _statistics(
-        reference.fields(reference.components, cycles), spe_usual, slide.fields, (rows, across, waves)
+        reference.fields(reference.components, cycles), spe_of_normal, slide.fields, (rows, across, waves)
     )
-    t_squared, spe, freedom, scale, p_scan, centre, least, wider, P, u = statistics
+    t_squared, spe, freedom, scale, p_scan, centre, least, score_variance, P, u = statistics
     chi_squared = float(chdtrc(freedom, spe / scale)) if freedom > 0 else 1.0
     p_values = (_hotelling_p_value(t_squared, cycles), chi_squared, *p_scan.tolist())
     odds = [share / max(p, MIN_P_VALUE) for share, p in zip(FALSE_ALARM_SHARES, p_values, strict=True)]
-    most = odds.index(max(odds))
+    likeliest = odds.index(max(odds))
     at = float(grid_m[centre]) if centre >= 0 else math.nan
     p_value, size, std = 1.0 / sum(odds), math.nan, math.nan
     if p_value < SIZED_P_VALUE:
-        family = most - 2 if most >= 2 else deviation_size.BUMP
-        size, std = deviation_size.estimate_size(family, P, u, grid_m, slide.reached_m, least, wider)
-    return DeviationTest(p_value, t_squared, spe, freedom, KINDS[most], at, size, std)
+        family = likeliest - 2 if likeliest >= 2 else deviation_size.BUMP
+        size, std = deviation_size.estimate_size(family, P, u, grid_m, slide.reached_m, least, score_variance)
+    return DeviationTest(p_value, t_squared, spe, freedom, KINDS[likeliest], at, size, std)
 
 
 @compiled
 def _statistics(
     reference_fields: references.ReferenceFields,
-    spe_usual: tuple[float, float],
+    spe_of_normal: tuple[float, float],
     slide_fields: tuple[Samples, Samples, int],
     shapes: tuple[Samples, int, int],
 ) -> tuple[float, float, int, float, Samples, int, float, float, Samples, Samples]:
     """T^2, SPE, its freedom and the scale of the noise, what `scan` finds, and what it was told.
 
-    `spe_usual` are the sum of SPE over its freedom and how many cycles it is of, `shapes` what
+    `spe_of_normal` are the sum of SPE over its freedom and how many cycles it is of, `shapes` what
     `DeviationShapes.within` gives.
     """
     reference = references.ReferenceArrays(*reference_fields)
     cycle = friction_profile.SlideInformation(*slide_fields)
-    (spe_sum, spe_count), (rows, across, waves) = spe_usual, shapes
-    n = min(cycle.seen, references.judged_coefficients(reference))
+    (spe_sum, spe_count), (rows, across, waves) = spe_of_normal, shapes
+    n = min(cycle.coefficients, references.judged_coefficients(reference))
     information, deviation = references.information_on_deviation(cycle, reference.mean, n)
     G, y = references.with_mean_error(information, deviation, reference.matrix, reference.strength)
     C = small_linalg.block(reference.components, 0, n, 0, MODES)
     t_squared, spe, freedom = _t_squared_and_spe(G, y, C, COMPONENTS)
     # variation beyond the modes, or noise that was declared too low, widens everything once it is certain
-    usual_spe = spe_sum / spe_count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * spe_count))
-    scale = max(1.0, usual_spe)
+    least_spe = spe_sum / spe_count - 2.0 * math.sqrt(2.0 / (max(freedom, 1) * spe_count))
+    scale = max(1.0, least_spe)
     P, u = small_linalg.with_random_effects(C, G, y)
     least = MIN_SCORE_SQUARED / (MAX_RELATIVE_SIZE * references.mean_friction(reference.mean, n)) ** 2
-    shown, wider = (
-        small_linalg.block(rows, 0, len(rows), 0, n),
-        scale * (1.0 + 2.0 * MODES / reference.cycles),
-    )
+    within_slide = small_linalg.block(rows, 0, len(rows), 0, n)
+    score_variance = scale * (1.0 + 2.0 * MODES / reference.cycles)
     p_values, centre = matched_filter_scan.scan(
-        matched_filter_scan.LookedFor(shown, across, waves),
+        matched_filter_scan.LookedFor(within_slide, across, waves),
         matched_filter_scan.Scores(P, u, C),
-        matched_filter_scan.Bounds(least, wider, reference.cycles),
+        matched_filter_scan.Bounds(least, score_variance, reference.cycles),
     )
-    return t_squared, spe, freedom, scale, p_values, centre, least, wider, P, u
+    return t_squared, spe, freedom, scale, p_values, centre, least, score_variance, P, u
 
 
 @compiled
@@ -148,19 +146,19 @@ def _t_squared_and_spe(G: Samples, y: Samples, C: Samples, leading: int) -> tupl
     """Hotelling's T^2, and the squared prediction error over the sensor noise with its freedom."""
     n, modes = C.shape
     # the lesser components widen the noise that SPE is whitened by; T^2 is on the leading ones
-    left, rest = small_linalg.with_random_effects(small_linalg.block(C, 0, n, leading, modes), G, y)
-    image = small_linalg.transposed_product(left, small_linalg.block(C, 0, n, 0, leading))
-    whitened, inside, freedom, whole = _whiten(left, rest, image)
-    gram = small_linalg.transposed_product(inside, inside)
-    along, sizes = np.zeros(leading), np.empty(leading)
+    matrix, vector = small_linalg.with_random_effects(small_linalg.block(C, 0, n, leading, modes), G, y)
+    image = small_linalg.transposed_product(matrix, small_linalg.block(C, 0, n, 0, leading))
+    whitened, components, freedom, squares = _whiten(matrix, vector, image)
+    gram = small_linalg.transposed_product(components, components)
+    scores, sizes = np.zeros(leading), np.empty(leading)
     for a in range(leading):
         sizes[a] = math.sqrt(gram[a, a])
         for k in range(n):
-            along[a] += inside[k, a] * whitened[k]
+            scores[a] += components[k, a] * whitened[k]
     if freedom <= leading or sizes.min() < MIN_COMPONENT_SIZE:
-        return 0.0, whole, freedom
+        return 0.0, squares, freedom
     for a in range(leading):
-        along[a] /= sizes[a]
+        scores[a] /= sizes[a]
         for b in range(leading):
             gram[a, b] /= sizes[a] * sizes[b]
     spread = gram.copy()
@@ -168,57 +166,57 @@ def _t_squared_and_spe(G: Samples, y: Samples, C: Samples, leading: int) -> tupl
         for b in range(leading):
             for c in range(leading):
                 spread[a, b] += gram[a, c] * sizes[c] ** 2 * gram[c, b]
-    t_squared, left_over = 0.0, whole
-    seen, noise = small_linalg.solve(spread, along), small_linalg.solve(gram, along)
+    t_squared, spe = 0.0, squares
+    usual, by_noise = small_linalg.solve(spread, scores), small_linalg.solve(gram, scores)
     for a in range(leading):
-        t_squared += along[a] * seen[a]
-        left_over -= along[a] * noise[a]
-    return t_squared, max(left_over, 0.0), freedom - leading
+        t_squared += scores[a] * usual[a]
+        spe -= scores[a] * by_noise[a]
+    return t_squared, max(spe, 0.0), freedom - leading
 
 
 @compiled
-def _whiten(left: Samples, rest: Samples, image: Samples) -> tuple[Samples, Samples, int, float]:
+def _whiten(matrix: Samples, vector: Samples, image: Samples) -> tuple[Samples, Samples, int, float]:
     """Whiten by a Cholesky factor that takes the best known direction next and ends where nothing is known.
 
     Parameters
     ----------
-    left, rest, image : ndarray, shapes (n, n), (n,), (n, c)
+    matrix, vector, image : ndarray, shapes (n, n), (n,), (n, c)
         Information, its vector, and its product with the components; used up.
 
     Returns
     -------
-    whitened, inside : ndarray, shapes (n,), (n, c)
+    whitened, components : ndarray, shapes (n,), (n, c)
         The vector and the components.
     freedom : int
         Directions known.
-    whole : float
+    squares : float
         Sum of squares of `whitened`.
     """
     n, leading = image.shape
-    whitened, inside, column = np.zeros(n), np.zeros((n, leading)), np.empty(n)
-    freedom, whole = 0, 0.0
+    whitened, components, column = np.zeros(n), np.zeros((n, leading)), np.empty(n)
+    freedom, squares = 0, 0.0
     for k in range(n):
         best = 0
         for i in range(n):
-            if left[i, i] > left[best, best]:
+            if matrix[i, i] > matrix[best, best]:
                 best = i
-        if left[best, best] < MIN_INFORMATION:
+        if matrix[best, best] < MIN_INFORMATION:
             break
-        root = math.sqrt(left[best, best])
-        whitened[k] = rest[best] / root
+        root = math.sqrt(matrix[best, best])
+        whitened[k] = vector[best] / root
         for j in range(leading):
-            inside[k, j] = image[best, j] / root
+            components[k, j] = image[best, j] / root
         for i in range(n):
-            column[i] = left[i, best] / root
+            column[i] = matrix[i, best] / root
         for i in range(n):
-            rest[i] -= column[i] * whitened[k]
+            vector[i] -= column[i] * whitened[k]
             for j in range(n):
-                left[i, j] -= column[i] * column[j]
+                matrix[i, j] -= column[i] * column[j]
             for j in range(leading):
-                image[i, j] -= column[i] * inside[k, j]
-        whole += whitened[k] ** 2
+                image[i, j] -= column[i] * components[k, j]
+        squares += whitened[k] ** 2
         freedom += 1
-    return whitened, inside, freedom, whole
+    return whitened, components, freedom, squares
 
 
 def _hotelling_p_value(t_squared: float, cycles: int) -> float:

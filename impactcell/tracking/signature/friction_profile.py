@@ -43,19 +43,19 @@ class SplineInformation:
         G and h, shapes (j, j) and (j,).
     reached_m : float
         How far the part slid.
-    seen : int
+    coefficients : int
         Coefficients of the splines it met; rows of G and h beyond are zero.
     """
 
     matrix: Samples
     vector: Samples
     reached_m: float
-    seen: int
+    coefficients: int
 
     @property
     def fields(self) -> tuple[Samples, Samples, int]:
         """What a `SlideInformation` is made of; compiled code is called with plain tuples in less time."""
-        return self.matrix, self.vector, self.seen
+        return self.matrix, self.vector, self.coefficients
 
 
 class SlideInformation(NamedTuple):
@@ -63,7 +63,7 @@ class SlideInformation(NamedTuple):
 
     matrix: Samples
     vector: Samples
-    seen: int
+    coefficients: int
 
 
 def information(
@@ -84,10 +84,10 @@ def information(
     moved_m = (
         np.zeros(len(slide.time_s)) if acceleration is None else _known_displacement(slide, acceleration)
     )
-    seen = spline_integrals.information(
+    fields = spline_integrals.information(
         slide.time_s, slide.distance_m, moved_m, slide.variance, grid_m, gravity_m_s2
     )
-    return SplineInformation(*seen)
+    return SplineInformation(*fields)
 
 
 def _known_displacement(slide: SlideSegment, acceleration: Acceleration) -> Samples:
@@ -142,22 +142,22 @@ def roughness(coefficients: int) -> Samples:
     return penalty
 
 
-def smooth(seen: SplineInformation, grid_m: Samples) -> tuple[Samples, float]:
-    """Posterior mean of the coefficients seen under exp(-lambda/2 beta' D beta), and the likeliest lambda.
+def smooth(slide: SplineInformation, grid_m: Samples) -> tuple[Samples, float]:
+    """Posterior mean of the coefficients met under exp(-lambda/2 beta' D beta), and the likeliest lambda.
 
     lambda is weighted by its restricted likelihood. Coefficients beyond follow the last ones in a straight
     line, at no penalty, so that they may be left out.
     """
     mean, strength, _, _ = _smoothed(
-        seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, SMOOTHING_STRENGTHS
+        slide.matrix, slide.vector, slide.coefficients, slide.reached_m, grid_m, SMOOTHING_STRENGTHS
     )
     return mean, strength
 
 
-def friction(seen: SplineInformation, grid_m: Samples) -> tuple[Samples, Samples]:
+def friction(slide: SplineInformation, grid_m: Samples) -> tuple[Samples, Samples]:
     """Friction and its standard deviation on the grid, by `smooth`; nan where the part did not get."""
     _, _, value, std = _smoothed(
-        seen.matrix, seen.vector, seen.seen, seen.reached_m, grid_m, SMOOTHING_STRENGTHS
+        slide.matrix, slide.vector, slide.coefficients, slide.reached_m, grid_m, SMOOTHING_STRENGTHS
     )
     return value, std
 
@@ -185,11 +185,11 @@ def _smoothed(
     fit, determinant = (n - 2) * np.log(strengths), np.ones(many)
     for i in range(n):
         # level and slope are not penalised; rounding must not say otherwise
-        own = min(max(share[i], 0.0), 1.0) if i > 1 else 0.0
+        penalised = min(max(share[i], 0.0), 1.0) if i > 1 else 0.0
         for j in range(n):
             inner[i] += vectors[j, i] * vector[j]
         for k in range(many):
-            diagonal = (1.0 - own) + strengths[k] * own
+            diagonal = (1.0 - penalised) + strengths[k] * penalised
             inverse[i, k] = 1.0 / diagonal
             means[i, k] = inner[i] * inverse[i, k]
             fit[k] += inner[i] * means[i, k]

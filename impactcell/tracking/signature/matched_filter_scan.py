@@ -64,7 +64,7 @@ class Projected(NamedTuple):
         s and P s.
     along : ndarray, shape (m, k)
         s' P C.
-    score, known : ndarray, shape (m,)
+    score, information : ndarray, shape (m,)
         s' u and s' P s.
     """
 
@@ -72,7 +72,7 @@ class Projected(NamedTuple):
     image: Samples
     along: Samples
     score: Samples
-    known: Samples
+    information: Samples
 
 
 @compiled
@@ -88,30 +88,31 @@ def scan(shapes: LookedFor, scores: Scores, bounds: Bounds) -> tuple[Samples, in
     """
     rows = shapes.rows
     image = rows @ scores.P
-    along, score, known = image @ scores.C, rows @ scores.u, np.empty(len(rows))
+    along, score, information = image @ scores.C, rows @ scores.u, np.empty(len(rows))
     for i in range(len(rows)):
-        known[i] = _dot(rows[i], image[i])
+        information[i] = _dot(rows[i], image[i])
     level, tilt = len(rows) - 2, len(rows) - 1
-    projected = Projected(rows, image, along, score, known)
+    projected = Projected(rows, image, along, score, information)
     p_values = np.empty(4)
-    p_values[0] = _single_p_value(score[level], known[level], _dot(along[level], along[level]), bounds)
+    p_values[0] = _single_p_value(score[level], information[level], _dot(along[level], along[level]), bounds)
     # slope about the point where it does not depend on the level, so that the two are looked for apart
-    turn = _dot(rows[tilt], image[level]) / known[level]
-    about, left, varied = score[tilt] - turn * score[level], known[tilt] - turn**2 * known[level], 0.0
+    pivot = _dot(rows[tilt], image[level]) / information[level]
+    tilt_score, varied = score[tilt] - pivot * score[level], 0.0
+    of_tilt = information[tilt] - pivot**2 * information[level]
     for k in range(along.shape[1]):
-        varied += (along[tilt, k] - turn * along[level, k]) ** 2
-    p_values[1] = _single_p_value(about, left, varied, bounds)
+        varied += (along[tilt, k] - pivot * along[level, k]) ** 2
+    p_values[1] = _single_p_value(tilt_score, of_tilt, varied, bounds)
     p_values[2], row = _largest_bump(projected, level - 2 * shapes.waves, shapes.across, bounds)
     p_values[3] = _largest_ripple(projected, level - 2 * shapes.waves, level, bounds)
     return p_values, row % shapes.across if row >= 0 else -1
 
 
 @compiled
-def _single_p_value(score: float, known: float, varied: float, bounds: Bounds) -> float:
+def _single_p_value(score: float, information: float, varied: float, bounds: Bounds) -> float:
     """Find the p-value of a single shape, of either sign; 1 where it cannot be seen."""
-    if known < bounds.least:
+    if information < bounds.least:
         return 1.0
-    z = _normal_score(score**2 / (known * bounds.scale), varied / known, bounds.cycles)
+    z = _normal_score(score**2 / (information * bounds.scale), varied / information, bounds.cycles)
     return math.erfc(z / math.sqrt(2.0))
 
 
@@ -141,14 +142,15 @@ def _largest_bump(projected: Projected, bumps: int, centres: int, bounds: Bounds
     They are not the same: a score that owes much to what was learned of the variation may be large and not
     rare.
     """
-    along, score, known = projected.along, projected.score, projected.known
-    best, c, most = -1, 0.0, 0.0
+    along, score, information = projected.along, projected.score, projected.information
+    best, c, highest = -1, 0.0, 0.0
     for i in range(bumps):
-        if known[i] >= bounds.least:
-            share, squared = _dot(along[i], along[i]) / known[i], score[i] ** 2 / (known[i] * bounds.scale)
+        if information[i] >= bounds.least:
+            share = _dot(along[i], along[i]) / information[i]
+            squared = score[i] ** 2 / (information[i] * bounds.scale)
             c = max(c, _normal_score(squared, share, bounds.cycles))
-            if best < 0 or squared > most:
-                best, most = i, squared
+            if best < 0 or squared > highest:
+                best, highest = i, squared
     if best < 0:
         return 1.0, -1
     euler, edge, area = _euler_edge_area(projected, bounds.least, centres, bumps // centres)
@@ -193,19 +195,19 @@ def _vertices_and_edges(projected: Projected, least: float, across: int, down: i
 
     Edges of each vertex go right, down, and diagonally from the right one to the lower one.
     """
-    rows, image, known = projected.rows, projected.image, projected.known
+    rows, image, information = projected.rows, projected.image, projected.information
     euler, length = 0.0, np.full((3, across * down), np.nan)
     for i in range(down):
         for k in range(across):
             a = i * across + k
-            euler += 1.0 if known[a] >= least else 0.0
+            euler += 1.0 if information[a] >= least else 0.0
             for kind in range(3):
                 if (kind != 1 and k + 1 == across) or (kind != 0 and i + 1 == down):
                     continue
                 p = a + 1 if kind == 2 else a
                 q = a + 1 if kind == 0 else a + across
-                if known[p] >= least and known[q] >= least:
-                    near = _dot(rows[p], image[q]) / math.sqrt(known[p] * known[q])
+                if information[p] >= least and information[q] >= least:
+                    near = _dot(rows[p], image[q]) / math.sqrt(information[p] * information[q])
                     length[kind, a] = math.acos(min(max(near, -1.0), 1.0))
                     euler -= 1.0
     return euler, length
@@ -252,16 +254,16 @@ def _largest_ripple(projected: Projected, first: int, end: int, bounds: Bounds) 
 
 
 @compiled
-def _angle_between_planes(rows: Samples, image: Samples, one: int, other: int) -> float:
+def _angle_between_planes(rows: Samples, image: Samples, wave: int, next_wave: int) -> float:
     """Root mean square angle between the planes that two waves span with their cosines and sines."""
     shared = 0.0
-    a, b = math.sqrt(_dot(rows[one], image[one])), _dot(rows[one], image[one + 1])
-    c = math.sqrt(_dot(rows[one + 1], image[one + 1]) - (b / a) ** 2)
-    d, e = math.sqrt(_dot(rows[other], image[other])), _dot(rows[other], image[other + 1])
-    f = math.sqrt(_dot(rows[other + 1], image[other + 1]) - (e / d) ** 2)
+    a, b = math.sqrt(_dot(rows[wave], image[wave])), _dot(rows[wave], image[wave + 1])
+    c = math.sqrt(_dot(rows[wave + 1], image[wave + 1]) - (b / a) ** 2)
+    d, e = math.sqrt(_dot(rows[next_wave], image[next_wave])), _dot(rows[next_wave], image[next_wave + 1])
+    f = math.sqrt(_dot(rows[next_wave + 1], image[next_wave + 1]) - (e / d) ** 2)
     for k in range(2):
-        first = _dot(rows[one], image[other + k]) / a
-        second = (_dot(rows[one + 1], image[other + k]) - b / a * first) / c
+        first = _dot(rows[wave], image[next_wave + k]) / a
+        second = (_dot(rows[wave + 1], image[next_wave + k]) - b / a * first) / c
         if k == 0:
             x, y = first / d, second / d
         else:

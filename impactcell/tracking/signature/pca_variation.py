@@ -45,7 +45,7 @@ class Sums(NamedTuple):
 
     weights: Samples
     moments: Samples
-    seen: Samples
+    signal: Samples
     noise: Samples
 
 
@@ -63,7 +63,7 @@ class Variation:
         Sum of tr(E_p W E_q W), E_p the symmetric unit matrices: the lower triangle by rows.
     moments : ndarray, shape (21,)
         Sum of tr E_p (T d d' T - T K T').
-    seen, noise : ndarray, shape (6, 6)
+    signal, noise : ndarray, shape (6, 6)
         Sums of W^2 and of (T W)' T W.
     """
 
@@ -71,13 +71,13 @@ class Variation:
     scale: Samples = field(default_factory=lambda: np.zeros(MODES))
     weights: Samples = field(default_factory=lambda: np.zeros(PAIRS * (PAIRS + 1) // 2))
     moments: Samples = field(default_factory=lambda: np.zeros(PAIRS))
-    seen: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
+    signal: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
     noise: Samples = field(default_factory=lambda: np.zeros((MODES, MODES)))
 
     @property
     def sums(self) -> "SumsFields":
         """What a `Sums` is made of."""
-        return self.weights, self.moments, self.seen, self.noise
+        return self.weights, self.moments, self.signal, self.noise
 
 
 SumsFields = tuple[Samples, Samples, Samples, Samples]
@@ -87,9 +87,9 @@ SumsFields = tuple[Samples, Samples, Samples, Samples]
 def initial_guess(friction: float) -> Variation:
     """Before the first cycle, from the friction's own size."""
     scale = INITIAL_RELATIVE_STD * abs(friction) / np.arange(1.0, MODES + 1.0)
-    fresh = Variation(scale=scale)
-    _add_to_sums(np.eye(MODES), np.zeros((MODES, MODES)), RIDGE_CYCLES, fresh.weights, fresh.moments)
-    return fresh
+    variation = Variation(scale=scale)
+    _add_to_sums(np.eye(MODES), np.zeros((MODES, MODES)), RIDGE_CYCLES, variation.weights, variation.moments)
+    return variation
 
 
 @compiled
@@ -109,16 +109,16 @@ def update_sums(B: Samples, matrix: Samples, vector: Samples, weight: float, sum
     """
     B = small_linalg.block(B, 0, len(vector), 0, MODES)
     K = small_linalg.transposed_product(small_linalg.transposed_product(matrix, B), B)
-    along = np.zeros((MODES, 1))
+    scores = np.zeros((MODES, 1))
     for i in range(len(vector)):
         for k in range(MODES):
-            along[k, 0] += B[i, k] * vector[i]
-    lost = K.copy()
+            scores[k, 0] += B[i, k] * vector[i]
+    inverse_T = K.copy()
     for i in range(MODES):
-        lost[i, i] += 1.0
-    T = small_linalg.inverse(lost)
+        inverse_T[i, i] += 1.0
+    T = small_linalg.inverse(inverse_T)
     r, W, TKT = (
-        small_linalg.transposed_product(T, along),
+        small_linalg.transposed_product(T, scores),
         small_linalg.transposed_product(T, K),
         small_linalg.transposed_product(T, small_linalg.transposed_product(K, T)),
     )
@@ -130,60 +130,60 @@ def update_sums(B: Samples, matrix: Samples, vector: Samples, weight: float, sum
             TKT[i, k] = share * r[i, 0] * r[k, 0] - TKT[i, k]
     TW = small_linalg.transposed_product(T, W)
     _add_to_sums(W, TKT, 1.0, weights, moments)
-    seen = sums.seen + small_linalg.transposed_product(W, W)
-    return Sums(weights, moments, seen, sums.noise + small_linalg.transposed_product(TW, TW))
+    signal = sums.signal + small_linalg.transposed_product(W, W)
+    return Sums(weights, moments, signal, sums.noise + small_linalg.transposed_product(TW, TW))
 
 
 @compiled
 def covariance(sums: Sums, cycles: float) -> Samples:
     """Lambda, shape (6, 6)."""
-    found, p = np.empty((MODES, MODES)), 0
+    unbiased, p = np.empty((MODES, MODES)), 0
     upper = small_linalg.solve(small_linalg.unpack_triangle(sums.weights), sums.moments)
     for i in range(MODES):
         for j in range(i, MODES):
-            found[i, j] = found[j, i] = upper[p]
+            unbiased[i, j] = unbiased[j, i] = upper[p]
             p += 1
-    half = small_linalg.solve_lower(small_linalg.cholesky(sums.noise), sums.seen)
+    half = small_linalg.solve_lower(small_linalg.cholesky(sums.noise), sums.signal)
     squares, turned = np.linalg.eigh(small_linalg.transposed_product(half, half))
-    each, lost = np.eye(MODES) / cycles, np.eye(MODES)
+    each, precision = np.eye(MODES) / cycles, np.eye(MODES)
     for k in range(MODES):
-        known = math.sqrt(max(squares[k], 0.0))
+        information = math.sqrt(max(squares[k], 0.0))
         for i in range(MODES):
             for j in range(MODES):
-                both = known * turned[i, k] * turned[j, k]
-                each[i, j] += both / math.sqrt(cycles)
-                lost[i, j] += both / math.sqrt(2.0)
+                product = information * turned[i, k] * turned[j, k]
+                each[i, j] += product / math.sqrt(cycles)
+                precision[i, j] += product / math.sqrt(2.0)
     # in units of the noise of one cycle
     root = small_linalg.cholesky(each)
     values, vectors = np.linalg.eigh(
-        small_linalg.transposed_product(small_linalg.transposed_product(found, root), root)
+        small_linalg.transposed_product(small_linalg.transposed_product(unbiased, root), root)
     )
     # what noise alone makes of six zeros at most (Marchenko & Pastur 1967) says nothing
     edge = (1.0 + math.sqrt(MODES / cycles)) ** 2 - 1.0
     for k in range(MODES):
         for i in range(MODES):
             vectors[i, k] *= math.sqrt(values[k]) if values[k] > edge else 0.0
-    back = small_linalg.solve_upper(root, vectors)
+    columns = small_linalg.solve_upper(root, vectors)
     # noise in n cycles hides a variance of sqrt(2 / n) of its own
-    whole = small_linalg.inverse(lost)
+    Lambda = small_linalg.inverse(precision)
     for i in range(MODES):
         for j in range(MODES):
             for k in range(MODES):
-                whole[i, j] += back[i, k] * back[j, k]
-    return whole
+                Lambda[i, j] += columns[i, k] * columns[j, k]
+    return Lambda
 
 
 @compiled
 def components(Lambda: Samples, B: Samples) -> Samples:
     """Principal components as columns, largest first, scaled to their standard deviations, shape (j, 6)."""
     values, vectors = np.linalg.eigh(Lambda)
-    found = np.zeros((len(B), MODES))
+    columns = np.zeros((len(B), MODES))
     for i in range(len(B)):
         for c in range(MODES):
             for k in range(MODES):
-                found[i, c] += B[i, k] * vectors[k, MODES - 1 - c]
-            found[i, c] *= math.sqrt(max(values[MODES - 1 - c], 0.0))
-    return found
+                columns[i, c] += B[i, k] * vectors[k, MODES - 1 - c]
+            columns[i, c] *= math.sqrt(max(values[MODES - 1 - c], 0.0))
+    return columns
 
 
 @lru_cache(maxsize=8)
@@ -196,17 +196,17 @@ def cosines(coefficients: int) -> Samples:
 
 
 @compiled
-def _add_to_sums(W: Samples, seen: Samples, share: float, weights: Samples, moments: Samples) -> None:
-    """Add tr(E_p W E_q W) and tr(E_p seen) to the sums."""
+def _add_to_sums(W: Samples, moment: Samples, share: float, weights: Samples, moments: Samples) -> None:
+    """Add tr(E_p W E_q W) and tr(E_p moment) to the sums."""
     n = len(W)
     p = at = 0
     for i in range(n):
         for j in range(i, n):
-            twice = 1.0 if i == j else 2.0
-            moments[p] += share * twice * seen[i, j]
+            pairs = 1.0 if i == j else 2.0
+            moments[p] += share * pairs * moment[i, j]
             p += 1
             for k in range(i + 1):
                 for m in range(k, n if k < i else j + 1):
-                    both = 0.5 if k == m else 1.0
-                    weights[at] += share * twice * both * (W[i, k] * W[j, m] + W[i, m] * W[j, k])
+                    orders = 0.5 if k == m else 1.0
+                    weights[at] += share * pairs * orders * (W[i, k] * W[j, m] + W[i, m] * W[j, k])
                     at += 1

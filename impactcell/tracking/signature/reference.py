@@ -51,9 +51,9 @@ class Reference:
     variation : Variation
     components : ndarray, shape (j, 6)
         Principal components of the variation as columns, largest first, scaled to their standard deviations.
-    met : ndarray, shape (j,)
+    cycles_met : ndarray, shape (j,)
         Cycles of this material that slid over each coefficient.
-    varied : ndarray, shape (j,)
+    cycles_varied : ndarray, shape (j,)
         Cycles of any material from which variation was learned there.
     spe_sum : float
         Summed SPE over its degrees of freedom, of judged normal cycles.
@@ -67,16 +67,16 @@ class Reference:
     strength: float = 0.0
     variation: Variation = field(default_factory=Variation)
     components: Samples = field(default_factory=lambda: np.zeros((0, MODES)))
-    met: Samples = field(default_factory=lambda: np.zeros(0))
-    varied: Samples = field(default_factory=lambda: np.zeros(0))
+    cycles_met: Samples = field(default_factory=lambda: np.zeros(0))
+    cycles_varied: Samples = field(default_factory=lambda: np.zeros(0))
     spe_sum: float = 0.0
     spe_count: int = 0
 
     def fields(self, components: Samples, cycles: int) -> "ReferenceFields":
         """Give what a `ReferenceArrays` is made of: compiled code takes plain tuples in less time."""
         return (
-            self.weight, self.matrix, self.vector, self.mean, self.strength, components, self.met,
-            self.varied, float(cycles),
+            self.weight, self.matrix, self.vector, self.mean, self.strength, components, self.cycles_met,
+            self.cycles_varied, float(cycles),
         )  # fmt: skip
 
 
@@ -89,8 +89,8 @@ class ReferenceArrays(NamedTuple):
     mean: Samples
     strength: float
     components: Samples
-    met: Samples
-    varied: Samples
+    cycles_met: Samples
+    cycles_varied: Samples
     cycles: float
 
 
@@ -102,20 +102,22 @@ def initial_state(coefficients: int) -> Reference:
     """Before the first cycle."""
     triangle, line = np.zeros(coefficients * (coefficients + 1) // 2), np.zeros(coefficients)
     components = np.zeros((coefficients, MODES))
-    return Reference(matrix=triangle, vector=line, mean=line, met=line, varied=line, components=components)
+    return Reference(
+        matrix=triangle, vector=line, mean=line, cycles_met=line, cycles_varied=line, components=components
+    )
 
 
 def restart(reference: Reference) -> Reference:
     """Another material: its mean is learned anew, how cycles vary is kept."""
     triangle, line = np.zeros_like(reference.matrix), np.zeros_like(reference.vector)
-    return replace(reference, weight=0.0, matrix=triangle, vector=line, met=line)
+    return replace(reference, weight=0.0, matrix=triangle, vector=line, cycles_met=line)
 
 
 @compiled
-def known_coefficients(met: Samples, weight: float) -> int:
+def known_coefficients(cycles_met: Samples, weight: float) -> int:
     """Coefficients, from the first on, that enough cycles have met for the mean to be known there."""
     n = 0
-    for cycles in met:
+    for cycles in cycles_met:
         n += 1 if cycles >= min(weight, MIN_CYCLES) else 0
     return n
 
@@ -124,9 +126,9 @@ def known_coefficients(met: Samples, weight: float) -> int:
 def judged_coefficients(reference: ReferenceArrays) -> int:
     """Coefficients, from the first on, where cycles can be judged: mean and variation are known."""
     n = 0
-    for learned in reference.varied:
+    for learned in reference.cycles_varied:
         n += 1 if learned >= min(reference.cycles, MIN_VARIATION_CYCLES) else 0
-    return min(known_coefficients(reference.met, reference.weight), n)
+    return min(known_coefficients(reference.cycles_met, reference.weight), n)
 
 
 @compiled
@@ -147,26 +149,27 @@ def information_on_deviation(
     Friction beyond is no better known than that it goes on from where it was, in steps of
     `RELATIVE_CONTINUATION_STEP` of itself: a longer slide tells neither deviance nor how cycles vary.
     """
-    matrix, vector, seen = cycle
-    own = np.empty(seen)
-    for i in range(seen):
-        own[i] = vector[i]
-        for j in range(seen):
-            own[i] -= matrix[i, j] * mean[j]
-    known = small_linalg.block(matrix, 0, n, 0, n)
-    if seen <= n:
-        return known, own
+    matrix, vector, coefficients = cycle
+    residual = np.empty(coefficients)
+    for i in range(coefficients):
+        residual[i] = vector[i]
+        for j in range(coefficients):
+            residual[i] -= matrix[i, j] * mean[j]
+    information = small_linalg.block(matrix, 0, n, 0, n)
+    if coefficients <= n:
+        return information, residual
     continues = 1.0 / (RELATIVE_CONTINUATION_STEP * mean_friction(mean, n)) ** 2
-    inner, cross = small_linalg.block(matrix, n, seen, n, seen), small_linalg.block(matrix, n, seen, 0, n)
-    known[n - 1, n - 1] += continues
+    inner = small_linalg.block(matrix, n, coefficients, n, coefficients)
+    cross = small_linalg.block(matrix, n, coefficients, 0, n)
+    information[n - 1, n - 1] += continues
     cross[0, n - 1] -= continues
-    for i in range(seen - n):
+    for i in range(coefficients - n):
         inner[i, i] += continues
         if i > 0:
             inner[i - 1, i - 1] += continues
             inner[i, i - 1] -= continues
             inner[i - 1, i] -= continues
-    return small_linalg.marginalise(known, own[:n], inner, cross, own[n:])
+    return small_linalg.marginalise(information, residual[:n], inner, cross, residual[n:])
 
 
 @compiled
@@ -174,16 +177,17 @@ def with_mean_error(
     matrix: Samples, vector: Samples, pooled: Samples, strength: float
 ) -> tuple[Samples, Samples]:
     """Information (G^-1 + V)^-1 and its vector, V the covariance of the mean's error."""
-    precise = precision(pooled, strength)
-    n, j = len(vector), len(precise)
-    beyond, cross = small_linalg.block(precise, n, j, n, j), small_linalg.block(precise, n, j, 0, n)
-    known, _ = small_linalg.marginalise(
-        small_linalg.block(precise, 0, n, 0, n), vector, beyond, cross, np.zeros(j - n)
+    mean_precision = precision(pooled, strength)
+    n, j = len(vector), len(mean_precision)
+    beyond = small_linalg.block(mean_precision, n, j, n, j)
+    cross = small_linalg.block(mean_precision, n, j, 0, n)
+    total, _ = small_linalg.marginalise(
+        small_linalg.block(mean_precision, 0, n, 0, n), vector, beyond, cross, np.zeros(j - n)
     )
     for i in range(n):
         for k in range(n):
-            known[i, k] += matrix[i, k]
-    return small_linalg.marginalise(matrix, vector, known, matrix, vector)
+            total[i, k] += matrix[i, k]
+    return small_linalg.marginalise(matrix, vector, total, matrix, vector)
 
 
 @compiled
@@ -214,17 +218,17 @@ def update(
     spe : float or None
         SPE of a judged cycle over its degrees of freedom.
     """
-    known, components, strength = reference.variation, reference.components, reference.strength
+    variation, components, strength = reference.variation, reference.components, reference.strength
     total = len(slide.vector)
     varies = reference.weight >= settled
-    if not varies and reference.weight == 0.0 and known.cycles == 0:
+    if not varies and reference.weight == 0.0 and variation.cycles == 0:
         first, _ = friction_profile.smooth(slide, grid_m)
-        known = pca_variation.initial_guess(float(np.median(first)))
-        components = pca_variation.components(np.eye(MODES), pca_variation.cosines(total) * known.scale)
-    cycles = known.cycles + 1 if varies else known.cycles
-    basis = known.scale, pca_variation.cosines(total)
-    matrix, vector, mean, components, met, varied, sums = _update_arrays(
-        reference.fields(components, cycles), known.sums, basis, slide.fields, varies
+        variation = pca_variation.initial_guess(float(np.median(first)))
+        components = pca_variation.components(np.eye(MODES), pca_variation.cosines(total) * variation.scale)
+    cycles = variation.cycles + 1 if varies else variation.cycles
+    basis = variation.scale, pca_variation.cosines(total)
+    matrix, vector, mean, components, cycles_met, cycles_varied, sums = _update_arrays(
+        reference.fields(components, cycles), variation.sums, basis, slide.fields, varies
     )
     if reference.weight in SMOOTHING_WEIGHTS:
         pooled = friction_profile.SplineInformation(
@@ -238,10 +242,10 @@ def update(
         vector,
         mean,
         strength,
-        Variation(cycles, known.scale, *sums),
+        Variation(cycles, variation.scale, *sums),
         components,
-        met,
-        varied,
+        cycles_met,
+        cycles_varied,
         reference.spe_sum if spe is None else reference.spe_sum + spe,
         reference.spe_count if spe is None else reference.spe_count + 1,
     )
@@ -261,30 +265,31 @@ def _update_arrays(
     """
     before, sums = ReferenceArrays(*reference_fields), pca_variation.Sums(*sums_fields)
     cycle = friction_profile.SlideInformation(*slide_fields)
-    met, varied, seen = before.met.copy(), before.varied.copy(), cycle.seen
+    cycles_met, cycles_varied = before.cycles_met.copy(), before.cycles_varied.copy()
+    coefficients = cycle.coefficients
     matrix, vector, components = before.matrix.copy(), before.vector.copy(), before.components
     if varies:
         scale, cosines = basis
-        n, B = min(known_coefficients(met, before.weight), seen), cosines.copy()
+        n, B = min(known_coefficients(cycles_met, before.weight), coefficients), cosines.copy()
         for i in range(len(B)):
             for k in range(MODES):
                 B[i, k] *= scale[k]
         information, deviation = information_on_deviation(cycle, before.mean, n)
         sums = pca_variation.update_sums(B, information, deviation, before.weight, sums)
         components = pca_variation.components(pca_variation.covariance(sums, before.cycles), B)
-        for i in range(min(n, seen - 1)):
-            varied[i] += 1.0
-    kept = 1.0 - 1.0 / MEMORY if before.weight >= MEMORY else 1.0
-    vary = small_linalg.block(components, 0, seen, 0, MODES)
-    of_cycle = small_linalg.block(cycle.matrix, 0, seen, 0, seen)
-    of_mean, score = small_linalg.with_random_effects(vary, of_cycle, cycle.vector[:seen])
+        for i in range(min(n, coefficients - 1)):
+            cycles_varied[i] += 1.0
+    retention = 1.0 - 1.0 / MEMORY if before.weight >= MEMORY else 1.0
+    modes = small_linalg.block(components, 0, coefficients, 0, MODES)
+    of_cycle = small_linalg.block(cycle.matrix, 0, coefficients, 0, coefficients)
+    of_mean, score = small_linalg.with_random_effects(modes, of_cycle, cycle.vector[:coefficients])
     p = 0
     for i in range(len(vector)):
-        met[i] = met[i] * kept + (1.0 if i < seen - 1 else 0.0)
-        vector[i] = vector[i] * kept + (score[i] if i < seen else 0.0)
+        cycles_met[i] = cycles_met[i] * retention + (1.0 if i < coefficients - 1 else 0.0)
+        vector[i] = vector[i] * retention + (score[i] if i < coefficients else 0.0)
         for j in range(i + 1):
-            matrix[p] = matrix[p] * kept + (of_mean[i, j] if i < seen else 0.0)
+            matrix[p] = matrix[p] * retention + (of_mean[i, j] if i < coefficients else 0.0)
             p += 1
     mean = small_linalg.solve(precision(matrix, before.strength), vector)
-    kept_sums = sums.weights, sums.moments, sums.seen, sums.noise
-    return matrix, vector, mean, components, met, varied, kept_sums
+    sums_after = sums.weights, sums.moments, sums.signal, sums.noise
+    return matrix, vector, mean, components, cycles_met, cycles_varied, sums_after

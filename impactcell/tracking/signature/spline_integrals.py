@@ -24,14 +24,14 @@ def information(
     columns = _columns(t, x, first, spacing, points, gravity)
     columns[:, -1] -= moved
     _remove_line(t, columns)
-    seen = columns.shape[1] - 1
+    coefficients = columns.shape[1] - 1
     products = columns.T @ columns
     matrix, vector = np.zeros((points + 2, points + 2)), np.zeros(points + 2)
-    for i in range(seen):
-        vector[i] = products[i, seen] / variance
+    for i in range(coefficients):
+        vector[i] = products[i, coefficients] / variance
         for j in range(i + 1):
             matrix[i, j] = matrix[j, i] = products[i, j] / variance
-    return matrix, vector, x[-1], seen
+    return matrix, vector, x[-1], coefficients
 
 
 @compiled
@@ -45,9 +45,9 @@ def _columns(t: Samples, x: Samples, first: float, spacing: float, points: int, 
     n, furthest = len(t), 0.0
     for k in range(n):
         furthest = max(furthest, (x[k] - first) / spacing)
-    seen = min(int(furthest), points - 2) + 4
-    columns = np.empty((n, seen + 1))
-    speed, place = np.zeros(seen), np.zeros(seen)
+    coefficients = min(int(furthest), points - 2) + 4
+    columns = np.empty((n, coefficients + 1))
+    speed, place = np.zeros(coefficients), np.zeros(coefficients)
     before, now = np.empty(4), np.empty(4)
     parts = max(1, MIN_INTEGRATION_STEPS // n)
     cell = _splines(x[0], first, spacing, points, before)
@@ -58,7 +58,7 @@ def _columns(t: Samples, x: Samples, first: float, spacing: float, points: int, 
                 # between blocks the path bends by less than a micrometre, which friction does not notice
                 at = x[k - 1] + (x[k] - x[k - 1]) * (part + 1.0) / parts
                 other = _splines(at, first, spacing, points, now)
-                for i in range(seen):
+                for i in range(coefficients):
                     place[i] += step * speed[i]
                 for i in range(4):
                     place[cell + i] += step**2 / 3.0 * before[i]
@@ -67,9 +67,9 @@ def _columns(t: Samples, x: Samples, first: float, spacing: float, points: int, 
                     speed[other + i] += step / 2.0 * now[i]
                     before[i] = now[i]
                 cell = other
-        for i in range(seen):
+        for i in range(coefficients):
             columns[k, i] = -gravity * place[i]
-        columns[k, seen] = x[k]
+        columns[k, coefficients] = x[k]
     return columns
 
 

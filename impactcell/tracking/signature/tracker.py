@@ -173,19 +173,19 @@ def update_reference(
 ) -> SignatureState:
     """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
     if test is None:
-        fresh = references.update(state.reference, information, settings.grid_m, settings.settled)
-        return SignatureState(fresh, state.batch_id)
+        reference = references.update(state.reference, information, settings.grid_m, settings.settled)
+        return SignatureState(reference, state.batch_id)
     if test.p_value < 1.0 / settings.false_alarm_cycles:
         run = state.deviant_run + 1
         if run < MAX_DEVIANT_RUN:
             return SignatureState(state.reference, state.batch_id, run)
-        fresh = references.update(
+        reference = references.update(
             references.restart(state.reference), information, settings.grid_m, settings.settled
         )
-        return SignatureState(fresh, state.batch_id)
+        return SignatureState(reference, state.batch_id)
     spe = test.spe / test.spe_freedom if test.spe_freedom > 0 else None
-    fresh = references.update(state.reference, information, settings.grid_m, settings.settled, spe)
-    return SignatureState(fresh, state.batch_id)
+    reference = references.update(state.reference, information, settings.grid_m, settings.settled, spe)
+    return SignatureState(reference, state.batch_id)
 
 
 def _evidence(

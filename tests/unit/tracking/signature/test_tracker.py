@@ -283,7 +283,7 @@ def test_a_restored_state_replays_to_the_same_bits(learned):
 def test_smoothing_is_the_posterior_averaged_over_its_strength():
     capture, _ = slide(textured(4, bump=0.2), 0.09, 1e4, NOISE, 4)
     seen = friction_profile.information(required(extract(capture).segment), GRID, 9.81)
-    n = seen.seen
+    n = seen.coefficients
     G, h, D = seen.matrix[:n, :n], seen.vector[:n], friction_profile.roughness(n)
     strengths = friction_profile.SMOOTHING_STRENGTHS * np.trace(G) / np.trace(D)
     means = np.array([np.linalg.solve(G + strength * D, h) for strength in strengths])
