@@ -1,4 +1,8 @@
-"""Friction of a free slide: no contact, unknown initial speed, constant deceleration until it stops."""
+"""Friction of a free slide: no contact, unknown initial speed, constant deceleration until it stops.
+
+`impactcell.features.slide` is for taps: it begins at separation and refuses a part that still moves when its
+record ends, as parts do in records of free slides (all 467 of the ContactNets tosses).
+"""
 
 import math
 

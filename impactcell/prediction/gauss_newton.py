@@ -1,219 +1,137 @@
-"""Gauss-Newton descent of a tap's posterior on one side of the kink of immediate breakaway."""
+"""The one loop of these fits: Gauss-Newton, damped after Levenberg and Marquardt where a step does harm."""
 
 import math
-from dataclasses import dataclass, replace
-
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from impactcell.errors import PhysicsError
-from impactcell.numerics.jit import IntArray, compiled
-from impactcell.prediction.linearised_model import (
-    JUST_STICKING,
-    PARAMETERS,
-    RATIO,
-    Linearisation,
-    LinearisedModel,
-)
-from impactcell.prediction.posterior import TruncatedGaussian
 from impactcell.records import Samples
 
-Indices = NDArray[np.intp]
-
-MAX_ITERATIONS = 25
-"""Steps after which a fit has not converged. Our choice."""
-STEP_TOLERANCE = 0.02
-"""Length of a step, in posterior standard deviations, below which the fit is at its minimum. This and
-`COST_TOLERANCE` are for residuals of the size of the noise; where they are larger, so are these."""
-MAX_STEP_STD = 4.0
-"""Longest step, in standard deviations of the prior: farther away the linear model says nothing."""
-COST_TOLERANCE = 0.005
-"""Change of half a sum of squares that means nothing: a kink that passes a sample makes Gauss-Newton go to
-and fro by less."""
-REFUSED_COST_TOLERANCE = 0.1
-"""The same of a step that was refused: where the smaller ones after it mean nothing either, a kink passes
-samples, and the minimum lies within less than half a standard deviation."""
+RAISED_DAMPING = 1e-2
+"""Damping, over the diagonal of the curvature, after the first step that is refused: a hundredth of it hardly
+turns the step. It is raised and lowered by factors of ten, as Marquardt (1963) does."""
+MAX_DAMPING = 1e8
+"""Damping beyond which a step is rounding of a double."""
+FREE_DAMPING = 1e-3
+"""Damping up to which a step's length tells how far the minimum is: it is then shorter by a thousandth."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class GaussianPrior:
-    """Prior in theta: mean, and one over its standard deviation; 0 where nothing is known.
+class Point(Protocol):
+    """Where a fit stands."""
 
-    Attributes
-    ----------
-    mean, weight : ndarray, shape (4,)
-    free : ndarray of int
-        Indices of what is fitted; all else stays at its mean.
-    """
+    @property
+    def theta(self) -> Samples:
+        """Parameters."""
 
-    mean: Samples
-    weight: Samples
-    free: Indices
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares."""
 
-    def cost(self, theta: Samples) -> float:
-        """Half the sum of squares of the prior."""
-        deviation = self.weight * (theta - self.mean)
-        return 0.5 * float(deviation @ deviation)
+
+PointT = TypeVar("PointT", bound=Point)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Minimum:
-    """Where a descent ended, and the linear model there.
+class Step:
+    """One step of a fit.
 
     Attributes
     ----------
-    theta : ndarray, shape (4,)
-    side : int
-    linear : Linear
-    cost : float
-        Half the sum of squares, data and prior.
-    converged : bool
-        False where the steps came to an end before the minimum did.
+    theta : ndarray
+        Parameters after it, held within what the linear model is believed over.
+    length : float
+        Squared, of the whole step, in variances of the posterior; nan where the curvature is not positive.
+    covariance : ndarray, shape (p, p)
+        Inverse of the curvature where the step began.
     """
 
     theta: Samples
-    side: int
-    linear: Linearisation
+    length: float
+    covariance: Samples
+
+
+class LeastSquares(Protocol[PointT]):
+    """What is fitted: residuals that are linear near a point."""
+
+    def linearise(self, theta: Samples) -> PointT:
+        """Take residuals and derivatives at `theta`; `PhysicsError` where the model has none there."""
+
+    def step(self, start: PointT, damping: float) -> Step:
+        """Solve the linear problem at a point, its curvature's diagonal raised by the share `damping`."""
+
+    def noise(self, at: PointT) -> float:
+        """Mean square of the residuals over what they were divided by: what tolerances are in units of."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopRule:
+    """When a fit ends.
+
+    Attributes
+    ----------
+    max_steps : int
+        Steps, refused ones included, after which it has not converged.
+    length : float
+        Of a step, in posterior standard deviations, below which the fit is at its minimum. This and the
+        costs are for residuals of the size of the noise; where they are larger, so are these.
+    cost : float
+        Change of half a sum of squares that means nothing: a kink that passes a sample makes Gauss-Newton
+        go to and fro by less.
+    refused_cost : float
+        The same of a step that was refused: where the smaller ones after it mean nothing either, a kink
+        passes samples, and the minimum lies within less than half a standard deviation.
+    """
+
+    max_steps: int
+    length: float
     cost: float
-    converged: bool = True
-
-    @property
-    def residual(self) -> Samples:
-        """The data's residuals, shape (n,)."""
-        return self.linear.residual
-
-    @property
-    def chi2(self) -> float:
-        """Sum of squares of the data's residuals."""
-        return self.linear.chi2
-
-    def truncated(self, prior: GaussianPrior, misfit: float = 1.0) -> TruncatedGaussian:
-        """Give the quadratic about the minimum, the data's weight divided by `misfit` squared.
-
-        Raises
-        ------
-        LinAlgError
-            The data and the prior do not determine it.
-        """
-        deviation = self.theta - prior.mean
-        step, covariance, length, log_determinant = _solve_step(
-            self.linear.normal, self.linear.slope, prior.weight, deviation, prior.free, misfit, 0.0
-        )
-        if not math.isfinite(log_determinant):
-            raise np.linalg.LinAlgError("the curvature is not positive")
-        cost = 0.5 * (self.chi2 / misfit**2 - length) + prior.cost(self.theta)
-        return TruncatedGaussian(self.theta + step, covariance, cost, -log_determinant, self.side)
+    refused_cost: float
 
 
-@compiled
-def _solve_step(
-    normal: Samples,
-    slope: Samples,
-    weight: Samples,
-    deviation: Samples,
-    free: IntArray,
-    misfit: float,
-    damping: float,
-) -> tuple[Samples, Samples, float, float]:
-    """Gauss-Newton step from a point at a `deviation` from the prior's mean.
-
-    The diagonal is damped after Levenberg and Marquardt, the data's weight divided by `misfit` squared.
+def fit(problem: LeastSquares[PointT], initial_guess: Samples, stop: StopRule) -> tuple[PointT, Step, bool]:
+    """Find the minimum of a problem.
 
     Returns
     -------
-    step : ndarray, shape (4,)
-        To the quadratic's minimum where nothing is damped.
-    inverse : ndarray, shape (4, 4)
-        Of the damped curvature; 0 for what is not fitted.
-    length : float
-        Of the step, in variances. Without damping also twice what the cost falls by.
-    log_determinant : float
-        Of the damped curvature; nan where it is not positive.
+    minimum : Point
+        Where the fit ended.
+    step : Step
+        The last one that was solved for, from `minimum` or to it.
+    converged : bool
+        False where the steps came to an end before the minimum did.
+
+    Raises
+    ------
+    PhysicsError
+        The model has no residuals at the initial guess.
     """
-    size = len(free)
-    curvature, factor = np.empty((size, size)), np.zeros((size, size))
-    gradient = np.empty(size)
-    log_determinant = 0.0
-    for j in range(size):
-        row = free[j]
-        gradient[j] = slope[row] / misfit**2 + weight[row] ** 2 * deviation[row]
-        for k in range(size):
-            curvature[j, k] = normal[row, free[k]] / misfit**2
-        curvature[j, j] += weight[row] ** 2
-    for j in range(size):  # Cholesky's factor L
-        for k in range(j + 1):
-            pivot = curvature[j, k] * (1.0 + damping if j == k else 1.0)
-            for m in range(k):
-                pivot -= factor[j, m] * factor[k, m]
-            factor[j, k] = math.sqrt(pivot) if j == k else pivot / factor[k, k]
-        log_determinant += 2.0 * math.log(factor[j, j])
-    columns = np.zeros((size, size))
-    for j in range(size):  # of the inverse of L
-        columns[j, j] = 1.0 / factor[j, j]
-        for k in range(j + 1, size):
-            for m in range(j, k):
-                columns[k, j] -= factor[k, m] * columns[m, j]
-            columns[k, j] /= factor[k, k]
-    inverse, step = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
-    for j in range(size):
-        for k in range(size):
-            for m in range(max(j, k), size):
-                inverse[free[j], free[k]] += columns[m, j] * columns[m, k]
-            step[free[j]] -= inverse[free[j], free[k]] * gradient[k]
-    length = 0.0
-    for j in range(size):
-        for k in range(size):
-            length += step[free[j]] * curvature[j, k] * step[free[k]]
-    return step, inverse, length, log_determinant
-
-
-def fit(model: LinearisedModel, prior: GaussianPrior, start: Samples, side: int) -> Minimum:
-    """Find the minimum of data and prior, with the model of one side continued across the kink.
-
-    Below the kink (`side` -1) the model is that of immediate breakaway. Above it (`side` +1) the residuals
-    are continued linearly along mu_k/mu_s from the kink.
-    """
-    longest = np.minimum(0.5, MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
-    best = _linearise(model, prior, start, side)
+    best = problem.linearise(initial_guess)
     damping, refused = 0.0, math.inf
-    for _ in range(MAX_ITERATIONS):
-        linear, deviation = best.linear, best.theta - prior.mean
-        step, _, length, _ = _solve_step(
-            linear.normal, linear.slope, prior.weight, deviation, prior.free, 1.0, damping
-        )
-        if not math.isfinite(length):
+    for _ in range(stop.max_steps):
+        step = problem.step(best, damping)
+        if not math.isfinite(step.length):
             break
-        noise = max(2.0 * best.cost / model.size, 1.0)
-        if length < STEP_TOLERANCE**2 * noise and damping <= 1e-3:
-            return best
-        moved = best.theta + np.minimum(np.maximum(step, -longest), longest)
+        noise = problem.noise(best)
+        if step.length < stop.length**2 * noise and damping <= FREE_DAMPING:
+            return best, step, True
         try:
-            tried = _linearise(model, prior, moved, side)
+            trial = problem.linearise(step.theta)
+            cost = trial.cost
         except PhysicsError:
-            tried = replace(best, cost=math.inf)
-        if tried.cost <= best.cost + COST_TOLERANCE * noise:
-            gain = best.cost - tried.cost
-            settled = abs(gain) < COST_TOLERANCE * noise and (
-                damping <= 1e-2 or refused < REFUSED_COST_TOLERANCE * noise
+            trial, cost = best, math.inf
+        if cost <= best.cost + stop.cost * noise:
+            gain = best.cost - cost
+            is_at_rest = abs(gain) < stop.cost * noise and (
+                damping <= RAISED_DAMPING or refused < stop.refused_cost * noise
             )
-            refused = math.inf if gain > REFUSED_COST_TOLERANCE * noise else refused
-            best = tried
-            if settled:
-                return best
-            damping = 0.0 if damping < 1e-2 else 0.1 * damping
+            refused = math.inf if gain > stop.refused_cost * noise else refused
+            best = trial
+            if is_at_rest:
+                return best, step, True
+            damping = 0.0 if damping < RAISED_DAMPING else 0.1 * damping
         else:
-            refused = tried.cost - best.cost
-            damping = max(10.0 * damping, 1e-2)
-            if damping > 1e8:
+            refused = cost - best.cost
+            damping = max(10.0 * damping, RAISED_DAMPING)
+            if damping > MAX_DAMPING:
                 break
-    return replace(best, converged=False)
-
-
-def _linearise(model: LinearisedModel, prior: GaussianPrior, theta: Samples, side: int) -> Minimum:
-    """Give the linear model at `theta`, that above the kink continued linearly below it."""
-    at, beyond = theta, 0.0
-    if side > 0 and (below := model.kink_coordinate(theta) - JUST_STICKING) < 0.0:
-        at, beyond = theta.copy(), -below
-        at[RATIO] += below
-    linear = model.linearise(at, side, beyond)
-    return Minimum(theta, side, linear, 0.5 * linear.chi2 + prior.cost(theta))
+    return best, step, False

@@ -13,6 +13,8 @@ import numpy as np
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
 from impactcell.features import Features, required
 from impactcell.physics import Plant
+from impactcell.prediction import gauss_newton
+from impactcell.prediction.gauss_newton import Step, StopRule
 from impactcell.prediction.linearised_model import (
     DAMPING,
     MU_K,
@@ -44,12 +46,10 @@ WEAK_STD = np.array([0.3, 1.0, 1.0])
 """Standard deviations of ln(mu_k/mu_s, k, b) about the start: they only hold what no tap shows."""
 CONTACT_STD = np.array([0.3, 3e-4, 2e-3])
 """The same where k and b of the contact alone are believed more than the model of the whole tap."""
-MAX_ITERATIONS = 40
-"""Steps after which a fit has not converged. Our choice."""
-STEP_TOLERANCE = 0.02
-"""Length of a step, in posterior standard deviations, below which the fit is at its minimum."""
-COST_TOLERANCE = 0.05
-"""Change of half a sum of squares over all taps that means nothing."""
+STOP = StopRule(max_steps=40, length=0.02, cost=0.05, refused_cost=0.1)
+"""When the joint fit ends; its cost is of all taps, ten and more."""
+MAX_STEP = 0.3
+"""Longest step of a shared parameter's logarithm: farther away the linear model says nothing."""
 MIN_RATIO_STD = 1e-3
 """Least standard deviation of mu_k/mu_s from tap to tap that a prior is given. Our choice."""
 REWEIGHTING_ROUNDS = 4
@@ -101,25 +101,27 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
     frictions = [max(required(tap.slide).deceleration.value / gravity_m_s2, MIN_MU_K) for tap in usable]
     mean = float(np.mean(frictions))
     start = Plant(stiffness, max(damping, 1.0), mean / INITIAL_RATIO, mean, gravity_m_s2)
-    responses, thetas, parts = [], [], []
+    responses, thetas, intervals = [], [], []
     for tap, mu_k in zip(usable, frictions, strict=True):
         plant = replace(start, mu_k=mu_k, mu_s=mu_k / INITIAL_RATIO)
         try:
             responses.append(linearised_model(tap, plant))
             thetas.append(parameters_of(plant))
             slide = required(tap.slide)
-            parts.append(interval_of_blocks(responses[-1], slide.separation_s, slide.stop_s))
+            intervals.append(interval_of_blocks(responses[-1], slide.separation_s, slide.stop_s))
         except PhysicsError as fault:
             faults.append(f"shot {tap.capture.cycle}: {fault}")
     if not responses:
         raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
-    thetas_fitted, covariance, chi2 = _fit_shared(responses, np.array(thetas), thetas[0][SHARED], WEAK_STD)
+    thetas_fitted, covariance, chi2 = _CampaignProblem(responses, thetas[0][SHARED], WEAK_STD).fit(
+        np.array(thetas)
+    )
     count = sum(response.size for response in responses)
     misfit = math.sqrt(chi2 / max(count - len(thetas_fitted) - 3, 1))
     if misfit > MISFIT_THRESHOLD:
         anchored = thetas_fitted.copy()
         anchored[:, STIFFNESS], anchored[:, DAMPING] = math.log(stiffness), math.log(max(damping, 1.0))
-        thetas_fitted, covariance = _fit_reweighted(responses, anchored, parts)
+        thetas_fitted, covariance = _fit_reweighted(responses, anchored, intervals)
     mu_k = float(np.exp(thetas_fitted[:, MU_K]).mean())
     ratio, stiffness, damping = np.exp(thetas_fitted[0, SHARED]).tolist()
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
@@ -195,47 +197,59 @@ def ratio_scatter(taps: Sequence[Features], model: Model) -> float:
     return math.sqrt(max(excess / float(weights.sum() - (weights**2).sum() / weights.sum()), 0.0))
 
 
-def _fit_shared(
-    responses: Sequence[LinearisedModel], thetas: Samples, anchor: Samples, spread: Samples
-) -> tuple[Samples, Samples, float]:
-    """Minimise over the shared parameters, held to `anchor` within `spread`, and every tap's mu_k."""
-    prior = np.diag(1.0 / spread**2)
-    linear, cost = _linearise_all(responses, thetas)
-    damping = 0.0
-    for _ in range(MAX_ITERATIONS):
-        curvature, gradient = prior.copy(), prior @ (thetas[0, SHARED] - anchor)
-        own = []
-        for one in linear:
-            h, cross, g = float(one.normal[MU_K, MU_K]), one.normal[SHARED, MU_K], float(one.slope[MU_K])
-            curvature += one.normal[SHARED, SHARED] - np.outer(cross, cross) / h
-            gradient += one.slope[SHARED] - cross * (g / h)
-            own.append((h, cross, g))
+@dataclass(frozen=True, slots=True, eq=False)
+class _CampaignPoint:
+    """Parameters of every tap, shape (n, 4), the linear model of each, and half of their sums of squares."""
+
+    theta: Samples
+    taps: list[Linearisation]
+    cost: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _CampaignProblem:
+    """The shared parameters, held to `anchor` within `spread`, and every tap's mu_k, which is eliminated."""
+
+    responses: Sequence[LinearisedModel]
+    anchor: Samples
+    spread: Samples
+
+    def fit(self, initial_guess: Samples) -> tuple[Samples, Samples, float]:
+        """Give the parameters of every tap, the covariance of the shared ones, and the sum of squares."""
+        minimum, step, converged = gauss_newton.fit(self, initial_guess, STOP)
+        if not converged:
+            raise NotConvergedError("the plant could not be fitted to the campaign")
+        return minimum.theta, step.covariance, 2.0 * minimum.cost
+
+    def linearise(self, theta: Samples) -> _CampaignPoint:
+        """Linearise the model of every tap."""
+        taps = [response.linearise(row) for response, row in zip(self.responses, theta, strict=True)]
+        return _CampaignPoint(theta, taps, 0.5 * sum(tap.chi2 for tap in taps))
+
+    def step(self, start: _CampaignPoint, damping: float) -> Step:
+        """Solve for the shared parameters; each tap's mu_k follows them."""
+        prior = np.diag(1.0 / self.spread**2)
+        curvature, gradient = prior.copy(), prior @ (start.theta[0, SHARED] - self.anchor)
+        eliminated = []
+        for tap in start.taps:
+            h, cross, g = float(tap.normal[MU_K, MU_K]), tap.normal[SHARED, MU_K], float(tap.slope[MU_K])
+            curvature += tap.normal[SHARED, SHARED] - np.outer(cross, cross) / h
+            gradient += tap.slope[SHARED] - cross * (g / h)
+            eliminated.append((h, cross, g))
         step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
-        if float(step @ curvature @ step) < STEP_TOLERANCE**2:
-            return thetas, np.asarray(np.linalg.inv(curvature)), 2.0 * cost
-        step = np.clip(step, -0.3, 0.3)
-        while True:
-            moved = thetas.copy()
-            moved[:, SHARED] += step
-            moved[:, MU_K] -= np.array([(g + cross @ step) / h for h, cross, g in own])
-            try:
-                new_linear, new_cost = _linearise_all(responses, moved)
-            except PhysicsError:
-                new_cost = math.inf
-            if new_cost <= cost + COST_TOLERANCE:
-                break
-            step = 0.3 * step
-            if float(np.abs(step).max()) < 1e-9:
-                raise NotConvergedError("the plant could not be fitted to the campaign")
-        settled = abs(new_cost - cost) < COST_TOLERANCE
-        thetas, linear, cost = moved, new_linear, new_cost
-        if settled:
-            return thetas, np.asarray(np.linalg.inv(curvature)), 2.0 * cost
-    raise NotConvergedError("the plant could not be fitted to the campaign")
+        length, step = float(step @ curvature @ step), np.clip(step, -MAX_STEP, MAX_STEP)
+        theta = start.theta.copy()
+        theta[:, SHARED] += step
+        theta[:, MU_K] -= np.array([(g + cross @ step) / h for h, cross, g in eliminated])
+        return Step(theta, length, np.asarray(np.linalg.inv(curvature)))
+
+    def noise(self, at: _CampaignPoint) -> float:  # noqa: ARG002  # what a misfit adds is weighed afterwards
+        """Give 1: steps end by the sensors' noise, whatever the model misses."""
+        return 1.0
 
 
 def _fit_reweighted(
-    responses: Sequence[LinearisedModel], thetas: Samples, parts: Sequence[Indices]
+    responses: Sequence[LinearisedModel], thetas: Samples, intervals: Sequence[Indices]
 ) -> tuple[Samples, Samples]:
     """Fit again, with each phase of the tap believed as far as the model describes it there.
 
@@ -245,17 +259,11 @@ def _fit_reweighted(
     covariance = np.zeros((3, 3))
     anchor = thetas[0, SHARED].copy()
     for _ in range(REWEIGHTING_ROUNDS):
-        linear, _ = _linearise_all(responses, thetas)
-        doubted = [
-            response.reweighted(std_factors(one.residual, phase) * LATE_FACTORS[phase])
-            for response, one, phase in zip(responses, linear, parts, strict=True)
+        reweighted = [
+            response.reweighted(
+                std_factors(response.linearise(row).residual, interval) * LATE_FACTORS[interval]
+            )
+            for response, row, interval in zip(responses, thetas, intervals, strict=True)
         ]
-        thetas, covariance, _ = _fit_shared(doubted, thetas, anchor, CONTACT_STD)
+        thetas, covariance, _ = _CampaignProblem(reweighted, anchor, CONTACT_STD).fit(thetas)
     return thetas, covariance
-
-
-def _linearise_all(
-    responses: Sequence[LinearisedModel], thetas: Samples
-) -> tuple[list[Linearisation], float]:
-    linear = [response.linearise(theta) for response, theta in zip(responses, thetas, strict=True)]
-    return linear, 0.5 * sum(one.chi2 for one in linear)

@@ -16,8 +16,6 @@ from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
 from impactcell.physics import Plant
-from impactcell.prediction import gauss_newton
-from impactcell.prediction.gauss_newton import GaussianPrior, Minimum
 from impactcell.prediction.linearised_model import (
     DAMPING,
     MU_K,
@@ -36,6 +34,7 @@ from impactcell.prediction.phase_reweighting import (
     std_factors,
 )
 from impactcell.prediction.posterior import Posterior, mixture
+from impactcell.prediction.tap_problem import GaussianPrior, Minimum, TapProblem
 from impactcell.records import Samples
 
 KINK_DISTANCE_STD = 6.0
@@ -182,11 +181,11 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
 def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samples) -> list[Minimum]:
     """Descend on the side of the start, and on the other where the kink is near."""
     side = 1 if response.kink_coordinate(start) >= 0.0 else -1
-    minimum = gauss_newton.fit(response, prior, start, side)
+    minimum = TapProblem(response, prior, side).fit(start)
     spread = math.sqrt(float(KINK_FORM @ minimum.truncated(prior).covariance @ KINK_FORM))
     if side * response.kink_coordinate(minimum.theta) >= KINK_DISTANCE_STD * spread:
         return [minimum]
-    return [minimum, gauss_newton.fit(response, prior, minimum.theta, -side)]
+    return [minimum, TapProblem(response, prior, -side).fit(minimum.theta)]
 
 
 def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> tuple[Minimum, float]:

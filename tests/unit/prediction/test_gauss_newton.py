@@ -1,0 +1,81 @@
+"""The loop of the fits: against scipy, also where full steps do harm, and where there is no minimum."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from impactcell.errors import PhysicsError
+from impactcell.prediction.gauss_newton import Step, StopRule, fit
+
+STOP = StopRule(max_steps=200, length=1e-6, cost=1e-12, refused_cost=1e-10)
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Place:
+    theta: Array
+    residual: Array
+    cost: float
+
+
+@dataclass
+class Valley:
+    """Rosenbrock's valley with a slope that does not vanish at its minimum; no residuals left of `wall`."""
+
+    wall: float = -np.inf
+    dampings: list[float] = field(default_factory=list)
+
+    def residual(self, theta: Array) -> Array:
+        return np.array([10.0 * (theta[1] - theta[0] ** 2), 1.0 - theta[0], 0.5 * theta[1]])
+
+    def linearise(self, theta: Array) -> Place:
+        if theta[0] < self.wall:
+            raise PhysicsError("behind the wall")
+        residual = self.residual(theta)
+        return Place(theta, residual, 0.5 * float(residual @ residual))
+
+    def step(self, start: Place, damping: float) -> Step:
+        self.dampings.append(damping)
+        J = np.array([[-20.0 * start.theta[0], 10.0], [-1.0, 0.0], [0.0, 0.5]])
+        curvature = J.T @ J
+        raised = curvature + damping * np.diag(np.diag(curvature))
+        step = -np.linalg.solve(raised, J.T @ start.residual)
+        return Step(start.theta + step, float(step @ curvature @ step), np.linalg.inv(curvature))
+
+    def noise(self, at: Place) -> float:
+        assert at.cost >= 0.0
+        return 1.0
+
+
+@pytest.mark.parametrize(
+    ("start", "does_harm"), [((-1.2, 1.0), True), ((2.0, -3.0), False), ((-0.5, 4.0), False)]
+)
+def test_the_minimum_is_scipys_though_full_steps_may_do_harm(
+    start: tuple[float, float], does_harm: bool
+) -> None:
+    problem = Valley()
+    minimum, _, converged = fit(problem, np.array(start), STOP)
+    expected = least_squares(problem.residual, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert converged
+    assert (max(problem.dampings) > 0.0) is does_harm
+    assert minimum.theta == pytest.approx(expected.x, abs=1e-5)
+    assert minimum.cost == pytest.approx(expected.cost, abs=1e-10)
+
+
+def test_a_step_into_what_the_model_does_not_know_is_refused() -> None:
+    problem = Valley(wall=-1.3)
+    minimum, _, converged = fit(problem, np.array([-1.2, 6.0]), STOP)
+    expected = least_squares(problem.residual, (1.0, 1.0))
+    assert converged
+    assert minimum.theta == pytest.approx(expected.x, abs=1e-5)
+    with pytest.raises(PhysicsError, match="behind the wall"):
+        fit(problem, np.array([-1.4, 0.0]), STOP)
+
+
+def test_steps_that_come_to_an_end_first_are_not_called_a_minimum() -> None:
+    few = StopRule(max_steps=3, length=1e-6, cost=1e-12, refused_cost=1e-10)
+    _, _, converged = fit(Valley(), np.array([-1.2, 1.0]), few)
+    assert not converged
