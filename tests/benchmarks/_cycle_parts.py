@@ -12,7 +12,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from impactcell import cell as core
+from impactcell.cell import pipeline
 from impactcell.journal import store
 from impactcell.records import Capture, Channel, ModuleStatus, PositioningState, Summary, uniform_times
 from impactcell.scada import Server
@@ -22,6 +22,8 @@ from impactcell.service.history_source import JournalHistory
 from impactcell.service.operator_commands import OperatorCommands
 from impactcell.service.worker import CellWorker
 from impactcell.settings import read_cell
+from impactcell.tracking import wear_batch
+from impactcell.tracking.signature import tracker
 from tests.benchmarks._modules import FORCE_HZ, POSITION_HZ, taps
 from tests.benchmarks.table import Table
 
@@ -30,9 +32,10 @@ LEARNING = 90
 WEAR, SIGNATURE, STATE = "tracking: wear and batch", "tracking: signature", "state as bytes"
 THREAD, VALUES, LINK = "thread of the cell", "OPC UA: values and conditions", "OPC UA: state of the link"
 PARTS: tuple[tuple[str, Any, str], ...] = (
-    ("friction by every predictor", core, "estimate"),
-    (WEAR, core, "track"),
-    (SIGNATURE, core, "_sign"),
+    ("features of the capture", pipeline, "extract"),
+    ("friction by every predictor", pipeline, "estimate_from_features"),
+    (WEAR, wear_batch, "update"),
+    (SIGNATURE, tracker, "update"),
     (STATE, CellWorker, "_blob"),
     ("capture as bytes", store, "encode_capture"),
     ("journal, capture as bytes included", store.Journal, "append"),
@@ -46,14 +49,14 @@ ELSEWHERE = np.zeros(4_000_000)
 
 def captures() -> list[Capture]:
     """Taps of the simulator's plant as the register map of the benchmark's modules gives them."""
-    made = []
+    recorded = []
     for samples, header in taps():
         channels = {}
         for name, rate_hz, step in (("force", FORCE_HZ, 0.025), ("position", POSITION_HZ, 1e-9)):
             codes = np.rint(samples[name] / step).astype(np.int64)
             times = uniform_times(0.0, rate_hz, len(codes))
             channels[name] = Channel(times, codes * step, resolution=step)
-        made.append(
+        recorded.append(
             Capture(
                 0,
                 float(header["velocity"]),
@@ -64,7 +67,7 @@ def captures() -> list[Capture]:
                 summary=Summary(float(header["peak_force"]), float(header["sliding_distance"])),
             )
         )
-    return made
+    return recorded
 
 
 @contextlib.contextmanager
@@ -93,7 +96,8 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
     running = CellTask(cell)
     recorded, rows = captures(), []
     history, actions = JournalHistory({cell.name: running}), OperatorCommands({cell.name: running})
-    async with Server(server_settings(cell), [cell_description(cell)], history, actions) as server:
+    users = cell.settings.opcua.users_file
+    async with Server(server_settings(cell), users, [cell_description(cell)], history, actions) as server:
         for cycle in range(1, LEARNING + number + 1):
             np.add(ELSEWHERE, 1.0, out=ELSEWHERE)
             capture = replace(
@@ -101,8 +105,8 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
             )
             spent: dict[str, float] = defaultdict(float)
             with timed(spent):
-                done = running.worker._process(capture, PositioningState(), None, ())
-                server.publish(cell.name, done.step_result.snapshot)
+                cycle_result = running.worker._process(capture, PositioningState(), None, ())
+                server.publish(cell.name, cycle_result.step_result.snapshot)
                 server.module(
                     cell.name,
                     ModuleStatus(connected=True, received=cycle, round_trip_s=1e-3),
