@@ -53,19 +53,8 @@ def transposed_product(A: Samples, B: Samples) -> Samples:
 
 
 @compiled
-def pack_triangle(matrix: Samples) -> Samples:
-    """Lower triangle of a symmetric matrix, by rows: what is kept of one between cycles."""
-    triangle, p = np.empty(len(matrix) * (len(matrix) + 1) // 2), 0
-    for i in range(len(matrix)):
-        for j in range(i + 1):
-            triangle[p] = matrix[i, j]
-            p += 1
-    return triangle
-
-
-@compiled
 def unpack_triangle(triangle: Samples) -> Samples:
-    """Symmetric matrix of a lower triangle."""
+    """Symmetric matrix of its lower triangle by rows, which is what is kept of one between cycles."""
     n, p = int(math.sqrt(2.0 * len(triangle))), 0
     matrix = np.empty((n, n))
     for i in range(n):

@@ -10,12 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, ndtr
+from scipy.special import log_ndtr
 
 from impactcell.records import Samples
-
-QUADRATURE_NODES = 300
-"""Places along z, of one weight each, at which a cut-off Gaussian is summed up. Our choice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,40 +74,6 @@ class Posterior:
         second = self.weights @ (np.array(variances) + (np.array(means) - mean) ** 2)
         return mean, math.sqrt(float(second))
 
-    def cdf(self, of: Samples, at: Samples) -> Samples:
-        """Probability that `of` @ theta is below `at`, shape (n,), by quadrature along z."""
-        total = np.zeros(len(at))
-        for side, weight in zip(self.sides, self.weights.tolist(), strict=True):
-            if weight == 0.0:
-                continue
-            mean, variance = float(of @ side.mean), float(of @ side.covariance @ of)
-            if side.sign == 0:
-                total += weight * ndtr((at - mean) / math.sqrt(variance))
-                continue
-            centre, spread, slope = self._along(side, of)
-            # z at equal steps of its own cut-off distribution: every node has the same weight
-            share = (np.arange(QUADRATURE_NODES) + 0.5) / QUADRATURE_NODES
-            bound = -side.sign * centre / spread
-            normal = _truncated_quantile(bound, share)
-            z = side.sign * spread * normal
-            rest = math.sqrt(max(variance - slope**2 * spread**2, 1e-30))
-            total += weight * ndtr((at[:, None] - mean - slope * z[None, :]) / rest).mean(axis=1)
-        return total
-
-    def interval(self, of: Samples, level: float = 0.95) -> tuple[float, float]:
-        """Equal-tailed credible interval of `of` @ theta."""
-        mean, std = self.moments(of)
-        low, high = mean - 8.0 * std, mean + 8.0 * std
-        ends = []
-        for target in (0.5 - 0.5 * level, 0.5 + 0.5 * level):
-            a, b = low, high
-            for _ in range(4):
-                grid = np.linspace(a, b, 33)
-                index = int(np.clip(np.searchsorted(self.cdf(of, grid), target), 1, 32))
-                a, b = float(grid[index - 1]), float(grid[index])
-            ends.append(0.5 * (a + b))
-        return ends[0], ends[1]
-
     def _along(self, side: TruncatedGaussian, of: Samples) -> tuple[float, float, float]:
         """Mean and spread of z on one side, and how the linear form follows z."""
         centre = float(self.form @ side.mean) + self.offset
@@ -135,11 +98,3 @@ def _truncated_moments(beta: float) -> tuple[float, float]:
     """Shift of the mean and factor of the variance of a standard normal cut off below -beta."""
     hazard = math.exp(-0.5 * beta * beta - 0.5 * math.log(2.0 * math.pi) - float(log_ndtr(beta)))
     return hazard, max(1.0 - hazard * (hazard + beta), 0.0)
-
-
-def _truncated_quantile(bound: float, share: Samples) -> Samples:
-    """Quantiles of a standard normal cut off below `bound`."""
-    from scipy.special import ndtri_exp
-
-    quantiles: Samples = -ndtri_exp(np.log1p(-share) + log_ndtr(-bound))
-    return quantiles

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from impactcell.numerics.jit import IntArray, compiled
+from impactcell.numerics.jit import compiled
 from impactcell.prediction import gauss_newton
 from impactcell.prediction.gauss_newton import Step, StopRule
 from impactcell.prediction.linearised_model import (
@@ -18,8 +17,6 @@ from impactcell.prediction.linearised_model import (
 )
 from impactcell.prediction.posterior import TruncatedGaussian
 from impactcell.records import Samples
-
-Indices = NDArray[np.intp]
 
 STOP = StopRule(max_steps=25, length=0.02, cost=0.005, refused_cost=0.1)
 """When the fit of one tap ends: an estimate off by 0.02 of its standard deviation is off by nothing."""
@@ -34,13 +31,10 @@ class GaussianPrior:
     Attributes
     ----------
     mean, weight : ndarray, shape (4,)
-    free : ndarray of int
-        Indices of what is fitted; all else stays at its mean.
     """
 
     mean: Samples
     weight: Samples
-    free: Indices
 
     def cost(self, theta: Samples) -> float:
         """Half the sum of squares of the prior."""
@@ -89,7 +83,7 @@ class Minimum:
         """
         deviation = self.theta - prior.mean
         step, covariance, length, log_determinant = _solve_step(
-            self.linear.normal, self.linear.slope, prior.weight, deviation, prior.free, misfit, 0.0
+            self.linear.normal, self.linear.slope, prior.weight, deviation, misfit, 0.0
         )
         if not math.isfinite(log_determinant):
             raise np.linalg.LinAlgError("the curvature is not positive")
@@ -103,7 +97,6 @@ def _solve_step(
     slope: Samples,
     weight: Samples,
     deviation: Samples,
-    free: IntArray,
     misfit: float,
     damping: float,
 ) -> tuple[Samples, Samples, float, float]:
@@ -116,22 +109,21 @@ def _solve_step(
     step : ndarray, shape (4,)
         To the quadratic's minimum where nothing is damped.
     inverse : ndarray, shape (4, 4)
-        Of the damped curvature; 0 for what is not fitted.
+        Of the damped curvature.
     length : float
         Of the step, in variances. Without damping also twice what the cost falls by.
     log_determinant : float
         Of the damped curvature; nan where it is not positive.
     """
-    size = len(free)
+    size = PARAMETERS
     curvature, factor = np.empty((size, size)), np.zeros((size, size))
     gradient = np.empty(size)
     log_determinant = 0.0
     for j in range(size):
-        row = free[j]
-        gradient[j] = slope[row] / misfit**2 + weight[row] ** 2 * deviation[row]
+        gradient[j] = slope[j] / misfit**2 + weight[j] ** 2 * deviation[j]
         for k in range(size):
-            curvature[j, k] = normal[row, free[k]] / misfit**2
-        curvature[j, j] += weight[row] ** 2
+            curvature[j, k] = normal[j, k] / misfit**2
+        curvature[j, j] += weight[j] ** 2
     for j in range(size):  # Cholesky's factor L
         for k in range(j + 1):
             pivot = curvature[j, k] * (1.0 + damping if j == k else 1.0)
@@ -146,16 +138,16 @@ def _solve_step(
             for m in range(j, k):
                 columns[k, j] -= factor[k, m] * columns[m, j]
             columns[k, j] /= factor[k, k]
-    inverse, step = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    inverse, step = np.zeros((size, size)), np.zeros(size)
     for j in range(size):
         for k in range(size):
             for m in range(max(j, k), size):
-                inverse[free[j], free[k]] += columns[m, j] * columns[m, k]
-            step[free[j]] -= inverse[free[j], free[k]] * gradient[k]
+                inverse[j, k] += columns[m, j] * columns[m, k]
+            step[j] -= inverse[j, k] * gradient[k]
     length = 0.0
     for j in range(size):
         for k in range(size):
-            length += step[free[j]] * curvature[j, k] * step[free[k]]
+            length += step[j] * curvature[j, k] * step[k]
     return step, inverse, length, log_determinant
 
 
@@ -195,7 +187,7 @@ class TapProblem:
         """Solve the linear problem at `start`."""
         linear, prior = start.linear, self.prior
         step, covariance, length, _ = _solve_step(
-            linear.normal, linear.slope, prior.weight, start.theta - prior.mean, prior.free, 1.0, damping
+            linear.normal, linear.slope, prior.weight, start.theta - prior.mean, 1.0, damping
         )
         longest = np.minimum(MAX_STEP, MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
         return Step(start.theta + np.minimum(np.maximum(step, -longest), longest), length, covariance)

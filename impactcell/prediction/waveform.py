@@ -17,10 +17,8 @@ from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
 from impactcell.physics import Plant
 from impactcell.prediction.linearised_model import (
-    DAMPING,
     MU_K,
-    RATIO,
-    STIFFNESS,
+    PARAMETERS,
     LinearisedModel,
     linearised_model,
     parameters_of,
@@ -80,14 +78,9 @@ class WaveformFit:
     gap: float
     misfit: float
 
-    def interval(self, level: float = 0.95) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Equal-tailed credible intervals of mu_s and of mu_k."""
-        mu_s, mu_k = (self.posterior.interval(of, level) for of in (MU_S_FORM, MU_K_FORM))
-        return (math.exp(mu_s[0]), math.exp(mu_s[1])), (math.exp(mu_k[0]), math.exp(mu_k[1]))
 
-
-def prior_of(model: Model, *, fixed_ratio: bool = False) -> GaussianPrior:
-    """Prior of a tap's parameters; with `fixed_ratio` mu_k/mu_s is the plant's exactly, as in the paper."""
+def prior_of(model: Model) -> GaussianPrior:
+    """Prior of a tap's parameters; nothing is known of mu_k."""
     plant, prior = model.plant, model.prior
     weight = np.array(
         [
@@ -97,11 +90,10 @@ def prior_of(model: Model, *, fixed_ratio: bool = False) -> GaussianPrior:
             plant.damping_n_s_per_m / prior.damping_std_n_s_per_m,
         ]
     )
-    free = np.array([MU_K, STIFFNESS, DAMPING] if fixed_ratio else [MU_K, RATIO, STIFFNESS, DAMPING])
-    return GaussianPrior(parameters_of(plant), weight, free)
+    return GaussianPrior(parameters_of(plant), weight)
 
 
-def fit(features: Features, model: Model, *, fixed_ratio: bool = False) -> WaveformFit:
+def fit(features: Features, model: Model) -> WaveformFit:
     """Fit the whole waveform of one tap.
 
     Parameters
@@ -109,8 +101,7 @@ def fit(features: Features, model: Model, *, fixed_ratio: bool = False) -> Wavef
     features : Features
         With force and position.
     model : Model
-    fixed_ratio : bool
-        Take mu_k/mu_s as exactly the plant's, as the paper does.
+        With a `ratio_std` of next to nothing mu_k/mu_s is the plant's, as the paper takes it.
 
     Raises
     ------
@@ -121,7 +112,7 @@ def fit(features: Features, model: Model, *, fixed_ratio: bool = False) -> Wavef
     """
     refuse_clipped(required(features.force))
     slide, capture = required(features.slide), features.capture
-    prior = prior_of(model, fixed_ratio=fixed_ratio)
+    prior = prior_of(model)
     theta = prior.mean.copy()
     theta[MU_K] = math.log(max(deceleration_friction(model, capture.mass_kg, slide), 1e-3))
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
@@ -190,7 +181,7 @@ def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samp
 
 def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> tuple[Minimum, float]:
     """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
-    freedom = max(len(fits[0].residual) - len(prior.free), 1)
+    freedom = max(len(fits[0].residual) - PARAMETERS, 1)
     misfit = math.sqrt(min(minimum.chi2 for minimum in fits) / freedom)
     if len(fits) == 1:
         return fits[0], misfit

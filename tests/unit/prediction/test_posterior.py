@@ -11,6 +11,7 @@ from impactcell.features.channels import CheckedChannel
 from impactcell.prediction.block_averaging import average_blocks
 from impactcell.prediction.phase_reweighting import std_factors
 from impactcell.prediction.posterior import TruncatedGaussian, mixture
+from tests.posterior_intervals import interval
 
 FORM, OFFSET = np.array([1.0, -1.0]), 0.3
 ABOVE = TruncatedGaussian(
@@ -39,7 +40,7 @@ def test_moments_and_intervals_are_those_of_samples(of: np.ndarray) -> None:
     mean, std = posterior.moments(of)
     assert mean == pytest.approx(samples.mean(), abs=0.01)
     assert std == pytest.approx(samples.std(), rel=0.01)
-    assert posterior.interval(of) == pytest.approx(np.quantile(samples, [0.025, 0.975]).tolist(), abs=0.05)
+    assert interval(posterior, of) == pytest.approx(np.quantile(samples, [0.025, 0.975]).tolist(), abs=0.05)
 
 
 def test_a_side_far_beyond_its_end_is_squeezed_against_it() -> None:
@@ -54,7 +55,7 @@ def test_one_whole_gaussian_is_itself() -> None:
     of = np.array([1.0, 1.0])
     mean, std = mixture((whole,), FORM, OFFSET).moments(of)
     assert (mean, std) == pytest.approx((0.6, np.sqrt(2.1)))
-    assert mixture((whole,), FORM, OFFSET).interval(of) == pytest.approx(
+    assert interval(mixture((whole,), FORM, OFFSET), of) == pytest.approx(
         (0.6 - 1.96 * std, 0.6 + 1.96 * std), abs=0.01
     )
 
