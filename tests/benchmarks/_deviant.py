@@ -105,26 +105,33 @@ def false_alarm_table(*, quick: bool) -> Table:
     truth = Normality(settings)
     draws, references_tried = (150, 2) if quick else (1000, 16)
     alpha, push = 1.0 / settings.false_alarm_cycles, 5.0
-    found: dict[int, list[float]] = {n: [] for n in LEARNED}
+    rates_by_learned: dict[int, list[float]] = {n: [] for n in LEARNED}
     ordinary = judged = 0
     for trial in range(references_tried):
         rng = np.random.default_rng([11, trial])
         state = tracker.initial_state(settings)
         vectors = truth.vectors(rng, LEARNED[-1] + 10) + truth.G @ truth.mean
         for vector in vectors:
-            known = state.reference
-            if known.variation.cycles in found and len(found[known.variation.cycles]) == trial:
-                found[known.variation.cycles].append(_tail(truth, settings, known, rng, draws, alpha, push))
-            seen = replace(truth.seen, vector=vector)
+            reference = state.reference
+            if (
+                reference.variation.cycles in rates_by_learned
+                and len(rates_by_learned[reference.variation.cycles]) == trial
+            ):
+                rates_by_learned[reference.variation.cycles].append(
+                    _tail(truth, settings, reference, rng, draws, alpha, push)
+                )
+            information = replace(truth.seen, vector=vector)
             verdict = None
-            if known.variation.cycles >= settings.learned_cycles:
-                verdict = deviation_test.test_deviation(known, seen, truth.grid)
+            if reference.variation.cycles >= settings.learned_cycles:
+                verdict = deviation_test.test_deviation(reference, information, truth.grid)
                 ordinary += verdict.p_value < 100.0 * alpha
                 judged += 1
             # never given up: what is falsely thought deviant is learned all the same
-            state = tracker.update_reference(state, seen, settings, verdict and replace(verdict, p_value=1.0))
+            state = tracker.update_reference(
+                state, information, settings, verdict and replace(verdict, p_value=1.0)
+            )
     rows = []
-    for n, rates in found.items():
+    for n, rates in rates_by_learned.items():
         error = 1.96 * np.std(rates) / math.sqrt(len(rates))
         worst = max(rates)
         rows.append(
@@ -144,21 +151,25 @@ def mixed_table(*, quick: bool) -> Table:
     """False alarms of real slides whose velocities come in turn, while cycles are still being learned."""
     settings = tracker.SignatureSettings()
     runs = 4 if quick else 40
-    found: dict[float, list[float]] = {speed: [] for speed in SPEEDS}
+    p_values: dict[float, list[float]] = {speed: [] for speed in SPEEDS}
     for run in range(runs):
         rng, state = np.random.default_rng([13, run]), tracker.initial_state(settings)
         for cycle in range(MIXED):
             speed = SPEEDS[cycle % len(SPEEDS)]
             capture, _ = slide(_normal(rng), speed, RATE, NOISE, run * MIXED + cycle)
-            seen = friction_profile.information(required(extract(capture).segment), settings.grid_m, GRAVITY)
-            known, verdict = state.reference, None
-            if known.variation.cycles >= settings.learned_cycles:
-                verdict = deviation_test.test_deviation(known, seen, settings.grid_m)
-                found[speed].append(verdict.p_value)
-            state = tracker.update_reference(state, seen, settings, verdict and replace(verdict, p_value=1.0))
+            information = friction_profile.information(
+                required(extract(capture).segment), settings.grid_m, GRAVITY
+            )
+            reference, verdict = state.reference, None
+            if reference.variation.cycles >= settings.learned_cycles:
+                verdict = deviation_test.test_deviation(reference, information, settings.grid_m)
+                p_values[speed].append(verdict.p_value)
+            state = tracker.update_reference(
+                state, information, settings, verdict and replace(verdict, p_value=1.0)
+            )
     rows = []
-    for name, p in [(f"{speed:g} m/s", np.array(found[speed])) for speed in SPEEDS] + [
-        ("all", np.concatenate(list(found.values())))
+    for name, p in [(f"{speed:g} m/s", np.array(p_values[speed])) for speed in SPEEDS] + [
+        ("all", np.concatenate(list(p_values.values())))
     ]:
         rows.append([name, f"{len(p)}", *(f"{np.mean(p < level):.1e}" for level in LEVELS)])
     return Table(
@@ -173,24 +184,26 @@ def mixed_table(*, quick: bool) -> Table:
 def _tail(
     truth: Normality,
     settings: tracker.SignatureSettings,
-    known: references.Reference,
+    reference: references.Reference,
     rng: np.random.Generator,
     draws: int,
     alpha: float,
     push: float,
 ) -> float:
     j = len(truth.G)
-    looked = deviation_shapes.deviation_shapes(settings.length_m, settings.points)
-    rows, _, waves = looked.within(truth.seen.reached_m, j)
+    shapes = deviation_shapes.deviation_shapes(settings.length_m, settings.points)
+    rows, _, waves = shapes.within(truth.seen.reached_m, j)
     first = len(rows) - 2 - 2 * waves
     cosines, sines = (rows[first + k : len(rows) - 2 : 2] for k in (0, 1))
     rows = np.vstack([rows, cosines + sines, cosines - sines])
     # the test's own filters, from y = h - G m to scores
-    lost = np.linalg.solve(truth.G + references.precision(known.matrix, known.strength), np.eye(j))
-    first = np.eye(j) - truth.G @ lost
-    image = first @ truth.G @ known.components
-    inner = np.eye(image.shape[1]) + known.components.T @ image
-    filters = rows @ (np.eye(j) - image @ np.linalg.solve(inner, known.components.T)) @ first
+    mean_covariance = np.linalg.solve(
+        truth.G + references.precision(reference.matrix, reference.strength), np.eye(j)
+    )
+    first = np.eye(j) - truth.G @ mean_covariance
+    image = first @ truth.G @ reference.components
+    inner = np.eye(image.shape[1]) + reference.components.T @ image
+    filters = rows @ (np.eye(j) - image @ np.linalg.solve(inner, reference.components.T)) @ first
     varies = np.einsum("ij,jk,ik->i", filters, truth.covariance, filters)
     least = 30.0 / (0.5 * FRICTION) ** 2
     use = np.einsum("ij,jk,ik->i", rows, truth.P, rows) > least
@@ -201,7 +214,7 @@ def _tail(
     y += (push * sign)[:, np.newaxis] * (filters[picked] @ truth.covariance)
     ratio = 0.1 + 0.9 * (np.cosh(push * (y @ filters.T)) * math.exp(-(push**2) / 2.0)).mean(axis=1)
     alarms = [
-        deviation_test.test_deviation(known, replace(truth.seen, vector=v), truth.grid).p_value < alpha
+        deviation_test.test_deviation(reference, replace(truth.seen, vector=v), truth.grid).p_value < alpha
         for v in y + truth.G @ truth.mean
     ]
     return float(np.mean(np.array(alarms) / ratio))
@@ -217,7 +230,7 @@ def _limits(truth: Normality, alpha: float) -> dict[str, dict[float, float]]:
     each = 300
     names = [name for name in DEVIATIONS for _ in range(each)]
     directions = np.array([truth.whitened(DEVIATIONS[name](rng)[0]) for name in names])
-    found: dict[str, dict[float, float]] = {name: {} for name in DEVIATIONS}
+    powers: dict[str, dict[float, float]] = {name: {} for name in DEVIATIONS}
     for oracle in ORACLE:
         delta = norm.isf(alpha) + norm.ppf(oracle)
         picked = np.tile(np.arange(len(names)), 40)
@@ -227,9 +240,9 @@ def _limits(truth: Normality, alpha: float) -> dict[str, dict[float, float]]:
         size = np.cumsum(1.0 / ratio[order]) / len(ratio)
         threshold = ratio[order][int(np.searchsorted(size, alpha))]
         for name in DEVIATIONS:
-            own = np.array(names)[picked] == name
-            found[name][oracle] = float((ratio[own] > threshold).mean())
-    return found
+            of_shape = np.array(names)[picked] == name
+            powers[name][oracle] = float((ratio[of_shape] > threshold).mean())
+    return powers
 
 
 def power_table(*, quick: bool) -> Table:
@@ -245,10 +258,10 @@ def power_table(*, quick: bool) -> Table:
     for k in range(learned):
         rng = np.random.default_rng([8, k])
         capture, _ = slide(_normal(rng), SPEED, RATE, NOISE, k)
-        done = tracker.update(settings, state, extract(capture))
-        false += done.deviation is not None
-        judged += done.judged
-        state = done.state
+        outcome = tracker.update(settings, state, extract(capture))
+        false += outcome.deviation is not None
+        judged += outcome.judged
+        state = outcome.state
         young = state if k < LEARNED[2] else young
     limits = _limits(truth, alpha)
     rows = [["false alarms while learning", "", f"{false} of {judged}", *[""] * 8]]
@@ -264,14 +277,14 @@ def power_table(*, quick: bool) -> Table:
                 size = aim / truth.score(shape, truth.G)
                 # as large as the oracle needs it in this very slide, whose length the deviation changes
                 size = aim / truth.score(shape, _deviant(truth, base, size * sign, shape, 5000 + k).matrix)
-                seen = _deviant(truth, base, size * sign, shape, 5000 + k)
-                power[oracle].append(norm.sf(norm.isf(alpha) - size * truth.score(shape, seen.matrix)))
-                verdict = deviation_test.test_deviation(state.reference, seen, truth.grid)
+                information = _deviant(truth, base, size * sign, shape, 5000 + k)
+                power[oracle].append(norm.sf(norm.isf(alpha) - size * truth.score(shape, information.matrix)))
+                verdict = deviation_test.test_deviation(state.reference, information, truth.grid)
                 ours[oracle].append(verdict.p_value < alpha)
                 if verdict.p_value < alpha:
                     off[oracle].append(abs(verdict.at_m - place))
                 plain[oracle].append(_plain(verdict, state.reference.variation.cycles) < alpha)
-                verdict = deviation_test.test_deviation(young.reference, seen, truth.grid)
+                verdict = deviation_test.test_deviation(young.reference, information, truth.grid)
                 early[oracle].append(verdict.p_value < alpha)
             amplitudes.append(100.0 * size)
         for kind, hits, bar in (
@@ -281,7 +294,7 @@ def power_table(*, quick: bool) -> Table:
             (", best possible", limits[name], ""),
         ):
             against = {o: o if hits is limits[name] else float(np.mean(power[o])) for o in ORACLE}
-            lost = [against[oracle] - float(np.mean(hits[oracle])) for oracle in ORACLE]
+            shortfall = [against[oracle] - float(np.mean(hits[oracle])) for oracle in ORACLE]
             about = ""
             if not kind:
                 about = f"{np.median(amplitudes):.1f} %"
@@ -290,7 +303,7 @@ def power_table(*, quick: bool) -> Table:
             interval = (
                 f"± {1.96 * math.sqrt(np.var(hits[ORACLE[-1]]) / runs):.2f}" if kind[2:3] != "b" else ""
             )
-            cells = [f"{v:+.2f}" for v in lost]
+            cells = [f"{v:+.2f}" for v in shortfall]
             rows.append(
                 [
                     name + kind,
@@ -298,8 +311,8 @@ def power_table(*, quick: bool) -> Table:
                     cells[-1],
                     interval,
                     *cells[:-1],
-                    f"{np.mean(lost):+.2f}",
-                    f"{max(lost):+.2f}",
+                    f"{np.mean(shortfall):+.2f}",
+                    f"{max(shortfall):+.2f}",
                     about,
                 ]
             )

@@ -32,14 +32,14 @@ def error_table(*, quick: bool) -> Table:
                 return FRICTION * (1.0 + h * np.exp(-0.5 * ((x - c) / w) ** 2))
 
             capture, distance = slide(friction, SPEED, rate, NOISE, k)
-            found = tracker.update(settings, tracker.initial_state(settings), extract(capture)).signature
+            signature = tracker.update(settings, tracker.initial_state(settings), extract(capture)).signature
             use = (grid > 0.1 * distance) & (grid < 0.9 * distance)
-            off = (found.friction - friction(grid))[use]
+            off = (signature.friction - friction(grid))[use]
             each.setdefault(width, []).append((off**2).mean())
             if width < 0.4e-3:
                 continue
             squares.append((off**2).mean())
-            scores.append(((off / found.friction_std[use]) ** 2).mean())
+            scores.append(((off / signature.friction_std[use]) ** 2).mean())
         rmse = 100.0 * math.sqrt(np.mean(squares)) / FRICTION
         error = (
             100.0 * np.std(squares) / math.sqrt(len(squares)) / (2.0 * math.sqrt(np.mean(squares))) / FRICTION

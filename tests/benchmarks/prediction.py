@@ -41,14 +41,16 @@ from tests.posterior_intervals import friction_intervals
 def table_of_coefficients() -> Table:
     velocities = np.linspace(0.05, 0.1, 17)
     tap = TapInput(0.1, MASS_KG, halts_at_separation=True)
-    fitted, given = fit_predictor(PLANT, tap, velocities, FRICTIONS), printed_predictor()
+    fitted, printed = fit_predictor(PLANT, tap, velocities, FRICTIONS), printed_predictor()
     mu, v = np.meshgrid(FRICTIONS, velocities)
 
-    def force(one):  # type: ignore[no-untyped-def]
-        return one.force.friction_n * mu + one.force.velocity_n_s_per_m * v
+    def force(predictor):  # type: ignore[no-untyped-def]
+        return predictor.force.friction_n * mu + predictor.force.velocity_n_s_per_m * v
 
-    error_f = np.abs(force(fitted) / force(given) - 1.0)
-    error_d = np.abs(sliding_distance(fitted.distance, mu, v) / sliding_distance(given.distance, mu, v) - 1.0)
+    error_f = np.abs(force(fitted) / force(printed) - 1.0)
+    error_d = np.abs(
+        sliding_distance(fitted.distance, mu, v) / sliding_distance(printed.distance, mu, v) - 1.0
+    )
     return Table(
         "Equations (4) and (5) refitted to the reference plant, against the printed coefficients",
         ("curve", "bar", "largest difference", "mean"),
@@ -71,10 +73,14 @@ def table_of_equations(shots: int) -> Table:
     for _ in range(shots):
         ratio = RATIO * (1.0 + 0.03 * rng.standard_normal())
         truth = Truth(rng.uniform(0.05, 0.1), rng.uniform(0.15, 0.25), ratio)
-        found = estimate(shot(truth, rng), model)
-        given = (found.by_force, found.by_distance, found.combined, found.mu_s)
-        rows.append(tuple(abs(one.value / truth.mu_s - 1.0) for one in given))
-        pulls.append(tuple(abs(one.value - truth.mu_s) < 1.96 * one.std for one in given))
+        friction = estimate(shot(truth, rng), model)
+        coefficients = (friction.by_force, friction.by_distance, friction.combined, friction.mu_s)
+        rows.append(tuple(abs(coefficient.value / truth.mu_s - 1.0) for coefficient in coefficients))
+        pulls.append(
+            tuple(
+                abs(coefficient.value - truth.mu_s) < 1.96 * coefficient.std for coefficient in coefficients
+            )
+        )
     errors, inside = 100.0 * np.array(rows), 100.0 * np.array(pulls)
     names = ("peak force (4)", "sliding distance (5)", "combined (6)", "waveform")
     return Table(
@@ -108,9 +114,9 @@ def table_of_velocities(shots_a_velocity: int) -> Table:
         for _ in range(shots_a_velocity):
             ratio = RATIO * (1.0 + 0.03 * rng.standard_normal())
             truth = Truth(velocity / 6e4, rng.uniform(0.15, 0.25), ratio)
-            found = estimate(shot(truth, rng), model)
-            given = (found.by_force, found.by_distance, found.combined, found.mu_s)
-            errors.append([abs(coefficient.value / truth.mu_s - 1.0) for coefficient in given])
+            friction = estimate(shot(truth, rng), model)
+            coefficients = (friction.by_force, friction.by_distance, friction.combined, friction.mu_s)
+            errors.append([abs(coefficient.value / truth.mu_s - 1.0) for coefficient in coefficients])
         mean = 100.0 * np.mean(errors, axis=0)
         half = 196.0 * np.std(errors, axis=0) / math.sqrt(shots_a_velocity)
         rows.append(
@@ -125,9 +131,9 @@ def table_of_velocities(shots_a_velocity: int) -> Table:
     )
 
 
-def averaged_bound(seen: list[tuple[float, np.ndarray]], groups: int) -> np.ndarray:
+def averaged_bound(of_shots: list[tuple[float, np.ndarray]], groups: int) -> np.ndarray:
     """Mean over groups of like mu_k of the inverse of the group's mean information, prior included."""
-    ordered = np.array([mine for _, mine in sorted(seen, key=lambda pair: pair[0])])
+    ordered = np.array([matrix for _, matrix in sorted(of_shots, key=lambda pair: pair[0])])
     inverses = [
         len(group) * np.linalg.inv(group.mean(axis=0) + PRIOR_INFORMATION)
         for group in np.array_split(ordered, groups)
@@ -145,8 +151,8 @@ def table_of_waveform(shots_a_velocity: int) -> list[Table]:
     ready: dict[str, list[bool]] = {name: [] for name in OF}
     for velocity in VELOCITIES_MM_PER_MIN:
         errors: dict[str, list[float]] = {name: [] for name in OF}
-        own: dict[str, list[float]] = {name: [] for name in OF}
-        seen: list[tuple[float, np.ndarray]] = []
+        variances: dict[str, list[float]] = {name: [] for name in OF}
+        of_shots: list[tuple[float, np.ndarray]] = []
         for _ in range(shots_a_velocity):
             truth = Truth(
                 velocity / 6e4,
@@ -155,21 +161,21 @@ def table_of_waveform(shots_a_velocity: int) -> list[Table]:
                 K * math.exp(0.01 * rng.standard_normal()),
                 B * math.exp(0.02 * rng.standard_normal()),
             )
-            found = fit(extract(shot(truth, rng)), model)
-            mine = information(truth)
-            seen.append((truth.mu_k, mine))
-            covariance = np.linalg.inv(mine + PRIOR_INFORMATION)
-            intervals = dict(zip(("mu_s", "mu_k"), friction_intervals(found), strict=True))
+            waveform = fit(extract(shot(truth, rng)), model)
+            matrix = information(truth)
+            of_shots.append((truth.mu_k, matrix))
+            covariance = np.linalg.inv(matrix + PRIOR_INFORMATION)
+            intervals = dict(zip(("mu_s", "mu_k"), friction_intervals(waveform), strict=True))
             for name, of in OF.items():
-                value, true = getattr(found, name), getattr(truth, name)
+                value, true = getattr(waveform, name), getattr(truth, name)
                 errors[name].append(math.log(value / true) ** 2)
-                own[name].append(float(of @ covariance @ of))
+                variances[name].append(float(of @ covariance @ of))
                 inside[name].append(intervals[name][0] <= true <= intervals[name][1])
-                ready[name].append(abs(value - true) <= 1.96 * getattr(found, name + "_std"))
-        averaged = [averaged_bound(seen, groups) for groups in (max(shots_a_velocity // 10, 1), 1)]
+                ready[name].append(abs(value - true) <= 1.96 * getattr(waveform, name + "_std"))
+        averaged = [averaged_bound(of_shots, groups) for groups in (max(shots_a_velocity // 10, 1), 1)]
         for name, of in OF.items():
             squares[name].append(errors[name])
-            bounds[name].append(own[name])
+            bounds[name].append(variances[name])
             loose[name].append([float(of @ covariance @ of) for covariance in averaged])
         print(f"  waveform at {velocity} mm/min", file=sys.stderr, flush=True)
     rows = []
@@ -284,9 +290,9 @@ def table_of_viscous_friction(campaigns: int) -> Table:
             for _ in range(6)
         ]
         for name, method in (("least squares", by_least_squares), ("decrement", by_decrement)):
-            found = method(captures)
-            errors[name].append(found.coefficient_n_s_per_m - VISCOUS)
-            stds[name].append(found.std)
+            regression = method(captures)
+            errors[name].append(regression.coefficient_n_s_per_m - VISCOUS)
+            stds[name].append(regression.std)
     return Table(
         "k_v together with mu_k over many shots",
         ("method", "mean error", "RMSE", "stated std", "of k_v"),
