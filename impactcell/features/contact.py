@@ -13,7 +13,8 @@ from impactcell.numerics.local_polynomial import fit_polynomial, median, value_s
 from impactcell.records import Samples
 
 MIN_WINDOW_S = 2.5e-4
-"""Narrowest half window of the cubic about the peak: short against a contact of some 17 ms."""
+"""Narrowest half window of the cubic about the peak: over 40 taps of 2000-6000 mm/min half or twice of
+it changes the error of the peak by 1 %, four times raises it by 23 %."""
 MAX_WINDOW_S = 4e-3
 """Widest half window of the cubic about the peak: a quarter of a contact of some 17 ms."""
 BIAS_FACTOR = 1.5
@@ -24,11 +25,14 @@ MIN_CONTACT_STD = 8.0
 """Least smoothed force of a contact, in standard deviations of a sample."""
 THRESHOLD_STD, THRESHOLD_SHARE = 7.0, 0.005
 """Smoothed force above which there is contact: the larger of so many of its standard deviations, which noise
-reaches once in 1e12, and of this share of its largest value."""
+reaches once in 1e12, and of this share of its largest value. A compromise: at 5 the error of the separation
+is larger by 9 %, at 10 by 16 %."""
 PRESSED_STD = 3.0
 """Least force of a sample that is used of the falling flank, in standard deviations of a sample."""
 FLANK_S = 1.5e-3
-"""Widest stretch of the falling flank that is extrapolated to zero: a tenth of a contact of some 17 ms."""
+"""Widest stretch of the falling flank that is extrapolated to zero. A compromise: over 40 taps of 2000-6000
+mm/min the separation is off by 12 µs, as its standard deviation says; with 1 ms by 22 µs, with 3 ms by 11 µs
+but by 1.7 of its standard deviations, for a parabola does not follow so far."""
 FLANK_SHRINK, FLANK_ROUNDS = 1.6, 5
 """Factor by which the stretch is shortened until a parabola fits it, and how often: down to 0.23 ms."""
 
