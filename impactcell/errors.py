@@ -25,6 +25,7 @@
     │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry, if busy)
     ├── JournalError
     │   ├── ForeignJournalError   not our file, or of another version; never overwritten
+    │   ├── JournalDamagedError   what is stored is not what was written (retry: in a journal begun anew)
     │   ├── JournalGoneError      the file was removed or replaced while it was in use (retry)
     │   └── JournalFullError      the disk is full, or the file cannot be used now    (retry)
     └── AccessError               users, certificates and rights of the OPC UA server
@@ -154,6 +155,12 @@ class JournalError(ImpactCellError):
 
 class ForeignJournalError(JournalError):
     """A file that is not this cell's journal, or of another format version; it is never overwritten."""
+
+
+class JournalDamagedError(JournalError):
+    """What is stored is not what was written; the message names the file, and the cycle where it is one's."""
+
+    retry: ClassVar[bool] = True
 
 
 class JournalGoneError(JournalError):

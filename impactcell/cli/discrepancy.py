@@ -11,7 +11,7 @@ from typing import Any
 from impactcell.api.findings import write_findings
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
-from impactcell.cli.paths import open_journal
+from impactcell.cli.paths import note_damage, open_journal
 from impactcell.discrepancy.report import verdict_sentence
 from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
@@ -83,7 +83,9 @@ def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> t
         return str(campaign.name), read(campaign)
     with open_journal(journal) as store:
         try:
-            recorded = from_captures(store.captures(), plant.gravity_m_s2 if plant else 9.81)
+            recorded = from_captures(
+                store.captures(damaged=note_damage), plant.gravity_m_s2 if plant else 9.81
+            )
         except CampaignError as error:
             raise CampaignError(f"{journal}: {error}") from error
     return str(journal.name), recorded.campaign

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from impactcell import campaign
 from impactcell.campaign.recorded import from_captures
-from impactcell.cli.paths import open_journal
+from impactcell.cli.paths import note_damage, open_journal
 from impactcell.errors import CampaignError
 from impactcell.process.console import print_note, print_result
 
@@ -23,7 +23,7 @@ def export(
     """
     with open_journal(journal) as source:
         try:
-            recorded = from_captures(source.captures(first_cycle, last_cycle))
+            recorded = from_captures(source.captures(first_cycle, last_cycle, note_damage))
         except CampaignError as error:
             raise CampaignError(f"{journal}: {error}") from error
     campaign.write(recorded.campaign, output)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from impactcell.errors import CampaignError, ImpactCellError
 from impactcell.journal.store import Journal
+from impactcell.process.console import print_note
 
 
 def open_journal(journal: Path) -> Journal:
@@ -19,6 +20,11 @@ def open_journal(journal: Path) -> Journal:
     if not journal.is_file():
         raise CampaignError(f"{journal}: there is no such journal; name the `file` of the cell's `journal`")
     return Journal(journal, None, read_only=True)
+
+
+def note_damage(damage: str) -> None:
+    """Say that a recorded capture cannot be read; the others are used."""
+    print_note(f"{damage}; it is left out")
 
 
 def check_output(file: Path, error: type[ImpactCellError]) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from impactcell.errors import JournalError
+from impactcell.errors import JournalDamagedError, JournalError
 from impactcell.journal.rice_codec import is_uniform, rice_decode, rice_encode
 from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 
@@ -52,18 +52,20 @@ def encode_capture(capture: Capture) -> bytes:
     return MAGIC + struct.pack("<I", zlib.crc32(content)) + content
 
 
-def decode_capture(blob: bytes) -> Capture:
-    """Return the capture that `encode_capture` was given.
+def decode_capture(blob: bytes | None) -> Capture:
+    """Return the capture that `encode_capture` was given; `blob` is None where it could not be read.
 
     Raises
     ------
     JournalError
-        If the bytes are not such a capture.
+        If the bytes are not such a capture; JournalDamagedError if they were one.
     """
+    if blob is None:
+        raise JournalDamagedError("the stored capture lies in a part of the file that cannot be used")
     if blob[:4] != MAGIC:
         raise JournalError("not a capture of this journal format")
     if blob[4:8] != struct.pack("<I", zlib.crc32(blob[8:])):
-        raise JournalError("a stored capture is damaged: its checksum is wrong")
+        raise JournalDamagedError("the stored capture is damaged: its checksum is wrong")
     try:
         (length,) = struct.unpack_from("<I", blob, 8)
         header = json.loads(blob[12 : 12 + length])
@@ -76,7 +78,7 @@ def decode_capture(blob: bytes) -> Capture:
         )  # fmt: skip
         return capture if summary is None else replace(capture, summary=Summary(*summary))
     except (zlib.error, ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
-        raise JournalError(f"a stored capture is damaged: {error}") from error
+        raise JournalDamagedError(f"the stored capture is damaged: {error}") from error
 
 
 def _encode_channel(channel: Channel, arrays: list[bytes]) -> dict[str, Any]:

@@ -1,18 +1,22 @@
 """The journal's file: opened, checked to be ours, and its errors by name."""
 
+import contextlib
 import errno
 import os
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
+from impactcell.errors import ForeignJournalError, JournalDamagedError, JournalError, JournalFullError
+from impactcell.journal.checksums import row_crc
 from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, OLDEST, TABLES, UPGRADES
 
 WAY_OUT: Final = "run the version that wrote it, or name another file to begin anew"
 _NO_ROOM: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+_DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _MAGIC: Final = b"SQLite format 3\0"
 _APPLICATION_ID_AT: Final = 68
 """Where a database's header has it (The SQLite Database File Format, section 1.3)."""
@@ -32,7 +36,11 @@ def errors(path: Path) -> Iterator[None]:
         if code == sqlite3.SQLITE_ERROR:  # a table is missing
             raise JournalError(f"{path}: cannot be used ({error}); name another file") from error
         raise _for_now(path, error, full=code in _NO_ROOM) from error
-    except (sqlite3.DatabaseError, OverflowError) as error:
+    except sqlite3.DatabaseError as error:
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED:
+            raise JournalDamagedError(f"{path}: is damaged and cannot be used ({error})") from error
+        raise JournalError(f"{path}: cannot be used ({error})") from error
+    except OverflowError as error:
         raise JournalError(f"{path}: cannot be used ({error})") from error
 
 
@@ -110,7 +118,7 @@ def _pages(database: sqlite3.Connection, path: Path, *, read_only: bool) -> int:
         return _pragma(database, "page_count")
     except sqlite3.DatabaseError as error:
         code = error.sqlite_errorcode & 0xFF
-        if code in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
+        if code in _DAMAGED and not _is_ours(path):
             raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
         if code == sqlite3.SQLITE_CANTOPEN and read_only:
             raise JournalError(
@@ -118,6 +126,23 @@ def _pages(database: sqlite3.Connection, path: Path, *, read_only: bool) -> int:
                 f"with {path.name}-wal where there is one, to a directory that can be written, and name that"
             ) from error
         raise
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether the header says that it is a journal, whatever else may be wrong with the file."""
+    with path.open("rb") as file:
+        head = file.read(_APPLICATION_ID_AT + 4)
+    return head.startswith(_MAGIC) and int.from_bytes(head[_APPLICATION_ID_AT:]) == APPLICATION_ID
+
+
+def set_aside(path: Path) -> Path:
+    """Give a damaged journal, with its log, another name beside its own; returns that."""
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    aside = path.with_name(f"{path.name}.damaged-{stamp}")
+    for suffix in ("-wal", "-shm", ""):
+        with contextlib.suppress(FileNotFoundError):
+            path.with_name(path.name + suffix).rename(aside.with_name(aside.name + suffix))
+    return aside
 
 
 def _check_header(path: Path) -> None:
@@ -144,7 +169,7 @@ def _create(database: sqlite3.Connection, cell: str) -> None:
     database.execute("BEGIN IMMEDIATE")
     for statement in TABLES.split(";"):
         database.execute(statement)
-    database.execute("INSERT INTO meta VALUES ('cell', ?)", (cell,))
+    database.execute("INSERT INTO meta VALUES ('cell', ?, ?)", (cell, row_crc(["cell", cell])))
     database.execute(f"PRAGMA application_id = {APPLICATION_ID}")
     database.execute(f"PRAGMA user_version = {FORMAT}")
     database.execute("COMMIT")
@@ -180,9 +205,10 @@ def unreadable_state(path: Path, cell: str, why: ValueError) -> ForeignJournalEr
 def _bring_up(database: sqlite3.Connection, path: Path, upgrade: Upgrade | None) -> None:
     """Bring a file of an earlier version up to this one, all or nothing."""
     version = _pragma(database, "user_version")
-    row = database.execute("SELECT blob FROM state").fetchone()
+    row = database.execute("SELECT * FROM state").fetchone()  # id, seq, blob and, from format 5 on, crc
+    whole = row is not None and (len(row) < 4 or row[3] in (None, row_crc([row[2]])))
     try:
-        state = None if row is None or upgrade is None else upgrade(bytes(row[0]))
+        state = upgrade(bytes(row[2])) if whole and upgrade is not None else None
     except ValueError as error:
         raise unreadable_state(path, _named_cell(database), error) from error
     present = {name for _, name, *_ in database.execute("PRAGMA table_info (cycles)")}
@@ -198,7 +224,7 @@ def _bring_up(database: sqlite3.Connection, path: Path, upgrade: Upgrade | None)
                 database.execute(statement)
         if state is not None:
             database.execute("INSERT INTO earlier_states (seq, blob) SELECT seq, blob FROM state")
-            database.execute("UPDATE state SET blob = ?", (state,))
+            database.execute("UPDATE state SET blob = ?, crc = ?", (state, row_crc([state])))
         database.execute(f"PRAGMA user_version = {FORMAT}")
         database.execute("COMMIT")
     except BaseException:

@@ -3,10 +3,12 @@
 import math
 import sqlite3
 import struct
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
 from impactcell.errors import JournalError
+from impactcell.journal.checksums import SqlValue
 from impactcell.journal.stored_forms import load_alarm
 from impactcell.quantities import BY_PATH, HISTORY
 from impactcell.records import Alarm, Quality
@@ -15,6 +17,9 @@ T = TypeVar("T")
 
 VARIABLES: Final = {path: BY_PATH[path] for path in HISTORY}
 """Quantities with a past, by their OPC UA path."""
+
+IsWhole = Callable[[str, Sequence[SqlValue]], bool]
+"""Whether a row of a table is as it was written."""
 
 _TOKEN = struct.Struct(">qq")
 
@@ -59,8 +64,10 @@ class Page(Generic[T]):
     resume: bytes | None
 
 
-def stored_values(database: sqlite3.Connection, variable: str, query: HistoryQuery) -> Page[StoredValue]:
-    """Read stored values of a variable of `VARIABLES`.
+def stored_values(
+    database: sqlite3.Connection, variable: str, query: HistoryQuery, is_whole: IsWhole
+) -> Page[StoredValue]:
+    """Read stored values of a variable of `VARIABLES`; damaged rows are left out.
 
     Raises
     ------
@@ -70,40 +77,45 @@ def stored_values(database: sqlite3.Connection, variable: str, query: HistoryQue
     if variable not in VARIABLES:
         raise JournalError(f"{variable} has no history; these have: {', '.join(VARIABLES)}")
     quantity = VARIABLES[variable]
-    columns = f"seq, time_ns, {quantity.column}, {quantity.quality_column}"
-    rows, resume = _page(database, query, columns, "cycles", "seq")
+    columns, rows, resume = _page(database, query, "cycles", "seq")
+    wanted = (columns.index(str(n)) for n in ("time_ns", quantity.column, quantity.quality_column))
+    at_time, at_value, at_quality = wanted
     return Page(
         tuple(
             StoredValue(
-                time_ns,
-                math.nan if stored is None else stored * quantity.per_si,
-                Quality.BAD if level is None else Quality(level),
+                row[at_time],
+                math.nan if row[at_value] is None else row[at_value] * quantity.per_si,
+                Quality.BAD if row[at_quality] is None else Quality(row[at_quality]),
             )
-            for _, time_ns, stored, level in rows
+            for row in rows
+            if is_whole("cycles", row)
         ),
         resume,
     )
 
 
-def stored_alarms(database: sqlite3.Connection, query: HistoryQuery) -> Page[Alarm]:
-    """Read the states that each transition of an alarm led to; those of conditions not known are left out.
+def stored_alarms(database: sqlite3.Connection, query: HistoryQuery, is_whole: IsWhole) -> Page[Alarm]:
+    """Read the states that each transition of an alarm led to.
+
+    Those of conditions that are not known, and damaged rows, are left out.
 
     Raises
     ------
     JournalError
         The token is not one of ours, or a record is of another version.
     """
-    rows, resume = _page(database, query, "id, time_ns, record", "alarms", "id")
+    columns, rows, resume = _page(database, query, "alarms", "id")
+    at_record = columns.index("record")
     try:
-        alarms = [load_alarm(record) for _, _, record in rows]
+        alarms = [load_alarm(row[at_record]) for row in rows if is_whole("alarms", row)]
     except ValueError as error:
         raise JournalError(f"the journal's alarms cannot be shown: {error}") from error
     return Page(tuple(alarm for alarm in alarms if alarm is not None), resume)
 
 
 def _page(
-    database: sqlite3.Connection, query: HistoryQuery, columns: str, table: str, key: str
-) -> tuple[list[tuple[Any, ...]], bytes | None]:
+    database: sqlite3.Connection, query: HistoryQuery, table: str, key: str
+) -> tuple[list[str], list[tuple[Any, ...]], bytes | None]:
     direction, beyond = ("DESC", "<") if query.newest_first else ("ASC", ">")
     after = None
     if query.resume is not None:
@@ -111,13 +123,16 @@ def _page(
             after = _TOKEN.unpack(query.resume)
         except struct.error as error:
             raise JournalError("this token continues no page of a history") from error
-    rows = database.execute(
-        f"SELECT {columns} FROM {table} "  # noqa: S608 - names from this module only
+    cursor = database.execute(
+        f"SELECT * FROM {table} "  # noqa: S608 - names from this module only
         "WHERE (?1 IS NULL OR time_ns >= ?1) AND (?2 IS NULL OR time_ns <= ?2) "
         f"AND (?3 IS NULL OR (time_ns, {key}) {beyond} (?3, ?4)) "
         f"ORDER BY time_ns {direction}, {key} {direction} LIMIT ?5",
         (query.start_ns, query.end_ns, *(after or (None, None)), query.limit + 1),
-    ).fetchall()
-    more = len(rows) > query.limit
-    rows = rows[: query.limit]
-    return rows, _TOKEN.pack(rows[-1][1], rows[-1][0]) if more and rows else None
+    )
+    columns, rows = [str(name) for name, *_ in cursor.description], cursor.fetchall()
+    more, rows = len(rows) > query.limit, rows[: query.limit]
+    if not (more and rows):
+        return columns, rows, None
+    last = rows[-1]
+    return columns, rows, _TOKEN.pack(last[columns.index("time_ns")], last[columns.index(key)])

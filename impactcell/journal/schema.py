@@ -8,16 +8,18 @@ alone tells cycles apart: a module that keeps its session over a restart, or wra
 numbers again.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import cast
 
+from impactcell.journal.checksums import CHECKED, SqlValue
 from impactcell.quantities import BY_COLUMN, QUALITY_BY_COLUMN, DataType, Quantity
 from impactcell.records import Capture, Quality, Snapshot
 
 APPLICATION_ID = 0x49435243  # "ICRC"
-FORMAT = 4
-"""From 4 on, state, alarms and model say of which format they are."""
+FORMAT = 5
+"""From 4 on, state, alarms and model say of which format they are; from 5 on, rows have checksums."""
 OLDEST = 3
 """Oldest format that can be read."""
 
@@ -98,27 +100,56 @@ def _columns() -> tuple[Column, ...]:
 
 COLUMNS = _columns()
 
+
+def cycle_row(capture: Capture, snapshot: Snapshot) -> dict[str, SqlValue]:
+    """Give the row of a cycle, as SQLite will give it back."""
+    return {column.name: _sql(column, column.of(capture, snapshot)) for column in COLUMNS}
+
+
+def _sql(column: Column, value: Value) -> SqlValue:
+    """NaN is no SQL number and stored as NULL; no number that SQLite gives back is a negative zero."""
+    if isinstance(value, str):
+        return value
+    if column.sql_type == "INTEGER":
+        return int(value)
+    return None if math.isnan(value) else float(value) + 0.0
+
+
 EARLIER_STATES = """
 CREATE TABLE earlier_states (id INTEGER PRIMARY KEY, seq INTEGER NOT NULL, blob BLOB NOT NULL) STRICT
 """
 """States as earlier versions wrote them, from before they were written anew by a later one."""
 
+STATE_BACKUP = """
+CREATE TABLE state_backup (id INTEGER PRIMARY KEY CHECK (id = 1), blob BLOB NOT NULL, crc INTEGER) STRICT
+"""
+"""The state as it was some cycles ago, for the case that the newest is damaged."""
+
 TABLES = f"""
-CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER) STRICT;
 CREATE TABLE cycles (
     seq INTEGER PRIMARY KEY,
-    {", ".join(f"{column.name} {column.sql_type}" for column in COLUMNS)}
+    {", ".join(f"{column.name} {column.sql_type}" for column in COLUMNS)},
+    crc INTEGER
 ) STRICT;
 CREATE INDEX cycles_by_time ON cycles (time_ns);
 CREATE TABLE captures (seq INTEGER PRIMARY KEY, blob BLOB NOT NULL) STRICT;
-CREATE TABLE alarms (id INTEGER PRIMARY KEY, time_ns INTEGER NOT NULL, record TEXT NOT NULL) STRICT;
+CREATE TABLE alarms (
+    id INTEGER PRIMARY KEY, time_ns INTEGER NOT NULL, record TEXT NOT NULL, crc INTEGER
+) STRICT;
 CREATE INDEX alarms_by_time ON alarms (time_ns);
 CREATE TABLE audit (
     id INTEGER PRIMARY KEY, time_ns INTEGER NOT NULL, user TEXT NOT NULL,
-    action TEXT NOT NULL, arguments TEXT NOT NULL, result TEXT NOT NULL
+    action TEXT NOT NULL, arguments TEXT NOT NULL, result TEXT NOT NULL, crc INTEGER
 ) STRICT;
-CREATE TABLE state (id INTEGER PRIMARY KEY CHECK (id = 1), seq INTEGER NOT NULL, blob BLOB NOT NULL) STRICT;
+CREATE TABLE state (
+    id INTEGER PRIMARY KEY CHECK (id = 1), seq INTEGER NOT NULL, blob BLOB NOT NULL, crc INTEGER
+) STRICT;
+{STATE_BACKUP};
 {EARLIER_STATES}"""
 
-UPGRADES: Mapping[int, tuple[str, ...]] = {3: (EARLIER_STATES,)}
+UPGRADES: Mapping[int, tuple[str, ...]] = {
+    3: (EARLIER_STATES,),
+    4: (STATE_BACKUP, *(f"ALTER TABLE {table} ADD COLUMN crc INTEGER" for table in CHECKED[:-1])),
+}
 """Statements that lead from each earlier format to the next."""

@@ -7,28 +7,26 @@ A `Journal` is used from one thread at a time; `impactcell.service.worker` gives
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from impactcell.errors import JournalError
+from impactcell.errors import JournalDamagedError, JournalError
 from impactcell.journal.capture_codec import decode_capture, encode_capture
-from impactcell.journal.database import Upgrade, errors, open_database
+from impactcell.journal.checksums import CheckedTables
+from impactcell.journal.database import Upgrade, errors, open_database, set_aside
 from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
 from impactcell.journal.lock import lock_journal
 from impactcell.journal.presence import FilePresence
 from impactcell.journal.retention import Retention, prune
-from impactcell.journal.schema import COLUMNS
+from impactcell.journal.salvage import stored_captures
+from impactcell.journal.schema import cycle_row
 from impactcell.journal.stored_forms import ALARM
 from impactcell.records import Alarm, Capture, CycleId, Snapshot
-
-_INSERT_CYCLE = (
-    f"INSERT INTO cycles ({', '.join(c.name for c in COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"  # noqa: S608
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,19 +70,25 @@ class Journal:
     ) -> None:
         self.path = path
         self._last_stored: CycleId | None = None
-        with self._errors():
+        with errors(self.path):
             if read_only and not path.is_file():
                 raise JournalError(f"{path}: there is no such journal")
             self._lock = None if read_only else lock_journal(path)
-        self._open = partial(open_database, path, cell, read_only=read_only, upgrade=upgrade)
+        self._open_database = partial(open_database, path, cell, read_only=read_only, upgrade=upgrade)
         try:
-            self._db = self._open()
+            self._open()
         except BaseException:
             if self._lock is not None:
                 self._lock.close()
             raise
-        self._presence = FilePresence(path)
-        self._presence.check()
+
+    def _open(self) -> None:
+        self._db = self._open_database()
+        self._presence = FilePresence(self.path)
+        with errors(self.path):
+            self._presence.check()
+            self._tables = CheckedTables(self._db, self.path)
+        self._last_stored = None
 
     def __enter__(self) -> Self:
         return self
@@ -100,8 +104,15 @@ class Journal:
         if self._lock is not None:
             self._lock.close()
 
-    def begin_anew(self) -> None:
-        """Open what is at the path now, after a `JournalGoneError`: a file that was put back, or a new one.
+    def begin_anew(self, *, damaged: bool) -> Path | None:
+        """Open what is at the path, a new file where there is none; what is damaged gets another name first.
+
+        For a journal whose file was removed or replaced, or that is damaged.
+
+        Returns
+        -------
+        Path or None
+            Where the damaged file is now.
 
         Raises
         ------
@@ -109,10 +120,12 @@ class Journal:
             As on opening; the next call tries again.
         """
         self._db.close()
-        self._db = self._open()
-        self._last_stored = None
-        self._presence = FilePresence(self.path)
-        self._presence.check()
+        aside = None
+        with errors(self.path):
+            if damaged and self.path.exists():
+                aside = set_aside(self.path)
+        self._open()
+        return aside
 
     @property
     def cell(self) -> str:
@@ -127,7 +140,7 @@ class Journal:
     def store_model(self, model: str) -> None:
         """Keep the model that the cell runs with from now on."""
         with self._transaction():
-            self._db.execute("INSERT OR REPLACE INTO meta VALUES ('model', ?)", (model,))
+            self._tables.insert("meta", {"key": "model", "value": model})
 
     def append(
         self, capture: Capture, snapshot: Snapshot, state: bytes, changed: Sequence[Alarm] = ()
@@ -147,12 +160,10 @@ class Journal:
         with self._transaction():
             if cycle_id == self.last_cycle_id():
                 raise JournalError(f"{self.path}: cycle {capture.cycle} is stored already")
-            row = self._db.execute(
-                _INSERT_CYCLE, [_sql(column.of(capture, snapshot)) for column in COLUMNS]
-            ).lastrowid
+            row = self._tables.insert("cycles", cycle_row(capture, snapshot))
             self._db.execute("INSERT INTO captures VALUES (?, ?)", (row, encode_capture(capture)))
             self._put_alarms(changed)
-            self._db.execute("INSERT OR REPLACE INTO state VALUES (1, ?, ?)", (row, state))
+            self._tables.insert("state", {"id": 1, "seq": row, "blob": state})
         self._last_stored = cycle_id
 
     def record(self, state: bytes, changed: Sequence[Alarm] = (), audit: AuditEntry | None = None) -> None:
@@ -160,85 +171,125 @@ class Journal:
         with self._transaction():
             self._put_alarms(changed)
             if audit is not None:
-                self._db.execute(
-                    "INSERT INTO audit (time_ns, user, action, arguments, result) VALUES (?, ?, ?, ?, ?)",
-                    (audit.time_ns, audit.user, audit.action, audit.arguments, audit.result),
-                )
-            self._db.execute(
-                "INSERT OR REPLACE INTO state VALUES (1, (SELECT coalesce(max(seq), 0) FROM cycles), ?)",
-                (state,),
-            )
+                self._tables.insert("audit", asdict(audit))
+            (row,) = self._db.execute("SELECT coalesce(max(seq), 0) FROM cycles").fetchone()
+            self._tables.insert("state", {"id": 1, "seq": row, "blob": state})
 
     def state(self) -> bytes | None:
-        """Return the state of the last durable cycle; None in a new journal."""
-        with self._errors():
-            row = self._db.execute("SELECT blob FROM state").fetchone()
-        return None if row is None else bytes(row[0])
+        """Return the state of the last durable cycle; None in a new journal.
+
+        Raises
+        ------
+        JournalDamagedError
+            If it is not what was written.
+        """
+        return self._blob("state")
+
+    def state_backup(self) -> bytes | None:
+        """Return the state as `back_up_state` kept it; None where it never did. Raises as `state` does."""
+        return self._blob("state_backup")
+
+    def back_up_state(self) -> None:
+        """Keep a second copy of the state, for the case that the first is damaged one day."""
+        with self._transaction():
+            self._db.execute("INSERT OR REPLACE INTO state_backup SELECT 1, blob, crc FROM state")
 
     def last_cycle_id(self) -> CycleId | None:
-        """Return the last durable cycle; None in a new journal."""
-        if self._last_stored is not None:
-            return self._last_stored
-        with self._errors():
-            row = self._db.execute("SELECT session, cycle FROM cycles ORDER BY seq DESC LIMIT 1").fetchone()
-        return None if row is None else CycleId(*row)
+        """Return the last durable cycle; None in a new journal. A row that is damaged does not count."""
+        if self._last_stored is None:
+            with errors(self.path):
+                rows = self._db.execute("SELECT * FROM cycles ORDER BY seq DESC")
+                row = next((row for row in rows if self._tables.is_whole("cycles", row)), None)
+            if row is not None:
+                columns = self._tables.columns["cycles"]
+                self._last_stored = CycleId(row[columns.index("session")], row[columns.index("cycle")])
+        return self._last_stored
 
-    def captures(self, first_cycle: int | None = None, last_cycle: int | None = None) -> Iterator[Capture]:
-        """Yield the stored captures in order of their cycles; thinned ones are gone."""
-        with self._errors():
-            rows = self._db.execute(
-                "SELECT blob FROM captures JOIN cycles USING (seq) "
-                "WHERE (?1 IS NULL OR cycle >= ?1) AND (?2 IS NULL OR cycle <= ?2) ORDER BY seq",
-                (first_cycle, last_cycle),
-            )
-            for (blob,) in rows:
-                yield decode_capture(blob)
+    def captures(
+        self,
+        first_cycle: int | None = None,
+        last_cycle: int | None = None,
+        damaged: Callable[[str], None] | None = None,
+    ) -> Iterator[Capture]:
+        """Yield the stored captures in order of their cycles; those that were dropped are gone.
+
+        Parameters
+        ----------
+        first_cycle, last_cycle : int or None
+            Both included.
+        damaged : callable, optional
+            Told of each capture that cannot be read, by its cycle; the others follow.
+
+        Raises
+        ------
+        JournalDamagedError
+            At the first that cannot be read, without `damaged`.
+        """
+        with errors(self.path):
+            for stored in stored_captures(self._db):
+                if not (first_cycle or 0) <= stored.cycle <= (math.inf if last_cycle is None else last_cycle):
+                    continue
+                try:
+                    yield decode_capture(stored.blob)
+                except JournalDamagedError as error:
+                    name = f"cycle {stored.cycle}" if stored.cycle else f"the {stored.seq}th cycle"
+                    if damaged is None:
+                        raise JournalDamagedError(f"{self.path}: {name}: {error}") from error
+                    damaged(f"{name}: {error}")
 
     def values(self, variable: str, query: HistoryQuery) -> Page[StoredValue]:
         """Return stored values of a variable; see `impactcell.journal.history`."""
-        with self._errors():
-            return stored_values(self._db, variable, query)
+        with errors(self.path):
+            return stored_values(self._db, variable, query, self._tables.is_whole)
 
     def alarms(self, query: HistoryQuery) -> Page[Alarm]:
         """Return the states that each transition of an alarm led to."""
-        with self._errors():
-            return stored_alarms(self._db, query)
+        with errors(self.path):
+            return stored_alarms(self._db, query, self._tables.is_whole)
 
     def checkpoint(self) -> None:
         """Move what has been committed from the log into the file; it is as durable before as after."""
-        with self._errors():
+        with errors(self.path):
             self._db.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
     def prune(self, keep: Retention, now_ns: int) -> bool:
         """Drop what `keep` does not keep, and say if there is more; see `impactcell.journal.retention`."""
-        with self._errors():
+        with errors(self.path):
             return prune(self._db, keep, now_ns)
 
     def count(self) -> int:
         """Return how many cycles the journal holds."""
-        with self._errors():
+        with errors(self.path):
             return int(self._db.execute("SELECT count(*) FROM cycles").fetchone()[0])
 
     def audit(self) -> tuple[AuditEntry, ...]:
         """Return every action of a person, oldest first."""
-        with self._errors():
-            rows = self._db.execute("SELECT time_ns, user, action, arguments, result FROM audit ORDER BY id")
-            return tuple(AuditEntry(*row) for row in rows)
+        with errors(self.path):
+            rows = self._db.execute("SELECT * FROM audit ORDER BY id").fetchall()
+            names = self._tables.columns["audit"]
+            entries = [
+                dict(zip(names, row, strict=True)) for row in rows if self._tables.is_whole("audit", row)
+            ]
+        fields = AuditEntry.__dataclass_fields__
+        return tuple(AuditEntry(**{name: entry[name] for name in fields}) for entry in entries)
+
+    def _blob(self, table: str) -> bytes | None:
+        with errors(self.path):
+            rows = self._tables.rows(table, f"SELECT * FROM {table}")  # noqa: S608 - from above
+        return bytes(rows[0]["blob"]) if rows else None
 
     def _meta(self, key: str) -> str:
-        with self._errors():
-            row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-        return "" if row is None else str(row[0])
+        with errors(self.path):
+            rows = self._tables.rows("meta", "SELECT * FROM meta WHERE key = ?", key)
+        return str(rows[0]["value"]) if rows else ""
 
     def _put_alarms(self, changed: Sequence[Alarm]) -> None:
-        self._db.executemany(
-            "INSERT INTO alarms (time_ns, record) VALUES (?, ?)",
-            [(alarm.time_ns, ALARM.dumps(alarm)) for alarm in changed],
-        )
+        for alarm in changed:
+            self._tables.insert("alarms", {"time_ns": alarm.time_ns, "record": ALARM.dumps(alarm)})
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        with self._errors():
+        with errors(self.path):
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -248,11 +299,3 @@ class Journal:
                     self._db.execute("ROLLBACK")
                 raise
             self._presence.check()
-
-    def _errors(self) -> AbstractContextManager[None]:
-        return errors(self.path)
-
-
-def _sql(value: float | str) -> float | str | None:
-    """NaN is no SQL number: it is stored as NULL."""
-    return None if isinstance(value, float) and math.isnan(value) else value

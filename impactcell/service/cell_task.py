@@ -15,8 +15,7 @@ from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention
-from impactcell.journal.store import AuditEntry, Journal
-from impactcell.journal.stored_forms import upgraded_state
+from impactcell.journal.store import AuditEntry
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
     BatchAnnouncement,
@@ -27,6 +26,7 @@ from impactcell.records import (
 )
 from impactcell.scada import Server
 from impactcell.service.factory import cell_design, module_link, retention_policy
+from impactcell.service.journal_writer import open_journal
 from impactcell.service.monitoring import CellHealth
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.publisher import CellPublisher
@@ -62,7 +62,7 @@ class CellTask:
         self.cell = cell
         self.log = CellLogger(logging.getLogger(__name__), cell.name)
         settings = cell.settings.journal
-        journal = None if settings is None else Journal(settings.file, cell.name, upgrade=upgraded_state)
+        journal, damage = (None, "") if settings is None else open_journal(settings.file, cell.name)
         keep = Retention() if settings is None else retention_policy(settings)
         try:
             self.worker = CellWorker(cell_design(cell), journal, keep)
@@ -70,6 +70,8 @@ class CellTask:
             if journal is not None:
                 journal.close()
             raise
+        if damage:
+            self.worker.tell_journal_event(damage)
         self._publisher = CellPublisher(cell.name, self.worker.alarms, self.log)
         self._notes: tuple[str, ...] = ()
         self._on_snapshot = on_snapshot
@@ -260,6 +262,8 @@ class CellTask:
             await self._apply_rule_result(module_connection.result(status.reason, connected=status.connected))
 
     async def _check_journal(self) -> None:
+        for event in self.worker.take_journal_events():  # a person has to know, also where it is over
+            await self._apply_rule_result(journal_fault.result(event))
         fault = self.worker.journal_fault
         active = any(a.active for a in self.worker.alarms if a.name == journal_fault.NAME)
         if bool(fault) != active:

@@ -4,10 +4,14 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 
-from impactcell.errors import JournalError, JournalGoneError
+from impactcell.errors import JournalDamagedError, JournalError, JournalGoneError
+from impactcell.journal.database import set_aside
 from impactcell.journal.retention import Retention
+from impactcell.journal.salvage import salvaged_state
 from impactcell.journal.store import Journal
+from impactcell.journal.stored_forms import upgraded_state
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId
 
@@ -20,6 +24,33 @@ PRUNE_EVERY = 256
 """Cycles between two looks at what the journal may drop."""
 
 Entry = Callable[[Journal], None]
+
+
+def open_journal(path: Path, cell: str) -> tuple[Journal, str]:
+    """Open a cell's journal; one that is damaged is put aside, and a new one goes on from its state.
+
+    Returns
+    -------
+    Journal
+    str
+        What a person has to know of it; empty where all is well.
+
+    Raises
+    ------
+    ForeignJournalError, JournalFullError, JournalError
+        As `Journal` does.
+    """
+    try:
+        return Journal(path, cell, upgrade=upgraded_state), ""
+    except JournalDamagedError as error:
+        aside = set_aside(path)
+        state, why = salvaged_state(aside), str(error)
+    journal = Journal(path, cell, upgrade=upgraded_state)
+    event = f"{why}; it was put aside as {aside.name}, and a new one is begun"
+    if state is None:
+        return journal, f"{event}: wear, batch, signature, and what positioning has learned, begin anew"
+    journal.record(state)
+    return journal, f"{event} with its state"
 
 
 class JournalWriter:
@@ -41,19 +72,34 @@ class JournalWriter:
     def __init__(self, cell: str, journal: Journal | None, keep: Retention) -> None:
         self.journal = journal
         self.fault = ""
+        self.durable: CycleId | None = None
+        """The last cycle that is safely stored; None where there is none."""
+        self._events: list[str] = []
         self._keep = keep
         self._log = CellLogger(logging.getLogger(__name__), cell)
         self._waiting: deque[tuple[CycleId | None, Entry]] = deque()
         self._model = ""
-        self._gone = False
+        self._broken: JournalError | None = None
         self._saved: CycleId | None = None
         """Last cycle of a journal begun anew: what was written last may be in it after all, by its log."""
         self._since_pruned, self._since_checkpoint = PRUNE_EVERY, CHECKPOINT_EVERY
+        if journal is not None:
+            try:
+                self.durable = journal.last_cycle_id()
+            except JournalDamagedError as error:
+                self._broken = error
+                self.tell(str(error))
 
-    @property
-    def durable(self) -> CycleId | None:
-        """The last cycle that is safely stored; None where there is none."""
-        return None if self.journal is None else self.journal.last_cycle_id()
+    def tell(self, event: str) -> None:
+        """Say that something happened to the journal which a person has to know of, also if it is over."""
+        self._log.error("%s", event)
+        self.fault = event
+        self._events.append(event)
+
+    def take_events(self) -> list[str]:
+        """Return what happened since the last call."""
+        events, self._events = self._events, []
+        return events
 
     @property
     def has_backlog(self) -> bool:
@@ -86,10 +132,14 @@ class JournalWriter:
             if self._since_pruned >= PRUNE_EVERY:
                 self._since_pruned = 0
                 # A module's clock that runs ahead must not make everything look old; 0 is no time at all.
+                self.journal.back_up_state()
                 if self.journal.prune(self._keep, min(time_ns or now_ns, now_ns)):
                     self._since_pruned = PRUNE_EVERY
             else:
                 self.journal.checkpoint()
+        except (JournalGoneError, JournalDamagedError) as error:
+            self._broken = error
+            self.tell(str(error))
         except JournalError as error:
             self.fault = str(error)
 
@@ -108,14 +158,15 @@ class JournalWriter:
         fault = ""
         while self._waiting and self.journal is not None:
             try:
-                if self._gone:
-                    self._begin_anew(self.journal)
+                if self._broken is not None:
+                    self._begin_anew(self.journal, damaged=isinstance(self._broken, JournalDamagedError))
                 cycle_id, entry = self._waiting[0]
                 if cycle_id is None or cycle_id != self._saved:
                     entry(self.journal)
-            except JournalGoneError as error:
-                self._gone, self.fault = True, str(error)
-                self._log.error("%s", error)
+                self.durable = cycle_id or self.durable
+            except (JournalGoneError, JournalDamagedError) as error:
+                self._broken = self._broken or error
+                self.tell(str(error))
                 return
             except JournalError as error:
                 if error.retry:
@@ -127,15 +178,19 @@ class JournalWriter:
             self._waiting.popleft()
         self.fault = fault
 
-    def _begin_anew(self, journal: Journal) -> None:
+    def _begin_anew(self, journal: Journal, *, damaged: bool) -> None:
         try:
-            journal.begin_anew()
+            aside = journal.begin_anew(damaged=damaged)
             journal.store_model(self._model)
         except JournalError as error:
             raise JournalGoneError(f"{journal.path}: cannot be begun anew: {error}") from error
-        self._gone = False
-        self._saved = journal.last_cycle_id()
-        self._log.warning("%s: the journal is begun anew", journal.path)
+        self._broken = None
+        self.durable = journal.last_cycle_id()
+        self._saved = self.durable
+        self.tell(
+            f"{journal.path}: the journal is begun anew"
+            + (f"; what is damaged was put aside as {aside.name}" if aside is not None else "")
+        )
 
     def close(self) -> None:
         """Close the journal."""

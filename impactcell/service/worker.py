@@ -12,10 +12,9 @@ from typing import TypeVar
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, RuleResult, Transition
 from impactcell.cell import CellDesign, CellState, StepResult
-from impactcell.journal.database import unreadable_state
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry, Journal
-from impactcell.journal.stored_forms import MODEL, StoredState, pack_state, unpack_state
+from impactcell.journal.stored_forms import MODEL, StoredState, pack_state
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
     Alarm,
@@ -28,6 +27,7 @@ from impactcell.records import (
 )
 from impactcell.serialization.tree import Unknown
 from impactcell.service.journal_writer import JournalWriter
+from impactcell.service.restoring import restored_state
 from impactcell.service.warmup import warm_up
 
 T = TypeVar("T")
@@ -75,7 +75,7 @@ class CellWorker:
         """The last cycle taken in since the start, durable or not."""
         self._unknown = Unknown()
         """Alarms of another version that are kept for it."""
-        restored = self._restore()
+        restored = restored_state(self._journal_writer, design, self._unknown)
         self._state = self._fitted(design, restored.cell)
         self._snapshot = restored.snapshot
         self.belief = restored.planner
@@ -105,6 +105,14 @@ class CellWorker:
     def journal_fault(self) -> str:
         """Why something was not stored, or is not yet; empty while all is."""
         return self._journal_writer.fault
+
+    def tell_journal_event(self, event: str) -> None:
+        """Say what happened to the journal before it was given to this worker."""
+        self._journal_writer.tell(event)
+
+    def take_journal_events(self) -> list[str]:
+        """Return what happened to the journal since the last call, also if all is well again."""
+        return self._journal_writer.take_events()
 
     async def warm_up(self) -> None:
         """Compile what a cycle needs, so that the first one is not late.
@@ -200,21 +208,6 @@ class CellWorker:
         if fitted is not state:
             self.log.warning("the grid of the signature was changed: the signature is learned anew")
         return fitted
-
-    def _restore(self) -> StoredState:
-        initial, journal = core.initial_state(self._design), self._journal_writer.journal
-        blob = None if journal is None else journal.state()
-        if journal is None or blob is None:
-            return StoredState(initial)
-        try:
-            stored = unpack_state(blob, initial, self._unknown)
-        except ValueError as error:
-            raise unreadable_state(journal.path, self._design.name, error) from error
-        for alarms in self._unknown.values():
-            self.log.warning(
-                "the journal has alarms of another version; they are kept: %s", ", ".join(alarms)
-            )
-        return stored
 
     def _process(
         self,

@@ -1,0 +1,95 @@
+"""A checksum for every row, so that a bit that has changed on the disk is not believed.
+
+SQLite checks the structure of its pages, not what stands in them. Each row that is written carries the CRC-32
+of its values in the order of the table's columns; one without, from an older format, is taken as it is. A
+column that is added later is NULL in the rows before, and so does not change their checksums.
+"""
+
+import logging
+import sqlite3
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from impactcell.errors import JournalDamagedError
+
+log = logging.getLogger(__name__)
+
+CHECKED: Final = ("meta", "cycles", "alarms", "audit", "state", "state_backup")
+"""Tables whose rows have a column `crc`; a capture carries its checksum inside."""
+KEYS: Final = ("seq", "id", "crc")
+"""Columns that no checksum covers: what SQLite numbers by itself, and the checksum."""
+
+SqlValue = float | int | str | bytes | None
+_ENCODER = msgspec.msgpack.Encoder()
+
+
+def row_crc(values: Sequence[SqlValue]) -> int:
+    """CRC-32 of the values of a row, without `KEYS`, as read back; NULL at the end does not count."""
+    end = len(values)
+    while end and values[end - 1] is None:
+        end -= 1
+    return zlib.crc32(_ENCODER.encode(values[:end]))
+
+
+class CheckedTables:
+    """The tables of an open journal whose rows have checksums."""
+
+    def __init__(self, database: sqlite3.Connection, path: Path) -> None:
+        self._database = database
+        self._path = path
+        self._told: set[tuple[str, int]] = set()
+        self.columns = {
+            table: tuple(name for _, name, *_ in database.execute(f"PRAGMA table_info ({table})"))
+            for table in CHECKED
+        }
+        """All columns of each table, in its own order."""
+        self._covered = {
+            table: [i for i, name in enumerate(columns) if name not in KEYS]
+            for table, columns in self.columns.items()
+        }
+        self._crc_at = {
+            table: columns.index("crc") if "crc" in columns else None
+            for table, columns in self.columns.items()
+        }
+
+    def insert(self, table: str, values: Mapping[str, SqlValue]) -> int | None:
+        """Write a row with its checksum, in the place of one with the same key; returns its number."""
+        columns = [name for name in self.columns[table] if name in values]
+        crc = row_crc([values.get(name) for name in self.columns[table] if name not in KEYS])
+        row = [*(values[name] for name in columns), crc]
+        names, places = ", ".join((*columns, "crc")), ", ".join("?" * len(row))
+        statement = f"INSERT OR REPLACE INTO {table} ({names}) VALUES ({places})"  # noqa: S608 - from CHECKED
+        return self._database.execute(statement, row).lastrowid
+
+    def rows(self, table: str, query: str, *arguments: str) -> list[dict[str, Any]]:
+        """Read whole rows that have to be right.
+
+        Raises
+        ------
+        JournalDamagedError
+            If one is not as it was written.
+        """
+        rows = self._database.execute(query, arguments).fetchall()
+        if not all(self._fits(table, row) for row in rows):
+            raise JournalDamagedError(f"{self._path}: the table {table} is damaged: a checksum is wrong")
+        return [dict(zip(self.columns[table], row, strict=True)) for row in rows]
+
+    def is_whole(self, table: str, row: Sequence[SqlValue]) -> bool:
+        """Whether a row is as it was written; of one that is not it is told once."""
+        if self._fits(table, row):
+            return True
+        number = row[0] if isinstance(row[0], int) else 0
+        if (table, number) not in self._told:
+            self._told.add((table, number))
+            log.error("%s: row %d of %s is damaged and left out", self._path, number, table)
+        return False
+
+    def _fits(self, table: str, row: Sequence[SqlValue]) -> bool:
+        at = self._crc_at[table]
+        if at is None or row[at] is None:
+            return True
+        return row[at] == row_crc([row[i] for i in self._covered[table]])

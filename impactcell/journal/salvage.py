@@ -1,0 +1,104 @@
+"""What can still be read of a damaged journal: its state, and captures one by one."""
+
+import contextlib
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from impactcell.errors import JournalDamagedError
+from impactcell.journal.checksums import CheckedTables
+
+_NEXT = "SELECT seq, blob FROM captures WHERE seq >= ? ORDER BY seq LIMIT 1"
+_ONE = "SELECT blob FROM captures WHERE seq = ?"
+
+
+@dataclass(frozen=True, slots=True)
+class StoredCapture:
+    """A capture as it is stored.
+
+    Attributes
+    ----------
+    seq : int
+        Its place in the journal.
+    cycle : int
+        Number of its cycle; 0 where that cannot be read.
+    blob : bytes or None
+        None where it cannot be read.
+    """
+
+    seq: int
+    cycle: int
+    blob: bytes | None
+
+
+def stored_captures(database: sqlite3.Connection) -> Iterator[StoredCapture]:
+    """Yield all captures in their order; after a page that cannot be read it goes on behind it.
+
+    Raises
+    ------
+    sqlite3.DatabaseError
+        If not even the last one can be found.
+    """
+    last = _last(database)
+    seq = 1
+    while seq <= last:
+        try:
+            row = database.execute(_NEXT, (seq,)).fetchone()
+        except sqlite3.DatabaseError:
+            row = None
+            stored = _one(database, seq)
+            if stored is not None:
+                yield stored
+        else:
+            if row is None:
+                return
+            seq = row[0]
+            yield StoredCapture(seq, _cycle(database, seq), bytes(row[1]))
+        seq += 1
+
+
+def salvaged_state(path: Path) -> bytes | None:
+    """Read the state of a journal that cannot be opened as one; None where that, too, is damaged."""
+    try:
+        with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+            tables = CheckedTables(database, path)
+            for table in ("state", "state_backup"):
+                with contextlib.suppress(sqlite3.DatabaseError, JournalDamagedError):
+                    for row in tables.rows(table, f"SELECT * FROM {table}"):  # noqa: S608 - from above
+                        return bytes(row["blob"])
+    except sqlite3.DatabaseError:
+        return None
+    return None
+
+
+def _one(database: sqlite3.Connection, seq: int) -> StoredCapture | None:
+    """Give the capture in this place; None where there is none, without a blob where it cannot be read."""
+    try:
+        row = database.execute(_ONE, (seq,)).fetchone()
+    except sqlite3.DatabaseError:
+        return StoredCapture(seq, _cycle(database, seq), None)
+    return None if row is None else StoredCapture(seq, _cycle(database, seq), bytes(row[0]))
+
+
+def _cycle(database: sqlite3.Connection, seq: int) -> int:
+    try:
+        row = database.execute("SELECT cycle FROM cycles WHERE seq = ?", (seq,)).fetchone()
+    except sqlite3.DatabaseError:
+        return 0
+    return 0 if row is None else int(row[0])
+
+
+def _last(database: sqlite3.Connection) -> int:
+    found: list[int] = []
+    error: sqlite3.DatabaseError | None = None
+    for table in ("cycles", "captures"):
+        try:
+            row = database.execute(f"SELECT max(seq) FROM {table}").fetchone()  # noqa: S608 - from above
+        except sqlite3.DatabaseError as fault:
+            error = fault
+        else:
+            found.append(row[0] or 0)
+    if error is not None and not found:
+        raise error
+    return max(found)

@@ -1,0 +1,62 @@
+"""What a cell goes on from when the service starts: the state in its journal, or what is left of it."""
+
+import logging
+
+from impactcell import cell as core
+from impactcell.cell import CellDesign
+from impactcell.errors import JournalDamagedError
+from impactcell.journal.database import unreadable_state
+from impactcell.journal.store import Journal
+from impactcell.journal.stored_forms import StoredState, unpack_state
+from impactcell.process.cell_logger import CellLogger
+from impactcell.serialization.tree import Unknown
+from impactcell.service.journal_writer import JournalWriter
+
+_log = logging.getLogger(__name__)
+
+
+def restored_state(writer: JournalWriter, design: CellDesign, unknown: Unknown) -> StoredState:
+    """Read the state that the journal holds; a new one where there is none.
+
+    Parameters
+    ----------
+    writer : JournalWriter
+        Is told where the state is damaged, and what is used instead.
+    unknown : dict
+        Is given the alarms of another version, to be kept for it.
+
+    Raises
+    ------
+    ForeignJournalError
+        The state is of another version; it is left as it is.
+    """
+    initial, journal = core.initial_state(design), writer.journal
+    blob = None if journal is None else _stored_state(journal, writer)
+    if journal is None or blob is None:
+        return StoredState(initial)
+    try:
+        stored = unpack_state(blob, initial, unknown)
+    except ValueError as error:
+        raise unreadable_state(journal.path, design.name, error) from error
+    log = CellLogger(_log, design.name)
+    for alarms in unknown.values():
+        log.warning("the journal has alarms of another version; they are kept: %s", ", ".join(alarms))
+    return stored
+
+
+def _stored_state(journal: Journal, writer: JournalWriter) -> bytes | None:
+    """Return the state to go on from: the last one or, if that is damaged, the one kept beside it."""
+    try:
+        return journal.state()
+    except JournalDamagedError as error:
+        why = str(error)
+    try:
+        blob = journal.state_backup()
+    except JournalDamagedError:
+        blob = None
+    writer.tell(
+        f"{why}; the state of an earlier cycle is used instead"
+        if blob is not None
+        else f"{why}; wear, batch, signature, and what positioning has learned, begin anew"
+    )
+    return blob
