@@ -139,7 +139,7 @@ class Model:
         return self.plant.mu_k / self.plant.mu_s
 
 
-def printed_predictor(force_rms: float = 0.0, distance_rms: float = 0.0) -> Predictor:
+def printed_predictor() -> Predictor:
     """Equations (4) and (5) as printed in the paper: 18.9 kg of steel on carbide.
 
     Units are not printed; they come out as v in mm/min, F_p in N and d in µm. The range is that over
@@ -150,13 +150,12 @@ def printed_predictor(force_rms: float = 0.0, distance_rms: float = 0.0) -> Pred
         mass_kg=18.9,
         mu_s_range=(0.15, 0.25),
         velocity_range_m_s=(0.05, 0.1),
-        force=ForceForm(friction_n=146.2, velocity_n_s_per_m=0.0529 * 60_000.0, rms=force_rms),
+        force=ForceForm(friction_n=146.2, velocity_n_s_per_m=0.0529 * 60_000.0),
         distance=DistanceForm(
             limit=0.3415,
             square_m=0.07379 * per_mm_per_min**1.6428 * 1e-6,
             square_power=1.6428,
             offset_m=0.00041 * per_mm_per_min**1.8997 * 1e-6,
             offset_power=1.8997,
-            rms=distance_rms,
         ),
     )

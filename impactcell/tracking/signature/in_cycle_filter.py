@@ -102,8 +102,10 @@ def update(state: InCycleFilter, position_m: Samples) -> tuple[InCycleFilter, Sa
     model = state.interval_s, state.position_std**2, process_noise(state.interval_s, state.density)
     z = np.ascontiguousarray(position_m, dtype=np.float64)
     steady = _filter(z, model, (mean, covariance, gain), state.steady, filtered)
-    fresh = InCycleFilter(state.interval_s, state.position_std, state.density, mean, covariance, gain, steady)
-    return fresh, filtered
+    after_block = InCycleFilter(
+        state.interval_s, state.position_std, state.density, mean, covariance, gain, steady
+    )
+    return after_block, filtered
 
 
 @compiled
@@ -141,10 +143,14 @@ def _filter(
         steady = steady + 1 if change < GAIN_TOLERANCE else 0
         gain[0], gain[1], gain[2] = k0, k1, k2
         # 1 - k0 = variance / s, written so that nothing cancels
-        left = variance / s
-        covariance[0, 0], covariance[1, 1], covariance[2, 2] = left * p00, p11 - k1 * p01, p22 - k2 * p02
-        covariance[0, 1] = covariance[1, 0] = left * p01
-        covariance[0, 2] = covariance[2, 0] = left * p02
+        unexplained = variance / s
+        covariance[0, 0], covariance[1, 1], covariance[2, 2] = (
+            unexplained * p00,
+            p11 - k1 * p01,
+            p22 - k2 * p02,
+        )
+        covariance[0, 1] = covariance[1, 0] = unexplained * p01
+        covariance[0, 2] = covariance[2, 0] = unexplained * p02
         covariance[1, 2] = covariance[2, 1] = p12 - k1 * p02
         x, v = x + T * v + half * a, v + T * a
         e = z[k] - x

@@ -13,13 +13,19 @@ from impactcell.settings.model_file import read_model, write_model
 
 PROTOTYPE = Path(__file__).resolve().parents[3] / "config" / "models" / "prototype.yaml"
 
+PRINTED = printed_predictor()
 MODEL = Model(
     name="a model",
     plant=Plant(
         6.5e5, 465.0, 0.2, 0.152, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.1}}
     ),
     prior=Prior(6500.0, 9.3, 0.03),
-    predictors=(printed_predictor(0.001, 0.002), replace(printed_predictor(), mass_kg=25.2)),
+    predictors=(
+        replace(
+            PRINTED, force=replace(PRINTED.force, rms=0.001), distance=replace(PRINTED.distance, rms=0.002)
+        ),
+        replace(PRINTED, mass_kg=25.2),
+    ),
     stroke_m=1.5e-3,
     intervals={"viscous_friction": {"viscous_coefficient_n_s_per_m": (80.0, 1 / 3)}},
     provenance={"made by": "a test"},
