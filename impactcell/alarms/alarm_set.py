@@ -1,11 +1,11 @@
 """All alarms of one cell: results of the rules and events go in, transitions come out."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from impactcell.alarms.debounce import ZERO_COUNTS, DebounceCounters, debounce
+from impactcell.alarms.debounce import ZERO_COUNTS, DebounceCounters, debounce, is_news
 from impactcell.alarms.lifecycle import AlarmEvent, EventKind, Transition, expire, transition
 from impactcell.alarms.rule import CycleInputs, RuleContext, RuleResult, RuleSettings
 from impactcell.alarms.rules import RULES
@@ -110,7 +110,7 @@ def update(
     state, transitions = expire_shelving(state, cycle, time_ns)
     state, suppressions = _suppress(settings, state, cycle, time_ns, announced=announced)
     transitions = (*transitions, *suppressions)
-    for result in results:
+    for result in _explained(state, tuple(results)):
         index = _INDEX[result.name]
         # nearly always there is nothing to do
         if result.holds or state.alarms[index].active or state.counters[index] is not ZERO_COUNTS:
@@ -136,17 +136,32 @@ def _suppress(
     ), transitions
 
 
+def _explained(state: AlarmSetState, results: tuple[RuleResult, ...]) -> Iterator[RuleResult]:
+    """Give the results; one that another explains neither holds nor is held back any longer."""
+    holding = {result.name for result in results if result.holds}
+    active = {alarm.name for alarm in state.alarms if alarm.active}
+    for result in results:
+        rule = RULES[result.name]
+        causes = set(rule.explained_by) & (holding | active)
+        if result.hold_back or state.counters[_INDEX[result.name]].held_back is not None:
+            causes |= set(rule.may_be_explained_by) & (holding - active)
+        yield RuleResult(result.name, holds=False, is_explained=True) if causes else result
+
+
 def apply_rule_result(
     settings: AlarmSettings, state: AlarmSetState, result: RuleResult, cycle: int, time_ns: int
 ) -> tuple[AlarmSetState, Transition]:
     """Move one alarm by one result: of a cycle, or of what happens beside the cycles."""
     index = _INDEX[result.name]
     alarm, rule = state.alarms[index], settings.rule(result.name)
-    counters, kind = debounce(rule, alarm, state.counters[index], result)
+    before = state.counters[index]
+    counters, kind = debounce(rule, alarm, before, result)
+    if kind is EventKind.ACTIVATE and before.held_back is not None:
+        result = before.held_back
     if counters is not state.counters[index]:
         state = AlarmSetState(state.alarms, _with(state.counters, index, counters), state.suppressed_cycles)
     if kind is None:
-        if alarm.active and result.holds and result.evidence != alarm.evidence:
+        if alarm.active and result.holds and is_news(rule, alarm.evidence, result.evidence):
             message = result.message
             renewed = replace(
                 alarm,

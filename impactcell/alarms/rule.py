@@ -55,6 +55,9 @@ class RuleSettings:
         Whether the condition starts enabled.
     activate_above, clear_below : float
         Hysteresis of the rule's statistic; nan for a rule that has a threshold of its own.
+    told_step : float
+        While the alarm is active, evidence is told anew once its size has changed by so many of its standard
+        deviations; 0 tells every change, as of a rule whose every result is an occurrence of its own.
     """
 
     severity: int = 500
@@ -64,16 +67,29 @@ class RuleSettings:
     enabled: bool = True
     activate_above: float = math.nan
     clear_below: float = math.nan
+    told_step: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class RuleResult:
-    """What a rule says of one condition now; `holds` None where it cannot tell, and all stays as it is."""
+    """What a rule says of one condition now.
+
+    Attributes
+    ----------
+    holds : bool or None
+        None where it cannot tell, and all stays as it is.
+    hold_back : int
+        Cycles for which it waits whether a rule that may explain it says so (`AlarmRule.explained_by`).
+    is_explained : bool
+        Another rule has: what was held back is given up.
+    """
 
     name: str
     holds: bool | None
     message: Message = NO_MESSAGE
     evidence: Evidence = NO_EVIDENCE
+    hold_back: int = 0
+    is_explained: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +100,8 @@ class CycleInputs:
     ----------
     shift : Evidence or None
         Of a batch shift, at the one cycle at which it is detected.
+    innovation : float
+        Of the tracker: mu_s minus what was predicted, in standard deviations; nan where it was not used.
     deviation : Evidence or None
         Of the signature, where the cycle deviates; `judged` says whether that could be told.
     gap : Evidence
@@ -98,6 +116,7 @@ class CycleInputs:
     friction: FrictionEstimate | None = None
     signature: Signature | None = None
     shift: Evidence | None = None
+    innovation: float = math.nan
     deviation: Evidence | None = None
     judged: bool = False
     gap: Evidence = NO_EVIDENCE
@@ -152,6 +171,10 @@ class AlarmRule:
         Of a rule that looks at every cycle; None for one of what happens beside the cycles.
     suppressed_by_announcement : bool
         An announced batch change keeps it silent for a while.
+    explained_by : tuple of str
+        Rules by name: while one of them holds or is active, it has called already, and this one does not.
+    may_be_explained_by : tuple of str
+        Rules by name that explain this one only where they begin to hold while it is held back.
     logged_by_cause : bool
         What raises it has logged it already.
     """
@@ -166,4 +189,6 @@ class AlarmRule:
     input_node: str = ""
     evaluate: Evaluate | None = None
     suppressed_by_announcement: bool = False
+    explained_by: tuple[str, ...] = ()
+    may_be_explained_by: tuple[str, ...] = ()
     logged_by_cause: bool = False

@@ -10,6 +10,7 @@ people do to a condition; `start_batch` and `reset_wear_level` what they do to t
 `CellState`, which `impactcell.serialization` writes and reads back bit for bit.
 """
 
+import hashlib
 import math
 from dataclasses import dataclass, field, replace
 
@@ -43,6 +44,7 @@ from impactcell.records import (
     Quality,
     Snapshot,
 )
+from impactcell.serialization import pack
 from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker as signature
@@ -77,7 +79,21 @@ class CellDesign:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellState:
-    """All that a cell keeps between cycles."""
+    """All that a cell keeps between cycles.
+
+    Attributes
+    ----------
+    cycle, time_ns : int
+        Of the last one.
+    period_s : float
+        Mean time between cycles, 0 before it is known.
+    grid : tuple
+        Length and points of the signature's grid.
+    model_digest : str
+        Of the model that the state was learned with; empty where that is not known.
+    model_changed : bool
+        Another model holds from the next cycle on.
+    """
 
     tracker: TrackerState
     signature: SignatureState
@@ -88,6 +104,8 @@ class CellState:
     period_s: float = 0.0
     batch: BatchNaming = field(default_factory=BatchNaming)
     grid: tuple[float, int] = (0.0, 0)
+    model_digest: str = ""
+    model_changed: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,18 +134,32 @@ def initial_state(design: CellDesign) -> CellState:
         gap_cusum.GapState(),
         alarms.initial_state(design.alarms),
         grid=_grid(design),
+        model_digest=_model_digest(design),
     )
 
 
 def migrate_state(design: CellDesign, state: CellState) -> CellState:
-    """Make a state fit the design: a signature on another grid is learned anew, all else stays."""
-    if state.grid == _grid(design):
+    """Make a state fit the design: what is learned on another grid or by another model is learned anew.
+
+    Another model moves the estimates, as another batch would, and what residuals are usual: the next cycle is
+    an expected change, and says nothing of the material.
+    """
+    if state.grid != _grid(design):
+        state = replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
+    digest = _model_digest(design)
+    if state.model_digest == digest:
         return state
-    return replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
+    has_changed = bool(state.model_digest)
+    gap = gap_cusum.GapState() if has_changed else state.gap
+    return replace(state, gap=gap, model_digest=digest, model_changed=state.model_changed or has_changed)
 
 
 def _grid(design: CellDesign) -> tuple[float, int]:
     return design.signature.length_m, design.signature.points
+
+
+def _model_digest(design: CellDesign) -> str:
+    return hashlib.sha256(pack(design.model)).hexdigest()[:16]
 
 
 def step(
@@ -147,11 +179,13 @@ def step(
     tracked = wear_batch.update(
         design.tracker,
         state.tracker,
-        FrictionObservation.of(capture, friction, named.batch_id, expected=named.expected),
+        FrictionObservation.of(
+            capture, friction, named.batch_id, expected=named.expected or state.model_changed
+        ),
     )
     conditions = CycleConditions(
         batch_id=tracked.batch.batch_id,
-        restart=tracked.shift is not None,
+        restart=tracked.shift is not None or state.model_changed,
         acceleration=free_motion.model_acceleration(design.model.plant, capture),
         gravity_m_s2=design.model.plant.gravity_m_s2,
         period_s=period_s,
@@ -165,6 +199,7 @@ def step(
         friction=friction,
         signature=signed.signature,
         shift=tracked.shift,
+        innovation=tracked.innovation,
         deviation=signed.deviation,
         judged=signed.judged,
         gap=gapped.evidence,
@@ -190,6 +225,7 @@ def step(
         cycle=capture.cycle,
         time_ns=capture.time_ns,
         period_s=period_s,
+        model_changed=False,
     )
     snapshot = Snapshot(
         cycle=capture.cycle,

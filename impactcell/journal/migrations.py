@@ -105,7 +105,13 @@ _STATE_2_RENAMED: Final[Mapping[str, str]] = {
     **_under("state.alarms.alarms.*", _ALARM_2_RENAMED),
 }
 """Of all that `StoredState` holds."""
-_STATE_2_ADDED: Final[Mapping[str, Tree]] = {"state.tracker.clock.session": 0}
+_STATE_2_ADDED: Final[Mapping[str, Tree]] = {
+    "state.tracker.clock.session": 0,
+    "state.model_digest": "",
+    "state.model_changed": False,
+    "state.alarms.delays.*.held_back": None,
+    "state.alarms.delays.*.waited": 0,
+}
 """What a state did not keep before."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""

@@ -12,17 +12,34 @@ from impactcell.alarms.rule import (
     RuleSettings,
     german,
 )
+from impactcell.alarms.rules import model_gap
 from impactcell.records import Evidence
 
 NAME = "BatchShift"
 """Published name."""
+GAP_RISING = 0.3
+"""Share of its threshold from which the model's residual is on its way over it: then the shift may be of the
+estimates only, for what the model does not know."""
+HOLD_BACK = 5
+"""Cycles for which such a shift waits: from that share on a residual that stays has crossed within three."""
 
 
 def evaluate(inputs: CycleInputs, _context: RuleContext) -> RuleResult:
-    """Say whether the tracker detected a shift at this cycle."""
-    if inputs.shift is None:
+    """Say whether the tracker detected a shift of the material at this cycle."""
+    shift, gap = inputs.shift, inputs.gap
+    if shift is None:
         return RuleResult(NAME, holds=False)
-    return RuleResult(NAME, holds=True, message=_message(inputs.shift), evidence=inputs.shift)
+    if inputs.gap_exceeds and abs(gap.change_cycle - shift.change_cycle) <= HOLD_BACK:
+        # the estimates moved with what the model does not know, which ModelGap has called
+        return RuleResult(NAME, holds=False)
+    is_gap_rising = GAP_RISING < gap.statistic / gap.threshold <= 1.0
+    return RuleResult(
+        NAME,
+        holds=True,
+        message=_message(shift),
+        evidence=shift,
+        hold_back=HOLD_BACK if is_gap_rising else 0,
+    )
 
 
 def _message(shift: Evidence) -> Message:
@@ -48,5 +65,6 @@ RULE = AlarmRule(
     input_node="Batch/Offset",
     evaluate=evaluate,
     suppressed_by_announcement=True,
+    may_be_explained_by=(model_gap.NAME,),
 )
 """The rule."""

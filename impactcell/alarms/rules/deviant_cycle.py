@@ -11,10 +11,16 @@ from impactcell.alarms.rule import (
     RuleSettings,
     german,
 )
+from impactcell.alarms.rules import batch_shift, model_gap
 from impactcell.records import Evidence
 
 NAME = "DeviantCycle"
 """Published name."""
+LEVEL_INNOVATION = 2.0
+"""Standard deviations of mu_s from its prediction beyond which the cycle's level of friction is off as well:
+then it may be the first of another batch."""
+HOLD_BACK = 5
+"""Cycles for which such a cycle waits: a step that makes cycles deviant is found to be a batch in them."""
 
 
 def evaluate(inputs: CycleInputs, _context: RuleContext) -> RuleResult:
@@ -25,7 +31,9 @@ def evaluate(inputs: CycleInputs, _context: RuleContext) -> RuleResult:
         return RuleResult(NAME, holds=False)
     at_m = inputs.signature.deviates_at_m if inputs.signature is not None else math.nan
     message = _message(inputs.cycle, inputs.deviation, at_m)
-    return RuleResult(NAME, holds=True, message=message, evidence=inputs.deviation)
+    is_level = abs(inputs.innovation) > LEVEL_INNOVATION
+    hold_back = HOLD_BACK if is_level else 0
+    return RuleResult(NAME, holds=True, message=message, evidence=inputs.deviation, hold_back=hold_back)
 
 
 def _message(cycle: int, deviation: Evidence, at_m: float) -> Message:
@@ -57,5 +65,6 @@ RULE = AlarmRule(
     settings=RuleSettings(severity=400, off_delay=1),
     input_node="Signature/TSquared",
     evaluate=evaluate,
+    explained_by=(batch_shift.NAME, model_gap.NAME),
 )
 """The rule."""

@@ -40,7 +40,7 @@ RULE = AlarmRule(
     type_number=1007,
     title=Message("Model gap", "Modelllücke"),
     description="Measurements no longer fit the model.",
-    settings=RuleSettings(severity=300, off_delay=20),
+    settings=RuleSettings(severity=300, off_delay=20, told_step=1.0),
     input_node="Model/Gap",
     evaluate=evaluate,
 )

@@ -53,7 +53,9 @@ RULE = AlarmRule(
     type_number=1003,
     title=Message("Wear limit", "Verschleißgrenze"),
     description="The filtered friction has probably passed the wear limit.",
-    settings=RuleSettings(severity=700, on_delay=5, off_delay=20, activate_above=0.98, clear_below=0.5),
+    settings=RuleSettings(
+        severity=700, on_delay=5, off_delay=20, activate_above=0.98, clear_below=0.5, told_step=1.0
+    ),
     condition_class=ConditionClass.MAINTENANCE,
     input_node="Wear/Level",
     evaluate=evaluate,

@@ -174,7 +174,13 @@ def _update_filter(
     batch_id, current, timing = cycle.observation.batch_id, state.filter, cycle.timing
     is_in_bank_only = timing.lag > 0 and current is not None and batch_id not in current.batches
     is_known = settings.batch is BatchKnowledge.KNOWN and batch_id is not None
-    if is_known and current is not None and change is None and not is_in_bank_only:
+    is_same_name = current is not None and batch_id == current.current
+    if is_known and cycle.observation.expected_change and is_same_name and timing.lag == 0:
+        # what is measured has changed, as by another model: the bank was told, and has the offset right
+        change, has_changed = None, True
+    else:
+        has_changed = change is not None
+    if is_known and current is not None and not has_changed and not is_in_bank_only:
         return _update_known_batch(settings, state, cycle, current)
     innovation = batch_filter.innovation(state, cycle)
     if settings.batch is BatchKnowledge.UNKNOWN:
@@ -185,7 +191,7 @@ def _update_filter(
             current = _pass_time(state, current, cycle) if change is None else None
     elif current is None:
         current = wear_filter.from_bank(*run_length_bank.moments(updated.bank), batch_id)
-    elif change is not None:
+    elif has_changed:
         current = wear_filter.restart_after_change(current, *run_length_bank.moments(updated.bank))
         # what was learned of the noise from here on would be learned from a mix of two materials
         state = replace(state, tested=True, commissioning=None)

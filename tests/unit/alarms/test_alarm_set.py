@@ -179,3 +179,90 @@ def test_the_state_is_restored_bit_for_bit():
     state, _ = alarms.apply_event(state, WEAR, AlarmEvent(EventKind.SHELVE_ONE_SHOT, comment="ä"))
     data = pack(state)
     assert pack(unpack(alarms.AlarmSetState, data)) == data
+
+
+DEVIANT, GAP = "DeviantCycle", "ModelGap"
+
+
+def feed(state, *results, cycle):
+    return alarms.update(SETTINGS, state, results, cycle, cycle * SECOND)
+
+
+def test_a_result_that_is_held_back_activates_with_what_it_said():
+    held = RuleResult(DEVIANT, holds=True, evidence=Evidence(9.0, 5.0, 1), hold_back=3)
+    state, moved = feed(NORMAL, held, cycle=1)
+    assert moved == ()
+    state = unpack(alarms.AlarmSetState, pack(state))
+    for cycle in (2, 3):
+        state, moved = feed(state, RuleResult(DEVIANT, holds=False), cycle=cycle)
+        assert moved == ()
+    # nor does it matter whether the rule can tell by then
+    state, (raised,) = feed(state, RuleResult(DEVIANT, None), cycle=4)
+    assert (raised.alarm.active, raised.alarm.evidence.change_cycle, raised.alarm.cycle) == (True, 1, 4)
+
+
+def test_what_another_rule_explains_is_given_up():
+    held = RuleResult(DEVIANT, holds=True, hold_back=3)
+    state, _ = feed(NORMAL, held, cycle=1)
+    state, moved = feed(state, RuleResult(BATCH, holds=True), RuleResult(DEVIANT, holds=True), cycle=2)
+    assert [t.alarm.name for t in moved] == [BATCH]
+    for cycle in range(3, 9):
+        state, moved = feed(state, RuleResult(BATCH, holds=False), RuleResult(DEVIANT, None), cycle=cycle)
+        assert moved == ()
+
+
+def test_deviant_cycles_do_not_call_while_the_model_does_not_fit():
+    state, _ = feed(NORMAL, RuleResult(GAP, holds=True), cycle=1)
+    state, moved = feed(state, RuleResult(DEVIANT, holds=True), RuleResult(GAP, holds=True), cycle=2)
+    assert moved == ()
+    state, moved = feed(state, RuleResult(BATCH, holds=True), RuleResult(GAP, holds=True), cycle=3)
+    assert [t.alarm.name for t in moved] == [BATCH], "a batch is another cause"
+
+
+def test_a_shift_waits_for_a_residual_that_rises_and_goes_with_it():
+    inputs = CycleInputs(
+        7, wear(0.0), shift=Evidence(12.0, 11.0, 6, 0.01, 0.002), gap=Evidence(3.3, 6.6, 6), gap_exceeds=False
+    )
+    result = judge(SETTINGS, NORMAL, inputs, BATCH)
+    assert result.hold_back == 5
+    state, moved = feed(NORMAL, result, cycle=7)
+    state, moved = feed(state, RuleResult(GAP, holds=True), RuleResult(BATCH, holds=False), cycle=8)
+    assert [t.alarm.name for t in moved] == [GAP]
+    for quiet in (0.0, 1.9, 6.7):
+        calm = replace(inputs, gap=Evidence(quiet, 6.6, 6))
+        assert judge(SETTINGS, NORMAL, calm, BATCH).hold_back == 0
+    # the residual crossed before the shift was detected: its cause is the same if they began together
+    for since, holds in ((6, False), (1, False), (0, True), (11, False), (12, True)):
+        late = replace(inputs, gap=Evidence(9.0, 6.6, since), gap_exceeds=True)
+        assert judge(SETTINGS, NORMAL, late, BATCH).holds is holds
+
+
+def test_a_deviation_waits_only_where_the_level_is_off_as_well():
+    for innovation, hold_back in ((1.9, 0), (2.1, 5), (-2.1, 5), (math.nan, 0)):
+        inputs = CycleInputs(3, wear(0.0), deviation=Evidence(6.0, 5.0), judged=True, innovation=innovation)
+        assert judge(SETTINGS, NORMAL, inputs, DEVIANT).hold_back == hold_back
+    assert judge(SETTINGS, NORMAL, replace(inputs, deviation=None), DEVIANT).holds is False
+    assert judge(SETTINGS, NORMAL, replace(inputs, judged=False), DEVIANT).holds is None
+
+
+def test_an_active_alarm_is_told_anew_only_when_its_size_has_changed_by_the_agreed_step():
+    """WearLimit sent an event every cycle: 24 in 24."""
+    state, told = NORMAL, []
+    for cycle in range(1, 40):
+        size = 0.001 + 1e-4 * cycle
+        result = RuleResult(WEAR, holds=True, evidence=Evidence(0.99, 0.98, 3, size, 0.00095))
+        state, _ = feed(state, result, cycle=cycle)
+        evidence = state.alarm(WEAR).evidence
+        if state.alarm(WEAR).active and (not told or evidence.size != told[-1]):
+            told.append(evidence.size)
+    assert told == [0.001 + 1e-4 * cycle for cycle in (6, 16, 26, 36)]
+
+
+def test_every_batch_shift_is_told_while_the_last_one_still_stands():
+    state, _ = feed(
+        NORMAL, RuleResult(BATCH, holds=True, evidence=Evidence(12.0, 11.0, 1, 0.01, 0.1)), cycle=1
+    )
+    state, _ = feed(
+        state, RuleResult(BATCH, holds=True, evidence=Evidence(12.0, 11.0, 5, 0.01, 0.1)), cycle=6
+    )
+    assert state.alarm(BATCH).evidence.change_cycle == 5
