@@ -62,7 +62,7 @@ class CellDesign:
 
     Attributes
     ----------
-    defaults : Known
+    defaults : CaptureDefaults
         What holds where the module says nothing.
     false_alarm_cycles : float
         Designed mean number of cycles between two false alarms of one rule.

@@ -24,7 +24,7 @@ class AutoTeach:
 
     Parameters
     ----------
-    cell : Cell
+    cell : CellConfig
         With a journal; its model file is replaced when an effect was named.
     say : callable
         Told in words what is being done and found.

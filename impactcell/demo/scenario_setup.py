@@ -37,7 +37,7 @@ class DemoSetup:
 
     Attributes
     ----------
-    cell : Cell
+    cell : CellConfig
     story : tuple of (int, str)
         What happens in the cell: from which cycle on, and in words.
     password : str

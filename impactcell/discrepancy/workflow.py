@@ -58,14 +58,14 @@ class DiscrepancyResult:
     ----------
     verdict : str
         `no_gap`, `named`, `tied` or `unknown`.
-    training, held_out : Index
+    training, held_out : IndexArray
         Places of the shots.
     problem, held_problem : Problem
     nominal, final : Fit
         Fitted to the training shots.
     held_nominal, held_final : Fit
         The same with the held-out shots' own factors.
-    parameters : tuple of Estimate
+    parameters : tuple of ParameterEstimate
         Of the final model.
     """
 

@@ -69,7 +69,7 @@ class Authenticator:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadIdentityTokenRejected (a kind that is not taken), BadIdentityTokenInvalid (malformed, or made
             for another nonce), BadUserSignatureInvalid, or BadUserAccessDenied (wrong password, unknown
             user).

@@ -90,7 +90,7 @@ def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, requeste
 
     Raises
     ------
-    FaultError
+    StatusCodeError
         BadFilterNotAllowed, BadMonitoredItemFilterUnsupported or BadDeadbandFilterInvalid.
     """
     if requested is None or isinstance(requested, ua.ExtensionObject):
@@ -132,7 +132,7 @@ def parse_range(text: str | None) -> tuple[int, int] | None:
 
     Raises
     ------
-    FaultError
+    StatusCodeError
         BadIndexRangeInvalid.
     """
     if not text:

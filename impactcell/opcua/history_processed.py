@@ -35,7 +35,7 @@ async def read_processed(
 
     Raises
     ------
-    FaultError
+    StatusCodeError
         BadAggregateNotSupported, BadAggregateInvalidInputs, BadAggregateConfigurationRejected or
         BadInvalidTimestampArgument.
     """

@@ -143,7 +143,7 @@ def check_operations(operations: list[Any] | None, limit: int = MAX_OPERATIONS) 
 
     Raises
     ------
-    FaultError
+    StatusCodeError
         BadNothingToDo or BadTooManyOperations.
     """
     if not operations:

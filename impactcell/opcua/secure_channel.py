@@ -134,7 +134,7 @@ class SecureChannel:
 
         Raises
         ------
-        ChannelError
+        SecureChannelError
             The chunk breaks the protocol or fails its security checks.
         """
         if header.MessageType == ua.MessageType.SecureOpen:
@@ -225,7 +225,7 @@ class SecureChannel:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             The response is larger than the client takes.
         """
         too_large = self._max_response and len(body) > self._max_response

@@ -56,7 +56,7 @@ class ContinuationPoints:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadContinuationPointInvalid.
         """
         if point not in self._states:
@@ -121,7 +121,7 @@ class SessionTable:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadTooManySessions.
         """
         if len(self._sessions) >= self._limits.sessions:
@@ -158,7 +158,7 @@ class SessionTable:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadSessionIdInvalid.
         """
         session = self._sessions.get(token)
@@ -171,7 +171,7 @@ class SessionTable:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadSessionIdInvalid, BadSecureChannelIdInvalid or BadSessionNotActivated.
         """
         session = self.find(token)

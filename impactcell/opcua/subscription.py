@@ -183,7 +183,7 @@ class Subscription:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadTooManyMonitoredItems.
         """
         if len(self.items) >= self._limits.items_per_subscription:
@@ -196,7 +196,7 @@ class Subscription:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadMonitoredItemIdInvalid.
         """
         item = self.items.get(number)
@@ -222,7 +222,7 @@ class Subscription:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadMessageNotAvailable.
         """
         message = self._retransmission_queue.get(sequence)

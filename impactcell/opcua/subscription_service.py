@@ -59,7 +59,7 @@ class SubscriptionService:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadSubscriptionIdInvalid: there is none, or it is another session's.
         """
         subscription = self._subscriptions.get(number)
@@ -80,7 +80,7 @@ class SubscriptionService:
 
         Raises
         ------
-        FaultError
+        StatusCodeError
             BadSubscriptionIdInvalid or BadMonitoredItemIdInvalid.
         """
         subscription = self.find(number, session)

@@ -52,7 +52,7 @@ class Motion:
 
     Attributes
     ----------
-    events : tuple of Event
+    events : tuple of TapEvent
         In order of time; no more than the first 4096.
     peak_force_n : float
         Maximum of the contact force over all contacts, as the force sensor reports it.

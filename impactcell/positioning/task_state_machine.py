@@ -42,7 +42,7 @@ class PositioningCell:
     Attributes
     ----------
     name : str
-    limits : Limits
+    limits : SafetyLimits
     resolution_m : float
         Of the encoder.
     two_sided : bool

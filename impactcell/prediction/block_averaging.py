@@ -50,7 +50,7 @@ class BlockMeans:
     ----------
     time_s, values, std : ndarray, shape (n,)
         Mean time, mean value, and its standard deviation from the noise of one sample.
-    scatter : Scatter
+    scatter : WithinBlockSums
         What the means leave out.
     """
 

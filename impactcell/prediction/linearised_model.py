@@ -97,7 +97,7 @@ class LinearisedModel:
     plant : Plant
         Its effects and gravity are kept; its four nominal parameters are those asked for.
     tap : TapInput
-    force, position : Blocks
+    force, position : BlockMeans
     """
 
     def __init__(self, plant: Plant, tap: TapInput, force: BlockMeans, position: BlockMeans) -> None:

@@ -45,7 +45,7 @@ class Posterior:
 
     Attributes
     ----------
-    sides : tuple of Side
+    sides : tuple of TruncatedGaussian
     weights : ndarray
         Probability of each side.
     form : ndarray, shape (p,)

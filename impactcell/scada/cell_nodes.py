@@ -67,7 +67,7 @@ class CellSpace:
     ----------
     node : NodeId
         The cell itself, source and notifier of its events.
-    kind : NodeId
+    cell_type : NodeId
         Its type.
     folder : NodeId
         The folder that holds all cells.

@@ -29,8 +29,8 @@ class PositioningTask:
     cell : CellConfig
         With a `positioning` section.
     design : CellDesign
-    module : Module
-    worker : Worker
+    module : ModuleAcquisition
+    worker : CellWorker
         Planning runs in its thread; it keeps what the planner has learned.
     changed : callable
         Called when what is to be published has changed.

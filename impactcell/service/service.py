@@ -40,7 +40,7 @@ class Service:
 
     Parameters
     ----------
-    cells : sequence of Cell
+    cells : sequence of CellConfig
     on_snapshot : callable, optional
         Called with the cell's name and each snapshot, after it was published.
 

@@ -51,7 +51,7 @@ def whiten_block(shot: PreparedShot, noise_std_m: float, gravity_m_s2: float, mu
 
     Parameters
     ----------
-    shot : Shot
+    shot : PreparedShot
         As recorded.
     mu_k : float
         About what friction is; only the whitener depends on it.

@@ -118,7 +118,7 @@ def replicate_spread(shots: tuple[PreparedShot, ...], log_factor: Samples, batch
 
     Parameters
     ----------
-    shots : tuple of Shot
+    shots : tuple of PreparedShot
     log_factor : ndarray, shape (n,)
     batches : int
     """

@@ -43,12 +43,12 @@ class CandidateDirections:
     Attributes
     ----------
     names : tuple of str
-    products : Products
+    products : DirectionProducts
     group : ndarray, shape (Q,)
         Candidate of each direction.
     sign : ndarray, shape (Q,)
         +1 where only a positive amplitude makes sense, else 0.
-    points : tuple of Probe
+    points : tuple of GridPoint
     """
 
     names: tuple[str, ...]

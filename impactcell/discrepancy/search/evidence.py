@@ -54,7 +54,7 @@ class ModelEvidence:
     fit : Fit
     map, map_scores, map_tests
         Residuals of every phase against every covariate.
-    candidate_scan : Scan
+    candidate_scan : CandidateScan
         Candidates.
     p_value : float
         That the model lacks nothing, over map and candidates together.

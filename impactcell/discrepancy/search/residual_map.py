@@ -39,7 +39,7 @@ class MapDirections:
 
     Attributes
     ----------
-    products : Products
+    products : DirectionProducts
     cell : ndarray, shape (Q,)
         Cell of each direction.
     rows, columns : tuple of str

@@ -52,9 +52,9 @@ class UnexplainedGap:
         Covariates with which it changes, significantly over the whole map.
     shape : str
         In words.
-    shapes : tuple of Shape
+    shapes : tuple of ResidualShape
         To be drawn.
-    split_fits : Alone, optional
+    split_fits : SplitFits, optional
         Contact and slide fitted alone, of taps.
     """
 

@@ -93,7 +93,7 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
 
     Returns
     -------
-    noise : Noise
+    noise : NoiseScale
     std : float
         Declared standard deviation, or in its place the usual one, or a guess to be corrected.
     """

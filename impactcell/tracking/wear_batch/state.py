@@ -99,7 +99,7 @@ class TrackerState:
 
     Attributes
     ----------
-    clock : Clock
+    clock : CycleClock
         Which cycles have been seen, and when.
     filter : WearFilter or None
         The filter that believes the PLC's batch ids.
@@ -113,7 +113,7 @@ class TrackerState:
         Index at which the PLC's present batch began, and how many there have been.
     tested : bool
         The present known batch has been reported as shifted, or was expected to be.
-    replayed_noise : Noise
+    replayed_noise : NoiseScale
         As it was when the first cycles were last gone over with it.
     """
 
