@@ -1,6 +1,8 @@
 """What the model says a capture should be: blocks of force and position for given parameters, and residuals.
 
-theta = ln(mu_k, mu_k / mu_s, k, b). Relative steps in it are of one size whatever the units.
+theta = ln(mu_k, mu_k / mu_s, k, b), with stiffness k [N/m] and damping b [N s/m] of the contact. Steps in it
+are relative, whatever the units. z (`kink_coordinate`) says whether the part sticks before it moves; at z = 0
+(the kink) the response to theta has a bend.
 """
 
 import math
@@ -28,7 +30,7 @@ MU_K, RATIO, STIFFNESS, DAMPING = range(4)
 PARAMETERS = 4
 """Length of theta."""
 JUST_STICKING = 1e-7
-"""z above which the model is that of a part that sticks first."""
+"""z above which the model is that of a part that sticks first (see above)."""
 STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
 RELATIVE_STEP = 1e-5
@@ -119,7 +121,7 @@ class LinearisedModel:
         self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
 
     def reweighted(self, factor: Samples) -> "LinearisedModel":
-        """Give the same response with the standard deviation of each residual multiplied, shape (n,)."""
+        """Give the same blocks and model with the standard deviation of each block multiplied, shape (n,)."""
         other = copy(self)
         other._weights = self._weights / factor  # noqa: SLF001  # its own copy
         return other
@@ -147,9 +149,9 @@ class LinearisedModel:
         return math.sqrt(total / count)
 
     def kink_coordinate(self, theta: Samples) -> float:
-        """Give z = ln(mu_s m g / (b v)), positive where the part sticks first."""
-        ahead = float(theta[MU_K] - theta[RATIO] - theta[DAMPING])
-        return ahead + math.log(self._weight_n / self.tap.velocity_m_s)
+        """Give z = ln(mu_s m g / (b v)); positive if static friction bears the first contact force."""
+        log_mu_s_over_b = float(theta[MU_K] - theta[RATIO] - theta[DAMPING])
+        return log_mu_s_over_b + math.log(self._weight_n / self.tap.velocity_m_s)
 
     def linearise(self, theta: Samples, side: int = 0, beyond: float = 0.0) -> Linearisation:
         """Residuals and their normal equations at `theta`.
@@ -162,7 +164,7 @@ class LinearisedModel:
         side : int
             -1: as if breakaway were immediate, whatever mu_s. 0 or +1: as the parameters say.
         beyond : float
-            How far mu_k/mu_s is to lie beyond `theta`: the residuals are continued linearly.
+            How far ln(mu_k/mu_s) is to lie beyond `theta`: the residuals are continued linearly.
 
         Raises
         ------
@@ -225,22 +227,22 @@ def _linearise(
     steps : ndarray, shape (p,)
         Which way, and how far, each parameter was moved.
     beyond : float
-        How far to continue along the ratio.
+        How far to continue along ln(mu_k/mu_s).
     """
     split, size = len(force) // (PARAMETERS + 1), len(values)
     residual, derivative = np.empty(size), np.empty(PARAMETERS)
     normal, slope = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
     chi2 = 0.0
     for i in range(size):
-        model, row, width = (force, i, split) if i < split else (position, i - split, size - split)
-        at = model[row]
+        model, row, blocks = (force, i, split) if i < split else (position, i - split, size - split)
+        modelled = model[row]
         for k in range(PARAMETERS):
-            derivative[k] = (at - model[(k + 1) * width + row]) * weights[i] / steps[k]
-        miss = (values[i] - at) * weights[i] + derivative[RATIO] * beyond
-        residual[i] = miss
-        chi2 += miss * miss
+            derivative[k] = (modelled - model[(k + 1) * blocks + row]) * weights[i] / steps[k]
+        scaled = (values[i] - modelled) * weights[i] + derivative[RATIO] * beyond
+        residual[i] = scaled
+        chi2 += scaled * scaled
         for k in range(PARAMETERS):
-            slope[k] += derivative[k] * miss
+            slope[k] += derivative[k] * scaled
             for m in range(k + 1):
                 normal[k, m] += derivative[k] * derivative[m]
     for k in range(PARAMETERS):
@@ -259,22 +261,23 @@ def _sample_squares(
 ) -> tuple[float, float]:
     """Sum of squares of single samples over their noise, and their number, blocks about a jump left out.
 
-    The model's slope in a block comes from its neighbours; beside a jump from the one this side of it.
-    `sums` are the fields of `WithinBlockSums`.
+    The model's slope in a block comes from its neighbours, limited to twice the smaller one-sided slope,
+    and 0 where these differ in sign: beside a jump it is that of this side. `weights` are one over the std of
+    each block; those about a jump are known by their widened std. `sums` are the fields of `WithinBlockSums`.
     """
-    count, spread, scatter, products, noise_std = sums
+    count, tt, yy, ty, noise_std = sums
     last = len(model) - 1
     total, counted = 0.0, 0.0
     for i in range(last + 1):
-        if not weights[i] * noise_std > 0.5 * math.sqrt(count[i]):
+        if not weights[i] * noise_std > 0.5 * math.sqrt(count[i]):  # its std is not noise_std / sqrt(count)
             continue
         before, after = max(i - 1, 0), min(i + 1, last)
         slope_before = (model[before + 1] - model[before]) / (times[before + 1] - times[before])
         slope_after = (model[after] - model[after - 1]) / (times[after] - times[after - 1])
-        across = (model[after] - model[before]) / (times[after] - times[before])
-        least = 2.0 * min(abs(slope_before), abs(slope_after))
-        slope = min(max(across, -least), least) if slope_before * slope_after > 0.0 else 0.0
-        within = scatter[i] - 2.0 * slope * products[i] + slope * slope * spread[i]
+        central = (model[after] - model[before]) / (times[after] - times[before])
+        steepest = 2.0 * min(abs(slope_before), abs(slope_after))
+        slope = min(max(central, -steepest), steepest) if slope_before * slope_after > 0.0 else 0.0
+        within = yy[i] - 2.0 * slope * ty[i] + slope * slope * tt[i]
         total += residual[i] * residual[i] + within / noise_std**2
         counted += count[i]
     return total, counted

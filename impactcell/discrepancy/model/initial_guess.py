@@ -47,7 +47,10 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
 
 
 def _coordinates_of(problem: Problem, plant: Plant) -> Samples:
-    """Coordinates of a plant."""
+    """Coordinates of a plant in the order of the problem's; the initial one where the plant says nothing.
+
+    `ratio` is mu_s / mu_k here, as in `parameters`.
+    """
     theta = []
     for coordinate in problem.coordinates:
         if coordinate.effect:

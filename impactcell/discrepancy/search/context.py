@@ -25,10 +25,13 @@ class SearchContext:
     problem, coarse : Problem
         The nominal model on all samples of the training shots, and on fewer.
     prepared : PreparedCampaign
+        Of it the search reads the covariates.
     library : tuple of str
         Effects that may be named.
     seed : int
+        Of the random numbers of all tests.
     mapper : callable
+        Applies a function to many candidates, in parallel where it can.
     floor_is_certain : bool
         What is above the floor is a gap: the noise is stated, or sampled fast enough to be seen.
     """
@@ -57,15 +60,20 @@ class SearchContext:
         return self.reaches_floor(evidence.fit) and not self.has_promising(evidence)
 
     def has_promising(self, evidence: ModelEvidence) -> bool:
-        """Whether some candidate or some cell of the map promises enough to be worth a name."""
+        """Whether some candidate or some cell of the residual map promises enough to be worth a name.
+
+        Gains are first-order falls of the squared misfit, twice those of the log-likelihood; of the friction
+        factors, a number of shots times the share of their variance that is explained.
+        """
         gains = evidence.candidate_scan.gains()
-        map_gain, on_traces = evidence.map_scores.gain, evidence.map.channel >= 0
-        promised, between = map_gain[on_traces].tolist(), map_gain[~on_traces].tolist()
+        map_gains, on_traces = evidence.map_scores.gain, evidence.map.channel >= 0
+        trace_gains, factor_gains = map_gains[on_traces].tolist(), map_gains[~on_traces].tolist()
         for effect, gain in gains.items():
-            (between if LIBRARY[effect].kind is Kind.BETWEEN_SHOTS else promised).append(gain)
-        share = max(between, default=0.0) / self.problem.count
+            (factor_gains if LIBRARY[effect].kind is Kind.BETWEEN_SHOTS else trace_gains).append(gain)
+        explained_share = max(factor_gains, default=0.0) / self.problem.count
         return bool(
-            max(promised, default=0.0) > 2.0 * POLICY.min_gain or share > 1.0 - POLICY.max_spread_ratio**2
+            max(trace_gains, default=0.0) > 2.0 * POLICY.min_gain
+            or explained_share > 1.0 - POLICY.max_spread_ratio**2
         )
 
     def gains_enough(self, fewer: Fit, more: Fit) -> bool:

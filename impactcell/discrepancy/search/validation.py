@@ -10,7 +10,7 @@ from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory
 from impactcell.records import Samples
 
 MIN_OPEN_GAP = 1.05
-"""A gap of at most this before is none that could be closed."""
+"""Gap before, in noise floors, above which there is something to close; the floor itself is 1."""
 
 RESAMPLES = 1999
 """Draws of the held-out shots: a quantile at 2.5 % rests on fifty of them."""
@@ -41,12 +41,13 @@ class Gap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
-    """Gaps before and after, in training and held out.
+    """Gaps of the nominal model (before) and of the extended one (after), in training and held out.
 
     Attributes
     ----------
     closed, low, high : float
-        Share of the held-out gap that was closed, and its 95 % interval over shots; nan where there was none.
+        Share of the held-out gap above the noise floor that was closed, and its 95 % interval over shots; nan
+        where there was none.
     regions : tuple of (phase, channel, before, after)
         Held-out RMS region by region.
     """
@@ -62,27 +63,28 @@ class Validation:
 
 
 def gap(problem: Problem, model: Fit, floor: NoiseFloor, replicates: ReplicateSpread) -> Gap:
-    """Gap of a model whose own numbers of each shot have been fitted.
+    """Gap of a model whose parameters of each shot have been fitted.
 
     Only channels whose noise is stated are counted, if there are any: elsewhere the floor is a lower bound.
     """
-    misfit, free = _counted_misfit(problem, model, floor)
-    return _gap(misfit, free, model.shot_parameters.log_factor, replicates.spread)
+    misfit, freedom = _counted_misfit(problem, model, floor)
+    return _gap(misfit, freedom, model.shot_parameters.log_factor, replicates.spread)
 
 
 def _counted_misfit(problem: Problem, model: Fit, floor: NoiseFloor) -> tuple[Samples, Samples]:
     """Squared residual and degrees of freedom of every shot, over the channels that count."""
-    stated = np.array([source == "stated" for source in floor.source])
-    counts = stated if stated.any() else ~stated
-    counted = counts[problem.shots.channel]
-    first = problem.shots.bounds[:-1]
-    misfit = np.add.reduceat(np.where(counted, model.residual**2, 0.0), first)
-    free = np.add.reduceat(counted.astype(np.float64), first) - len(problem.shot_parameter_names)
-    return misfit, np.maximum(free, 0.0)
+    is_stated = np.array([source == "stated" for source in floor.source])
+    counting_channels = is_stated if is_stated.any() else ~is_stated
+    counted = counting_channels[problem.shots.channel]
+    starts = problem.shots.bounds[:-1]
+    misfit = np.add.reduceat(np.where(counted, model.residual**2, 0.0), starts)
+    freedom = np.add.reduceat(counted.astype(np.float64), starts) - len(problem.shot_parameter_names)
+    return misfit, np.maximum(freedom, 0.0)
 
 
-def _gap(misfit: Samples, free: Samples, log_factor: Samples, spread: float) -> Gap:
-    trace = math.sqrt(float(misfit.sum() / max(float(free.sum()), 1.0)))
+def _gap(misfit: Samples, freedom: Samples, log_factor: Samples, spread: float) -> Gap:
+    """Gap from squared residual, degrees of freedom and log friction factor of every shot."""
+    trace = math.sqrt(float(misfit.sum() / max(float(freedom.sum()), 1.0)))
     factor = math.sqrt(float(np.mean(log_factor**2))) / spread if spread > 0.0 else math.nan
     return Gap(trace, factor)
 
@@ -99,7 +101,7 @@ def validate(
     Parameters
     ----------
     training, held_out : tuple of Problem, Fit and Fit
-        Shots, and the model before and after, its shots' own numbers fitted to them.
+        Shots, and the model before and after, its parameters of each shot fitted to them.
     """
     problem, before, after = held_out
     gap_before, gap_after = (gap(problem, model, floor, replicates) for model in (before, after))
@@ -133,8 +135,8 @@ def _resampled_shares(
     for _ in range(RESAMPLES):
         drawn = rng.integers(0, problem.count, problem.count)
         before, after = (
-            _gap(misfit[drawn], free[drawn], model.shot_parameters.log_factor[drawn], replicates.spread)
-            for (misfit, free), model in zip(counted, models, strict=True)
+            _gap(misfit[drawn], freedom[drawn], model.shot_parameters.log_factor[drawn], replicates.spread)
+            for (misfit, freedom), model in zip(counted, models, strict=True)
         )
         if before.whole > MIN_OPEN_GAP:
             shares.append(_closed_share(before, after))
@@ -142,6 +144,7 @@ def _resampled_shares(
 
 
 def _closed_share(before: Gap, after: Gap) -> float:
+    """Share of what was above the noise floor, 1, that is gone."""
     return (before.whole - after.whole) / (before.whole - 1.0)
 
 

@@ -10,7 +10,7 @@ from impactcell.numerics.jit import compiled
 from impactcell.records import Quality, WearState
 
 INTERVAL = 0.95
-"""Coverage of cycles_to_limit_low .. high."""
+"""Coverage of `WearState.cycles_to_limit_low` to `cycles_to_limit_high`."""
 INTERVAL_STDS = float(ndtri(0.5 + INTERVAL / 2.0))
 """Half of that interval, in standard deviations."""
 FARTHEST = 1e9
@@ -20,7 +20,7 @@ BISECTION = 1e-10
 
 
 class WearMoments(NamedTuple):
-    """Level and slope of friction, as if the first batch were there: means, variances and covariance."""
+    """Level of mu_s at the reference batch and its slope a cycle: means, variances and covariance."""
 
     level: float
     slope: float
@@ -30,7 +30,7 @@ class WearMoments(NamedTuple):
 
 
 class Extrapolation(NamedTuple):
-    """Level minus limit and how it goes on: `WearMoments`, and variances of the random walks, a cycle."""
+    """Level minus limit and how it goes on: `WearMoments`, and process variances of both a cycle."""
 
     excess: float
     slope: float
@@ -58,9 +58,9 @@ def forecast(
     level_variance, slope_variance = max(moments.level_variance, 0.0), max(moments.slope_variance, 0.0)
     std, excess = math.sqrt(level_variance), moments.level - limit
     if not math.isfinite(limit):
-        above, expected, low, high = 0.0, math.inf, math.inf, math.inf
+        probability_above, cycles, low, high = 0.0, math.inf, math.inf, math.inf
     else:
-        above = float(ndtr(excess / std)) if std > 0.0 else float(excess > 0.0)
+        probability_above = float(ndtr(excess / std)) if std > 0.0 else float(excess > 0.0)
         ahead = Extrapolation(
             excess,
             moments.slope,
@@ -70,16 +70,29 @@ def forecast(
             float(walks[0]),
             float(walks[1]),
         )
-        expected, low, high = _cycles_to_limit(ahead)
+        cycles, low, high = _cycles_to_limit(ahead)
     slope_std = math.sqrt(slope_variance)
     return WearState(
-        moments.level, std, moments.slope, slope_std, limit, above, expected, low, high, quality, reason
+        moments.level,
+        std,
+        moments.slope,
+        slope_std,
+        limit,
+        probability_above,
+        cycles,
+        low,
+        high,
+        quality,
+        reason,
     )
 
 
 @compiled
 def _quantile_above_limit(ahead: Extrapolation, stds: float, cycles: float) -> float:
-    """Return level minus limit after so many cycles, plus so many standard deviations of it."""
+    """Return level minus limit after so many cycles, plus `stds` standard deviations of it.
+
+    The slope's random walk, integrated, adds a third of its variance times the cube of the cycles.
+    """
     variance = ahead.level_variance + cycles * (
         2.0 * ahead.level_slope_covariance + cycles * ahead.slope_variance
     )
@@ -89,7 +102,7 @@ def _quantile_above_limit(ahead: Extrapolation, stds: float, cycles: float) -> f
 
 @compiled
 def _cycles_to_limit(ahead: Extrapolation) -> tuple[float, float, float]:
-    """Cycles until the limit is reached, and both ends of their interval."""
+    """Cycles until the level meets the limit, and both ends of their interval, where its quantiles do."""
     return (
         _first_crossing(ahead, 0.0),
         _first_crossing(ahead, INTERVAL_STDS),
@@ -99,7 +112,7 @@ def _cycles_to_limit(ahead: Extrapolation) -> tuple[float, float, float]:
 
 @compiled
 def _first_crossing(ahead: Extrapolation, stds: float) -> float:
-    """Cycles until that quantile is above the limit, by bisection; inf if beyond `FARTHEST`."""
+    """Cycles until the level plus `stds` standard deviations is at the limit; inf if beyond `FARTHEST`."""
     if _quantile_above_limit(ahead, stds, 0.0) >= 0.0:
         return 0.0
     near, far = 0.0, 1.0
