@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality
 
 PERIOD_GAIN = 0.05
-"""How fast the mean time between cycles follows."""
+"""Share of the latest time between cycles in their mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +89,9 @@ def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
 def assign_batch(naming: BatchNaming, capture: Capture, announcement: BatchAnnouncement | None) -> CycleBatch:
     """Decide which batch a cycle belongs to, and whether its change was expected.
 
-    The batch is what the module wrote down with the cycle itself. Of announcements only the newest can be
-    seen: after an outage with several of them, each change of the module's batch before the newest applies
-    counts as one of those between, as many as its sequence says there were.
+    The batch is what the module wrote down with the cycle itself. Only the newest announcement can be read.
+    If several came during an outage, its sequence tells how many were missed: so many changes of the module's
+    batch before `from_cycle` of the newest count as announced.
     """
     by_operator, batch_id, expected = naming.by_operator, capture.batch_id, False
     if by_operator is not None and by_operator.module_batch_id == capture.batch_id:
@@ -99,25 +99,25 @@ def assign_batch(naming: BatchNaming, capture: Capture, announcement: BatchAnnou
         by_operator = replace(by_operator, expected=False)
     else:
         by_operator = None
-    seen = naming.last_announcement
-    if announcement is not None and announcement.sequence != seen:
+    last_sequence = naming.last_announcement
+    if announcement is not None and announcement.sequence != last_sequence:
         changed = naming.by_module is not None and capture.batch_id not in (None, naming.by_module)
         if capture.cycle >= announcement.from_cycle:
-            expected, seen = True, announcement.sequence
-        elif changed and 0 < seen < announcement.sequence - 1:
-            expected, seen = True, seen + 1
-    return CycleBatch(BatchNaming(by_operator, capture.batch_id, seen), batch_id, expected)
+            expected, last_sequence = True, announcement.sequence
+        elif changed and 0 < last_sequence < announcement.sequence - 1:
+            expected, last_sequence = True, last_sequence + 1
+    return CycleBatch(BatchNaming(by_operator, capture.batch_id, last_sequence), batch_id, expected)
 
 
 def update_period(before_s: float, since: tuple[int, int], capture: Capture) -> float:
-    """Follow the mean time between cycles, 0 before it is known; pauses of a shift change count little.
+    """Follow the mean time between cycles, 0 before it is known; a pause counts as ten of them at most.
 
-    `since` is number and time (ns) of the cycle before.
+    `since` is number and time (ns) of the cycle before; time 0 where there was none.
     """
     cycles, elapsed_s = capture.cycle - since[0], (capture.time_ns - since[1]) * 1e-9
     if not since[1] or cycles <= 0 or elapsed_s <= 0.0:
         return before_s
-    now_s = elapsed_s / cycles
+    latest_s = elapsed_s / cycles
     if not before_s:
-        return now_s
-    return before_s + PERIOD_GAIN * (min(now_s, 10.0 * before_s) - before_s)
+        return latest_s
+    return before_s + PERIOD_GAIN * (min(latest_s, 10.0 * before_s) - before_s)

@@ -30,12 +30,14 @@ def errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise _for_now(path, error.strerror, full=error.errno in (errno.ENOSPC, errno.EDQUOT)) from error
+        raise _temporary_error(
+            path, error.strerror, full=error.errno in (errno.ENOSPC, errno.EDQUOT)
+        ) from error
     except sqlite3.OperationalError as error:
         code = error.sqlite_errorcode & 0xFF
         if code == sqlite3.SQLITE_ERROR:  # a table is missing
             raise JournalError(f"{path}: cannot be used ({error}); name another file") from error
-        raise _for_now(path, error, full=code in _NO_ROOM) from error
+        raise _temporary_error(path, error, full=code in _NO_ROOM) from error
     except sqlite3.DatabaseError as error:
         if getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED:
             raise JournalDamagedError(f"{path}: is damaged and cannot be used ({error})") from error
@@ -44,7 +46,8 @@ def errors(path: Path) -> Iterator[None]:
         raise JournalError(f"{path}: cannot be used ({error})") from error
 
 
-def _for_now(path: Path, reason: object, *, full: bool) -> JournalFullError:
+def _temporary_error(path: Path, reason: object, *, full: bool) -> JournalFullError:
+    """Make the error after which trying again can help."""
     if full:
         return JournalFullError(f"{path}: the disk or its quota is full ({reason}); make room")
     return JournalFullError(f"{path}: cannot be used now ({reason}); check its disk, directory and owner")
@@ -77,7 +80,7 @@ def open_database(
         _check_header(path)
     with errors(path):
         database = sqlite3.connect(
-            f"{path.absolute().as_uri()}?{_reading(path) if read_only else 'mode=rwc'}",
+            f"{path.absolute().as_uri()}?{_read_only_query(path) if read_only else 'mode=rwc'}",
             uri=True,
             isolation_level=None,
             check_same_thread=False,
@@ -89,7 +92,7 @@ def open_database(
             _check(database, path, cell)
             if not read_only:
                 database.execute("PRAGMA synchronous = FULL")
-                _bring_up(database, path, upgrade)  # what is refused is left as it is
+                _upgrade_file(database, path, upgrade)  # what is refused is left as it is
                 database.execute("PRAGMA journal_mode = WAL")
     except BaseException:
         database.close()
@@ -101,8 +104,8 @@ def _pragma(database: sqlite3.Connection, name: str) -> int:
     return int(database.execute(f"PRAGMA {name}").fetchone()[0])
 
 
-def _reading(path: Path) -> str:
-    """Say how to open a file that is only to be read.
+def _read_only_query(path: Path) -> str:
+    """Give the query of the URI of a file that is only to be read.
 
     SQLite wants to write a little beside the file even then. On a read-only medium, where it cannot, and
     where nobody changes the file, it can do without, unless a log has what is not in the file yet.
@@ -114,6 +117,7 @@ def _reading(path: Path) -> str:
 
 
 def _pages(database: sqlite3.Connection, path: Path, *, read_only: bool) -> int:
+    """Count the pages, 0 in a new file; what no journal can be is found here, where a file is first read."""
     try:
         return _pragma(database, "page_count")
     except sqlite3.DatabaseError as error:
@@ -176,6 +180,7 @@ def _create(database: sqlite3.Connection, cell: str) -> None:
 
 
 def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
+    """Refuse what is no journal, of a format that is not known, or of another cell than `cell`."""
     application_id, version = _pragma(database, "application_id"), _pragma(database, "user_version")
     if application_id != APPLICATION_ID:
         raise ForeignJournalError(f"{path}: a database, but no journal of impactcell; it is left as it is")
@@ -185,16 +190,16 @@ def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
             f"{path}: the journal{of} has format {version}, this version of the program knows {OLDEST} to "
             f"{FORMAT}; it is left as it is: {WAY_OUT}"
         )
-    stored_cell = _named_cell(database)
+    stored_cell = _stored_cell(database)
     if cell is not None and stored_cell != cell:
         raise ForeignJournalError(
             f"{path}: the journal of cell '{stored_cell}', not of '{cell}'; name another file"
         )
 
 
-def _named_cell(database: sqlite3.Connection) -> str:
-    named = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
-    return str(named[0]) if named else ""
+def _stored_cell(database: sqlite3.Connection) -> str:
+    row = database.execute("SELECT value FROM meta WHERE key = 'cell'").fetchone()
+    return str(row[0]) if row else ""
 
 
 def unreadable_state(path: Path, cell: str, why: ValueError) -> ForeignJournalError:
@@ -202,15 +207,15 @@ def unreadable_state(path: Path, cell: str, why: ValueError) -> ForeignJournalEr
     return ForeignJournalError(f"{path}: the journal of cell '{cell}' is left as it is, {why}: {WAY_OUT}")
 
 
-def _bring_up(database: sqlite3.Connection, path: Path, upgrade: Upgrade | None) -> None:
-    """Bring a file of an earlier version up to this one, all or nothing."""
+def _upgrade_file(database: sqlite3.Connection, path: Path, upgrade: Upgrade | None) -> None:
+    """Bring a file of an earlier format up to this one: columns, tables and state, all or nothing."""
     version = _pragma(database, "user_version")
     row = database.execute("SELECT * FROM state").fetchone()  # id, seq, blob and, from format 5 on, crc
     whole = row is not None and (len(row) < 4 or row[3] in (None, row_crc([row[2]])))
     try:
         state = upgrade(bytes(row[2])) if whole and upgrade is not None else None
     except ValueError as error:
-        raise unreadable_state(path, _named_cell(database), error) from error
+        raise unreadable_state(path, _stored_cell(database), error) from error
     present = {name for _, name, *_ in database.execute("PRAGMA table_info (cycles)")}
     absent = [column for column in COLUMNS if column.name not in present]
     if version == FORMAT and state is None and not absent:

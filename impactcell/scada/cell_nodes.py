@@ -80,31 +80,31 @@ class CellSpace:
             )
         self.description = description
         self._space = address_space(server)
-        self._cells = uris.index(CELLS_URI)
-        self._types = uris.index(TYPES_URI)
-        self.node = ua.NodeId(description.name, self._cells)
+        self._cells_namespace = uris.index(CELLS_URI)
+        self._types_namespace = uris.index(TYPES_URI)
+        self.node = ua.NodeId(description.name, self._cells_namespace)
         if self.node in self._space:
             raise SettingsError(f"cell {description.name!r} is there twice")
-        self.cell_type = self._named(
+        self.cell_type = self._child(
             ua.NodeId(ua.ObjectIds.BaseObjectType), "ImpactCellType", ua.ObjectIds.HasSubtype
         )
-        self.folder = parent = self._named(
+        self.folder = self._child(
             ua.NodeId(ua.ObjectIds.ObjectsFolder), "ImpactCells", ua.ObjectIds.Organizes
         )
         instantiate(
             self._space,
             self.cell_type,
             self.node,
-            ua.QualifiedName(description.name, self._cells),
+            ua.QualifiedName(description.name, self._cells_namespace),
             f"Cell {description.name}.",
             DESCRIPTIONS,
             self._is_wanted,
         )
         notifies = ua.EventNotifier.SubscribeToEvents.mask | ua.EventNotifier.HistoryRead.mask
         set_attribute(self._space, self.node, ua.AttributeIds.EventNotifier, notifies, ua.VariantType.Byte)
-        link(self._space, parent, ua.NodeId(ua.ObjectIds.Organizes), self.node)
-        link(self._space, parent, ua.NodeId(ua.ObjectIds.HasNotifier), self.node)
-        machines = ua.NodeId(1001, uris.index(MACHINERY_URI))
+        link(self._space, self.folder, ua.NodeId(ua.ObjectIds.Organizes), self.node)
+        link(self._space, self.folder, ua.NodeId(ua.ObjectIds.HasNotifier), self.node)
+        machines = ua.NodeId(1001, uris.index(MACHINERY_URI))  # the folder Machines of OPC 40001-1
         link(self._space, machines, ua.NodeId(ua.ObjectIds.Organizes), self.node)
         for alarm in RULES:
             link(self._space, self.node, ua.NodeId(ua.ObjectIds.HasCondition), self.path(alarm))
@@ -114,7 +114,7 @@ class CellSpace:
 
     def path(self, path: str) -> ua.NodeId:
         """NodeId of a node of the cell by its path, as `Wear/Level`."""
-        return ua.NodeId(f"{self.description.name}/{path}", self._cells)
+        return ua.NodeId(f"{self.description.name}/{path}", self._cells_namespace)
 
     def compute(self, path: str, value: Callable[[], ua.DataValue]) -> None:
         """Let a variable be computed whenever it is read."""
@@ -124,14 +124,16 @@ class CellSpace:
         """Event type of a condition."""
         return targets(self._space[self.path(alarm)], HAS_TYPE_DEFINITION)[0]
 
-    def _named(self, parent: ua.NodeId, name: str, reference_type: int) -> ua.NodeId:
-        browse_name = ua.QualifiedName(name, self._types)
+    def _child(self, parent: ua.NodeId, name: str, reference_type: int) -> ua.NodeId:
+        """Node that is referred to from `parent`, by its name in the namespace of the types."""
+        browse_name = ua.QualifiedName(name, self._types_namespace)
         for reference in self._space[parent].references:
             if reference.ReferenceTypeId == ua.NodeId(reference_type) and reference.BrowseName == browse_name:
                 return reference.NodeId
         raise LookupError(f"the NodeSet2 file has no {name}")
 
     def _is_wanted(self, path: str) -> bool:
+        """Whether the cell has an optional node: what is known of its machine, some of each condition."""
         head, _, rest = path.partition("/")
         if head == "Identification":
             field = _IDENTIFICATION.get(rest)
@@ -191,8 +193,8 @@ class CellSpace:
                 ("AggregateConfiguration/UseSlopedExtrapolation", False, ua.VariantType.Boolean),
             )
             for name, value, variant_type in defaults:
-                place = ua.NodeId(f"{settings.Identifier}/{name}", settings.NamespaceIndex)
-                set_attribute(self._space, place, ua.AttributeIds.Value, value, variant_type)
+                property_node = ua.NodeId(f"{settings.Identifier}/{name}", settings.NamespaceIndex)
+                set_attribute(self._space, property_node, ua.AttributeIds.Value, value, variant_type)
 
 
 def cell_notifiers(cell: CellSpace) -> frozenset[ua.NodeId]:

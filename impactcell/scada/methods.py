@@ -78,7 +78,7 @@ class MethodTable:
         self._audit.add_method(owner, method_id, audit_name)
 
 
-def _text(value: object, index: int) -> str:
+def _comment_text(value: object, index: int) -> str:
     """Take a comment: an absent one leaves the last one standing (Part 9, 5.5.6)."""
     text = (value.Text or "") if isinstance(value, ua.LocalizedText) else ""
     if len(text) > MAX_COMMENT:
@@ -98,7 +98,7 @@ def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeI
         await actions.start_batch(cell, batch, expected=expected, actor=context.actor)
 
     async def reset_wear(context: RequestContext, arguments: Sequence[Any]) -> None:
-        await actions.reset_wear(cell, _text(arguments[0], 0), context.actor)
+        await actions.reset_wear(cell, _comment_text(arguments[0], 0), context.actor)
 
     async def set_target(context: RequestContext, arguments: Sequence[Any]) -> None:
         target, allowed = arguments[0], BY_PATH["Positioning/Target"].node_range(description.ranges)
@@ -109,12 +109,12 @@ def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeI
     async def abort(context: RequestContext, _arguments: Sequence[Any]) -> None:
         await actions.abort_positioning(cell, context.actor)
 
-    text, flag = ua.VariantType.String, ua.VariantType.Boolean
+    string, boolean = ua.VariantType.String, ua.VariantType.Boolean
     for name, area, arguments, handler in (
         (
             "StartBatch",
             Area.START_BATCH,
-            (InputArgument("BatchId", text), InputArgument("Expected", flag)),
+            (InputArgument("BatchId", string), InputArgument("Expected", boolean)),
             start_batch,
         ),
         ("ResetWear", Area.RESET_WEAR, (_COMMENT,), reset_wear),
@@ -136,7 +136,7 @@ def bind_condition(
         instance_method = space.path(f"{condition.name}/{name}")
         audit_name = f"{condition.cell}: {condition.name}: {name.rpartition('/')[2]}"
         for owner in (condition.node, shelving) if "/" in name else (condition.node,):
-            for method_id in (instance_method, *(ua.NodeId(number) for number in type_ids)):
+            for method_id in (instance_method, *(ua.NodeId(type_id) for type_id in type_ids)):
                 table.bind(owner, method_id, CONDITION_AREAS[event], method, audit_name)
 
 
@@ -148,7 +148,7 @@ def _action(
         if event in (EventKind.ACKNOWLEDGE, EventKind.CONFIRM, EventKind.COMMENT):
             if condition.alarm.enabled and not condition.is_current_event(arguments[0]):
                 raise StatusCodeError(ua.StatusCodes.BadEventIdUnknown)
-            comment = _text(arguments[1], 1)
+            comment = _comment_text(arguments[1], 1)
         elif event is EventKind.SHELVE_TIMED:
             shelve_s = arguments[0] / 1e3
             if not 0.0 < shelve_s <= MAX_SHELVE_S:
@@ -171,10 +171,10 @@ def bind_refresh(
     """Make ConditionRefresh and ConditionRefresh2 callable."""
 
     def events() -> list[Any]:
-        shown = [event for condition in conditions.values() if (event := condition.present()) is not None]
+        retained = [event for condition in conditions.values() if (event := condition.present()) is not None]
         return [
             refresh_event(_ids.RefreshStartEventType),
-            *shown,
+            *retained,
             refresh_event(_ids.RefreshEndEventType),
         ]
 
@@ -184,10 +184,10 @@ def bind_refresh(
     async def refresh_item(context: RequestContext, arguments: Sequence[Any]) -> None:
         subscriptions.refresh(context.session, arguments[0], arguments[1], events())
 
-    number = ua.VariantType.UInt32
-    refresh_method = Method((InputArgument("SubscriptionId", number),), refresh)
+    id_type = ua.VariantType.UInt32
+    refresh_method = Method((InputArgument("SubscriptionId", id_type),), refresh)
     refresh_item_method = Method(
-        (InputArgument("SubscriptionId", number), InputArgument("MonitoredItemId", number)), refresh_item
+        (InputArgument("SubscriptionId", id_type), InputArgument("MonitoredItemId", id_type)), refresh_item
     )
     owner = ua.NodeId(_ids.ConditionType)
     table.bind(owner, ua.NodeId(_ids.ConditionType_ConditionRefresh), Area.REFRESH, refresh_method)
