@@ -35,7 +35,7 @@ class Watched:
         """Wait until an alarm is active, or not; its message."""
         async with asyncio.timeout(timeout_s):
             while True:
-                alarm = next(a for a in self.service.running[cell].worker.alarms if a.name is name)
+                alarm = next(a for a in self.service.running[cell].worker.alarms if a.name == name)
                 if alarm.active is active:
                     return alarm.message
                 async with self.news:

@@ -57,7 +57,7 @@ def test_the_alarms_of_the_snapshot_are_those_of_the_state(initial: CellState):
 def worn(initial: CellState) -> CellState:
     """State with an alarm that people have seen."""
     alarm = replace(initial.alarms.alarm("WearLimit"), active=True, acknowledged=False, comment="seen")
-    shown = tuple(alarm if a.name is alarm.name else a for a in initial.alarms.alarms)
+    shown = tuple(alarm if a.name == alarm.name else a for a in initial.alarms.alarms)
     return replace(initial, cycle=7, alarms=replace(initial.alarms, alarms=shown))
 
 
