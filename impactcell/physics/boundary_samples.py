@@ -97,7 +97,7 @@ def is_at_rest(t: float, phase: SmoothPhase, step: StepBuffers, record: TapRecor
         outputs[at.STATUS] = at.STILL_MOVING
         return False
     phase.cache[at.RESTING_FROM_S] = min(phase.cache[at.RESTING_FROM_S], t)
-    derivative(t, state, phase, rates, 0)
+    derivative(t, state, phase, rates, 0 * at.STATE_WIDTH)
     still = rates[at.PART_SPEED] == 0.0 and state[at.PART_SPEED] == 0.0
     period = 2.0 * np.pi * math.sqrt(phase.parameters[at.MASS] / phase.cache[at.STICK_STIFFNESS])
     if still or t >= phase.cache[at.RESTING_FROM_S] + ELASTIC_PERIODS * period:

@@ -34,7 +34,7 @@ from impactcell.physics.runge_kutta import (
     evaluate_stages,
     step_error,
 )
-from impactcell.physics.sampling import record_step
+from impactcell.physics.sampling import accept_step
 from impactcell.records import Samples
 
 MAX_EVENTS = 20_000  # of a tap; one that has more is pushed on without end
@@ -55,6 +55,15 @@ WORKSPACE: Final = STEP_ROOM + at.CACHE_COUNT  # numbers of all buffers
 
 
 @compiled
+def try_step(t: float, h: float, fresh: bool, phase: SmoothPhase, step: StepBuffers) -> float:  # noqa: FBT001
+    """Take a step and return its error; `fresh`: its first stage is not the last of the step before."""
+    evaluate_stages(0 if fresh else 1, STAGES + 1, t, h, phase, step)
+    for i in range(phase.contact_mode[at.STATE_COUNT]):
+        step.next_state[i] = step.trial_state[i]
+    return step_error(phase.contact_mode[at.STATE_COUNT], h, step)
+
+
+@compiled
 def step_to_event(
     event: int, fraction: float, t: float, h: float, phase: SmoothPhase, step: StepBuffers
 ) -> float:
@@ -68,53 +77,26 @@ def step_to_event(
     slope = (above - below) / (2.0 * delta * h)
     length = fraction * h
     for attempt in range(LOCATING_STEPS):
-        evaluate_stages(1, STAGES + 1, t, length, phase, step)
-        take_trial_state(phase, step)
+        try_step(t, length, False, phase, step)  # noqa: FBT003
         change = -event_margin(event, t + length, step.next_state, phase) / slope
         last = attempt == LOCATING_STEPS - 1
         if last or not 1e-13 * h < abs(change) < 0.1 * h or length + change <= 0.0:
             break
         length += change
-    evaluate_stages(STAGES + 1, EXTENDED, t, length, phase, step)
-    build_interpolant(phase.contact_mode[at.STATE_COUNT], length, step)
+    build_interpolant(t, length, phase, step)
     return length
-
-
-@compiled
-def take_trial_state(phase: SmoothPhase, step: StepBuffers) -> None:
-    """Take the state of the last stage as that at the end of the step."""
-    for i in range(phase.contact_mode[at.STATE_COUNT]):
-        step.next_state[i] = step.trial_state[i]
-
-
-@compiled
-def try_step(t: float, h: float, fresh: bool, phase: SmoothPhase, step: StepBuffers) -> float:  # noqa: FBT001
-    """Take a step and return its error; `fresh`: its first stage is not the last of the step before."""
-    evaluate_stages(0 if fresh else 1, STAGES + 1, t, h, phase, step)
-    take_trial_state(phase, step)
-    return step_error(phase.contact_mode[at.STATE_COUNT], h, step)
 
 
 @compiled
 def complete_step(t: float, h: float, phase: SmoothPhase, step: StepBuffers) -> tuple[int, float]:
     """Interpolate an accepted step and end it at its first event; the event, -1 if none, and the length."""
-    evaluate_stages(STAGES + 1, EXTENDED, t, h, phase, step)
-    build_interpolant(phase.contact_mode[at.STATE_COUNT], h, step)
+    build_interpolant(t, h, phase, step)
     event, fraction = first_event(t, h, phase, step)
     if event < 0:
         return event, h
     if fraction > 0.0:
         return event, step_to_event(event, fraction, t, h, phase, step)
     return event, 0.0
-
-
-@compiled
-def accept_step(t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
-    """Record the step, and go on from its end."""
-    record_step(t, h, phase, step, record)
-    for i in range(phase.contact_mode[at.STATE_COUNT]):
-        step.state[i] = step.next_state[i]
-        step.stages[i] = step.stages[STAGES * at.STATE_WIDTH + i]
 
 
 @compiled

@@ -83,10 +83,12 @@ def step_error(n: int, h: float, step: StepBuffers) -> float:
 
 
 @compiled
-def build_interpolant(n: int, h: float, step: StepBuffers) -> None:
+def build_interpolant(t: float, h: float, phase: SmoothPhase, step: StepBuffers) -> None:
     """Coefficients of the interpolant over the step, shape (INTERPOLANT, STATE_WIDTH), from all 16 stages."""
+    first_extra = STAGES + 1
+    evaluate_stages(first_extra, first_extra + EXTENDED - STAGES - 1, t, h, phase, step)
     K, out = step.stages, step.interpolant
-    for i in range(n):
+    for i in range(phase.contact_mode[at.STATE_COUNT]):
         delta = step.next_state[i] - step.state[i]
         out[i] = step.state[i]
         out[at.STATE_WIDTH + i] = delta

@@ -9,7 +9,7 @@ from impactcell.numerics.jit import FloatPointer, advance, compiled
 from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import actuator_speed, contact_force, sensor_reading
 from impactcell.physics.memory_layout import SmoothPhase, StepBuffers, TapRecord
-from impactcell.physics.runge_kutta import interpolate, interpolate_state
+from impactcell.physics.runge_kutta import STAGES, interpolate, interpolate_state
 
 POWERS: Final = at.LAG_MOMENTS - at.FORCE_POWERS
 """Coefficients of the polynomial that stands for the contact force over a step."""
@@ -177,8 +177,8 @@ def fill_channel(
 
 
 @compiled
-def record_step(t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
-    """Take the peak force and the samples of an accepted step, and carry the sensor's lag over it."""
+def accept_step(t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
+    """Take peak force and samples of a step, carry the sensor's lag over it, and go on from its end."""
     sign = phase.parameters[at.DIRECTION]
     if phase.cache[at.LAG_S] > 0.0:
         fit_force(t, h, phase, step)
@@ -189,3 +189,6 @@ def record_step(t: float, h: float, phase: SmoothPhase, step: StepBuffers, recor
     fill_channel(at.PART_VELOCITY, at.PART_SPEED, t, h, sign, step.interpolant, record)
     if phase.cache[at.LAG_S] > 0.0:
         phase.cache[at.LAGGED_FORCE] = lagged_force(1.0, h, phase.cache)
+    for i in range(phase.contact_mode[at.STATE_COUNT]):
+        step.state[i] = step.next_state[i]
+        step.stages[i] = step.stages[STAGES * at.STATE_WIDTH + i]
