@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from impactcell.numerics.jit import compiled
-from impactcell.physics.half_wave import Oscillator, separation_time, stop_time, swing
+from impactcell.physics.half_wave import Oscillator, Swing, separation_time, stop_time, swing_at, swing_from
 from impactcell.physics.linear_slide import (
     CONVERGED,
     NEVER,
@@ -143,17 +143,14 @@ def halt_apart(j: int, travel: float, place: float, asked: Strokes) -> int:
 
 
 @compiled
-def halt_in_contact(
-    j: int, t: float, duration: float, e: float, r: float, contact: Contact, asked: Strokes
-) -> int:
-    """Fill the strokes from the j-th that end in a half wave from (e, r) at t; the first beyond."""
+def halt_in_contact(j: int, t: float, duration: float, swing: Swing, contact: Contact, asked: Strokes) -> int:
+    """Fill the strokes from the j-th that end in a half wave that begins at t; the first beyond."""
     v = contact.velocity
-    of = contact.loading if r > 0.0 or e < 0.0 else contact.unloading
     while j < asked.strokes.size and asked.strokes[j] <= v * (t + duration):
         stroke = asked.strokes[j]
-        e_halt, r_halt = swing(stroke / v - t, e, r, of)
-        depth = max(e_halt + contact.static_indentation, 0.0)
-        speed = v - r_halt
+        e, r = swing_at(stroke / v - t, swing)
+        depth = max(e + contact.static_indentation, 0.0)
+        speed = v - r
         asked.displacements[j] = stroke - depth
         if speed > 0.0:
             asked.displacements[j] += travel_after_halt(depth, speed, contact)
@@ -199,10 +196,11 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
             duration, ending = half_wave(e, r, contact)
             if ending == FADES and count > j and math.isinf(strokes[count - 1]):
                 count -= 1
-            j = halt_in_contact(j, t, duration, e, r, contact, asked)
+            swing = swing_from(e, r, contact.loading if r > 0.0 or e < 0.0 else contact.unloading)
+            j = halt_in_contact(j, t, duration, swing, contact, asked)
             if j == count:
                 return
-            e, r = swing(duration, e, r, contact.loading if r > 0.0 or e < 0.0 else contact.unloading)
+            e, r = swing_at(duration, swing)
             t += duration
             if ending == STOPS:
                 d, resting = e + rest, True

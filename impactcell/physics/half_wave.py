@@ -18,14 +18,34 @@ class Oscillator(NamedTuple):
     frequency: float
 
 
+class Swing(NamedTuple):
+    """Half a wave: e(t) = exp(-z t) (e cos wd t + f sin wd t), r(t) = exp(-z t) (r cos wd t - c sin wd t)."""
+
+    e: float
+    r: float
+    f: float
+    c: float
+    decay: float
+    frequency: float
+
+
 @compiled
-def swing(s: float, e: float, r: float, of: Oscillator) -> tuple[float, float]:
-    """Indentation about its static value and approach speed, a time s after they were e and r."""
-    z, wd = of.decay, of.frequency
-    c = (of.squared_frequency * e + z * r) / wd
-    f = (r + z * e) / wd
-    decay, cosine, sine = math.exp(-z * s), math.cos(wd * s), math.sin(wd * s)
-    return decay * (e * cosine + f * sine), decay * (r * cosine - c * sine)
+def swing_from(e: float, r: float, of: Oscillator) -> Swing:
+    """Work out the half wave that begins with indentation e about its static value and approach speed r."""
+    f = (r + of.decay * e) / of.frequency
+    c = (of.squared_frequency * e + of.decay * r) / of.frequency
+    return Swing(e, r, f, c, of.decay, of.frequency)
+
+
+@compiled
+def swing_at(s: float, swing: Swing) -> tuple[float, float]:
+    """Indentation about its static value and approach speed after a time s."""
+    decay = math.exp(-swing.decay * s)
+    cosine, sine = math.cos(swing.frequency * s), math.sin(swing.frequency * s)
+    return (
+        decay * (swing.e * cosine + swing.f * sine),
+        decay * (swing.r * cosine - swing.c * sine),
+    )
 
 
 @compiled
