@@ -183,7 +183,7 @@ class Site:
         endpoint: str | None = None,
     ) -> Client:
         """Client of asyncua, not connected yet."""
-        client = Client(endpoint or self.server.endpoint, timeout=10)
+        client = Client(endpoint or self.server.endpoint, timeout=30)
         client.application_uri = CLIENT_URI
         if user is not None:
             client.set_user(user)
