@@ -181,10 +181,9 @@ class Site:
         policy: SecurityPolicy = SecurityPolicy.BASIC256SHA256,
         certificate: tuple[Path, Path] | None = None,
         endpoint: str | None = None,
-        timeout_s: float = 10.0,
     ) -> Client:
-        """Client of asyncua, not connected yet; it gives up a request, and its link, after `timeout_s`."""
-        client = Client(endpoint or self.server.endpoint, timeout=timeout_s)
+        """Client of asyncua, not connected yet."""
+        client = Client(endpoint or self.server.endpoint, timeout=30)
         client.application_uri = CLIENT_URI
         if user is not None:
             client.set_user(user)

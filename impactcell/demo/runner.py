@@ -20,7 +20,7 @@ from impactcell.demo.auto_teach import AutoTeach
 from impactcell.demo.scenario_setup import USER, DemoSetup, set_up_scenario
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
-from impactcell.process.console import is_quiet
+from impactcell.process.console import is_quiet, print_note
 from impactcell.process.signals import stop_on_signals
 from impactcell.records import ModuleStatus, Snapshot
 from impactcell.service import Service
@@ -70,6 +70,7 @@ class _DemoRun:
     raised: list[dict[str, Any]] = field(default_factory=list)
     service: Service | None = None
     endpoint: str = ""
+    page: str = ""
     missed: int = 0
     messages: list[tuple[int, str]] = field(default_factory=list)
 
@@ -105,6 +106,9 @@ class _DemoRun:
     def _started(self) -> None:
         assert self.service is not None  # noqa: S101 - it calls us
         self.endpoint = self.service.endpoints[self.setup.cell.name]
+        self.page = self.service.pages[self.setup.cell.name]
+        if not is_quiet() and not sys.stdout.isatty():  # the live view shows it itself
+            print_note(f"page at {self.page}: user {USER}, password {self.setup.password}")
 
     def _take(self, snapshot: Snapshot) -> None:
         assert self._status is not None  # noqa: S101 - its cell calls us
@@ -153,7 +157,7 @@ class _DemoRun:
         link = "connected" if self._status is None or self._status.connected else "not connected"
         return Scene(
             self.setup.cell.name,
-            f"{self.endpoint} · {who}",
+            f"{self.endpoint} · page: {self.page} · {who}",
             messages[-1] if messages else "",
             list(self.snapshots),
             link,
@@ -165,6 +169,7 @@ class _DemoRun:
             return {
                 "cell": self.setup.cell.name,
                 "endpoint": self.endpoint,
+                "page": self.page,
                 "cycles": 0,
                 "missed": self.missed,
             }
@@ -172,6 +177,7 @@ class _DemoRun:
         return {
             "cell": self.setup.cell.name,
             "endpoint": self.endpoint,
+            "page": self.page,
             "cycles": self.seen,
             "missed": self.missed,
             "last_cycle": last.cycle,

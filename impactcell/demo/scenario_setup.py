@@ -29,6 +29,8 @@ USER = "demo"
 EVENT_SECTIONS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
 PREFERRED_PORT = 4840
 """Registered port of OPC UA (IANA)."""
+PREFERRED_PAGE_PORT = 8480
+"""Customary port of the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,15 +165,16 @@ def _write_cell_file(scenario: str, directory: Path, port: int) -> Path:
     content["model"] = str(model)
     content["module"]["port"] = port
     content["module"]["register_map"] = str((source.parent / content["module"]["register_map"]).resolve())
-    content["opcua"]["endpoint"] = f"opc.tcp://127.0.0.1:{_free_port()}/impactcell"
+    content["opcua"]["endpoint"] = f"opc.tcp://127.0.0.1:{_free_port(PREFERRED_PORT)}/impactcell"
+    content["web"] = {"endpoint": f"http://127.0.0.1:{_free_port(PREFERRED_PAGE_PORT)}"}
     path = directory / "cell.yaml"
     path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     return path
 
 
-def _free_port() -> int:
-    """Prefer the customary port of OPC UA; any free one where it is taken."""
-    for port in (PREFERRED_PORT, 0):
+def _free_port(preferred: int) -> int:
+    """Take a customary port; any free one where it is taken."""
+    for port in (preferred, 0):
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)) as free:
             return int(free.getsockname()[1])
     raise ImpactCellError("no free port on loopback")

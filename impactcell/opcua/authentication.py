@@ -75,19 +75,32 @@ class Authenticator:
             user).
         """
         if isinstance(token, ua.UserNameIdentityToken):
-            return await self._identify_by_password(token, nonce, client)
+            password = self._decrypt(token, nonce, encrypted=client.certificate is not None)
+            certificate = fingerprint(client.certificate) if client.certificate else ""
+            return await self.identify_by_password(
+                token.UserName or "", password, client.address, certificate
+            )
         if isinstance(token, ua.X509IdentityToken):
             return self._identify_by_certificate(token, signature, nonce, client.address)
         raise StatusCodeError(ua.StatusCodes.BadIdentityTokenRejected)
 
-    async def _identify_by_password(
-        self, token: ua.UserNameIdentityToken, nonce: bytes, client: ClientApplication
+    async def identify_by_password(
+        self, name: str, password: str, address: str, certificate: str = ""
     ) -> Actor:
-        password = self._decrypt(token, nonce, encrypted=client.certificate is not None)
-        name, address = token.UserName or "", client.address
-        if len(name) > MAX_NAME:
+        """Find out who a password stands for, wherever it was typed: one throttle for all logins.
+
+        Parameters
+        ----------
+        certificate : str
+            Fingerprint of the client's certificate; empty without one.
+
+        Raises
+        ------
+        StatusCodeError
+            BadUserAccessDenied (wrong password, unknown user), BadIdentityTokenInvalid (longer than any).
+        """
+        if len(name) > MAX_NAME or len(password.encode()) > MAX_PASSWORD_BYTES:
             raise StatusCodeError(ua.StatusCodes.BadIdentityTokenInvalid)
-        certificate = fingerprint(client.certificate) if client.certificate else ""
         async with self._throttle.attempt(address, name, certificate) as attempt:
             user = self._users.find(name)
             matches = await asyncio.get_running_loop().run_in_executor(

@@ -14,11 +14,12 @@ from impactcell.errors import AccessError
 from impactcell.opcua.asyncua_adapter import AddressSpace, SecurityPolicyFactory, bound_null_arrays
 from impactcell.opcua.attribute_service import AttributeService
 from impactcell.opcua.authentication import Authenticator
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.discovery_service import POLICIES, DiscoveryService
 from impactcell.opcua.historical_variable import VALUES_PER_PAGE
 from impactcell.opcua.history_processed import AGGREGATE_FUNCTIONS
 from impactcell.opcua.history_service import MAX_NODES_PER_READ, HistoryService
-from impactcell.opcua.host_interface import Actor, Host, ServerSettings
+from impactcell.opcua.host_interface import Actor, Host, RefusedError, ServerSettings
 from impactcell.opcua.method_service import MethodService
 from impactcell.opcua.monitored_item_service import MonitoredItemService
 from impactcell.opcua.request_dispatch import MAX_OPERATIONS, RequestDispatcher, Service
@@ -138,6 +139,19 @@ class ServiceHost:
         self._discovery.port = self._listener.sockets[0].getsockname()[1]
         self._clock = asyncio.get_running_loop().create_task(self._run_clock(), name="opcua clock")
         _log.info("OPC UA server listens on %s (port %d)", settings.endpoint, self.port)
+
+    async def log_in(self, name: str, password: str, address: str) -> Actor:
+        """Find out who a password stands for that was typed elsewhere than at an OPC UA client.
+
+        Raises
+        ------
+        RefusedError
+            Wrong password or unknown user.
+        """
+        try:
+            return await self._authenticator.identify_by_password(name, password, address)
+        except StatusCodeError as error:
+            raise RefusedError("BadUserAccessDenied") from error
 
     async def stop(self) -> None:
         """Close every connection and stop listening."""

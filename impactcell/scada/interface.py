@@ -45,6 +45,26 @@ class CellDescription:
     ranges: Ranges = field(default_factory=Ranges)
 
 
+@dataclass(frozen=True, slots=True)
+class ConditionAction:
+    """What a person does with a condition from elsewhere than an OPC UA client.
+
+    Attributes
+    ----------
+    event : EventKind
+    event_id : bytes
+        Of the state that the person saw; needed to acknowledge, to confirm and to comment.
+    comment : str
+    shelve_s : float
+        How long to shelve, for `SHELVE_TIMED`.
+    """
+
+    event: EventKind
+    event_id: bytes = b""
+    comment: str = ""
+    shelve_s: float = 0.0
+
+
 class Actions(Protocol):
     """The service, as OPC UA methods reach it. Every call may raise `RefusedError`."""
 

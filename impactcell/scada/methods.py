@@ -25,6 +25,9 @@ MAX_BATCH_ID: Final = 64
 MAX_COMMENT: Final = 1_000
 """Longest comment, characters."""
 
+NAMES_EVENT: Final = (EventKind.ACKNOWLEDGE, EventKind.CONFIRM, EventKind.COMMENT)
+"""Actions that name the event they answer: one that came meanwhile is not acknowledged unseen."""
+
 _EVENT_ID: Final = InputArgument("EventId", ua.VariantType.ByteString)
 _COMMENT: Final = InputArgument("Comment", ua.VariantType.LocalizedText)
 _SHELVING_TIME: Final = InputArgument("ShelvingTime", ua.VariantType.Double)
@@ -145,7 +148,7 @@ def _action(
 ) -> Callable[[RequestContext, Sequence[Any]], Awaitable[None]]:
     async def act(context: RequestContext, arguments: Sequence[Any]) -> None:
         comment, shelve_s = "", 0.0
-        if event in (EventKind.ACKNOWLEDGE, EventKind.CONFIRM, EventKind.COMMENT):
+        if event in NAMES_EVENT:
             if condition.alarm.enabled and not condition.is_current_event(arguments[0]):
                 raise StatusCodeError(ua.StatusCodes.BadEventIdUnknown)
             comment = _comment_text(arguments[1], 1)

@@ -11,23 +11,32 @@ from urllib.parse import urlsplit
 from asyncua import ua
 
 from impactcell import __version__
-from impactcell.alarms import RULES
+from impactcell.alarms import RULES, EventKind
 from impactcell.opcua.asyncua_adapter import AddressSpace, address_space, new_standard_server
 from impactcell.opcua.event_notification import EventNotification
-from impactcell.opcua.host_interface import Host, Product, ServerSettings
+from impactcell.opcua.host_interface import Actor, Host, Permission, Product, RefusedError, ServerSettings
 from impactcell.opcua.service_host import ServiceHost, aggregate_functions
 from impactcell.opcua.type_instances import link
 from impactcell.opcua.variable_store import VariableStore
 from impactcell.quantities import HISTORY
 from impactcell.records import Alarm, ModuleStatus, Snapshot
 from impactcell.scada.access_policy import CellAccess
+from impactcell.scada.audit_log import audited, describe_action
 from impactcell.scada.audit_trail import AuditTrail
 from impactcell.scada.cell_history import CellHistory
 from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
-from impactcell.scada.conditions import Condition
-from impactcell.scada.interface import Actions, CellDescription, HistorySource
-from impactcell.scada.methods import MethodTable, bind_cell, bind_condition, bind_refresh
+from impactcell.scada.conditions import MAX_SHELVE_S, Condition
+from impactcell.scada.interface import Actions, CellDescription, ConditionAction, HistorySource
+from impactcell.scada.methods import (
+    MAX_COMMENT,
+    NAMES_EVENT,
+    MethodTable,
+    bind_cell,
+    bind_condition,
+    bind_refresh,
+)
 from impactcell.scada.publishing import CellValues
+from impactcell.scada.rights import CONDITION_AREAS, allowed
 from impactcell.scada.users import Users
 
 _log = logging.getLogger(__name__)
@@ -154,6 +163,45 @@ class Server:
     def mark_stale(self, cell: str, time_ns: int) -> None:
         """Nothing new for a while: all figures of a cycle become Uncertain and keep their last values."""
         self._cells[cell].stale(time_ns)
+
+    async def log_in(self, name: str, password: str, address: str) -> Actor:
+        """Find out who a password stands for that was typed elsewhere: as slowly as at an OPC UA client.
+
+        Raises
+        ------
+        RefusedError
+            Wrong password, unknown user, or the server does not run.
+        """
+        if self._host is None:
+            raise RefusedError("BadServerHalted")
+        return await self._host.log_in(name, password, address)
+
+    async def act_on_condition(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
+        """Do from elsewhere what the methods of a condition do: same rights, bounds, audit trail and events.
+
+        Raises
+        ------
+        RefusedError
+            The role may not, an argument is out of range, the event has passed, or the state forbids it.
+        """
+        what = describe_action(cell, alarm, action.event, action.comment, action.shelve_s)
+        self.alarm(cell, await audited(actor, what, self._act(cell, alarm, action, actor)))
+
+    async def _act(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> Alarm:
+        event, comment, shelve_s = action.event, action.comment, action.shelve_s
+        if not allowed(actor.role, CONDITION_AREAS[event], Permission.CALL):
+            raise RefusedError("BadUserAccessDenied")
+        if len(comment) > MAX_COMMENT:
+            raise RefusedError("BadOutOfRange", f"a comment has at most {MAX_COMMENT} characters")
+        if event is EventKind.SHELVE_TIMED and not 0.0 < shelve_s <= MAX_SHELVE_S:
+            raise RefusedError("BadShelvingTimeOutOfRange")
+        if event in NAMES_EVENT and not self._conditions[cell, alarm].is_current_event(action.event_id):
+            raise RefusedError("BadEventIdUnknown", "the alarm has come again since; look at it first")
+        if event is EventKind.SHELVE_ONE_SHOT:
+            shelve_s = MAX_SHELVE_S
+        return await self._actions.act_on_condition(
+            cell, alarm, event, actor, comment=comment, shelve_s=shelve_s
+        )
 
     def _event_of(self, cell: str, alarm: Alarm) -> EventNotification:
         return self._conditions[cell, alarm.name].event(alarm)

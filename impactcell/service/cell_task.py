@@ -32,6 +32,7 @@ from impactcell.service.positioning import PositioningTask
 from impactcell.service.publisher import CellPublisher
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig, read_cell
+from impactcell.web.live_feed import LiveFeed
 
 TICK_S = 1.0
 """Between two looks at shelved alarms, the journal's backlog and the model file, seconds."""
@@ -73,6 +74,7 @@ class CellTask:
         if damage:
             self.worker.tell_journal_event(damage)
         self._publisher = CellPublisher(cell.name, self.worker.alarms, self.log)
+        self.publish_alarms = self._publisher.publish_alarms
         self._notes: tuple[str, ...] = ()
         self._on_snapshot = on_snapshot
         self._module = ModuleAcquisition(
@@ -111,9 +113,9 @@ class CellTask:
             journal_ok=not self.worker.journal_fault,
         )
 
-    async def run(self, server: Server) -> None:
-        """Run until cancelled."""
-        self._publisher.server = server
+    async def run(self, server: Server, feed: LiveFeed | None = None) -> None:
+        """Run until cancelled, shown by a server and on a page."""
+        self._publisher.server, self._publisher.feed = server, feed
         self._publish_restored()
         try:
             async with asyncio.TaskGroup() as group:
@@ -214,7 +216,7 @@ class CellTask:
                 self.log.info("%s", note, cycle=capture.cycle)
         self._notes = notes
         self._last_cycle_s, self._stale = time.monotonic(), False
-        self._publisher.publish(snapshot)
+        self._publisher.publish(snapshot, capture)
         self._publisher.publish_module(self._module.status)
         for alarm in result.step_result.changed:  # the snapshot has shown them
             self._publisher.log_alarm(alarm)

@@ -19,8 +19,10 @@ from impactcell.scada import (
 )
 from impactcell.settings import CellConfig
 from impactcell.settings.sections import JournalSection
+from impactcell.settings.web_section import WebSection
 from impactcell.tracking.signature.tracker import SignatureSettings
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
+from impactcell.web.interface import CellFacts, PageSettings
 
 MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
 """SI units of what a cell file is written in."""
@@ -106,6 +108,22 @@ def server_settings(cell: CellConfig) -> ServerSettings:
         pki=opcua.certificates_dir,
         allow_none=opcua.allow_sessions_without_encryption,
         limits=ServerLimits(sessions=opcua.max_sessions),
+    )
+
+
+def page_settings(cell: CellConfig, section: WebSection) -> PageSettings:
+    """How the page of the cell, and of those that share its endpoint, is reached."""
+    opcua = cell.settings.opcua
+    return PageSettings(
+        section.endpoint, opcua.users_file, opcua.certificates_dir, section.certificate, section.key
+    )
+
+
+def cell_facts(cell: CellConfig, endpoint: str) -> CellFacts:
+    """Say to the page what a cell is that its OPC UA server shows at `endpoint`."""
+    module, journal = cell.settings.module, cell.settings.journal
+    return CellFacts(
+        cell.name, f"{module.host}:{module.port}", endpoint, None if journal is None else journal.file
     )
 
 

@@ -69,6 +69,7 @@ class OperatorCommands:
         transition = await self._cell(cell).worker.apply_event(alarm, alarm_event, audit)
         if transition.refusal is not None:
             raise RefusedError(transition.refusal.value, f"{cell}: {alarm}: {transition.refusal.value}")
+        self._cells[cell].publish_alarms((transition.alarm,))
         return transition.alarm
 
 

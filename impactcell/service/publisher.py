@@ -1,16 +1,18 @@
-"""What the world sees of one running cell: values and conditions over OPC UA, alarms in the log."""
+"""What the world sees of one running cell: over OPC UA, on the page, and alarms in the log."""
 
 import logging
 import time
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from impactcell.alarms import RULES
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Alarm, ModuleStatus, Snapshot
+from impactcell.records import Alarm, Capture, ModuleStatus, Snapshot
+from impactcell.web.interface import CellNews, Freshness
 
 if TYPE_CHECKING:
     from impactcell.scada import Server
+    from impactcell.web.live_feed import LiveFeed
 
 
 class CellPublisher:
@@ -26,30 +28,37 @@ class CellPublisher:
 
     def __init__(self, cell: str, alarms: Iterable[Alarm], log: CellLogger) -> None:
         self.server: Server | None = None
+        self.feed: LiveFeed | None = None
         self._cell = cell
         self._active = {alarm.name for alarm in alarms if alarm.active}
         self._log = log
 
-    def publish(self, snapshot: Snapshot) -> None:
-        """Show a cycle."""
+    def publish(self, snapshot: Snapshot, capture: Capture | None = None) -> None:
+        """Show a cycle, and what was measured in it."""
+        self._put(snapshot=snapshot, capture=capture, freshness=Freshness.LIVE)
         if self.server is not None:
             self.server.publish(self._cell, snapshot)
 
     def publish_link(self, status: ModuleStatus) -> None:
         """Show the state of the link; without one no value is good."""
-        if self.server is not None:
-            if not status.connected:
-                self.server.mark_bad(self._cell, time.time_ns())
-            self.publish_module(status)
+        if not status.connected:
+            self._put(freshness=Freshness.LOST)
+        if self.server is not None and not status.connected:
+            self.server.mark_bad(self._cell, time.time_ns())
+        self.publish_module(status)
 
     def publish_module(self, status: ModuleStatus) -> None:
         """Show what has come over the link."""
+        self._put(status=status)
         if self.server is not None:
             self.server.module(self._cell, status, time.time_ns())
 
     def publish_alarms(self, changed: Iterable[Alarm]) -> None:
         """Show conditions that have changed, and log them."""
-        for alarm in changed:
+        alarms = tuple(changed)
+        if alarms:
+            self._put(alarms=alarms)
+        for alarm in alarms:
             self.log_alarm(alarm)
             if self.server is not None:
                 self.server.alarm(self._cell, alarm)
@@ -64,5 +73,10 @@ class CellPublisher:
 
     def mark_stale(self, time_ns: int) -> None:
         """Show that the values are of another time."""
+        self._put(freshness=Freshness.STALE)
         if self.server is not None:
             self.server.mark_stale(self._cell, time_ns)
+
+    def _put(self, **news: Any) -> None:
+        if self.feed is not None:
+            self.feed.put(CellNews(self._cell, **news))

@@ -7,21 +7,31 @@ import logging
 import signal
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
-from impactcell.errors import JournalError
+from impactcell.errors import JournalError, SettingsError
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.signals import stop_on_signals
 from impactcell.scada import Server
 from impactcell.service.cell_task import CellTask, SnapshotCallback
-from impactcell.service.factory import cell_description, cell_design, server_settings
+from impactcell.service.factory import (
+    cell_description,
+    cell_design,
+    cell_facts,
+    page_settings,
+    server_settings,
+)
 from impactcell.service.history_source import JournalHistory
 from impactcell.service.monitoring import CellHealth, Monitoring, waiting_cell
 from impactcell.service.operator_commands import OperatorCommands
+from impactcell.service.page_gateway import PageGateway
 from impactcell.settings import CellConfig
+from impactcell.settings.web_section import WebSection
+from impactcell.web import CellNews, PageServer
+from impactcell.web.live_feed import LiveFeed
 
 log = logging.getLogger("impactcell.service")
 
@@ -58,6 +68,9 @@ class Service:
         self.running: dict[str, CellTask] = {}
         self.endpoints: dict[str, str] = {}
         """Where each cell is to be found, once `run` has started."""
+        self.pages: dict[str, str] = {}
+        """Address of the page that each cell is on, if any, once `run` has started."""
+        self._feeds: dict[str, LiveFeed] = {}
 
     async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
         """Run until `stop` is set; `started` is called when every endpoint listens."""
@@ -69,6 +82,7 @@ class Service:
                 servers[endpoint] = await stack.enter_async_context(self._server(endpoint))
             for cell in self._cells:
                 self.endpoints[cell.name] = servers[cell.settings.opcua.endpoint].endpoint
+            await stack.enter_async_context(self._pages(servers))
             tasks = [
                 asyncio.create_task(
                     self._keep_running(cell, servers[cell.settings.opcua.endpoint]), name=cell.name
@@ -121,6 +135,45 @@ class Service:
         )
 
     @contextlib.asynccontextmanager
+    async def _pages(self, servers: Mapping[str, Server]) -> AsyncIterator[None]:
+        """Serve a page for each `web.endpoint`, from a thread of its own."""
+        with_page = [cell for cell in self._cells if cell.settings.web is not None]
+        async with contextlib.AsyncExitStack() as stack:
+            for section in dict.fromkeys(cell.settings.web for cell in with_page):
+                cells = [cell for cell in with_page if cell.settings.web == section]
+                if section is not None:
+                    await self._page(section, cells, servers, stack)
+            yield
+
+    async def _page(
+        self,
+        section: WebSection,
+        cells: Sequence[CellConfig],
+        servers: Mapping[str, Server],
+        stack: contextlib.AsyncExitStack,
+    ) -> None:
+        shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in cells}
+        settings = page_settings(cells[0], section)
+        facts = [cell_facts(cell, self.endpoints[cell.name]) for cell in cells]
+        page = PageServer(settings, facts, PageGateway(shown_by, settings.certificates))
+        try:
+            await asyncio.to_thread(page.start)
+        except SettingsError as error:
+            if "web" in cells[0].settings.model_fields_set:
+                raise
+            # Nobody asked for the page at this address: another service of this machine may have it.
+            log.warning("%s; no page for now", error)
+            return
+        stack.push_async_callback(asyncio.to_thread, page.stop)
+        if not (settings.is_encrypted or section.is_on_loopback):
+            log.warning(
+                "page: http beyond loopback is allowed (web.allow_without_encryption): anybody can listen"
+            )
+        log.info("page at %s", page.endpoint)
+        self.pages |= dict.fromkeys(shown_by, page.endpoint)
+        self._feeds |= dict.fromkeys(shown_by, page.feed)
+
+    @contextlib.asynccontextmanager
     async def _monitoring(self) -> AsyncIterator[None]:
         sections = dict.fromkeys(cell.settings.monitoring for cell in self._cells)
         listeners = [section for section in sections if section is not None]
@@ -138,7 +191,7 @@ class Service:
                 if cell.name not in self.running:
                     await self._open(cell, server)
                     logger.info("its journal can be opened now; the cell runs")
-                await self.running[cell.name].run(server)
+                await self.running[cell.name].run(server, self._feeds.get(cell.name))
             except asyncio.CancelledError:
                 raise
             except Exception:
@@ -163,7 +216,7 @@ class Service:
             except JournalError as error:
                 if str(error) != reason:
                     reason = str(error)
-                    _tell_fault(cell, server, reason)
+                    _tell_fault(cell, server, self._feeds.get(cell.name), reason)
             await asyncio.sleep(again_s)
             again_s = min(2.0 * again_s, AGAIN_AT_MOST_S)
 
@@ -208,13 +261,15 @@ def _say_started(service: Service) -> None:
         log.info("cell=%s at %s", cell, endpoint)
 
 
-def _tell_fault(cell: CellConfig, server: Server, reason: str) -> None:
+def _tell_fault(cell: CellConfig, server: Server, feed: LiveFeed | None, reason: str) -> None:
     """Log why a cell does not run, and raise its alarm; once it runs, it shows its own."""
     log.error("cell=%s waits until its journal can be opened: %s", cell.name, reason)
     design = cell_design(cell)
     fault = journal_fault.result(reason)
     for alarm in core.apply_rule_result(design, core.initial_state(design), fault, time.time_ns())[1]:
         server.alarm(cell.name, alarm)
+        if feed is not None:
+            feed.put(CellNews(cell.name, alarms=(alarm,)))
 
 
 async def _watchdog() -> None:

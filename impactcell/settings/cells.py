@@ -102,6 +102,20 @@ def _acknowledgement_target(cell: CellConfig) -> tuple[str, int, int, Path]:
     return module.host, module.port, module.device_id, module.register_map
 
 
+def _page_faults(cell: CellConfig, other: CellConfig) -> list[str]:
+    """Say why two cells cannot be on one page; its users log in once for all of its cells."""
+    page, other_page = cell.settings.web, other.settings.web
+    if page is None or other_page is None or page.endpoint != other_page.endpoint:
+        return []
+    if page != other_page:
+        return [f"{cell.path}: {other.path} has the same web endpoint, but other web settings"]
+    if cell.settings.opcua.users_file != other.settings.opcua.users_file:
+        return [
+            f"{cell.path}: {other.path} is on the same page (web.endpoint), but has another opcua.users_file"
+        ]
+    return []
+
+
 def read_cells(paths: Sequence[Path]) -> tuple[CellConfig, ...]:
     """Read the cells of one process; see that they do not get in each other's way.
 
@@ -130,6 +144,7 @@ def read_cells(paths: Sequence[Path]) -> tuple[CellConfig, ...]:
                 faults.append(
                     f"{cell.path}: {other.path} has the same journal file; a journal belongs to one cell"
                 )
+            faults += _page_faults(cell, other)
             if cell.settings.opcua != other.settings.opcua and _port(cell) == _port(other):
                 faults.append(f"{cell.path}: {other.path} has the same endpoint, but other opcua settings")
     if faults:

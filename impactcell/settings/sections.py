@@ -4,86 +4,32 @@ Relative paths are taken from the directory of the file that names them.
 """
 
 import json
-import re
-from pathlib import Path
 from typing import Annotated, Literal, Self
-from urllib.parse import urlsplit
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, model_validator
 
 from impactcell.alarms.rules import wear_limit
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.journal.retention import Retention
+from impactcell.settings.fields import (
+    AnyPath,
+    InputFile,
+    NotNegative,
+    OutputFile,
+    Positive,
+    Probability,
+    Section,
+    cell_name,
+    opcua_endpoint,
+)
+from impactcell.settings.web_section import WebSection
 from impactcell.tracking.signature.tracker import SignatureSettings
 
 _LINK, _CAPTURE, _WEAR_LIMIT, _SIGNATURE, _RETENTION = (
     ModuleLink(), CaptureDefaults(), wear_limit.RULE.settings, SignatureSettings(), Retention()
 )  # fmt: skip
 """What the parts of the service do by themselves; a key that is left out means that."""
-
-
-def _resolved(value: object, info: ValidationInfo) -> object:
-    if not isinstance(value, str) or not value:
-        return value
-    directory: Path = (info.context or {}).get("directory", Path())
-    return (directory / Path(value).expanduser()).resolve()
-
-
-def _existing_file(path: Path) -> Path:
-    if not path.is_file():
-        raise ValueError(f"there is no file {path}")
-    return path
-
-
-def _existing_parent(path: Path) -> Path:
-    if path.is_dir():
-        raise ValueError(f"{path} is a directory; a file is needed here")
-    if not path.parent.is_dir():
-        raise ValueError(f"there is no directory {path.parent} to write it in")
-    return path
-
-
-AnyPath = Annotated[Path, BeforeValidator(_resolved)]
-InputFile = Annotated[AnyPath, AfterValidator(_existing_file)]
-OutputFile = Annotated[AnyPath, AfterValidator(_existing_parent)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-"""A finite number above 0."""
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-"""A finite number of at least 0."""
-Probability = Annotated[float, Field(gt=0, lt=1)]
-"""A number between 0 and 1, both excluded."""
-
-
-def _endpoint(value: str) -> str:
-    parts = urlsplit(value)
-    try:
-        whole = parts.scheme == "opc.tcp" and bool(parts.hostname) and parts.port is not None
-    except ValueError:
-        whole = False
-    if not whole:
-        raise ValueError("an OPC UA endpoint has host and port, as in opc.tcp://127.0.0.1:4840/impactcell")
-    return value
-
-
-def _cell_name(value: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", value):
-        raise ValueError("a cell's name has up to 64 letters, digits, '_', '-' or '.', as in press-1")
-    return value
-
-
-class Section(BaseModel):
-    """A mapping of the cell file; unknown keys are faults."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
 
 class IdentificationSection(Section):
@@ -225,7 +171,7 @@ class PositioningSection(Section):
 class OpcUaSection(Section):
     """The OPC UA server; cells with the same endpoint share one."""
 
-    endpoint: Annotated[str, AfterValidator(_endpoint)] = "opc.tcp://127.0.0.1:4840/impactcell"
+    endpoint: Annotated[str, AfterValidator(opcua_endpoint)] = "opc.tcp://127.0.0.1:4840/impactcell"
     """Where SCADA connects; an address other than loopback opens it to the network."""
     users_file: AnyPath = Field(default="users.yaml", validate_default=True)
     """Users and roles, made by `impactcell users`; while there is none, nobody can log in."""
@@ -264,7 +210,7 @@ class CellSettings(Section):
 
     format: Literal[1]
     """Version of this file format."""
-    cell: Annotated[str, AfterValidator(_cell_name)]
+    cell: Annotated[str, AfterValidator(cell_name)]
     """Name of the cell, in OPC UA, in logs and in messages."""
     identification: IdentificationSection = IdentificationSection()
     module: ModuleSection
@@ -282,7 +228,9 @@ class CellSettings(Section):
     journal: JournalSection | None = None
     """Absent: nothing is kept over a restart."""
     monitoring: MonitoringSection | None = None
-    """Absent: no HTTP."""
+    """Absent: no health and metrics over HTTP."""
+    web: WebSection | None = WebSection()
+    """The live page; null: none."""
 
 
 def schema() -> str:

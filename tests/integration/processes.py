@@ -101,9 +101,10 @@ def write_cell(directory: Path, port: int, name: str = "press-1", **changes: Any
         "alarms": {"wear_limit": 0.25},
         "opcua": {"endpoint": "opc.tcp://127.0.0.1:0/", "allow_sessions_without_encryption": True},
         "journal": {"file": f"{name}.sqlite"},
+        "web": None,
     }
     for key, value in changes.items():
-        cell[key] = {**cell.get(key, {}), **value} if isinstance(value, dict) else value
+        cell[key] = {**(cell.get(key) or {}), **value} if isinstance(value, dict) else value
     path = directory / f"{name}.yaml"
     path.write_text(yaml.safe_dump(cell))
     return path

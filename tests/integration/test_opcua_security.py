@@ -206,12 +206,12 @@ async def test_more_sessions_at_once_than_allowed() -> None:
     """A thousand scaled to forty: ten are let in, the rest is refused with the standard's code."""
     async with site(limits=ServerLimits(sessions=10, connections=60)) as here:
         here.publish()
-        async with await here.client("observer", timeout_s=100.0) as inside:
+        async with await here.client("observer") as inside:
             held: list[Client] = []
             refused: dict[int, int] = {}
 
             async def attempt() -> None:
-                client = await here.client("operator", timeout_s=100.0)
+                client = await here.client("operator")
                 try:
                     await client.connect()
                 except ua.UaStatusCodeError as error:

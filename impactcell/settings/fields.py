@@ -1,0 +1,77 @@
+"""What the sections of a cell file are made of: paths, ranges, addresses, names."""
+
+import re
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import urlsplit
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+
+
+def _resolved(value: object, info: ValidationInfo) -> object:
+    if not isinstance(value, str) or not value:
+        return value
+    directory: Path = (info.context or {}).get("directory", Path())
+    return (directory / Path(value).expanduser()).resolve()
+
+
+def _existing_file(path: Path) -> Path:
+    if not path.is_file():
+        raise ValueError(f"there is no file {path}")
+    return path
+
+
+def _existing_parent(path: Path) -> Path:
+    if path.is_dir():
+        raise ValueError(f"{path} is a directory; a file is needed here")
+    if not path.parent.is_dir():
+        raise ValueError(f"there is no directory {path.parent} to write it in")
+    return path
+
+
+AnyPath = Annotated[Path, BeforeValidator(_resolved)]
+InputFile = Annotated[AnyPath, AfterValidator(_existing_file)]
+OutputFile = Annotated[AnyPath, AfterValidator(_existing_parent)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+"""A finite number above 0."""
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+"""A finite number of at least 0."""
+Probability = Annotated[float, Field(gt=0, lt=1)]
+"""A number between 0 and 1, both excluded."""
+
+
+def opcua_endpoint(value: str) -> str:
+    """See that an OPC UA endpoint is whole."""
+    parts = urlsplit(value)
+    try:
+        whole = parts.scheme == "opc.tcp" and bool(parts.hostname) and parts.port is not None
+    except ValueError:
+        whole = False
+    if not whole:
+        raise ValueError("an OPC UA endpoint has host and port, as in opc.tcp://127.0.0.1:4840/impactcell")
+    return value
+
+
+def page_endpoint(value: str) -> str:
+    """See that the address of a page is whole."""
+    parts = urlsplit(value)
+    try:
+        is_whole = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port is not None
+    except ValueError:
+        is_whole = False
+    if not is_whole or parts.path not in ("", "/") or parts.query or parts.fragment or parts.username:
+        raise ValueError("a page's endpoint has scheme, host and port, as in http://127.0.0.1:8480")
+    return value.rstrip("/")
+
+
+def cell_name(value: str) -> str:
+    """See that a name can be part of NodeIds, files and addresses."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", value):
+        raise ValueError("a cell's name has up to 64 letters, digits, '_', '-' or '.', as in press-1")
+    return value
+
+
+class Section(BaseModel):
+    """A mapping of the cell file; unknown keys are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)

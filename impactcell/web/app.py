@@ -1,0 +1,154 @@
+"""The page as a web application: which address leads where, and which role it takes."""
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import quote
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+
+from impactcell.scada import Role
+from impactcell.web import alarm_pages, cell_pages, login_pages, system_page
+from impactcell.web.interface import PageBackend, PageContent, PageSettings
+from impactcell.web.live_feed import LiveFeed
+from impactcell.web.page_context import STATIC, STATIC_VERSION, PageContext
+from impactcell.web.past import Past
+from impactcell.web.requests import (
+    RequestRefusedError,
+    check_token,
+    cookie_name,
+    read_form,
+    session_of,
+)
+from impactcell.web.security_headers import SecurityHeaders
+from impactcell.web.sessions import Session, SessionTable
+
+Show = Callable[[PageContext, Request, Session], Awaitable[Response | ASGIApp]]
+Act = Callable[[PageContext, Request, Session, dict[str, str]], Awaitable[Response]]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """An address that shows something to whom has the role."""
+
+    path: str
+    show: Show
+    role: Role = Role.OBSERVER
+    is_page: bool = True
+    """A page leads somebody who is not logged in to the login; what only scripts ask for says 401."""
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """An address that a form is sent to by whom has the role."""
+
+    path: str
+    act: Act
+    role: Role
+
+
+VIEWS: Final = (
+    View("/", cell_pages.overview),
+    View("/cells/{cell}", cell_pages.cell),
+    View("/cells/{cell}/trend", cell_pages.trend, is_page=False),
+    View("/live", cell_pages.live, is_page=False),
+    View("/alarms", alarm_pages.alarms),
+    View("/alarms/rows", alarm_pages.rows, is_page=False),
+    View("/alarms/history.csv", alarm_pages.history_csv),
+    View("/alarms/history.xlsx", alarm_pages.history_xlsx),
+    View("/system", system_page.system),
+)
+"""Everything that can be looked at, but for the login and the static files, which are for all."""
+
+ACTIONS: Final = (
+    Action("/logout", login_pages.log_out, Role.OBSERVER),
+    Action("/alarms/act", alarm_pages.act, Role.OPERATOR),
+    Action("/system/trust", system_page.trust, Role.ENGINEER),
+)
+"""Everything that can be done; each form needs the token of the session that it was shown to."""
+
+
+def page_app(
+    settings: PageSettings,
+    content: PageContent,
+    feed: LiveFeed,
+    sessions: SessionTable,
+    backend: PageBackend,
+) -> ASGIApp:
+    """Put the application together."""
+    context = PageContext(settings, content, feed, sessions, backend, Past())
+    routes = [
+        Route("/login", _logged_out(context), methods=["GET", "POST"]),
+        *(Route(view.path, _shown(context, view), methods=["GET"]) for view in VIEWS),
+        *(Route(action.path, _done(context, action), methods=["POST"]) for action in ACTIONS),
+        Mount(f"/static/{STATIC_VERSION}", StaticFiles(directory=STATIC)),
+    ]
+    return Starlette(
+        routes=routes,
+        middleware=[Middleware(SecurityHeaders)],
+        exception_handlers={
+            RequestRefusedError: _refused(context),
+            404: _not_found(context),
+            405: _not_found(context),
+        },
+    )
+
+
+def _logged_out(context: PageContext) -> Callable[[Request], Awaitable[Response]]:
+    async def handle(request: Request) -> Response:
+        if request.method == "POST":
+            return await login_pages.log_in(context, request, await read_form(request))
+        return await login_pages.login(context, request)
+
+    return handle
+
+
+def _shown(context: PageContext, view: View) -> Callable[[Request], Awaitable[Response]]:
+    async def handle(request: Request) -> Response:
+        session = session_of(request, context.sessions)
+        if session is None:
+            if not view.is_page:
+                return JSONResponse({"error": "not logged in"}, 401)
+            after = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+            was_logged_in = cookie_name(request) in request.cookies
+            return RedirectResponse(f"/login?next={quote(after)}{'&over=1' if was_logged_in else ''}", 303)
+        if session.actor.role < view.role:
+            raise RequestRefusedError(403, "error_role")
+        return await view.show(context, request, session)  # type: ignore[return-value] # a stream is no Response
+
+    return handle
+
+
+def _done(context: PageContext, action: Action) -> Callable[[Request], Awaitable[Response]]:
+    async def handle(request: Request) -> Response:
+        session = session_of(request, context.sessions)
+        if session is None:
+            return RedirectResponse("/login", 303)
+        form = await read_form(request)
+        check_token(session, form)
+        if session.actor.role < action.role:
+            raise RequestRefusedError(403, "error_role")
+        return await action.act(context, request, session, form)
+
+    return handle
+
+
+def _refused(context: PageContext) -> Callable[[Request, Exception], Awaitable[Response]]:
+    async def handle(request: Request, error: Exception) -> Response:
+        assert isinstance(error, RequestRefusedError)  # noqa: S101 - it is registered for these
+        return context.error_page(request, error.status, error.reason)
+
+    return handle
+
+
+def _not_found(context: PageContext) -> Callable[[Request, Exception], Awaitable[Response]]:
+    async def handle(request: Request, error: Exception) -> Response:
+        return context.error_page(request, getattr(error, "status_code", 404), "error_not_found")
+
+    return handle

@@ -1,0 +1,81 @@
+"""The cells: all of them at a glance, one of them in depth, and the stream that keeps both alive."""
+
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.types import ASGIApp
+
+from impactcell.errors import JournalError
+from impactcell.journal.trend import TrendColumn
+from impactcell.web.cell_view import number
+from impactcell.web.event_stream import MAX_VIEWERS, EventStream
+from impactcell.web.interface import CellFacts
+from impactcell.web.page_context import PageContext
+from impactcell.web.past import SPANS_S
+from impactcell.web.requests import RequestRefusedError
+from impactcell.web.sessions import Session
+
+
+async def overview(context: PageContext, request: Request, session: Session) -> Response:
+    """Show a card a cell."""
+    return context.page(request, "overview.html.j2", session)
+
+
+async def cell(context: PageContext, request: Request, session: Session) -> Response:
+    """Show one cell."""
+    return context.page(request, "cell.html.j2", session, cell=_cell(context, request), spans=tuple(SPANS_S))
+
+
+async def live(context: PageContext, request: Request, session: Session) -> Response | ASGIApp:
+    """Stream what changes: of all cells, or of one with its last tap."""
+    if context.feed.viewers >= MAX_VIEWERS:
+        return JSONResponse({"error": "too many viewers"}, 503)
+    name = request.query_params.get("cell")
+    if name is not None and context.content.find(name) is None:
+        return JSONResponse({"error": "no such cell"}, 404)
+    cells = [name] if name is not None else [facts.name for facts in context.content.cells]
+    token = session.token
+    return EventStream(context.feed, cells, name, lambda: context.sessions.find(token) is not None)
+
+
+async def trend(context: PageContext, request: Request, _: Session) -> Response:
+    """Give the trend of a cell over the last hour, shift or month."""
+    facts, span = _cell(context, request), request.query_params.get("span", "hour")
+    if span not in SPANS_S:
+        return JSONResponse({"error": f"span is one of {', '.join(SPANS_S)}"}, 400)
+    if facts.journal is None:
+        return JSONResponse({"error": "no journal"}, 404)
+    try:
+        columns = await context.past.trend(facts.journal, span)
+    except JournalError:
+        return JSONResponse({"error": "the journal cannot be read now"}, 503)
+    return JSONResponse(_trend_content(columns))
+
+
+def _cell(context: PageContext, request: Request) -> CellFacts:
+    facts = context.content.find(request.path_params["cell"])
+    if facts is None:
+        raise RequestRefusedError(404, "error_not_found")
+    return facts
+
+
+def _trend_content(columns: tuple[TrendColumn, ...]) -> dict[str, Any]:
+    """Give the series of a trend, and where a batch begins."""
+
+    def series(values: list[float | None]) -> list[float | None]:
+        return [None if value is None else number(value) for value in values]
+
+    batches: list[tuple[int, str]] = []
+    for column in columns:
+        if column.batch_id and (not batches or batches[-1][1] != column.batch_id):
+            batches.append((column.time_ns // 1_000_000, column.batch_id))
+    return {
+        "time_ms": [column.time_ns // 1_000_000 for column in columns],
+        "mu_s_low": series([column.mu_s_low for column in columns]),
+        "mu_s_high": series([column.mu_s_high for column in columns]),
+        "level": series([column.level for column in columns]),
+        "level_std": series([column.level_std for column in columns]),
+        "gap": series([column.gap for column in columns]),
+        "batches": batches,
+    }

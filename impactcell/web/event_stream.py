@@ -1,0 +1,101 @@
+"""Server-sent events (HTML Living Standard, 9.2) for one viewer."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from starlette.types import Receive, Scope, Send
+
+from impactcell.web.live_feed import LiveFeed
+
+FRAME_S: Final = 0.25
+"""Shortest time between two frames: fast enough for an eye, and cheap with many cells and viewers."""
+HEARTBEAT_S: Final = 10.0
+"""Without news a comment is sent this often, which also finds out who has gone."""
+STALLED_S: Final = 30.0
+"""A viewer who takes nothing for so long is let go; the browser comes back by itself."""
+MAX_VIEWERS: Final = 100
+"""Streams that are served at once."""
+
+_HEADERS: Final = [
+    (b"content-type", b"text/event-stream; charset=utf-8"),
+    (b"cache-control", b"no-store"),
+]
+
+
+class EventStream:
+    """Sends what changes of some cells until the viewer leaves; an ASGI response.
+
+    Parameters
+    ----------
+    feed : LiveFeed
+    cells : sequence of str
+        Whose cards are sent.
+    detail : str or None
+        The cell whose last tap is sent too.
+    may_go_on : callable
+        Whether the viewer is still logged in.
+    """
+
+    def __init__(
+        self, feed: LiveFeed, cells: Sequence[str], detail: str | None, may_go_on: Callable[[], bool]
+    ) -> None:
+        self._feed = feed
+        self._streams = [("card", cell) for cell in cells] + ([("detail", detail)] if detail else [])
+        self._may_go_on = may_go_on
+        self._sent: dict[tuple[str, str], int] = {}
+
+    async def __call__(self, _scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one viewer."""
+        sending = asyncio.create_task(self._send_all(send), name="page viewer")
+        leaving = asyncio.create_task(_left(receive), name="page viewer leaves")
+        try:
+            await asyncio.wait({sending, leaving}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (sending, leaving):
+                task.cancel()
+            with contextlib.suppress(OSError, TimeoutError):
+                for outcome in await asyncio.gather(sending, leaving, return_exceptions=True):
+                    if isinstance(outcome, Exception):
+                        raise outcome
+
+    async def _send_all(self, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": _HEADERS})
+        changed = self._feed.subscribe()
+        try:
+            while not self._feed.is_closed:
+                body = self._next_frame()
+                if not self._may_go_on():
+                    break
+                await _send(send, body or b": still here\n\n")
+                await asyncio.sleep(FRAME_S)
+                changed.clear()
+                if not self._is_behind():
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(changed.wait(), HEARTBEAT_S)
+            await _send(send, b"event: ended\ndata: {}\n\n", more=False)
+        finally:
+            self._feed.unsubscribe(changed)
+
+    def _is_behind(self) -> bool:
+        return any(self._sent.get(key) != self._feed.version(key[1]) for key in self._streams)
+
+    def _next_frame(self) -> bytes:
+        frames = []
+        for key in self._streams:
+            version = self._feed.version(key[1])
+            if self._sent.get(key) != version:
+                self._sent[key] = version
+                frames.append(self._feed.frame(*key))
+        return b"".join(frames)
+
+
+async def _send(send: Send, body: bytes, *, more: bool = True) -> None:
+    async with asyncio.timeout(STALLED_S):
+        await send({"type": "http.response.body", "body": body, "more_body": more})
+
+
+async def _left(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass

@@ -1,0 +1,105 @@
+"""What the page is told of the cells, and what it asks of the service behind it."""
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+from urllib.parse import urlsplit
+
+from impactcell.records import Alarm, Capture, ModuleStatus, Snapshot
+from impactcell.scada import Actor, ConditionAction
+
+
+class Freshness(enum.Enum):
+    """Whether the values of a cell are of now."""
+
+    LIVE = "live"
+    STALE = "stale"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class CellNews:
+    """One thing that happened in a cell; what is None, or empty, is as it was.
+
+    A capture comes together with the snapshot that was made of it.
+    """
+
+    cell: str
+    snapshot: Snapshot | None = None
+    capture: Capture | None = None
+    status: ModuleStatus | None = None
+    alarms: tuple[Alarm, ...] = ()
+    freshness: Freshness | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CellFacts:
+    """What does not change of a cell while the service runs.
+
+    Attributes
+    ----------
+    name : str
+    module : str
+        Address of its module.
+    endpoint : str
+        Where OPC UA clients find it.
+    journal : Path or None
+        Its journal file.
+    """
+
+    name: str
+    module: str
+    endpoint: str
+    journal: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PageSettings:
+    """How the page is reached and who may look at it.
+
+    Attributes
+    ----------
+    endpoint : str
+        `http://host:port` or `https://host:port`; port 0 takes a free one.
+    users, certificates : Path
+        Users file and directory of certificates, those of OPC UA.
+    certificate, key : Path or None
+        Of the page itself, PEM, for https.
+    """
+
+    endpoint: str
+    users: Path
+    certificates: Path
+    certificate: Path | None = None
+    key: Path | None = None
+
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether it is reached over TLS."""
+        return urlsplit(self.endpoint).scheme == "https"
+
+
+class PageBackend(Protocol):
+    """The service as the page reaches it; a coroutine that raises `RefusedError` has changed nothing."""
+
+    async def log_in(self, name: str, password: str, address: str) -> Actor:
+        """Find out who a password stands for; guessing is slowed down."""
+
+    async def act_on_condition(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
+        """Acknowledge, confirm, comment, shelve or unshelve an alarm, as over OPC UA."""
+
+    async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
+        """Let a client connect whose certificate has been refused."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageContent:
+    """What a page is about: its cells, in the order in which they are shown."""
+
+    cells: Sequence[CellFacts] = field(default_factory=tuple)
+
+    def find(self, name: str) -> CellFacts | None:
+        """Find a cell by name."""
+        return next((cell for cell in self.cells if cell.name == name), None)

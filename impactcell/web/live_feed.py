@@ -1,0 +1,100 @@
+"""From the service's thread to many viewers: news in, frames out, each encoded once.
+
+The service's thread does no more for it than to append to a bounded queue. Viewers who are too slow miss
+frames, never the last state: what changed several times while one was sent is sent once, as it is then.
+"""
+
+import asyncio
+import threading
+from collections import deque
+from collections.abc import Iterable
+
+from impactcell.web.cell_view import CellView
+from impactcell.web.interface import CellNews
+
+WAITING_NEWS = 256
+"""News that may wait for the page's thread; the oldest give way, since the next cycle says all anew."""
+
+
+class LiveFeed:
+    """The cells of a page as they are now.
+
+    `put` may be called from any thread; all else belongs to the thread of the page's event loop.
+    """
+
+    def __init__(self, cells: Iterable[str]) -> None:
+        self.views = {cell: CellView(cell) for cell in cells}
+        self._inbox: deque[CellNews] = deque(maxlen=WAITING_NEWS)
+        self._lock = threading.Lock()
+        self._is_woken = False
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._versions = dict.fromkeys(self.views, 0)
+        self._encoded: dict[tuple[str, str], tuple[int, bytes]] = {}
+        self._changed: set[asyncio.Event] = set()
+        self.is_closed = False
+
+    def start(self) -> None:
+        """Take news from now on, in the event loop that runs."""
+        self._loop = asyncio.get_running_loop()
+        self._take_news()
+
+    def close(self) -> None:
+        """End every viewer's stream."""
+        self.is_closed = True
+        self._loop = None
+        for event in self._changed:
+            event.set()
+
+    def put(self, news: CellNews) -> None:
+        """Hand over what has happened; returns at once."""
+        self._inbox.append(news)
+        with self._lock:
+            loop = self._loop
+            if self._is_woken or loop is None:
+                return
+            self._is_woken = True
+        try:
+            loop.call_soon_threadsafe(self._take_news)
+        except RuntimeError:  # the page has just ended
+            self._loop = None
+
+    def subscribe(self) -> asyncio.Event:
+        """Give an event that is set whenever something changed."""
+        event = asyncio.Event()
+        event.set()
+        self._changed.add(event)
+        return event
+
+    def unsubscribe(self, event: asyncio.Event) -> None:
+        """Forget an event."""
+        self._changed.discard(event)
+
+    @property
+    def viewers(self) -> int:
+        """How many look on."""
+        return len(self._changed)
+
+    def version(self, cell: str) -> int:
+        """Count the changes of a cell."""
+        return self._versions[cell]
+
+    def frame(self, kind: str, cell: str) -> bytes:
+        """Encode a cell, once for all who look at it; `kind` is `card` or `detail`."""
+        version = self._versions[cell]
+        last = self._encoded.get((kind, cell))
+        if last is None or last[0] != version:
+            view = self.views[cell]
+            data = view.card() if kind == "card" else view.detail()
+            last = version, b"event: " + kind.encode() + b"\ndata: " + data + b"\n\n"
+            self._encoded[kind, cell] = last
+        return last[1]
+
+    def _take_news(self) -> None:
+        with self._lock:
+            self._is_woken = False
+        while self._inbox:
+            news = self._inbox.popleft()
+            self.views[news.cell].take(news)
+            self._versions[news.cell] += 1
+        for event in self._changed:
+            event.set()

@@ -1,0 +1,97 @@
+"""What every page is made with: the parts of the application, language, theme and templates."""
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+
+from impactcell import __version__
+from impactcell.scada import Role
+from impactcell.web.interface import PageBackend, PageContent, PageSettings
+from impactcell.web.live_feed import LiveFeed
+from impactcell.web.messages import LANGUAGES, Messages, preferred_language
+from impactcell.web.past import Past
+from impactcell.web.requests import session_of
+from impactcell.web.sessions import Session, SessionTable
+
+STATIC: Final = Path(__file__).parent / "static"
+
+
+def _static_version() -> str:
+    files = sorted(path for path in STATIC.rglob("*") if path.is_file())
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:12]
+
+
+STATIC_VERSION: Final = _static_version()
+"""Part of the address of every static file: another content never has the same address."""
+THEMES: Final = ("auto", "light", "dark")
+"""Colours: as the system says, or as chosen."""
+YEAR_S: Final = 365 * 86_400
+"""How long a browser remembers language and theme."""
+
+
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("impactcell.web"),
+        autoescape=select_autoescape(default=True, default_for_string=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PageContext:
+    """The parts of the application, for those who answer a request."""
+
+    settings: PageSettings
+    content: PageContent
+    feed: LiveFeed
+    sessions: SessionTable
+    backend: PageBackend
+    past: Past
+    _templates: Environment = field(default_factory=_environment)
+
+    def page(
+        self,
+        request: Request,
+        template: str,
+        session: Session | None,
+        /,
+        status: int = 200,
+        **values: object,
+    ) -> Response:
+        """Render a page in the language and the colours of who asks for it."""
+        asked = request.query_params.get("lang")
+        language = preferred_language(
+            asked, request.cookies.get("language"), request.headers.get("accept-language", "")
+        )
+        theme = request.cookies.get("theme", "auto")
+        messages = Messages(language)
+        html = self._templates.get_template(template).render(
+            t=messages,
+            language=language,
+            languages=LANGUAGES,
+            theme=theme if theme in THEMES else "auto",
+            session=session,
+            may_operate=session is not None and session.actor.role >= Role.OPERATOR,
+            may_engineer=session is not None and session.actor.role >= Role.ENGINEER,
+            path=request.url.path,
+            version=__version__,
+            static=f"/static/{STATIC_VERSION}",
+            cells=self.content.cells,
+            **values,
+        )
+        response = HTMLResponse(html, status)
+        if asked is not None and asked in LANGUAGES:
+            response.set_cookie("language", asked, max_age=YEAR_S, samesite="strict", httponly=True)
+        return response
+
+    def error_page(self, request: Request, status: int, reason: str) -> Response:
+        """Say why a request is not carried out."""
+        session = session_of(request, self.sessions)
+        return self.page(request, "error.html.j2", session, status=status, code=status, reason=reason)

@@ -1,0 +1,137 @@
+"""The page's own thread: uvicorn on an event loop that nothing else uses."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+import ssl
+import threading
+from collections.abc import Sequence
+from typing import Final
+from urllib.parse import urlsplit
+
+import uvicorn
+
+from impactcell.errors import SettingsError
+from impactcell.scada.users import Users
+from impactcell.web.app import page_app
+from impactcell.web.interface import CellFacts, PageBackend, PageContent, PageSettings
+from impactcell.web.live_feed import LiveFeed
+from impactcell.web.sessions import SessionTable
+
+_log = logging.getLogger(__name__)
+
+MAX_CONNECTIONS: Final = 250
+"""Connections served at once; those beyond are told to come back."""
+BACKLOG: Final = 128
+"""Connections the system keeps waiting to be taken."""
+KEEP_ALIVE_S: Final = 10
+"""How long a connection without a request stays open."""
+SHUTDOWN_S: Final = 1
+"""How long requests may take to end when the service ends."""
+
+
+class PageServer:
+    """Serves the page from a thread of its own, between `start` and `stop`.
+
+    Parameters
+    ----------
+    settings : PageSettings
+    cells : sequence of CellFacts
+    backend : PageBackend
+        Called from the page's thread; it sees to it that the service's own thread does the work.
+    """
+
+    def __init__(self, settings: PageSettings, cells: Sequence[CellFacts], backend: PageBackend) -> None:
+        self._settings = settings
+        self._content = PageContent(tuple(cells))
+        self._backend = backend
+        self.feed = LiveFeed(cell.name for cell in cells)
+        """Where to put what happens; from any thread, at any time."""
+        self._started = threading.Event()
+        self.endpoint = settings.endpoint
+        """Address of the page, with the port that was taken where the settings ask for a free one."""
+
+    def start(self) -> None:
+        """Listen, and serve from now on.
+
+        Raises
+        ------
+        SettingsError
+            The address cannot be listened on, or certificate and key do not fit.
+        """
+        url = urlsplit(self._settings.endpoint)
+        try:
+            listener = _listen(url.hostname or "127.0.0.1", url.port or 0)
+        except OSError as error:
+            raise SettingsError(
+                f"page: cannot listen on {self._settings.endpoint} ({error.strerror}); "
+                "choose another web.endpoint"
+            ) from error
+        host = url.netloc.rpartition(":")[0]
+        self.endpoint = url._replace(netloc=f"{host}:{listener.getsockname()[1]}").geturl()
+        sessions = SessionTable(Users(self._settings.users))
+        app = page_app(self._settings, self._content, self.feed, sessions, self._backend)
+        certificate, key = self._settings.certificate, self._settings.key
+        config = uvicorn.Config(
+            app,
+            loop="asyncio",
+            http="h11",
+            ws="none",
+            lifespan="off",
+            log_config=None,
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            limit_concurrency=MAX_CONNECTIONS,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            timeout_graceful_shutdown=SHUTDOWN_S,
+            ssl_certfile=certificate,
+            ssl_keyfile=key,
+        )
+        try:
+            config.load()
+        except (OSError, ssl.SSLError) as error:
+            listener.close()
+            raise SettingsError(f"page: {certificate} and {key} cannot be used: {error}") from error
+        self._server = uvicorn.Server(config)
+        self._listener = listener
+        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End every stream and stop listening; returns when it is done."""
+        self._started.wait()
+        with contextlib.suppress(RuntimeError):  # it has ended by itself
+            self._loop.call_soon_threadsafe(self._end)
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except (OSError, RuntimeError):
+            _log.exception("the page has ended; cells and OPC UA go on")
+        finally:
+            self._listener.close()
+
+    async def _serve(self) -> None:
+        self.feed.start()
+        self._loop = asyncio.get_running_loop()
+        self._started.set()
+        try:
+            await self._server.serve(sockets=[self._listener])
+        finally:
+            self.feed.close()
+
+    def _end(self) -> None:
+        """End the streams first: the server waits for them."""
+        self.feed.close()
+        self._server.should_exit = True
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.create_server((host, port), family=family, backlog=BACKLOG)
+    listener.setblocking(False)  # noqa: FBT003 - its only argument
+    return listener

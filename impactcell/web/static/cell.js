@@ -1,0 +1,120 @@
+// One cell in depth: its last tap, its trend, its signature.
+import { Chart } from "./charts.js";
+import { moment } from "./frame.js";
+import { coefficient, follow, number, set, showAlarm, showFriction, showState, texts, withUnit } from "./live.js";
+
+const root = document.querySelector(".cell"), cell = root.dataset.cell;
+const edges = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
+const tapSeries = [...edges, { colour: "curve", width: 1.5 }, { colour: "curve", width: 1.5 }];
+const place = (id) => document.getElementById(id);
+let limit = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
+
+function makeCharts() {
+  return {
+    force: new Chart(place("force"), { unit: "N", xUnit: `${texts.time} / ms`, series: tapSeries }),
+    position: new Chart(place("position"), { unit: "mm", xUnit: `${texts.time} / ms`, series: tapSeries }),
+    signature: new Chart(place("signature"), { unit: "µk", xUnit: `${texts.distance_axis} / mm`, series: [...edges, { colour: "curve", width: 2 }, { colour: "curve", width: 0.5 }, { colour: "curve", width: 0.5 }, { colour: "bad", width: 1.5, dash: [6, 4] }] }),
+    trend: new Chart(place("trend"), { unit: "µs", time: true, series: [...edges, { colour: "curve", width: 2 }] }),
+  };
+}
+
+function showCurve(chart, curve, describe) {
+  if (!curve || !curve.x || !curve.x.length) return chart.clear(texts.not_recorded);
+  const none = curve.x.map(() => null);
+  chart.show([curve.x, curve.usual_low ?? none, curve.usual_high ?? none, curve.low, curve.high]);
+  chart.element.setAttribute("aria-label", describe);
+}
+
+function showDetail(detail) {
+  if (!charts) { waiting = detail; return; }
+  set(root, "usual", detail.usual_taps ? `${texts.compared_with} ${detail.usual_taps}` : "");
+  if (detail.force !== undefined) {
+    showCurve(charts.force, detail.force, place("force").getAttribute("aria-label"));
+    showCurve(charts.position, detail.position, place("position").getAttribute("aria-label"));
+    const s = detail.signature, none = s.x.map(() => null);
+    const edge = (sign) => s.low.map((value, i) => (value === null || s.std[i] === null ? null : value + sign * 2 * s.std[i]));
+    const deviant = detail.deviant?.friction.length === s.x.length ? detail.deviant : null;
+    charts.signature.show([s.x, s.usual_low ?? none, s.usual_high ?? none, s.low, edge(1), edge(-1), deviant?.friction ?? none],
+      deviant ? [{ x: deviant.at, text: `▼ ${texts.cycle} ${deviant.cycle} ${texts.deviates}`, colour: "bad" }] : []);
+  }
+  const table = place("taps");
+  table.hidden = detail.taps.length === 0;
+  table.tBodies[0].replaceChildren(...detail.taps.slice().reverse().map((tap) => {
+    const row = document.createElement("tr");
+    for (const text of [number(tap.cycle, 10), withUnit(tap.velocity, "mm/min"), withUnit(tap.remaining, "mm")]) row.insertCell().textContent = text;
+    return row;
+  }));
+}
+
+function showCard(card) {
+  showState(root, card);
+  const alarm = root.querySelector(".alarm");
+  showAlarm(alarm, card, "");
+  if (card.cycle === undefined) return;
+  limit = card.wear.limit;
+  showFriction(root, card);
+  const values = {
+    cycle_number: number(card.cycle, 10),
+    cycle_time: moment(card.time_ms),
+    batch_offset: card.batch.offset === null ? "" : plusMinus({ value: card.batch.offset, std: card.batch.std }),
+    kinetic_friction: plusMinus(card.mu_k),
+    by_force: plusMinus(card.by_force),
+    by_distance: plusMinus(card.by_distance),
+    estimator: texts[card.estimator],
+    peak_force: withUnit(card.peak_force, "N"),
+    sliding_distance: withUnit(card.sliding_distance, "µm"),
+    velocity: withUnit(card.velocity, "mm/min"),
+    mass: withUnit(card.mass, "kg"),
+    wear_level: plusMinus({ value: card.wear.level, std: card.wear.std }),
+    wear_rate: coefficient(card.wear.rate_per_1000),
+    wear_limit: coefficient(card.wear.limit),
+    last_shift: card.batch.last_shift_cycle ? `${coefficient(card.batch.last_shift)}, ${texts.since_cycle} ${card.batch.last_shift_cycle}` : "–",
+    t_squared: number(card.signature_test.t_squared, 3),
+    spe: number(card.signature_test.spe, 3),
+    signature_reason: card.signature_test.reason,
+    target: card.positioning.target === null ? texts.no_task : withUnit(card.positioning.target, "mm"),
+    remaining: withUnit(card.positioning.remaining, "mm"),
+    next_tap: card.positioning.next_velocity === null ? "–" : `${withUnit(card.positioning.next_velocity, "mm/min")}, ${withUnit(card.positioning.next_stroke, "mm")}`,
+    positioning_reason: card.positioning.reason,
+    model: card.model,
+    gap: number(card.gap, 3),
+    gap_meaning: card.gap === null ? "" : texts[card.gap < 1.5 ? "at_noise" : "above_noise"],
+  };
+  for (const [field, text] of Object.entries(values)) set(root, field, text);
+  root.dataset.cycle = card.cycle;
+  if (Date.now() - lastTrend > { hour: 3e3, shift: 15e3, month: 60e3 }[span]) loadTrend();
+}
+
+const plusMinus = (c) => (c.value === null ? "–" : `${coefficient(c.value)} ± ${c.std === null ? "–" : number(2 * c.std, 2)}`);
+
+async function loadTrend() {
+  if (!charts) return;
+  lastTrend = Date.now();
+  const asked = span;
+  const answer = await fetch(`/cells/${encodeURIComponent(cell)}/trend?span=${asked}`).catch(() => null);
+  if (!answer || asked !== span) return;
+  if (answer.status === 404) return charts.trend.clear(texts.no_past);
+  if (!answer.ok) return;
+  const past = await answer.json();
+  if (!past.time_ms.length) return charts.trend.clear(texts.no_trend);
+  const marks = past.batches.map(([ms, id]) => ({ x: ms / 1e3, text: id, colour: "soft" }));
+  if (limit !== null) marks.push({ y: limit, text: texts.limit, colour: "bad", dashed: true });
+  charts.trend.show([past.time_ms.map((ms) => ms / 1e3), past.mu_s_low, past.mu_s_high, past.level], marks);
+}
+
+for (const button of document.querySelectorAll("[data-span]")) {
+  button.addEventListener("click", () => {
+    span = button.dataset.span;
+    for (const other of document.querySelectorAll("[data-span]")) other.setAttribute("aria-pressed", String(other === button));
+    loadTrend();
+  });
+}
+addEventListener("DOMContentLoaded", start);
+if (document.readyState !== "loading") start();
+function start() {
+  if (charts || !window.uPlot) return;
+  charts = makeCharts();
+  loadTrend();
+  if (waiting) showDetail(waiting);
+}
+follow(`/live?cell=${encodeURIComponent(cell)}`, { card: showCard, detail: showDetail });

@@ -1,0 +1,97 @@
+// Charts: a band, a line on it, and marks; colours are those of the page.
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
+/** Draws vertical marks with a word each, and horizontal dashed lines. */
+function drawMarks(plot, marks) {
+  const { ctx, bbox } = plot, ratio = devicePixelRatio;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  ctx.font = `${12 * ratio}px system-ui, sans-serif`;
+  ctx.lineWidth = 1.5 * ratio;
+  ctx.textAlign = "left";
+  ctx.textBaseline = "alphabetic";
+  let lastEnd = -Infinity;
+  for (const mark of marks) {
+    ctx.strokeStyle = ctx.fillStyle = colour(mark.colour);
+    ctx.setLineDash(mark.dashed ? [6 * ratio, 4 * ratio] : []);
+    ctx.beginPath();
+    if (mark.x !== undefined) {
+      const x = plot.valToPos(mark.x, "x", true);
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      const width = ctx.measureText(mark.text).width;
+      const at = Math.min(x + 4 * ratio, bbox.left + bbox.width - width - 2 * ratio);
+      if (at > lastEnd) { ctx.fillText(mark.text, at, bbox.top + 13 * ratio); lastEnd = at + width; }
+    } else {
+      const y = plot.valToPos(mark.y, "y", true);
+      ctx.moveTo(bbox.left, y);
+      ctx.lineTo(bbox.left + bbox.width, y);
+      const width = ctx.measureText(mark.text).width;
+      ctx.fillText(mark.text, bbox.left + bbox.width - width - 4 * ratio, y + 14 * ratio);
+    }
+    ctx.stroke();
+  }
+  ctx.restore();
+}
+
+/** A chart in an element. `show` takes columns [x, band low, band high, line, ...]; series are described once. */
+export class Chart {
+  constructor(element, { unit, xUnit, time = false, band = [1, 2], series, include = [] }) {
+    Object.assign(this, { element, unit, xUnit, time, band, series, include, marks: [], data: null });
+    this.plot = null;
+    new ResizeObserver(() => this.resize()).observe(element);
+    document.addEventListener("themechange", () => this.rebuild());
+  }
+
+  show(data, marks = []) {
+    this.marks = marks;
+    this.data = data;
+    if (this.plot) this.plot.setData(data);
+    else this.rebuild();
+  }
+
+  clear(text) {
+    this.plot?.destroy();
+    this.plot = this.data = null;
+    this.element.textContent = text;
+  }
+
+  resize() {
+    if (this.plot) this.plot.setSize(this.size());
+  }
+
+  size() {
+    return { width: Math.max(this.element.clientWidth, 200), height: Math.max(this.element.clientHeight, 120) };
+  }
+
+  rebuild() {
+    if (!this.data) return;
+    this.plot?.destroy();
+    this.element.textContent = "";
+    const axis = { stroke: colour("soft"), grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1 }, labelSize: 18, labelFont: "12px system-ui, sans-serif" };
+    const numbers = new Intl.NumberFormat(document.documentElement.lang, { maximumSignificantDigits: 6 });
+    const format = (_, values) => values.map((value) => (value === null ? "" : numbers.format(value)));
+    const range = (plot, low, high) => {
+      const values = [low, high, ...this.marks.map((mark) => mark.y)].filter((value) => Number.isFinite(value));
+      if (!values.length) return [0, 1];
+      const least = Math.min(...values), most = Math.max(...values), room = Math.max(most - least, 1e-9) * 0.08;
+      return [least - room, most + room];
+    };
+    const options = {
+      ...this.size(),
+      scales: { x: { time: this.time }, y: { range } },
+      legend: { show: false },
+      cursor: { drag: { x: true, y: false }, points: { size: 6 } },
+      axes: [{ ...axis, size: this.time ? 44 : 50, ...(this.time ? {} : { label: this.xUnit, values: format }) }, { ...axis, size: 64, label: this.unit, values: format }],
+      series: [{}, ...this.series.map((s) => ({
+        stroke: s.colour ? colour(s.colour) : "transparent", width: s.width ?? 0, dash: s.dash,
+        points: { show: false }, spanGaps: false,
+      }))],
+      bands: this.band ? [{ series: [this.band[1], this.band[0]], fill: colour("band") }] : [],
+      hooks: { draw: [(plot) => drawMarks(plot, this.marks)] },
+    };
+    this.plot = new uPlot(options, this.data, this.element);
+  }
+}

@@ -1,0 +1,25 @@
+// What every page has: the choice of colours, times in the reader's own zone.
+const theme = document.getElementById("theme");
+theme.addEventListener("change", () => {
+  document.cookie = `theme=${theme.value}; path=/; max-age=31536000; samesite=strict`;
+  document.documentElement.dataset.theme = theme.value;
+  document.dispatchEvent(new Event("themechange"));
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => document.dispatchEvent(new Event("themechange")));
+// Choosing a language keeps the rest of the address.
+for (const link of document.querySelectorAll(".languages a")) {
+  const address = new URL(location.href);
+  address.searchParams.set("lang", link.hreflang);
+  link.href = address.pathname + address.search;
+}
+
+const when = new Intl.DateTimeFormat(document.documentElement.lang, { dateStyle: "medium", timeStyle: "medium" });
+export function showTimes(root) {
+  for (const time of root.querySelectorAll("time[data-ms]")) {
+    const date = new Date(Number(time.dataset.ms));
+    time.dateTime = date.toISOString();
+    time.textContent = when.format(date);
+  }
+}
+export const moment = (ms) => when.format(new Date(ms));
+showTimes(document);

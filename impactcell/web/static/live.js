@@ -1,0 +1,103 @@
+// The stream of what changes, and how it is written: numbers in the reader's language, texts never as markup.
+export const texts = JSON.parse(document.getElementById("texts").textContent);
+const language = document.documentElement.lang;
+
+/** A number with so many significant digits; a dash where there is none. */
+export function number(value, digits = 4) {
+  if (value === null || value === undefined) return "–";
+  return new Intl.NumberFormat(language, { maximumSignificantDigits: digits, useGrouping: Math.abs(value) >= 1e4 }).format(value);
+}
+/** A friction coefficient: four decimals, as its scatter asks for. */
+export function coefficient(value) {
+  if (value === null || value === undefined) return "–";
+  return new Intl.NumberFormat(language, { minimumFractionDigits: 4, maximumFractionDigits: 4 }).format(value);
+}
+export const withUnit = (value, unit, digits) => (value === null || value === undefined ? "–" : `${number(value, digits)} ${unit}`);
+
+export function set(root, field, text) {
+  for (const place of root.querySelectorAll(`[data-field="${field}"]`)) if (place.textContent !== text) place.textContent = text;
+}
+
+export function showState(root, card) {
+  const kind = card.freshness === "live" && card.cycle === undefined ? "waiting" : card.freshness;
+  const sign = { live: "●", waiting: "○", stale: "⏱", lost: "✕" }[kind];
+  for (const place of root.querySelectorAll('[data-field="state"]')) {
+    place.className = `state ${{ live: "good", waiting: "plain", stale: "warn", lost: "bad" }[kind]}`;
+    place.textContent = `${sign} ${texts[kind]}`;
+    place.title = card.link.reason;
+  }
+}
+
+export function cyclesLeft(wear) {
+  if (wear.level !== null && wear.limit !== null && wear.level > wear.limit) return texts.passed;
+  if (wear.cycles === null) return texts.not_reached;
+  const range = wear.cycles_low === null ? "" : ` (${texts.from} ${number(wear.cycles_low, 2)}${wear.cycles_high === null ? "" : ` ${texts.to} ${number(wear.cycles_high, 2)}`})`;
+  return `${number(wear.cycles, 2)}${range}`;
+}
+
+export function showFriction(root, card) {
+  set(root, "mu_s", coefficient(card.mu_s.value));
+  set(root, "mu_s_band", card.mu_s.std === null ? "" : `± ${number(2 * card.mu_s.std, 2)}`);
+  set(root, "mu_s_quality", card.mu_s.quality === "good" ? "" : `${texts[card.mu_s.quality]}: ${card.mu_s.reason}`);
+  set(root, "wear", `${coefficient(card.wear.level)} / ${coefficient(card.wear.limit)}`);
+  for (const meter of root.querySelectorAll('[data-field="wear_meter"]')) {
+    Object.assign(meter, { max: card.wear.limit ?? 1, value: card.wear.level ?? 0, high: 0.9 * (card.wear.limit ?? 1), optimum: 0 });
+  }
+  set(root, "cycles_left", cyclesLeft(card.wear));
+  set(root, "batch", card.batch.id || "–");
+}
+
+/** The alarm that matters most: open before over, then the latest. */
+export function lastAlarm(card) {
+  const told = card.alarms.filter((alarm) => alarm.time_ms > 0 && alarm.message.en);
+  const rank = (alarm) => (alarm.active ? 2 : 0) + (alarm.acknowledged ? 0 : 1);
+  return told.sort((a, b) => rank(b) - rank(a) || b.time_ms - a.time_ms)[0];
+}
+export const isOpen = (alarm) => alarm.enabled && alarm.shelved === "unshelved" && (alarm.active || !alarm.acknowledged);
+
+export function evidence(alarm) {
+  const e = alarm.evidence, parts = [];
+  if (e.statistic !== null) parts.push(`${texts.statistic} ${number(e.statistic, 3)}` + (e.threshold === null ? "" : `, ${texts.threshold} ${number(e.threshold, 3)}`));
+  if (e.size !== null) parts.push(`${texts.size} ${number(e.size, 2)}` + (e.size_std === null ? "" : ` ± ${number(e.size_std, 2)}`));
+  if (e.change_cycle) parts.push(`${texts.since_cycle} ${e.change_cycle}`);
+  return parts.join(", ");
+}
+
+export function showAlarm(place, card, emptyText) {
+  const alarm = lastAlarm(card);
+  const open = alarm && isOpen(alarm);
+  place.classList.toggle("is-open", Boolean(open));
+  const lines = alarm ? [`${open ? "▲ " : "○ "}${texts[alarm.name]}${alarm.acknowledged ? "" : ` (${texts.acknowledge})`}: ${alarm.message[language] || alarm.message.en}`, evidence(alarm)] : [emptyText];
+  place.replaceChildren(...lines.filter(Boolean).map((line, index) => {
+    const paragraph = document.createElement("p");
+    if (index) paragraph.className = "help";
+    paragraph.textContent = line;
+    return paragraph;
+  }));
+}
+
+/** Keeps a stream open; the browser reconnects by itself, the end of a session leads to the login. */
+export function follow(address, handlers) {
+  const openAlarms = new Map();
+  const offline = document.getElementById("offline"), count = document.getElementById("open-alarms");
+  const source = new EventSource(address);
+  source.addEventListener("open", () => { offline.hidden = true; });
+  source.addEventListener("error", async () => {
+    offline.hidden = false;
+    const answer = await fetch("/alarms/rows", { redirect: "manual" }).catch(() => null);
+    if (answer && answer.status === 401) location.reload();
+    else if (source.readyState === EventSource.CLOSED) setTimeout(() => location.reload(), 5000);
+  });
+  source.addEventListener("ended", () => { source.close(); setTimeout(() => location.reload(), 1000); });
+  source.addEventListener("card", (event) => {
+    const card = JSON.parse(event.data);
+    openAlarms.set(card.cell, card.alarms.filter(isOpen).length);
+    const total = [...openAlarms.values()].reduce((sum, n) => sum + n, 0);
+    count.hidden = total === 0;
+    count.textContent = total;
+    count.setAttribute("aria-label", `${total} ${total === 1 ? texts.open_one : texts.open_many}`);
+    handlers.card(card);
+  });
+  source.addEventListener("detail", (event) => handlers.detail?.(JSON.parse(event.data)));
+  addEventListener("pagehide", () => source.close());
+}

@@ -1,0 +1,102 @@
+"""The system: links, journals, users, and certificates that wait to be trusted."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from cryptography.x509 import Certificate
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
+
+from impactcell.alarms.rules import journal_fault
+from impactcell.errors import AccessError
+from impactcell.opcua.trust_list import der, read_certificate, thumbprint
+from impactcell.records import ModuleStatus
+from impactcell.scada import RefusedError, Role
+from impactcell.scada.users import User, read_users
+from impactcell.web.interface import CellFacts
+from impactcell.web.page_context import PageContext
+from impactcell.web.requests import RequestRefusedError
+from impactcell.web.sessions import Session
+
+
+@dataclass(frozen=True, slots=True)
+class CellSystem:
+    """What lies under one cell."""
+
+    facts: CellFacts
+    status: ModuleStatus
+    journal_bytes: int
+    journal_fault: str
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedCertificate:
+    """A certificate that somebody tried to connect with."""
+
+    subject: str
+    thumbprint: str
+    valid_until: str
+
+
+async def system(context: PageContext, request: Request, session: Session) -> Response:
+    """Show the system; users and certificates only to engineers."""
+    cells = await context.past.run(lambda: [_cell_system(context, facts) for facts in context.content.cells])
+    users: list[User] = []
+    certificates: list[RefusedCertificate] = []
+    if session.actor.role >= Role.ENGINEER:
+        users = await context.past.run(lambda: _users(context.settings.users))
+        certificates = await context.past.run(lambda: refused_certificates(context.settings.certificates))
+    return context.page(
+        request,
+        "system.html.j2",
+        session,
+        systems=cells,
+        users=users,
+        certificates=certificates,
+        viewers=context.feed.viewers,
+    )
+
+
+async def trust(context: PageContext, _: Request, session: Session, form: dict[str, str]) -> Response:
+    """Trust a certificate that was refused."""
+    try:
+        await context.backend.trust_certificate(form.get("thumbprint", ""), session.actor)
+    except RefusedError as error:
+        raise RequestRefusedError(404, "error_not_found") from error
+    return RedirectResponse("/system", 303)
+
+
+def refused_certificates(pki: Path) -> list[RefusedCertificate]:
+    """List the certificates in `rejected`."""
+    listed = []
+    for path in sorted((pki / "rejected").glob("*")):
+        try:
+            certificate = read_certificate(path)
+        except AccessError:
+            continue
+        listed.append(_refused(certificate))
+    return listed
+
+
+def _refused(certificate: Certificate) -> RefusedCertificate:
+    return RefusedCertificate(
+        certificate.subject.rfc4514_string(),
+        thumbprint(der(certificate)),
+        f"{certificate.not_valid_after_utc:%Y-%m-%d}",
+    )
+
+
+def _users(path: Path) -> list[User]:
+    try:
+        return list(read_users(path).values())
+    except AccessError:
+        return []
+
+
+def _cell_system(context: PageContext, facts: CellFacts) -> CellSystem:
+    view, size = context.feed.views[facts.name], 0
+    if facts.journal is not None:
+        for path in (facts.journal, facts.journal.with_name(facts.journal.name + "-wal")):
+            size += path.stat().st_size if path.exists() else 0
+    fault = view.alarms.get(journal_fault.NAME)
+    return CellSystem(facts, view.status, size, fault.message if fault is not None and fault.active else "")

@@ -1,0 +1,133 @@
+"""A page without a service behind it: the application in this process, asked by a client in this process."""
+
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import httpx
+
+from impactcell.records import Alarm
+from impactcell.scada import Actor, ConditionAction, RefusedError, Role
+from impactcell.scada.conditions import event_id
+from impactcell.scada.users import User, Users, write_users
+from impactcell.web.app import page_app
+from impactcell.web.interface import CellFacts, CellNews, PageContent, PageSettings
+from impactcell.web.live_feed import LiveFeed
+from impactcell.web.sessions import SessionTable
+
+ADDRESS = "http://127.0.0.1:8480"
+CELL = "press-1"
+PASSWORD = "right"
+NAMES = {Role.OBSERVER: "olga", Role.OPERATOR: "otto", Role.ENGINEER: "eva"}
+
+
+@dataclass
+class Backend:
+    """Takes what people do and remembers it."""
+
+    users: Path
+    acted: list[tuple[str, str, ConditionAction, Actor]] = field(default_factory=list)
+    trusted: list[str] = field(default_factory=list)
+    logins: list[tuple[str, str]] = field(default_factory=list)
+    refuses: str = ""
+
+    async def log_in(self, name: str, password: str, address: str) -> Actor:
+        self.logins.append((name, address))
+        user = Users(self.users).find(name)
+        if user is None or password != PASSWORD:
+            raise RefusedError("BadUserAccessDenied")
+        return Actor(name, user.role, address)
+
+    async def act_on_condition(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
+        if self.refuses:
+            raise RefusedError(self.refuses)
+        self.acted.append((cell, alarm, action, actor))
+
+    async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
+        if self.refuses:
+            raise RefusedError(self.refuses)
+        self.trusted.append(thumbprint)
+
+
+class Clock:
+    """Seconds that pass when a test says so."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@dataclass
+class Page:
+    """The application with what it stands on."""
+
+    app: object
+    feed: LiveFeed
+    backend: Backend
+    users: Path
+    clock: Clock
+
+    def client(self) -> httpx.AsyncClient:
+        """A browser of its own: nobody is logged in."""
+        return httpx.AsyncClient(transport=httpx.ASGITransport(self.app), base_url=ADDRESS)  # type: ignore[arg-type]
+
+    @asynccontextmanager
+    async def logged_in(self, role: Role) -> AsyncIterator[httpx.AsyncClient]:
+        async with self.client() as client:
+            answer = await log_in(client, NAMES[role], PASSWORD)
+            assert answer.status_code == 303, answer.text
+            yield client
+
+
+def raised(message: str = "friction is off", **changes: object) -> Alarm:
+    return Alarm(
+        "DeviantCycle",
+        active=True,
+        acknowledged=False,
+        message=message,
+        cycle=7,
+        time_ns=10**18,
+        **changes,  # type: ignore[arg-type]
+    )
+
+
+def make_page(directory: Path, journal: Path | None = None) -> Page:
+    users = directory / "users.yaml"
+    write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
+    clock, backend = Clock(), Backend(users)
+    settings = PageSettings(ADDRESS, users, directory / "pki")
+    feed = LiveFeed([CELL])
+    feed.start()
+    facts = CellFacts(CELL, "127.0.0.1:502", "opc.tcp://127.0.0.1:4840", journal)
+    app = page_app(settings, PageContent((facts,)), feed, SessionTable(Users(users), clock), backend)
+    return Page(app, feed, backend, users, clock)
+
+
+async def put(page: Page, news: CellNews) -> None:
+    page.feed.put(news)
+    await asyncio.sleep(0)
+
+
+async def log_in(client: httpx.AsyncClient, user: str, password: str, **fields: str) -> httpx.Response:
+    return await client.post("/login", data={"user": user, "password": password, **fields})
+
+
+async def csrf_of(client: httpx.AsyncClient, path: str = "/") -> str:
+    match = re.search(r'name="csrf" value="([^"]+)"', (await client.get(path)).text)
+    assert match is not None
+    return match[1]
+
+
+def acknowledgement(alarm: Alarm, **fields: str) -> dict[str, str]:
+    return {
+        "cell": CELL,
+        "alarm": alarm.name,
+        "event_id": event_id(CELL, alarm).hex(),
+        "action": "acknowledge",
+        **fields,
+    }

@@ -1,0 +1,302 @@
+"""Who may see and do what on the page: every address, every role, and all that must be refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from impactcell.alarms import EventKind
+from impactcell.scada import Role
+from impactcell.scada.users import User, read_users, write_users
+from impactcell.web.app import ACTIONS, VIEWS, Action, View
+from impactcell.web.interface import CellNews
+from impactcell.web.requests import MAX_FORM_BYTES
+from impactcell.web.security_headers import HEADERS
+from impactcell.web.sessions import IDLE_S, LONGEST_S
+from tests.unit.web.page import (
+    ADDRESS,
+    CELL,
+    NAMES,
+    PASSWORD,
+    Page,
+    acknowledgement,
+    csrf_of,
+    log_in,
+    make_page,
+    put,
+    raised,
+)
+
+SHOWN = [view for view in VIEWS if view.path != "/live"]
+"""The stream does not end by itself: it has tests of its own."""
+
+
+def address(path: str) -> str:
+    return path.replace("{cell}", CELL)
+
+
+@pytest.fixture
+async def page(tmp_path: Path) -> Page:
+    return make_page(tmp_path)
+
+
+@pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.path)
+async def test_nobody_sees_anything_without_a_login(page: Page, view: View) -> None:
+    async with page.client() as client:
+        answer = await client.get(address(view.path))
+    if view.is_page:
+        assert answer.status_code == 303
+        assert answer.headers["location"].startswith("/login?next=")
+    else:
+        assert answer.status_code == 401
+    assert CELL not in answer.text
+
+
+@pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.path)
+async def test_nobody_does_anything_without_a_login(page: Page, action: Action) -> None:
+    async with page.client() as client:
+        answer = await client.post(action.path, data=acknowledgement(raised()))
+    assert answer.status_code == 303
+    assert answer.headers["location"] == "/login"
+    assert not page.backend.acted
+    assert not page.backend.trusted
+
+
+@pytest.mark.parametrize("role", Role, ids=lambda role: role.name)
+@pytest.mark.parametrize("view", SHOWN, ids=lambda view: view.path)
+async def test_each_role_sees_what_it_may(page: Page, view: View, role: Role) -> None:
+    async with page.logged_in(role) as client:
+        answer = await client.get(address(view.path))
+    without_journal = view.path.endswith("/trend")
+    assert answer.status_code == (404 if without_journal else 200 if role >= view.role else 403)
+
+
+@pytest.mark.parametrize("role", Role, ids=lambda role: role.name)
+@pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.path)
+async def test_each_role_does_what_it_may(page: Page, action: Action, role: Role) -> None:
+    async with page.logged_in(role) as client:
+        form = {"csrf": await csrf_of(client), "thumbprint": "AB", **acknowledgement(raised())}
+        answer = await client.post(action.path, data=form)
+    assert answer.status_code == (303 if role >= action.role else 403)
+    assert len(page.backend.acted) == (action.path == "/alarms/act" and role >= Role.OPERATOR)
+    assert len(page.backend.trusted) == (action.path == "/system/trust" and role >= Role.ENGINEER)
+
+
+@pytest.mark.parametrize("token", ["", "guess", None])
+@pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.path)
+async def test_a_form_without_its_token_is_refused(page: Page, action: Action, token: str | None) -> None:
+    form = acknowledgement(raised()) | ({} if token is None else {"csrf": token})
+    async with page.logged_in(Role.ENGINEER) as client:
+        answer = await client.post(action.path, data=form)
+        assert answer.status_code == 403
+        assert (await client.get("/")).status_code == 200
+    assert not page.backend.acted
+    assert not page.backend.trusted
+
+
+async def test_the_token_of_another_session_is_refused(page: Page) -> None:
+    async with page.logged_in(Role.ENGINEER) as one, page.logged_in(Role.OPERATOR) as other:
+        form = {"csrf": await csrf_of(one), **acknowledgement(raised())}
+        assert (await other.post("/alarms/act", data=form)).status_code == 403
+    assert not page.backend.acted
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"origin": "http://elsewhere.example"},
+        {"origin": "null"},
+        {"origin": "http://127.0.0.1:9999"},
+        {"sec-fetch-site": "cross-site"},
+        {"sec-fetch-site": "same-site"},
+    ],
+    ids=str,
+)
+async def test_a_form_from_elsewhere_is_refused(page: Page, headers: dict[str, str]) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        form = {"csrf": await csrf_of(client), **acknowledgement(raised())}
+        assert (await client.post("/alarms/act", data=form, headers=headers)).status_code == 403
+    async with page.client() as client:
+        data = {"user": NAMES[Role.OPERATOR], "password": PASSWORD}
+        answer = await client.post("/login", data=data, headers=headers)
+    assert answer.status_code == 403
+    assert "set-cookie" not in answer.headers
+    assert not page.backend.acted
+
+
+async def test_a_form_of_this_page_is_taken(page: Page) -> None:
+    alarm = raised()
+    headers = {"origin": ADDRESS, "sec-fetch-site": "same-origin"}
+    async with page.logged_in(Role.OPERATOR) as client:
+        form = {"csrf": await csrf_of(client), **acknowledgement(alarm, comment=" looked at ")}
+        answer = await client.post("/alarms/act", data=form, headers=headers)
+    assert answer.headers["location"] == "/alarms"
+    [(cell, name, action, actor)] = page.backend.acted
+    assert (cell, name) == (CELL, alarm.name)
+    assert action.event is EventKind.ACKNOWLEDGE
+    assert action.event_id.hex() == acknowledgement(alarm)["event_id"]
+    assert action.comment == "looked at"
+    assert (actor.user, actor.role) == (NAMES[Role.OPERATOR], Role.OPERATOR)
+
+
+@pytest.mark.parametrize(
+    ("change", "status"),
+    [
+        ({"alarm": "NoSuchAlarm"}, 400),
+        ({"action": "disable"}, 400),
+        ({"event_id": "zz"}, 400),
+        ({"minutes": "long"}, 400),
+        ({"cell": "press-2"}, 404),
+        ({"comment": "x" * MAX_FORM_BYTES}, 413),
+    ],
+    ids=lambda value: str(value)[:30],
+)
+async def test_a_form_that_makes_no_sense_is_refused(page: Page, change: dict[str, str], status: int) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        form = {"csrf": await csrf_of(client), **acknowledgement(raised()), **change}
+        assert (await client.post("/alarms/act", data=form)).status_code == status
+    assert not page.backend.acted
+
+
+@pytest.mark.parametrize(
+    ("content_type", "body", "status"),
+    [
+        ("application/json", b"{}", 415),
+        ("multipart/form-data; boundary=x", b"--x--", 415),
+        ("application/x-www-form-urlencoded", b"\xff\xfe", 400),
+        ("application/x-www-form-urlencoded", b"&".join(b"a=1" for _ in range(100)), 400),
+    ],
+    ids=["json", "multipart", "not-utf-8", "many-fields"],
+)
+async def test_what_is_no_form_is_refused(page: Page, content_type: str, body: bytes, status: int) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        for path in ("/alarms/act", "/login"):
+            answer = await client.post(path, content=body, headers={"content-type": content_type})
+            assert answer.status_code == status
+
+
+async def test_what_the_service_refuses_is_said(page: Page) -> None:
+    page.backend.refuses = "BadConditionBranchAlreadyAcked"
+    async with page.logged_in(Role.OPERATOR) as client:
+        form = {"csrf": await csrf_of(client), **acknowledgement(raised())}
+        answer = await client.post("/alarms/act", data=form)
+        assert answer.headers["location"] == "/alarms?refused=BadConditionBranchAlreadyAcked"
+        assert "BadConditionBranchAlreadyAcked" in (await client.get(answer.headers["location"])).text
+
+
+async def test_wrong_passwords_go_through_the_throttle_of_opc_ua(page: Page) -> None:
+    async with page.client() as client:
+        for user, password in (("eva", "wrong"), ("nobody", PASSWORD), ("", "")):
+            answer = await log_in(client, user, password)
+            assert answer.status_code == 401
+            assert "set-cookie" not in answer.headers
+    assert page.backend.logins == [("eva", "127.0.0.1"), ("nobody", "127.0.0.1"), ("", "127.0.0.1")]
+
+
+async def test_the_cookie_is_for_this_page_alone(page: Page) -> None:
+    async with page.client() as client:
+        cookie = (await log_in(client, "eva", PASSWORD)).headers["set-cookie"]
+    assert cookie.startswith("impactcell_8480=")
+    assert "HttpOnly" in cookie
+    assert "SameSite=strict" in cookie
+
+
+@pytest.mark.parametrize(
+    "after", ["//elsewhere.example", "http://elsewhere.example", "/\\elsewhere", "javascript:x", "/a\nb"]
+)
+async def test_the_login_leads_nowhere_else(page: Page, after: str) -> None:
+    async with page.client() as client:
+        assert (await log_in(client, "eva", PASSWORD, next=after)).headers["location"] == "/"
+
+
+async def test_a_session_that_is_idle_ends(page: Page) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        page.clock.now += IDLE_S
+        assert (await client.get("/")).status_code == 200
+        page.clock.now += IDLE_S + 1
+        assert (await client.get("/")).status_code == 303
+
+
+@pytest.mark.parametrize("role", Role)
+async def test_a_session_in_use_ends_too(page: Page, role: Role) -> None:
+    async with page.logged_in(role) as client:
+        for _ in range(int(LONGEST_S[role] // IDLE_S)):
+            page.clock.now += IDLE_S
+            assert (await client.get("/live?cell=none")).status_code == 404
+        page.clock.now += IDLE_S
+        assert (await client.get("/")).status_code == 303
+
+
+@pytest.mark.parametrize("change", ["removed", "role", "password"])
+async def test_a_session_ends_with_its_user(page: Page, change: str) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        users = read_users(page.users)
+        user = users.pop(NAMES[Role.ENGINEER])
+        if change == "role":
+            users[user.name] = replace(user, role=Role.OBSERVER)
+        elif change == "password":
+            users[user.name] = replace(user, password="another")
+        write_users(page.users, users)
+        assert (await client.get("/system")).status_code == 303
+
+
+async def test_logging_out_ends_the_session(page: Page) -> None:
+    async with page.logged_in(Role.OBSERVER) as client:
+        token = client.cookies["impactcell_8480"]
+        await client.post("/logout", data={"csrf": await csrf_of(client)})
+        client.cookies["impactcell_8480"] = token
+        assert (await client.get("/")).status_code == 303
+
+
+async def test_users_and_certificates_are_shown_to_engineers_only(page: Page) -> None:
+    for role in Role:
+        async with page.logged_in(role) as client:
+            text = (await client.get("/system")).text
+        others = [name for other, name in NAMES.items() if other is not role]
+        assert all((name in text) == (role is Role.ENGINEER) for name in others)
+
+
+async def test_an_observer_is_offered_nothing_to_do(page: Page) -> None:
+    await put(page, CellNews(CELL, alarms=(raised(),)))
+    for role in Role:
+        async with page.logged_in(role) as client:
+            text = (await client.get("/alarms")).text
+        assert "friction is off" in text
+        assert ('action="/alarms/act"' in text) == (role >= Role.OPERATOR)
+
+
+SCRIPT = '"><script>alert(1)</script><img src=x onerror=alert(2)>'
+
+
+async def test_a_script_in_a_name_or_a_comment_is_text(tmp_path: Path) -> None:
+    page = make_page(tmp_path)
+    users = read_users(page.users)
+    write_users(page.users, users | {SCRIPT: User(SCRIPT, Role.ENGINEER, password="x")})
+    await put(page, CellNews(CELL, alarms=(raised(SCRIPT, comment=SCRIPT, user=SCRIPT),)))
+    async with page.client() as client:
+        assert SCRIPT not in (await log_in(client, SCRIPT, "wrong", next=SCRIPT)).text
+        await log_in(client, SCRIPT, PASSWORD)
+        for path in ("/", "/alarms", "/alarms/rows", "/system", f"/alarms?refused={SCRIPT}", f"/{SCRIPT}"):
+            text = (await client.get(path)).text
+            assert "<script>alert" not in text, path
+            assert "<img src=x" not in text, path
+    frame = page.feed.frame("card", CELL)
+    assert frame.count(b"\n") == 3  # an event of one line: nothing in a text ends it
+
+
+@pytest.mark.parametrize("path", ["/login", "/", "/nothing", "/live", "/static/none"])
+async def test_every_answer_has_the_headers(page: Page, path: str) -> None:
+    async with page.client() as client:
+        answer = await client.get(path)
+    assert {name: answer.headers.get(name) for name in HEADERS} == HEADERS
+    assert answer.headers["cache-control"] == "no-store"
+    assert "unsafe" not in HEADERS["content-security-policy"]
+
+
+async def test_other_methods_are_refused(page: Page) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        for view in SHOWN:
+            for method in ("POST", "PUT", "DELETE"):
+                assert (await client.request(method, address(view.path))).status_code == 405
+        for action in ACTIONS:
+            assert (await client.get(action.path)).status_code == 405

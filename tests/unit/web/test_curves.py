@@ -1,0 +1,41 @@
+"""Curves of a screen's width: no peak is lost, and a band is where most curves are."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from impactcell.records import Channel
+from impactcell.web.curves import Curve, decimate, envelope
+
+
+@given(st.integers(1, 5000), st.integers(2, 400), st.integers(0, 2**32 - 1))
+def test_columns_hold_every_sample(count: int, columns: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    values = random.normal(size=count)
+    curve = decimate(Channel(np.arange(count, dtype=float), values), columns)
+    assert len(curve.x) == min(count, columns)
+    assert np.all(np.diff(curve.x) > 0)
+    assert curve.low.min() == values.min()
+    assert curve.high.max() == values.max()
+    assert np.all(curve.low <= curve.high)
+
+
+def test_each_column_is_of_its_own_samples() -> None:
+    curve = decimate(Channel(np.arange(1000.0), np.arange(1000.0)), 10)
+    assert curve.low.tolist() == [100.0 * i for i in range(10)]
+    assert curve.high.tolist() == [100.0 * i + 99.0 for i in range(10)]
+    assert curve.x.tolist() == pytest.approx([100.0 * i + 49.5 for i in range(10)])
+
+
+def test_a_band_is_where_most_curves_are() -> None:
+    x = np.arange(5.0)
+    curves = [
+        Curve(x[:n], np.full(n, level), np.full(n, level + 1)) for n, level in ((5, 0.0), (3, 2.0), (3, 1.0))
+    ]
+    band = envelope(curves, x)
+    assert band is not None
+    assert band.low[:3].tolist() == [0.0] * 3
+    assert band.high[:3].tolist() == [3.0] * 3
+    assert np.isnan(band.low[3:]).all()
+    assert envelope([], x) is None

@@ -1,0 +1,70 @@
+"""One catalogue: every text in every language, every text in use, every use with a text."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import impactcell.web
+from impactcell.alarms import EventKind
+from impactcell.records import Estimator, Quality
+from impactcell.scada import Role
+from impactcell.web.alarm_pages import ACTIONS
+from impactcell.web.messages import CATALOGUE, LANGUAGES, Messages
+from impactcell.web.page_context import THEMES
+from impactcell.web.past import SPANS_S
+from tests.unit.web.page import make_page
+
+ROOM = Path(impactcell.web.__file__).parent
+
+
+def sources(*patterns: str) -> str:
+    return "\n".join(path.read_text() for pattern in patterns for path in ROOM.glob(pattern))
+
+
+def test_every_text_is_there_in_every_language() -> None:
+    for key, texts in CATALOGUE.items():
+        assert len(texts) == len(LANGUAGES), key
+        assert all(text.strip() for text in texts), key
+
+
+def test_every_condition_role_theme_and_span_has_a_name() -> None:
+    messages = Messages("de")
+    for key in (
+        *(role.name.lower() for role in Role),
+        *(f"theme_{theme}" for theme in THEMES),
+        *(f"span_{span}" for span in SPANS_S),
+    ):
+        assert messages[key]
+    assert EventKind.ACKNOWLEDGE in ACTIONS.values()
+
+
+def test_no_text_is_left_over_or_missing() -> None:
+    everything = sources("templates/*.j2", "*.py", "static/*.js")
+    asked = set(re.findall(r't\["(\w+)"\]|t\[\'(\w+)\'\]', sources("templates/*.j2")))
+    assert {a or b for a, b in asked} <= set(CATALOGUE) | {"theme_", "span_"}
+    scripts = sources("static/*.js")
+    assert set(re.findall(r"texts\.(\w+)", scripts)) <= set(Messages("en").for_script())
+    by_name = {
+        *(f"theme_{theme}" for theme in THEMES),
+        *(f"span_{span}" for span in SPANS_S),
+        *(f"live_{quality.name.lower()}" for quality in Quality),
+        *(f"live_{estimator.value}" for estimator in Estimator),
+    }
+    for key in CATALOGUE:
+        word = key.removeprefix("live_")
+        generated = key in by_name
+        uses = len(re.findall(rf"\b{word}\b", everything)) - (word == key)
+        assert generated or uses > 0, f"{key} is not used"
+
+
+@pytest.mark.parametrize(("accepts", "language"), [("de-DE,de;q=0.9", "de"), ("fr", "en"), ("", "en")])
+async def test_the_browser_says_which_language(tmp_path: Path, accepts: str, language: str) -> None:
+    page = make_page(tmp_path)
+    async with page.client() as client:
+        text = (await client.get("/login", headers={"accept-language": accepts})).text
+        assert f'<html lang="{language}"' in text
+        assert Messages(language)["password"] in text
+        assert '<html lang="de"' in (await client.get("/login?lang=de")).text
+        assert '<html lang="de"' in (await client.get("/login")).text  # it remembers
+        assert '<html lang="de"' in (await client.get("/login?lang=xx")).text

@@ -1,0 +1,111 @@
+"""The past on the page: trends from the journal, alarms as files that a spreadsheet may open."""
+
+import csv
+import io
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+from impactcell.journal.store import Journal
+from impactcell.journal.trend import CYCLES_PER_COLUMN, trend
+from impactcell.records import Alarm
+from impactcell.scada import Role
+from impactcell.web.alarm_export import HEADER, to_csv, to_xlsx
+from tests.snapshots import make_capture, make_snapshot
+from tests.unit.web.page import CELL, make_page, raised
+
+SECOND = 10**9
+
+
+def store(path: Path, times_ns: list[int], batches: dict[int, str], alarms: tuple[Alarm, ...] = ()) -> None:
+    """Write cycles whose mu_s is a thousandth of their number."""
+    with Journal(path, CELL) as journal:
+        for number, time_ns in enumerate(times_ns, 1):
+            capture = replace(make_capture(number, samples=10), time_ns=time_ns)
+            snapshot = make_snapshot(capture, mu_s=number / 1e3)
+            batch_id = batches[max(first for first in batches if first <= number)]
+            snapshot = replace(snapshot, batch=replace(snapshot.batch, batch_id=batch_id))
+            journal.append(capture, snapshot, b"", alarms if number == 1 else ())
+
+
+def test_columns_are_what_their_cycles_were(tmp_path: Path) -> None:
+    times = [1000 * SECOND + i * SECOND for i in range(60)]
+    store(tmp_path / "j.sqlite", times, {1: "A", 31: "B"})
+    columns = trend(tmp_path / "j.sqlite", 0, times[-1] + SECOND, 6)
+    assert [column.cycles for column in columns] == [10] * 6
+    assert [column.mu_s_low for column in columns] == pytest.approx([0.001 + 0.01 * i for i in range(6)])
+    assert [column.mu_s_high for column in columns] == pytest.approx([0.010 + 0.01 * i for i in range(6)])
+    assert [column.level for column in columns] == pytest.approx([0.0055 + 0.01 * i for i in range(6)])
+    assert [column.batch_id for column in columns] == ["A"] * 3 + ["B"] * 3
+    assert [column.time_ns for column in columns] == times[::10]
+
+
+def test_empty_stretches_are_left_out_and_full_ones_are_sampled(tmp_path: Path) -> None:
+    times = [SECOND * i for i in range(1, CYCLES_PER_COLUMN + 11)] + [10_000 * SECOND]
+    store(tmp_path / "j.sqlite", times, {1: "A"})
+    columns = trend(tmp_path / "j.sqlite", 0, 10_001 * SECOND, 4)
+    assert trend(tmp_path / "j.sqlite", 20_000 * SECOND, 30_000 * SECOND, 4) == ()
+    assert [column.cycles for column in columns] == [CYCLES_PER_COLUMN, 1]
+
+
+async def test_the_trend_of_a_cell(tmp_path: Path) -> None:
+    now = time.time_ns()
+    store(
+        tmp_path / "j.sqlite",
+        [now - 7200 * SECOND, *(now - i * SECOND for i in (30, 20, 10))],
+        {1: "A", 4: "B"},
+    )
+    page = make_page(tmp_path, tmp_path / "j.sqlite")
+    async with page.logged_in(Role.OBSERVER) as client:
+        hour = (await client.get(f"/cells/{CELL}/trend?span=hour")).json()
+        shift = (await client.get(f"/cells/{CELL}/trend?span=shift")).json()
+        assert (await client.get(f"/cells/{CELL}/trend?span=year")).status_code == 400
+        assert (await client.get("/cells/press-2/trend")).status_code == 404
+    assert hour["mu_s_high"] == pytest.approx([0.002, 0.003, 0.004])
+    assert [batch for _, batch in hour["batches"]] == ["A", "B"]
+    assert shift["mu_s_low"][0] == pytest.approx(0.001)
+
+
+async def test_a_journal_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+    page = make_page(tmp_path, tmp_path / "gone.sqlite")
+    async with page.logged_in(Role.OBSERVER) as client:
+        assert (await client.get(f"/cells/{CELL}/trend")).status_code == 503
+        assert (await client.get("/alarms")).status_code == 200
+        assert (await client.get("/system")).status_code == 200
+
+
+async def test_the_history_is_shown_and_can_be_taken_home(tmp_path: Path) -> None:
+    store(tmp_path / "j.sqlite", [10**18], {1: "A"}, (raised("the reason"), raised("again")))
+    page = make_page(tmp_path, tmp_path / "j.sqlite")
+    async with page.logged_in(Role.OBSERVER) as client:
+        assert "the reason" in (await client.get("/alarms")).text
+        assert (await client.get("/alarms?cell=press-2")).status_code == 404
+        text = await client.get(f"/alarms/history.csv?cell={CELL}")
+        book = await client.get("/alarms/history.xlsx")
+    assert text.headers["content-disposition"] == 'attachment; filename="alarms.csv"'
+    rows = list(csv.DictReader(io.StringIO(text.content.decode("utf-8-sig"))))
+    assert [row["message"] for row in rows] == ["again", "the reason"]
+    assert rows[0]["time_utc"] == "2001-09-09T01:46:40.000Z"
+    sheet = openpyxl.load_workbook(io.BytesIO(book.content)).active
+    assert next([cell.value for cell in row] for row in sheet.iter_rows()) == list(HEADER)
+    assert sheet.max_row == 3
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", '=HYPERLINK("http://x")'])
+def test_no_text_becomes_a_formula(text: str) -> None:
+    history = [(CELL, raised(text, comment=text, user=text))]
+    [row] = list(csv.DictReader(io.StringIO(to_csv(history).decode("utf-8-sig"))))
+    assert row["message"] == row["comment"] == row["user"] == f"'{text}"
+    sheet = openpyxl.load_workbook(io.BytesIO(to_xlsx(history))).active
+    cells = {cell.value: cell.data_type for cell in sheet[2]}
+    assert all(kind != "f" for kind in cells.values())
+    assert text in cells
+
+
+def test_control_characters_do_not_break_a_workbook() -> None:
+    history = [(CELL, Alarm("JournalFault", message="a\x00b\x1bc", time_ns=1))]
+    sheet = openpyxl.load_workbook(io.BytesIO(to_xlsx(history))).active
+    assert sheet[2][HEADER.index("message")].value == "abc"

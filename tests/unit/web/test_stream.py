@@ -1,0 +1,192 @@
+"""The stream: every viewer gets the last state, encoded once, and a slow one holds up nobody."""
+
+import asyncio
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from impactcell.records import ModuleStatus, Snapshot
+from impactcell.scada import Role
+from impactcell.web import event_stream
+from impactcell.web.cell_view import CellView
+from impactcell.web.event_stream import MAX_VIEWERS, EventStream
+from impactcell.web.interface import CellNews
+from impactcell.web.live_feed import WAITING_NEWS, LiveFeed
+from tests.snapshots import make_capture, make_snapshot
+from tests.unit.web.page import CELL, make_page, raised
+
+
+def cycle(number: int) -> Snapshot:
+    return make_snapshot(make_capture(number))
+
+
+class Viewer:
+    """The other end of a stream: reads only what it is allowed to."""
+
+    def __init__(self, feed: LiveFeed, *, detail: str | None = None, reads: int = 10**6) -> None:
+        self.stream = EventStream(feed, [CELL], detail, lambda: self.may_go_on)
+        self.may_go_on = True
+        self.may_read = asyncio.Semaphore(reads)
+        self.bodies: list[bytes] = []
+        self.news = asyncio.Condition()
+        self.left = asyncio.Event()
+        self.task = asyncio.create_task(self.stream({}, self._receive, self._send))
+
+    async def _receive(self) -> dict[str, Any]:
+        await self.left.wait()
+        return {"type": "http.disconnect"}
+
+    async def _send(self, message: Any) -> None:
+        await self.may_read.acquire()
+        async with self.news:
+            if message["type"] == "http.response.body":
+                self.bodies.append(message["body"])
+            self.news.notify_all()
+
+    def events(self, kind: str = "card") -> list[dict[str, Any]]:
+        text = b"".join(self.bodies).decode()
+        blocks = [block.split("\n") for block in text.split("\n\n") if block.startswith(f"event: {kind}\n")]
+        return [json.loads(block[1].removeprefix("data: ")) for block in blocks]
+
+    async def until_cycle(self, number: int) -> None:
+        async with asyncio.timeout(20), self.news:
+            await self.news.wait_for(lambda: any(e.get("cycle") == number for e in self.events()))
+
+    async def leave(self) -> None:
+        self.left.set()
+        await self.task
+
+
+@pytest.fixture(autouse=True)
+def no_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frames follow each other as fast as they are read."""
+    monkeypatch.setattr(event_stream, "FRAME_S", 0.0)
+
+
+@pytest.fixture
+async def feed() -> LiveFeed:
+    feed = LiveFeed([CELL])
+    feed.start()
+    return feed
+
+
+async def test_a_viewer_sees_what_is_and_what_comes(feed: LiveFeed) -> None:
+    feed.put(CellNews(CELL, cycle(1), make_capture(1)))
+    viewer = Viewer(feed, detail=CELL)
+    await viewer.until_cycle(1)
+    feed.put(CellNews(CELL, cycle(2), make_capture(2)))
+    await viewer.until_cycle(2)
+    await viewer.leave()
+    assert [event["cycle"] for event in viewer.events()] == [1, 2]
+    assert viewer.events("detail")[-1]["usual_taps"] == 1
+    assert feed.viewers == 0
+
+
+async def test_a_frame_is_encoded_once_for_all(feed: LiveFeed, monkeypatch: pytest.MonkeyPatch) -> None:
+    encoded: list[str] = []
+    card = CellView.card
+    monkeypatch.setattr(CellView, "card", lambda view: (encoded.append(view.cell), card(view))[1])
+    viewers = [Viewer(feed) for _ in range(20)]
+    for number in (1, 2, 3):
+        feed.put(CellNews(CELL, cycle(number)))
+        for viewer in viewers:
+            await viewer.until_cycle(number)
+    for viewer in viewers:
+        await viewer.leave()
+    assert 3 <= len(encoded) <= 4  # the empty card before the first cycle too, if somebody was there in time
+
+
+async def test_a_slow_viewer_misses_frames_and_never_the_last(feed: LiveFeed) -> None:
+    slow, quick = Viewer(feed, reads=1), Viewer(feed)
+    for number in range(1, 101):
+        feed.put(CellNews(CELL, cycle(number)))
+        await quick.until_cycle(number)
+    assert slow.events() == []  # all it took so far is the head of the answer
+    for _ in range(10):
+        slow.may_read.release()
+    await slow.until_cycle(100)
+    assert len(slow.events()) <= 2
+    assert len(quick.events()) >= 100
+    await slow.leave()
+    await quick.leave()
+
+
+async def test_a_viewer_who_takes_nothing_is_let_go(feed: LiveFeed, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(event_stream, "STALLED_S", 0.0)
+    viewer = Viewer(feed, reads=1)
+    async with asyncio.timeout(20):
+        await viewer.task
+    assert feed.viewers == 0
+
+
+async def test_the_stream_ends_with_the_session(feed: LiveFeed) -> None:
+    viewer = Viewer(feed)
+    feed.put(CellNews(CELL, cycle(1)))
+    await viewer.until_cycle(1)
+    viewer.may_go_on = False
+    feed.put(CellNews(CELL, cycle(2)))
+    async with asyncio.timeout(20):
+        await viewer.task
+    assert viewer.events("ended") == [{}]
+    assert [event["cycle"] for event in viewer.events() if "cycle" in event] == [1]
+
+
+async def test_the_stream_ends_with_the_service(feed: LiveFeed) -> None:
+    viewer = Viewer(feed)
+    feed.put(CellNews(CELL, cycle(1)))
+    await viewer.until_cycle(1)
+    feed.close()
+    async with asyncio.timeout(20):
+        await viewer.task
+    feed.put(CellNews(CELL, cycle(2)))  # late news hurt nobody
+
+
+async def test_news_come_from_another_thread_in_their_order(feed: LiveFeed) -> None:
+    viewer = Viewer(feed)
+
+    def produce() -> None:
+        for number in range(1, 201):
+            feed.put(CellNews(CELL, cycle(number), status=ModuleStatus(received=number)))
+
+    thread = threading.Thread(target=produce)
+    thread.start()
+    await viewer.until_cycle(200)
+    thread.join()
+    await viewer.leave()
+    shown = [event["cycle"] for event in viewer.events() if "cycle" in event]
+    assert shown == sorted(set(shown))
+    assert viewer.events()[-1]["link"]["received"] == 200
+
+
+def test_what_waits_is_bounded_and_the_newest_stays() -> None:
+    feed = LiveFeed([CELL])
+    for number in range(1, 3 * WAITING_NEWS):
+        feed.put(CellNews(CELL, status=ModuleStatus(received=number)))
+
+    async def start() -> None:
+        feed.start()
+
+    asyncio.run(start())
+    assert feed.version(CELL) == WAITING_NEWS
+    assert feed.views[CELL].status.received == 3 * WAITING_NEWS - 1
+
+
+async def test_an_alarm_between_cycles_is_shown(feed: LiveFeed) -> None:
+    feed.put(CellNews(CELL, cycle(1)))
+    feed.put(CellNews(CELL, alarms=(raised(),)))
+    await asyncio.sleep(0)
+    card = json.loads(feed.views[CELL].card())
+    [alarm] = [alarm for alarm in card["alarms"] if alarm["active"]]
+    assert alarm["name"] == "DeviantCycle"
+    assert alarm["message"] == {"en": "friction is off", "de": ""}
+
+
+async def test_more_viewers_than_allowed_are_told_so(tmp_path: Path) -> None:
+    page = make_page(tmp_path)
+    for _ in range(MAX_VIEWERS):
+        page.feed.subscribe()
+    async with page.logged_in(Role.OBSERVER) as client:
+        assert (await client.get("/live")).status_code == 503
