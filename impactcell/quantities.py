@@ -53,14 +53,18 @@ class Unit:
     per_si: float = 1.0
 
 
-# Units in use; `per_si` follows from their definition.
 ONE: Final = Unit("C62", "", "one")
 PER_1000: Final = replace(ONE, per_si=1e3)
+"""A rate in 1 per cycle, shown per 1000 cycles."""
 NEWTON: Final = Unit("NEW", "N", "newton")
 MILLIMETRE: Final = Unit("MMT", "mm", "millimetre", 1e3)
+"""1000 to the metre (SI prefix milli)."""
 MICROMETRE: Final = Unit("4H", "µm", "micrometre (micron)", 1e6)
+"""1e6 to the metre (SI prefix micro)."""
 MILLIMETRE_PER_MINUTE: Final = Unit("H81", "mm/min", "millimetre per minute", 60e3)
+"""1000 mm in a metre times 60 s in a minute."""
 MILLISECOND: Final = Unit("C26", "ms", "millisecond", 1e3)
+"""1000 to the second (SI prefix milli)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,8 @@ from impactcell.journal.checksums import CHECKED, SqlValue
 from impactcell.quantities import BY_COLUMN, QUALITY_BY_COLUMN, DataType, Quantity
 from impactcell.records import Capture, Quality, Snapshot
 
-APPLICATION_ID = 0x49435243  # "ICRC"
+APPLICATION_ID = 0x49435243
+"""`PRAGMA application_id` by which a file says that it is a journal: the letters ICRC."""
 FORMAT = 5
 """From 4 on, state, alarms and model say of which format they are; from 5 on, rows have checksums."""
 OLDEST = 3

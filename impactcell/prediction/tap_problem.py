@@ -50,7 +50,7 @@ class Minimum:
     ----------
     theta : ndarray, shape (4,)
     side : int
-    linear : Linear
+    linear : Linearisation
     cost : float
         Half the sum of squares, data and prior.
     converged : bool

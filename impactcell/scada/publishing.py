@@ -29,6 +29,7 @@ _EMPTY: Final[dict[ua.VariantType, object]] = {
     ua.VariantType.String: "",
     ua.VariantType.Boolean: False,
 }
+"""What a variable holds of each type before it has a value."""
 
 
 class CellValues:
