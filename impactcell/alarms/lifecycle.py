@@ -236,7 +236,10 @@ def transition(alarm: Alarm, event: AlarmEvent) -> Transition:
     repeated = event.kind is EventKind.COMMENT or (event.kind is EventKind.REALARM and alarm.active)
     if moved == alarm and not repeated:
         return Transition(alarm)
+    is_raised = moved.active and not moved.acknowledged and (alarm.acknowledged or not alarm.active)
     moved = _described(moved, event)
+    if is_raised:
+        moved = replace(moved, activation=max(event.time_ns, alarm.activation + 1))
     calls = moved.active and not moved.acknowledged and event.kind in (EventKind.ACTIVATE, EventKind.REALARM)
     notifications = (
         (Notification.EVENT, Notification.ANNUNCIATE)

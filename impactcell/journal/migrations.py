@@ -75,8 +75,8 @@ def _under(place: str, rows: Mapping[str, Tree]) -> dict[str, Tree]:
 
 _ALARM_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.records.Alarm`, as "evidence.size": "magnitude"; they hold for the state too."""
-_ALARM_2_ADDED: Final[Mapping[str, Tree]] = {"message_de": ""}
-"""The German message; like those above, they hold for the state too."""
+_ALARM_2_ADDED: Final[Mapping[str, Tree]] = {"message_de": "", "activation": 0}
+"""The German message, which activation it is; like those above, they hold for the state too."""
 _NOISE_2_RENAMED: Final[Mapping[str, str]] = {"belief": "exponent_posterior", "rough": "winsorised_factor"}
 """Of the tracker's scale of the noise, wherever it is kept."""
 _TRACKER_2_RENAMED: Final[Mapping[str, str]] = {

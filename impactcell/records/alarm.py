@@ -51,6 +51,9 @@ class Alarm:
         Of the last activation, for a shift worker: English and German; empty before the first.
     cycle, time_ns : int
         Cycle and time of the last transition.
+    activation : int
+        Tells the last activation from those before: its time, or more where that is not later; 0 before the
+        first.
     comment, user : str
         Of the last action by a person.
     """
@@ -69,6 +72,7 @@ class Alarm:
     message_de: str = ""
     cycle: int = 0
     time_ns: int = 0
+    activation: int = 0
     evidence: Evidence = field(default_factory=Evidence)
     comment: str = ""
     user: str = ""

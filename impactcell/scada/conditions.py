@@ -15,12 +15,11 @@ from impactcell.alarms import RULES, is_retained
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.variable_store import GOOD, VariableStore, moment
 from impactcell.records import Alarm, Shelving
+from impactcell.scada.alarm_events import activation_id, event_id
 from impactcell.scada.cell_nodes import CellSpace
 
 MAX_SHELVE_S: Final = 24 * 3600.0
 """Longest time a condition can be shelved: nobody remembers longer why."""
-KEPT_EVENT_IDS: Final = 100
-"""EventIds of one condition that an action may name."""
 
 _LT: Final = ua.VariantType.LocalizedText
 _SHELVING: Final[dict[Shelving, tuple[str, int]]] = {
@@ -46,11 +45,6 @@ _TOLD_WHEN_DISABLED: Final = frozenset(
 _DISABLED: Final = ua.StatusCode(ua.StatusCodes.BadConditionDisabled)
 
 
-def event_id(cell: str, alarm: Alarm) -> bytes:
-    """EventId of the event that told this state: the same state has the same id, also after a restart."""
-    return hashlib.sha256(f"{cell}\0{alarm!r}".encode()).digest()[:16]
-
-
 def unshelve_ms(alarm: Alarm) -> float:
     """Milliseconds until a shelving ends: 0 where there is none, the longest where nothing ends it."""
     if alarm.shelving is Shelving.UNSHELVED:
@@ -61,7 +55,7 @@ def unshelve_ms(alarm: Alarm) -> float:
 
 
 class Condition:
-    """One condition: its present state, its nodes, and the EventIds a client may act on."""
+    """One condition: its present state, its nodes, and the last event that told of it."""
 
     def __init__(
         self, cell: CellSpace, name: str, values: VariableStore, notifiers: frozenset[ua.NodeId]
@@ -74,12 +68,13 @@ class Condition:
         self._values = values
         self._notifiers = notifiers
         self._event_type = cell.alarm_type(name)
-        self._event_ids: dict[bytes, None] = {}
+        self._event_id = event_id(self.cell, self.alarm)
         self._last_severity = 0
+        self._time: datetime | None = None
         input_path = RULES[name].input_node
         self._input = cell.path(input_path) if input_path else ua.NodeId()
         cell.compute(f"{name}/ShelvingState/UnshelveTime", self._unshelve_time)
-        self._write_nodes(self.alarm)
+        self._write_nodes()
 
     def _unshelve_time(self) -> ua.DataValue:
         now = datetime.now(UTC)
@@ -87,50 +82,55 @@ class Condition:
         return ua.DataValue(variant, GOOD if self.alarm.enabled else _DISABLED, now, now)
 
     def update(self, alarm: Alarm) -> EventNotification | None:
-        """Take a new state; the event that tells it, None where nothing has changed."""
+        """Take a new state; the event that tells it, None where there is nothing to tell."""
         if alarm is self.alarm:  # as it is from cycle to cycle, nearly always
             return None
-        new = event_id(self.cell, alarm)
-        if new == event_id(self.cell, self.alarm):
+        before, self.alarm = self.alarm, alarm
+        told = event_id(self.cell, alarm)
+        if told == self._event_id:
             return None
-        if alarm.active and not alarm.acknowledged and (self.alarm.acknowledged or not self.alarm.active):
-            # A newly raised alarm: what was acknowledged before cannot stand for it.
-            self._event_ids.clear()
-        self._last_severity = self.alarm.severity
-        self.alarm = alarm
-        self._event_ids[new] = None
-        while len(self._event_ids) > KEPT_EVENT_IDS:
-            del self._event_ids[next(iter(self._event_ids))]
-        self._write_nodes(alarm)
-        return self.event(alarm)
+        is_transition = (alarm.time_ns, alarm.cycle) != (before.time_ns, before.cycle)
+        self._event_id, self._last_severity = told, before.severity
+        self._time = None if is_transition else datetime.now(UTC)
+        self._write_nodes()
+        return self._event(alarm, before.severity, self._time)
 
-    def is_current_event(self, event_id: bytes | None) -> bool:
-        """Whether an EventId was told since the alarm was raised."""
-        return event_id in self._event_ids
+    def is_current_event(self, given: bytes | None) -> bool:
+        """Whether an EventId is of the alarm's present activation."""
+        activation = activation_id(self.cell, self.alarm)
+        return given is not None and given.startswith(activation) and len(given) == len(self._event_id)
 
-    def event(self, alarm: Alarm) -> EventNotification:
-        """Make the event that tells a state."""
-        fields = dict(self._fields(alarm))
+    def past_event(self, alarm: Alarm) -> EventNotification:
+        """Make the event again that told of a transition."""
+        return self._event(alarm, alarm.severity)
+
+    def present(self) -> EventNotification | None:
+        """Make the event of the present state for a refresh; None where it is not to be shown."""
+        if not is_retained(self.alarm):
+            return None
+        return self._event(self.alarm, self._last_severity, self._time)
+
+    def _event(self, alarm: Alarm, last_severity: int, time: datetime | None = None) -> EventNotification:
+        fields = dict(self._fields(alarm, last_severity, time))
         if not alarm.enabled:
             bad = ua.Variant(_DISABLED, ua.VariantType.StatusCode)
             fields = {p: v if not p or p[0] in _TOLD_WHEN_DISABLED else bad for p, v in fields.items()}
         return EventNotification(self._event_type, fields, self._notifiers)
 
-    def present(self) -> EventNotification | None:
-        """Make the event of the present state for a refresh; None where it is not to be shown."""
-        return self.event(self.alarm) if is_retained(self.alarm) else None
-
-    def _write_nodes(self, alarm: Alarm) -> None:
-        time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
-        for path, variant in self._fields(alarm):
+    def _write_nodes(self) -> None:
+        alarm, now = self.alarm, datetime.now(UTC)
+        time_of = _time_of(alarm, self._time)
+        for path, variant in self._fields(alarm, self._last_severity, self._time):
             if not path:
                 continue
             status = GOOD if alarm.enabled or path[0] in _TOLD_WHEN_DISABLED else _DISABLED
             node = self._space.path("/".join((self.name, *path)))
-            self._values.write(node, ua.DataValue(variant, status, time_of, datetime.now(UTC)))
+            self._values.write(node, ua.DataValue(variant, status, time_of, now))
 
-    def _fields(self, alarm: Alarm) -> Iterator[tuple[BrowsePath, ua.Variant]]:
-        time_of = moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC)
+    def _fields(
+        self, alarm: Alarm, last_severity: int, time: datetime | None
+    ) -> Iterator[tuple[BrowsePath, ua.Variant]]:
+        time_of = _time_of(alarm, time)
         yield from _variants(
             {
                 "EventId": (event_id(self.cell, alarm), ua.VariantType.ByteString),
@@ -147,7 +147,7 @@ class Condition:
                 "ClientUserId": (alarm.user, ua.VariantType.String),
                 "Comment": (ua.LocalizedText(alarm.comment), _LT),
                 "Quality": (GOOD, ua.VariantType.StatusCode),
-                "LastSeverity": (self._last_severity, ua.VariantType.UInt16),
+                "LastSeverity": (last_severity, ua.VariantType.UInt16),
                 "InputNode": (self._input, ua.VariantType.NodeId),
                 "MaxTimeShelved": (MAX_SHELVE_S * 1e3, ua.VariantType.Double),
                 "SuppressedOrShelved": (
@@ -187,6 +187,11 @@ class Condition:
         yield ("ShelvingState", "CurrentState"), ua.Variant(ua.LocalizedText(text), _LT)
         yield ("ShelvingState", "CurrentState", "Id"), ua.Variant(ua.NodeId(state), ua.VariantType.NodeId)
         yield ("ShelvingState", "UnshelveTime"), ua.Variant(unshelve_ms(alarm), ua.VariantType.Double)
+
+
+def _time_of(alarm: Alarm, time: datetime | None) -> datetime:
+    """Time of an event: of the transition, unless it tells of something since; now where it is not known."""
+    return time or (moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC))
 
 
 def _variants(fields: dict[str, tuple[Any, ua.VariantType]]) -> Iterator[tuple[BrowsePath, ua.Variant]]:

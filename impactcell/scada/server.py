@@ -204,7 +204,7 @@ class Server:
         )
 
     def _event_of(self, cell: str, alarm: Alarm) -> EventNotification:
-        return self._conditions[cell, alarm.name].event(alarm)
+        return self._conditions[cell, alarm.name].past_event(alarm)
 
 
 def _offer_aggregates(space: AddressSpace) -> None:

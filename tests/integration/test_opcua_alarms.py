@@ -1,0 +1,162 @@
+"""Events of alarms: when one is sent, and for how long its EventId stands for the alarm."""
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from asyncua import Client, ua
+
+from impactcell.alarms import (
+    RULES,
+    AlarmEvent,
+    AlarmSettings,
+    EventKind,
+    Message,
+    RuleResult,
+    apply_event,
+    apply_rule_result,
+    initial_state,
+)
+from impactcell.records import Alarm, Evidence
+from tests.opcua_server import CELL, Site, site
+
+codes = ua.StatusCodes
+
+
+class Events:
+    """Collects the events of a cell."""
+
+    def __init__(self) -> None:
+        self.queue: asyncio.Queue[object] = asyncio.Queue()
+
+    def event_notification(self, event: object) -> None:
+        self.queue.put_nowait(event)
+
+    async def next(self) -> object:
+        return await asyncio.wait_for(self.queue.get(), 20)
+
+
+async def listening(here: Site, client: Client) -> Events:
+    events = Events()
+    subscription = await client.create_subscription(10, events)
+    kind = ua.NodeId(1002, await client.get_namespace_index("urn:impactcell:ua"))
+    await subscription.subscribe_events(
+        await here.node(client, ""), client.get_node(kind), where_clause_generation=False
+    )
+    return events
+
+
+async def act(here: Site, client: Client, method: str, event_id: bytes) -> int:
+    request = ua.CallMethodRequest(
+        ObjectId=(await here.node(client, "WearLimit")).nodeid,
+        MethodId=(await here.node(client, f"WearLimit/{method}")).nodeid,
+        InputArguments=[
+            ua.Variant(event_id, ua.VariantType.ByteString),
+            ua.Variant(ua.LocalizedText("seen")),
+        ],
+    )
+    return (await client.uaclient.call([request]))[0].StatusCode.value
+
+
+async def test_an_alarm_that_stands_sends_no_event_a_cycle() -> None:
+    """Active and acknowledged: only a step of what it watches, and another severity, are told."""
+    wear = RULES["WearLimit"].settings
+    settings = AlarmSettings()
+    state = initial_state(settings)
+
+    def cycle(size: float, number: int) -> Alarm:
+        nonlocal state
+        evidence = Evidence(statistic=0.99, threshold=0.98, size=size, size_std=0.002)
+        result = RuleResult("WearLimit", True, Message(f"by {size}", f"um {size}"), evidence)
+        state = apply_rule_result(settings, state, result, number, number * 10**9)[0]
+        return state.alarm("WearLimit")
+
+    async with site() as here, await here.client("operator") as client:
+        events = await listening(here, client)
+        number = 0
+        while not (alarm := cycle(0.01, number)).active:
+            number += 1
+        here.actions.alarms[CELL, "WearLimit"] = alarm
+        here.server.alarm(CELL, alarm)
+        raised = await events.next()
+        assert await act(here, client, "Acknowledge", raised.EventId) == 0
+        acknowledged = await events.next()
+        state = apply_event(state, "WearLimit", AlarmEvent(EventKind.ACKNOWLEDGE, number, 10**9))[0]
+        state = replace(state, alarms=tuple(_as(here, a) for a in state.alarms))
+        for step in range(24):
+            here.server.alarm(CELL, cycle(0.01 + 0.0001 * (step % 7), number + step))
+        here.server.alarm(CELL, cycle(0.01 + 1.1 * wear.told_step * 0.002, number + 24))
+        step = await events.next()
+        assert step.Size == pytest.approx(0.0122), "one of the 24 cycles was told"
+        assert step.Message.Text == "by 0.0122"
+        assert step.Time > acknowledged.Time
+        here.server.alarm(CELL, replace(state.alarm("WearLimit"), severity=800))
+        severe = await events.next()
+        assert severe.Severity == 800
+        assert len({e.EventId for e in (raised, acknowledged, step, severe)}) == 4
+        assert events.queue.empty()
+        for event in (raised, acknowledged, step):
+            assert await act(here, client, "Confirm", event.EventId) in {
+                0,
+                codes.BadConditionBranchAlreadyConfirmed,
+            }
+
+
+def _as(here: Site, alarm: Alarm) -> Alarm:
+    """The alarm as the server has it after a person's action."""
+    return here.actions.alarms.get((CELL, alarm.name), alarm)
+
+
+async def test_an_event_id_stands_for_its_activation_however_much_came_after() -> None:
+    async with site() as here, await here.client("operator") as client:
+        events = await listening(here, client)
+        here.raise_alarm()
+        first = (await events.next()).EventId
+        for _ in range(150):
+            assert await act(here, client, "AddComment", first) == 0
+        assert await act(here, client, "Acknowledge", first) == 0
+        assert await act(here, client, "Confirm", first) == 0
+
+
+async def test_an_event_id_does_not_stand_for_another_activation() -> None:
+    async with site() as here, await here.client("operator") as client:
+        events = await listening(here, client)
+        here.raise_alarm()
+        first = (await events.next()).EventId
+        here.clear_alarm()
+        cleared = (await events.next()).EventId
+        here.raise_alarm()
+        again = (await events.next()).EventId
+        for old in (first, cleared, bytes(16), b"", again[:8], again + b"x"):
+            assert await act(here, client, "Acknowledge", old) == codes.BadEventIdUnknown, old.hex()
+        assert await act(here, client, "Acknowledge", again) == 0
+
+
+@pytest.mark.parametrize("action", ["Acknowledge", "AddComment"])
+async def test_an_event_id_holds_over_a_restart(tmp_path: Path, action: str) -> None:
+    """Not only the newest: a client that was offline acts on the event it has."""
+    async with site(directory=tmp_path) as here, await here.client("operator") as client:
+        events = await listening(here, client)
+        here.raise_alarm()
+        first = (await events.next()).EventId
+        assert await act(here, client, "AddComment", first) == 0
+        stored = here.actions.of(CELL, "WearLimit")
+    async with site(directory=tmp_path) as here:
+        here.actions.alarms[CELL, "WearLimit"] = stored
+        here.server.alarm(CELL, stored)
+        async with await here.client("operator") as client:
+            assert await act(here, client, action, first) == 0
+
+
+async def test_the_history_tells_the_same_event_ids() -> None:
+    async with site() as here, await here.client("operator") as client:
+        events = await listening(here, client)
+        here.history.transitions[CELL] = [here.raise_alarm(), here.clear_alarm()]
+        live = [(await events.next()).EventId for _ in range(2)]
+        node = await here.node(client, "")
+        past = await node.read_event_history(
+            starttime=ua.win_epoch_to_datetime(1 << 56), numvalues=5,
+            evtypes=client.get_node(ua.ObjectIds.AlarmConditionType),
+        )  # fmt: skip
+        assert [event.EventId for event in past] == live
