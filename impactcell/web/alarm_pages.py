@@ -9,7 +9,7 @@ from impactcell.alarms import RULES, EventKind, is_retained
 from impactcell.errors import JournalError
 from impactcell.records import Alarm, Shelving
 from impactcell.scada import ConditionAction, RefusedError
-from impactcell.scada.conditions import event_id
+from impactcell.scada.alarm_events import event_id
 from impactcell.web.alarm_export import to_csv, to_xlsx
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError

@@ -9,7 +9,7 @@ from typing import Any
 
 from impactcell.quantities import BY_PATH
 from impactcell.records import Alarm, Channel, Coefficient, ModuleStatus, Samples, Snapshot
-from impactcell.scada.conditions import event_id
+from impactcell.scada.alarm_events import event_id
 from impactcell.web.curves import Curve, decimate, envelope
 from impactcell.web.interface import CellNews, Freshness
 
