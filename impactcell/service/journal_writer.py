@@ -88,9 +88,9 @@ class JournalWriter:
                 self.durable = journal.last_cycle_id()
             except JournalDamagedError as error:
                 self._broken = error
-                self.tell(str(error))
+                self.report(str(error))
 
-    def tell(self, event: str) -> None:
+    def report(self, event: str) -> None:
         """Say that something happened to the journal which a person has to know of, also if it is over."""
         self._log.error("%s", event)
         self.fault = event
@@ -139,7 +139,7 @@ class JournalWriter:
                 self.journal.checkpoint()
         except (JournalGoneError, JournalDamagedError) as error:
             self._broken = error
-            self.tell(str(error))
+            self.report(str(error))
         except JournalError as error:
             self.fault = str(error)
 
@@ -166,7 +166,7 @@ class JournalWriter:
                 self.durable = cycle_id or self.durable
             except (JournalGoneError, JournalDamagedError) as error:
                 self._broken = self._broken or error
-                self.tell(str(error))
+                self.report(str(error))
                 return
             except JournalError as error:
                 if error.retry:
@@ -187,7 +187,7 @@ class JournalWriter:
         self._broken = None
         self.durable = journal.last_cycle_id()
         self._saved = self.durable
-        self.tell(
+        self.report(
             f"{journal.path}: the journal is begun anew"
             + (f"; what is damaged was put aside as {aside.name}" if aside is not None else "")
         )

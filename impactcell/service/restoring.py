@@ -54,7 +54,7 @@ def _stored_state(journal: Journal, writer: JournalWriter) -> bytes | None:
         blob = journal.state_backup()
     except JournalDamagedError:
         blob = None
-    writer.tell(
+    writer.report(
         f"{why}; the state of an earlier cycle is used instead"
         if blob is not None
         else f"{why}; wear, batch, signature, and what positioning has learned, begin anew"

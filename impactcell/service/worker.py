@@ -108,7 +108,7 @@ class CellWorker:
 
     def tell_journal_event(self, event: str) -> None:
         """Say what happened to the journal before it was given to this worker."""
-        self._journal_writer.tell(event)
+        self._journal_writer.report(event)
 
     def take_journal_events(self) -> list[str]:
         """Return what happened to the journal since the last call, also if all is well again."""

@@ -13,7 +13,7 @@ from impactcell.scada.alarm_events import event_id
 from impactcell.web.alarm_export import to_csv, to_xlsx
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError
-from impactcell.web.sessions import Session
+from impactcell.web.sessions import BrowserSession
 
 SHOWN_HISTORY: Final = 200
 """Transitions of a cell that the page lists; the files have more."""
@@ -56,7 +56,7 @@ async def _history(context: PageContext, cell: str | None, limit: int) -> list[t
     return sorted(entries, key=lambda entry: -entry[1].time_ns)
 
 
-async def alarms(context: PageContext, request: Request, session: Session) -> Response:
+async def alarms(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show open alarms and the past."""
     cell = _chosen_cell(context, request)
     history = await _history(context, cell, SHOWN_HISTORY)
@@ -71,12 +71,12 @@ async def alarms(context: PageContext, request: Request, session: Session) -> Re
     )
 
 
-async def rows(context: PageContext, request: Request, session: Session) -> Response:
+async def rows(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show the open alarms alone, for a page that brings itself up to date."""
     return context.page(request, "_open_alarms.html.j2", session, open_alarms=_open_alarms(context))
 
 
-async def act(context: PageContext, _: Request, session: Session, form: dict[str, str]) -> Response:
+async def act(context: PageContext, _: Request, session: BrowserSession, form: dict[str, str]) -> Response:
     """Acknowledge, confirm, comment, shelve or unshelve an alarm."""
     try:
         alarm, event = RULES[form.get("alarm", "")].name, ACTIONS[form.get("action", "")]
@@ -97,14 +97,14 @@ async def act(context: PageContext, _: Request, session: Session, form: dict[str
     return RedirectResponse("/alarms", 303)
 
 
-async def history_csv(context: PageContext, request: Request, _: Session) -> Response:
+async def history_csv(context: PageContext, request: Request, _: BrowserSession) -> Response:
     """Give the past as CSV."""
     history = await _history(context, _chosen_cell(context, request), EXPORTED_HISTORY)
     body = await context.past.run(lambda: to_csv(history))
     return _file(body, "text/csv; charset=utf-8", "alarms.csv")
 
 
-async def history_xlsx(context: PageContext, request: Request, _: Session) -> Response:
+async def history_xlsx(context: PageContext, request: Request, _: BrowserSession) -> Response:
     """Give the past as a spreadsheet."""
     history = await _history(context, _chosen_cell(context, request), EXPORTED_HISTORY)
     body = await context.past.run(lambda: to_xlsx(history))

@@ -27,10 +27,10 @@ from impactcell.web.requests import (
     session_of,
 )
 from impactcell.web.security_headers import SecurityHeaders
-from impactcell.web.sessions import Session, SessionTable
+from impactcell.web.sessions import BrowserSession, SessionTable
 
-Show = Callable[[PageContext, Request, Session], Awaitable[Response | ASGIApp]]
-Act = Callable[[PageContext, Request, Session, dict[str, str]], Awaitable[Response]]
+Show = Callable[[PageContext, Request, BrowserSession], Awaitable[Response | ASGIApp]]
+Act = Callable[[PageContext, Request, BrowserSession, dict[str, str]], Awaitable[Response]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,20 +14,20 @@ from impactcell.web.interface import CellFacts
 from impactcell.web.page_context import PageContext
 from impactcell.web.past import SPANS_S
 from impactcell.web.requests import RequestRefusedError
-from impactcell.web.sessions import Session
+from impactcell.web.sessions import BrowserSession
 
 
-async def overview(context: PageContext, request: Request, session: Session) -> Response:
+async def overview(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show a card a cell."""
     return context.page(request, "overview.html.j2", session)
 
 
-async def cell(context: PageContext, request: Request, session: Session) -> Response:
+async def cell(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show one cell."""
     return context.page(request, "cell.html.j2", session, cell=_cell(context, request), spans=tuple(SPANS_S))
 
 
-async def live(context: PageContext, request: Request, session: Session) -> Response | ASGIApp:
+async def live(context: PageContext, request: Request, session: BrowserSession) -> Response | ASGIApp:
     """Stream what changes: of all cells, or of one with its last tap."""
     if context.feed.viewers >= MAX_VIEWERS:
         return JSONResponse({"error": "too many viewers"}, 503)
@@ -39,7 +39,7 @@ async def live(context: PageContext, request: Request, session: Session) -> Resp
     return EventStream(context.feed, cells, name, lambda: context.sessions.find(token) is not None)
 
 
-async def trend(context: PageContext, request: Request, _: Session) -> Response:
+async def trend(context: PageContext, request: Request, _: BrowserSession) -> Response:
     """Give the trend of a cell over the last hour, shift or month."""
     facts, span = _cell(context, request), request.query_params.get("span", "hour")
     if span not in SPANS_S:

@@ -8,7 +8,7 @@ from starlette.responses import RedirectResponse, Response
 from impactcell.scada import RefusedError
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import address_of, cookie_name, local_path, session_of
-from impactcell.web.sessions import Session
+from impactcell.web.sessions import BrowserSession
 
 _log = logging.getLogger(__name__)
 
@@ -44,7 +44,9 @@ async def log_in(context: PageContext, request: Request, form: dict[str, str]) -
     return response
 
 
-async def log_out(context: PageContext, request: Request, session: Session, _: dict[str, str]) -> Response:
+async def log_out(
+    context: PageContext, request: Request, session: BrowserSession, _: dict[str, str]
+) -> Response:
     """End the session."""
     context.sessions.end(session)
     response = RedirectResponse("/login", 303)

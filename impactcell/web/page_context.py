@@ -16,7 +16,7 @@ from impactcell.web.live_feed import LiveFeed
 from impactcell.web.messages import LANGUAGES, Messages, preferred_language
 from impactcell.web.past import Past
 from impactcell.web.requests import session_of
-from impactcell.web.sessions import Session, SessionTable
+from impactcell.web.sessions import BrowserSession, SessionTable
 
 STATIC: Final = Path(__file__).parent / "static"
 
@@ -60,7 +60,7 @@ class PageContext:
         self,
         request: Request,
         template: str,
-        session: Session | None,
+        session: BrowserSession | None,
         /,
         status: int = 200,
         **values: object,

@@ -6,7 +6,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from starlette.requests import Request
 
-from impactcell.web.sessions import Session, SessionTable
+from impactcell.web.sessions import BrowserSession, SessionTable
 
 MAX_FORM_BYTES: Final = 16_384
 """Longest form: a comment, percent-encoded, with room to spare."""
@@ -29,7 +29,7 @@ def cookie_name(request: Request) -> str:
     return f"impactcell_{request.url.port or (443 if request.url.scheme == 'https' else 80)}"
 
 
-def session_of(request: Request, sessions: SessionTable) -> Session | None:
+def session_of(request: Request, sessions: SessionTable) -> BrowserSession | None:
     """Find who asks; None for somebody who is not, or no longer, logged in."""
     token = request.cookies.get(cookie_name(request))
     return None if token is None else sessions.find(token)
@@ -76,7 +76,7 @@ async def read_form(request: Request) -> dict[str, str]:
     return {name: values[-1] for name, values in fields.items()}
 
 
-def check_token(session: Session, form: dict[str, str]) -> None:
+def check_token(session: BrowserSession, form: dict[str, str]) -> None:
     """See that a form was shown to this session.
 
     Raises

@@ -28,7 +28,7 @@ def _token() -> str:
 
 
 @dataclass(slots=True)
-class Session:
+class BrowserSession:
     """One login; `csrf` is part of every form that it is shown."""
 
     actor: Actor
@@ -53,20 +53,20 @@ class SessionTable:
     def __init__(self, users: UserDirectory, clock: Callable[[], float] = time.monotonic) -> None:
         self._users = users
         self._clock = clock
-        self._sessions: dict[str, Session] = {}
+        self._sessions: dict[str, BrowserSession] = {}
 
-    def begin(self, actor: Actor) -> Session:
+    def begin(self, actor: Actor) -> BrowserSession:
         """Begin a session."""
         now = self._clock()
         for token in [t for t, session in self._sessions.items() if self._is_over(session, now)]:
             del self._sessions[token]
         while len(self._sessions) >= MAX_SESSIONS:
             del self._sessions[min(self._sessions, key=lambda token: self._sessions[token].last_seen_s)]
-        session = Session(actor, self._users.find(actor.user), now, now)
+        session = BrowserSession(actor, self._users.find(actor.user), now, now)
         self._sessions[session.token] = session
         return session
 
-    def find(self, token: str) -> Session | None:
+    def find(self, token: str) -> BrowserSession | None:
         """Find a session that is not over, and count it as used."""
         session = self._sessions.get(token)
         if session is None:
@@ -78,10 +78,10 @@ class SessionTable:
         session.last_seen_s = now
         return session
 
-    def end(self, session: Session) -> None:
+    def end(self, session: BrowserSession) -> None:
         """End a session."""
         self._sessions.pop(session.token, None)
 
     @staticmethod
-    def _is_over(session: Session, now: float) -> bool:
+    def _is_over(session: BrowserSession, now: float) -> bool:
         return now - session.last_seen_s > IDLE_S or now - session.created_s > LONGEST_S[session.actor.role]

@@ -16,7 +16,7 @@ from impactcell.scada.users import User, read_users
 from impactcell.web.interface import CellFacts
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError
-from impactcell.web.sessions import Session
+from impactcell.web.sessions import BrowserSession
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class RefusedCertificate:
     valid_until: str
 
 
-async def system(context: PageContext, request: Request, session: Session) -> Response:
+async def system(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show the system; users and certificates only to engineers."""
     cells = await context.past.run(lambda: [_cell_system(context, facts) for facts in context.content.cells])
     users: list[User] = []
@@ -57,7 +57,7 @@ async def system(context: PageContext, request: Request, session: Session) -> Re
     )
 
 
-async def trust(context: PageContext, _: Request, session: Session, form: dict[str, str]) -> Response:
+async def trust(context: PageContext, _: Request, session: BrowserSession, form: dict[str, str]) -> Response:
     """Trust a certificate that was refused."""
     try:
         await context.backend.trust_certificate(form.get("thumbprint", ""), session.actor)
