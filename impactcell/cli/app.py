@@ -60,6 +60,14 @@ def check(cells: Cells) -> None:
 
 
 @verb(app)
+def probe(cell: Cell) -> None:
+    """Look once at a cell's live module: identity, status, and one tap, read as its map says."""
+    from impactcell.cli.probe import probe as run_probe
+
+    run_probe(cell)
+
+
+@verb(app)
 def schema() -> None:
     """Print the JSON Schema of a cell file."""
     from impactcell.settings import schema as cell_schema

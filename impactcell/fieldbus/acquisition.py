@@ -18,6 +18,7 @@ from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_consistent, next_capture
 from impactcell.fieldbus.decoding import StatusBlock
 from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.plausibility import wrong_word_order
 from impactcell.fieldbus.poll_schedule import PollSchedule
 from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
@@ -76,6 +77,7 @@ class ModuleAcquisition:
         self._durable: CycleId | None = None
         self._acknowledged: CycleId | None = None
         self._connections = 0
+        self._order_proved = False
 
     @property
     def status(self) -> ModuleStatus:
@@ -101,7 +103,8 @@ class ModuleAcquisition:
         """Close the connection."""
         self._ready.clear()
         await self._client.close()
-        self._report_link(connected=False, reason=f"{self.cell}: connection closed", level=logging.INFO)
+        level = logging.INFO if self._status.connected else logging.DEBUG
+        self._report_link(connected=False, reason=f"{self.cell}: connection closed", level=level)
 
     async def wait_connected(self) -> None:
         """Wait until the right module answers; `captures` must be running meanwhile."""
@@ -191,12 +194,19 @@ class ModuleAcquisition:
             return None
         return next_capture(last, status.session, status.cycle_counter, status.ring, skip)
 
+    async def connect_once(self) -> StatusBlock:
+        """Connect, check who answers, and read the status block; raises FieldbusError where that fails."""
+        await self._connect()
+        status = await self.read_status()
+        await self._prove_word_order(status)
+        return status
+
     async def _connect(self) -> None:
         """Connect and check who answers."""
         self._ready.clear()
         await self._client.connect()
         await self._identify()
-        self._acknowledged = None
+        self._acknowledged, self._order_proved = None, False
 
     async def _identify(self) -> None:
         """Raise WrongDeviceError unless every register that the map pins shows what it should."""
@@ -220,10 +230,24 @@ class ModuleAcquisition:
                     f"map {self.registers.name} expects {register.expect!r}"
                 )
 
+    async def _prove_word_order(self, status: StatusBlock) -> None:
+        """Raise WrongDeviceError where the module has the other word order: else it would count by 65536."""
+        if self._status_reader.proves_word_order:
+            self._order_proved = True
+        elif status.cycle_counter and status.cycle_counter in status.ring:
+            header = await self.register_client.read_header(status.ring.index(status.cycle_counter))
+            image = self._status_reader.image
+            wrong = None if image is None else wrong_word_order(self.registers, image, header)
+            if wrong is not None:
+                raise WrongDeviceError(f"{self.cell}: {self.link}: {wrong}")
+            self._order_proved = True
+
     async def _poll(self) -> StatusBlock:
         if not self._client.connected:
             await self._connect()
         status = await self.read_status()
+        if not self._order_proved:
+            await self._prove_word_order(status)
         if self._durable != self._acknowledged:
             await self._send_acknowledgement()
         if not self._ready.is_set():

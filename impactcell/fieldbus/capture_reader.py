@@ -8,6 +8,7 @@ there is a CRC to prove the whole.
 
 import asyncio
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,6 +16,7 @@ from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.capture_ring import NextCapture, is_after
 from impactcell.fieldbus.register_client import RegisterClient
+from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import Value, Words, registers_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.fieldbus.taken_cycles import TakenCycles
@@ -64,7 +66,7 @@ class _PartialCapture:
     """A capture as far as it has been read."""
 
     target: NextCapture
-    header: dict[str, Value]
+    header: Mapping[str, Value]
     words: Words
     blocks: dict[str, PartialBlock]
 
@@ -154,14 +156,15 @@ class CaptureReader:
         """Show the slot and read its header, or go on with the reading that was interrupted."""
         client, registers = self._client, self._registers
         if self._partial is not None:
-            _, words = await client.read_header()
+            words = self._words(await client.read_header())
             if words.tobytes() == self._partial.words.tobytes():
                 return self._partial
             self._partial = None
             self.discarded += 1
-        header, words = await client.read_header(target.slot)
-        if header["window_slot"] != target.slot:
-            header, words = await client.read_header()
+        image = await client.read_header(target.slot)
+        if image.values["window_slot"] != target.slot:
+            image = await client.read_header()
+        header, words = image.values, self._words(image)
         if _at_rest(header["window_sequence"]) and header["window_slot"] == target.slot:
             integer, wanted = decoding.integer, target.cycle_id
             shown = CycleId(integer(header["window_session"]), integer(header["window_cycle"]))
@@ -175,6 +178,9 @@ class CaptureReader:
         self._partial = _PartialCapture(target, header, words, blocks)
         self._fewest_missing = self._partial.missing_requests
         return self._partial
+
+    def _words(self, image: RegisterImage) -> Words:
+        return image.words(self._registers["window_sequence"], self._registers.header()[-1].end)
 
     def _identifying(self, words: Words) -> bytes:
         """Words of a header that stay the same while its capture does."""

@@ -5,7 +5,7 @@ left out (nan, None), so that nothing wrong is ever passed on as measured.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +68,8 @@ LIGHTEST_KG, HEAVIEST_KG = 0.01, 1e5
 """What a part can weigh; anything else is a wrong register, and would cost the estimators much time."""
 LATEST_NS = 2**63 - 1
 """The year 2262."""
+OUT_OF_SCALE = 5.0
+"""Factor between the module's own figure and its samples: no tap explains it, every wrong unit exceeds it."""
 
 _BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
 _POSITIONING = STATUS_REGISTERS[7:-1]
@@ -184,6 +186,7 @@ def capture_from_words(
         for name in ("peak_force", "sliding_distance"):
             if not math.isfinite(_number(header[name])):
                 faults.append(f"register {name} ({registers[name].address}): not a number")
+        faults += _scale_faults(registers, summary, channels)
     start = _number(header.get("start_position", 0.0))
     return Capture(
         cycle=integer(header["window_cycle"]),
@@ -200,6 +203,27 @@ def capture_from_words(
         start_m=start,
         summary=summary,
     ), faults
+
+
+def _scale_faults(
+    registers: RegisterMap, summary: Summary, channels: Mapping[str, Channel | None]
+) -> Iterator[str]:
+    """Compare the module's own figures with the samples: a wrong scale or unit puts them far apart."""
+    for name, figure, unit, value in (
+        ("force", "peak_force", "N", summary.peak_force_n),
+        ("position", "sliding_distance", "m", summary.sliding_distance_m),
+    ):
+        channel = channels.get(name)
+        if channel is None or not (math.isfinite(value) and value > 0.0):
+            continue
+        least, most = channel.values.min(), channel.values.max()
+        largest = most if name == "force" else most - least
+        if largest > 0.0 and least != most and not 1.0 / OUT_OF_SCALE < value / largest < OUT_OF_SCALE:
+            where = f"register {figure} ({registers[figure].address})"
+            yield (
+                f"{where}: {value:.3g} {unit}, but the samples of {name} show {largest:.3g} {unit}: "
+                "scale or unit of one of them is wrong in the map"
+            )
 
 
 def _never(_: float) -> bool:

@@ -1,8 +1,7 @@
 """Registers by name, over a client: neighbouring registers are read in as few requests as may be."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Self
+from collections.abc import Iterable, Mapping
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,76 +9,12 @@ from numpy.typing import ArrayLike
 from impactcell.errors import ProtocolError
 from impactcell.fieldbus.codec import MAX_WRITE
 from impactcell.fieldbus.modbus_client import ModbusClient
-from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Words
+from impactcell.fieldbus.register_image import RegisterBlock, RegisterImage, decoded_image, group_registers
+from impactcell.fieldbus.registers import Register, RegisterMap, Words
 from impactcell.fieldbus.request_batching import PartialBlock
 
 _STABLE_READ_ATTEMPTS: Final = 8
 """Readings of a block of several requests until two agree, before it counts as restless."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RegisterBlock:
-    """Neighbouring registers that are read together."""
-
-    table: str
-    address: int
-    count: int
-    fields: tuple[tuple[Register, slice], ...]
-
-    @property
-    def end(self) -> int:
-        """First address after it."""
-        return self.address + self.count
-
-    @classmethod
-    def of(cls, registers: Sequence[Register]) -> Self:
-        """Make the block from the first to the last of `registers`, which are in the order of addresses."""
-        first = registers[0].address
-        fields = tuple((each, slice(each.address - first, each.end - first)) for each in registers)
-        return cls(registers[0].table, first, registers[-1].end - first, fields)
-
-    def decode(self, words: Words) -> dict[str, Value]:
-        """Values in its words, by name."""
-        return {register.name: register.decode(words[where]) for register, where in self.fields}
-
-
-def group_registers(registers: Iterable[Register], max_registers: int) -> tuple[RegisterBlock, ...]:
-    """Group registers into blocks of at most `max_registers`, cut only between values.
-
-    A value that is larger than that is a block of its own.
-    """
-    blocks: list[list[Register]] = []
-    for register in sorted(registers, key=lambda r: (r.table, r.address)):
-        last = blocks[-1] if blocks else None
-        if last and last[0].table == register.table and register.end - last[0].address <= max_registers:
-            last.append(register)
-        else:
-            blocks.append([register])
-    return tuple(RegisterBlock.of(group) for group in blocks)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RegisterImage:
-    """What registers showed when they were read.
-
-    Attributes
-    ----------
-    values : mapping
-        Name to value, in SI.
-    """
-
-    blocks: tuple[RegisterBlock, ...]
-    raw: tuple[bytes, ...]
-    values: Mapping[str, Value]
-
-    def words(self, first: Register, end: int) -> Words:
-        """Words from register `first` up to address `end`, as on the wire; 0 between those that were read."""
-        words = np.zeros(end - first.address, dtype=WIRE)
-        for block, raw in zip(self.blocks, self.raw, strict=True):
-            if block.table == first.table and first.address <= block.address < end:
-                part = np.frombuffer(raw, WIRE)[: end - block.address]
-                words[block.address - first.address :][: part.size] = part
-        return words
 
 
 class RegisterClient:
@@ -104,7 +39,7 @@ class RegisterClient:
                 raw[i] = await self._read_until_stable(block, raw[i])
         image = self._images.get(names)
         if image is None or image.raw != tuple(raw):  # nearly always a poll finds all unchanged
-            image = self._images[names] = _decoded(blocks, raw)
+            image = self._images[names] = decoded_image(blocks, raw)
         return image
 
     def partial_block(self, name: str, values: int) -> PartialBlock:
@@ -118,15 +53,14 @@ class RegisterClient:
         await self.modbus.complete(partial_block)
         return partial_block.words()
 
-    async def read_header(self, slot: int | None = None) -> tuple[dict[str, Value], Words]:
-        """Read the window's header: its values, and its words from `window_sequence` to the first array.
+    async def read_header(self, slot: int | None = None) -> RegisterImage:
+        """Read the window's header, from `window_sequence` to the first array.
 
         With `slot` that is selected right before; a device that is busy meanwhile may still show another.
         """
         select, blocks = self.registers["slot_select"], self._blocks(self._header)
         write = None if slot is None else (select.address, select.encode(slot))
-        image = _decoded(blocks, [words.tobytes() for words in await self._read(blocks, write)])
-        return dict(image.values), image.words(self.registers["window_sequence"], blocks[-1].end)
+        return decoded_image(blocks, [words.tobytes() for words in await self._read(blocks, write)])
 
     async def write_values(self, values: Mapping[str, ArrayLike | str]) -> None:
         """Write registers; neighbours go out in one request, so that the device takes them together."""
@@ -159,13 +93,6 @@ class RegisterClient:
             f"{self.modbus.link}: {block.count} registers from {block.address} "
             "change faster than they can be read"
         )
-
-
-def _decoded(blocks: tuple[RegisterBlock, ...], raw: Sequence[bytes]) -> RegisterImage:
-    values: dict[str, Value] = {}
-    for block, data in zip(blocks, raw, strict=True):
-        values |= block.decode(np.frombuffer(data, WIRE))
-    return RegisterImage(blocks, tuple(raw), values)
 
 
 def _adjacent_runs(registers: list[Register]) -> list[list[Register]]:

@@ -2,10 +2,12 @@
 
 from typing import Final
 
-from impactcell.errors import ProtocolError
+from impactcell.errors import ProtocolError, WrongDeviceError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.decoding import StatusBlock
-from impactcell.fieldbus.register_client import RegisterClient, RegisterImage
+from impactcell.fieldbus.plausibility import wrong_word_order
+from impactcell.fieldbus.register_client import RegisterClient
+from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import registers_crc32
 
 _ATTEMPTS: Final = 8
@@ -36,6 +38,8 @@ class StatusReader:
         ------
         LinkError, ProtocolError, ModbusExceptionError
             If the link fails, the module refuses, or no reading can be proved.
+        WrongDeviceError
+            If it is proved with the other word order.
         """
         before: RegisterImage | None = None
         for _ in range(_ATTEMPTS):
@@ -45,11 +49,23 @@ class StatusReader:
             if self._fits_crc(image) or (before is not None and self._agree(before, image)):
                 self._proved = image, decoding.decode_status(self._registers, image.values)
                 return self._proved[1]
+            if (wrong := wrong_word_order(self._registers, image)) is not None and self._has_crc(image):
+                raise WrongDeviceError(f"{self._client.modbus.link}: {wrong}")
             before = image
         raise ProtocolError(
             f"{self._client.modbus.link}: {_ATTEMPTS} readings of the status block "
             + ("do not fit its CRC" if self._has_crc(image) else "all differ")
         )
+
+    @property
+    def proves_word_order(self) -> bool:
+        """Whether the status block that was read last has a checksum; that shows the order of words, too."""
+        return self._proved is not None and self._has_crc(self._proved[0])
+
+    @property
+    def image(self) -> RegisterImage | None:
+        """What the registers showed, as it was proved last."""
+        return None if self._proved is None else self._proved[0]
 
     def _has_crc(self, image: RegisterImage) -> bool:
         return image.values.get("status_crc32", 0) != 0

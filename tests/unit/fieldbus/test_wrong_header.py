@@ -34,6 +34,7 @@ async def test_every_bit_of_the_header_wrong_once(fpga: RegisterMap) -> None:
         for cycle, (address, bit) in enumerate(bits, 1):
             draw = np.random.default_rng(cycle)
             force, position = draw.normal(0.0, 50.0, 40), draw.normal(0.0, 1e-3, 10)
+            force[7], position[3] = HEADER["peak_force"], HEADER["sliding_distance"]
             device.complete({"force": force, "position": position}, **HEADER)
             seen = flipping(device, address, bit, times=1)
             received = await anext(receptions)

@@ -1,0 +1,93 @@
+"""`impactcell probe`: one look at the live module of a cell."""
+
+import asyncio
+import math
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from impactcell.errors import FieldbusError
+from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.probe import ProbeResult
+from impactcell.fieldbus.probe import probe as probe_module
+from impactcell.fieldbus.transports import transport_for
+from impactcell.process.console import print_result
+from impactcell.records import Capture, Channel
+from impactcell.service.factory import module_link
+from impactcell.settings import read_cell
+
+
+def probe(cell: Path) -> None:
+    """Print identity, status and the newest tap of a cell's module, read as its map says.
+
+    Only the slot that the module's window shows is changed. The service may run meanwhile.
+
+    Raises
+    ------
+    SettingsError
+        The cell cannot be read.
+    FieldbusError
+        The module does not answer, is another one, or shows what its map cannot mean.
+    """
+    config = read_cell(cell)
+    link = module_link(config)
+    module = ModuleAcquisition(config.name, ModbusClient(transport_for(link)), config.register_map)
+    result = asyncio.run(probe_module(module))
+    rows = [("link", f"{link}, {1e3 * result.round_trip_s:.2f} ms a request"), *_rows(result)]
+    print_result("\n".join(f"{name:12}{text}" for name, text in rows))
+    if result.faults:
+        raise FieldbusError("\n".join(result.faults))
+
+
+def _rows(result: ProbeResult) -> Iterator[tuple[str, str]]:
+    status = result.status
+    yield "identity", ", ".join(f"{name} {value}" for name, value in result.identity.items())
+    held = sum(1 for cycle in status.ring if cycle)
+    ring = f"the ring holds {held} of {len(status.ring)}"
+    yield "status", f"{status.state}, session {status.session}, cycle {status.cycle_counter}, {ring}"
+    if status.batch is not None and status.batch.sequence:
+        yield "batch", f"{status.batch.batch_id} announced from cycle {status.batch.from_cycle} on"
+    if status.positioning is not None:
+        part_mm, target_mm = 1e3 * status.positioning.position_m, 1e3 * status.positioning.target_m
+        yield (
+            "positioning",
+            f"{status.positioning.state}, part at {part_mm:.3f} mm, target {target_mm:.3f} mm",
+        )
+    if result.capture is None:
+        yield "tap", "none yet" if not status.cycle_counter else "cannot be read"
+        return
+    yield from _tap_rows(result.capture)
+
+
+def _tap_rows(capture: Capture) -> Iterator[tuple[str, str]]:
+    made = "at no known time"
+    if capture.time_ns:
+        made = f"{datetime.fromtimestamp(1e-9 * capture.time_ns, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    mass, stroke = _or_unknown(capture.mass_kg, "kg"), _or_unknown(1e3 * capture.stroke_m, "mm")
+    how = (
+        f"{6e4 * capture.velocity_m_s:.5g} mm/min, {mass}, stroke {stroke}, direction {capture.direction:+d}"
+    )
+    yield "tap", f"cycle {capture.cycle}, {made}, {how}"
+    summary = capture.summary
+    force, position = capture.force, capture.position
+    if force is None:
+        yield "force", "no samples"
+    else:
+        figure = "" if summary is None else f" (the module says {summary.peak_force_n:.4g} N)"
+        yield "force", f"{_samples(force)}, largest {force.values.max():.4g} N{figure}"
+    if position is None:
+        yield "position", "no samples"
+    else:
+        figure = "" if summary is None else f" (slid {1e3 * summary.sliding_distance_m:.4g} mm, it says)"
+        yield "position", f"{_samples(position)}, moved {1e3 * abs(position.values[-1]):.4g} mm{figure}"
+
+
+def _samples(channel: Channel) -> str:
+    count = len(channel.values)
+    span_s = float(channel.time_s[-1] - channel.time_s[0])
+    return f"{count} samples in {1e3 * span_s:.4g} ms"
+
+
+def _or_unknown(value: float, unit: str) -> str:
+    return f"{value:.5g} {unit}" if math.isfinite(value) else "unknown"

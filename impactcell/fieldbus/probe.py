@@ -1,0 +1,69 @@
+"""One look at a live module: who it is, what it says, and one tap of it; nothing is acknowledged."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
+from impactcell.fieldbus.capture_ring import NextCapture
+from impactcell.fieldbus.decoding import StatusBlock
+from impactcell.fieldbus.registers import Value
+from impactcell.fieldbus.taken_cycles import TakenCycles
+from impactcell.records import Capture, CycleId
+
+IDENTITY: Final = ("module_name", "serial_number", "map_version", "firmware_version")
+"""Registers that say who the module is, where the map has them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProbeResult:
+    """What a module showed.
+
+    Attributes
+    ----------
+    identity : mapping
+        Of `IDENTITY`, by name.
+    status : StatusBlock
+    round_trip_s : float
+        Of the last request.
+    capture : Capture or None
+        The newest cycle; None where there is none yet.
+    faults : tuple of str
+        What is wrong with it; each names cell, cycle and register.
+    """
+
+    identity: Mapping[str, Value]
+    status: StatusBlock
+    round_trip_s: float
+    capture: Capture | None
+    faults: tuple[str, ...]
+
+
+async def probe(module: ModuleAcquisition) -> ProbeResult:
+    """Connect to a module and read its identity, its status block and its newest cycle.
+
+    Raises
+    ------
+    FieldbusError
+        It does not answer, is another module, or has the other word order.
+    """
+    async with module:
+        status = await module.connect_once()
+        identity = (await module.register_client.read_image(IDENTITY)).values
+        capture: Capture | None = None
+        faults: tuple[str, ...] = ()
+        if status.cycle_counter in status.ring and status.cycle_counter:
+            capture, faults = await _newest(module, status)
+        return ProbeResult(identity, status, module.status.round_trip_s, capture, faults)
+
+
+async def _newest(module: ModuleAcquisition, status: StatusBlock) -> tuple[Capture | None, tuple[str, ...]]:
+    counter = status.cycle_counter
+    cycle_id = CycleId(status.session, counter)
+    target = NextCapture(cycle_id, status.ring.index(counter), counter, missed=0, restarted=False)
+    reader = CaptureReader(module.cell, module.register_client)
+    fetched = await reader.fetch(target, TakenCycles(None, 0, module.registers.slots))
+    if isinstance(fetched, NotFetched):
+        return None, (f"{module.cell}: cycle {counter}: {fetched.value}",)
+    return fetched.capture if fetched.readable else None, fetched.faults

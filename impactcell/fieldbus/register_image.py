@@ -1,0 +1,83 @@
+"""What registers showed when they were read: their words, and the values in them. Pure."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from impactcell.fieldbus.registers import WIRE, Register, Value, Words
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegisterBlock:
+    """Neighbouring registers that are read together."""
+
+    table: str
+    address: int
+    count: int
+    fields: tuple[tuple[Register, slice], ...]
+
+    @property
+    def end(self) -> int:
+        """First address after it."""
+        return self.address + self.count
+
+    @classmethod
+    def of(cls, registers: Sequence[Register]) -> Self:
+        """Make the block from the first to the last of `registers`, which are in the order of addresses."""
+        first = registers[0].address
+        fields = tuple((each, slice(each.address - first, each.end - first)) for each in registers)
+        return cls(registers[0].table, first, registers[-1].end - first, fields)
+
+    def decode(self, words: Words) -> dict[str, Value]:
+        """Values in its words, by name."""
+        return {register.name: register.decode(words[where]) for register, where in self.fields}
+
+
+def group_registers(registers: Iterable[Register], max_registers: int) -> tuple[RegisterBlock, ...]:
+    """Group registers into blocks of at most `max_registers`, cut only between values.
+
+    A value that is larger than that is a block of its own.
+    """
+    blocks: list[list[Register]] = []
+    for register in sorted(registers, key=lambda r: (r.table, r.address)):
+        last = blocks[-1] if blocks else None
+        if last and last[0].table == register.table and register.end - last[0].address <= max_registers:
+            last.append(register)
+        else:
+            blocks.append([register])
+    return tuple(RegisterBlock.of(group) for group in blocks)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegisterImage:
+    """What registers showed when they were read.
+
+    Attributes
+    ----------
+    values : mapping
+        Name to value, in SI.
+    """
+
+    blocks: tuple[RegisterBlock, ...]
+    raw: tuple[bytes, ...]
+    values: Mapping[str, Value]
+
+    def words(self, first: Register, end: int) -> Words:
+        """Words from register `first` up to address `end`, as on the wire; 0 between those that were read."""
+        words = np.zeros(end - first.address, dtype=WIRE)
+        for block, raw in zip(self.blocks, self.raw, strict=True):
+            begin, stop = max(first.address, block.address), min(end, block.end)
+            if block.table == first.table and begin < stop:
+                part = np.frombuffer(raw, WIRE)[begin - block.address : stop - block.address]
+                words[begin - first.address : stop - first.address] = part
+        return words
+
+
+def decoded_image(blocks: tuple[RegisterBlock, ...], raw: Sequence[bytes]) -> RegisterImage:
+    """Decode what was read of blocks, block by block."""
+    values: dict[str, Value] = {}
+    for block, data in zip(blocks, raw, strict=True):
+        values |= block.decode(np.frombuffer(data, WIRE))
+    return RegisterImage(blocks, tuple(raw), values)

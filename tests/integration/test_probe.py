@@ -1,0 +1,75 @@
+"""`impactcell probe` looks at a live module. Truth: what the simulator says it did."""
+
+import asyncio
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.integration.processes import CONFIG, ROOT, simulator, write_cell
+
+
+async def probed(cell: Path) -> tuple[int | None, str, str]:
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "impactcell", "probe", str(cell),
+        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, cwd=ROOT,
+    )  # fmt: skip
+    out, err = await process.communicate()
+    return process.returncode, out.decode(), err.decode()
+
+
+async def test_identity_status_and_one_tap_are_shown(tmp_path: Path) -> None:
+    strikes = {"period_s": 0.1, "cycles": 20, "velocities_mm_per_min": [4200.0]}
+    async with simulator(tmp_path, strikes=strikes) as module:
+        cell = write_cell(tmp_path, module["port"])
+        for _ in range(100):
+            code, out, err = await probed(cell)
+            if "cycle 20, the ring holds 16 of 16" in out:
+                break
+    assert (code, err) == (0, "")
+    for said in (
+        "identity    module_name IMPACT-FPGA, serial_number SIM-0001, map_version 1, firmware_version 256",
+        "status      ready, session ",
+        "tap         cycle 20, 20",
+        "4200 mm/min, 18.9 kg, stroke 1.5 mm, direction +1",
+        "force       ",
+        "position    ",
+    ):
+        assert said in out, out
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"word_order": "little"}, "the word order is wrong, with `word_order: big` all of it can be"),
+        ({"device_id": 9}, "device_id 9 is wrong"),
+    ],
+)
+async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object], told: str) -> None:
+    async with simulator(tmp_path, strikes={"period_s": 0.1}) as module:
+        cell = write_cell(tmp_path, module["port"], module=change)
+        code, out, err = await probed(cell)
+    assert (code, out) == (1, "")
+    assert told in err
+
+
+async def test_a_wrong_scale_is_named_beside_the_tap(tmp_path: Path) -> None:
+    text = (CONFIG / "maps" / "fpga-v1.yaml").read_text()
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(text.replace("scale: 0.025, saturation: [-32767, 32767]", "scale: 25.0"))
+    async with simulator(tmp_path, strikes={"period_s": 0.1, "cycles": 1}) as module:
+        cell = write_cell(tmp_path, module["port"], module={"register_map": str(wrong)})
+        for _ in range(100):
+            code, out, err = await probed(cell)
+            if "tap         cycle 1" in out:
+                break
+    assert code == 1
+    assert "scale or unit of one of them is wrong in the map" in err
+
+
+async def test_a_module_that_is_not_there_is_named(tmp_path: Path) -> None:
+    async with simulator(tmp_path, strikes={"period_s": 0.1}) as module:
+        cell = write_cell(tmp_path, module["port"])
+    code, out, err = await probed(cell)
+    assert (code, out) == (1, "")
+    assert "nothing listens there; is the module on, are host and port right?" in err
