@@ -263,6 +263,15 @@ class Messages:
         """Say why an alarm came."""
         return Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
 
+    def number(self, value: float, digits: int) -> str:
+        """Write a number with so many significant digits.
+
+        >>> Messages("de").number(0.1234, 2)
+        '0,12'
+        """
+        text = f"{value:.{digits}g}"
+        return text.replace(".", ",") if self.language == "de" else text
+
     def for_script(self) -> dict[str, str]:
         """Give the texts that the script writes, by their key without `live_`."""
         texts = {key[5:]: texts[self._index] for key, texts in CATALOGUE.items() if key.startswith("live_")}

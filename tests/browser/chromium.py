@@ -1,0 +1,134 @@
+"""Debian's Chromium, driven by its own driver: nothing is downloaded, and it asks nobody outside."""
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from selenium import webdriver
+from selenium.common.exceptions import StaleElementReferenceException, TimeoutException
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+PATIENCE_S = 30.0
+"""A page that does not show what it should by then has failed."""
+DESK, PHONE, WALL = (1280, 900), (390, 844), (3840, 2160)
+"""Widths and heights in pixels."""
+
+
+def need_chromium() -> None:
+    """Skip where there is no Chromium; in CI there has to be one."""
+    if CHROMIUM is None or DRIVER is None:
+        if os.environ.get("IMPACTCELL_CI"):
+            pytest.fail("CI installs chromium and chromium-driver; one of them is missing")
+        pytest.skip("chromium or chromedriver is not installed")
+
+
+@contextlib.contextmanager
+def chromium(profile: Path) -> Iterator["Browser"]:
+    """Start a browser with an empty profile."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = str(CHROMIUM)
+    for flag in (
+        *("headless", "no-sandbox", "disable-gpu", "no-first-run", "disable-background-networking"),
+        *("disable-component-update", "disable-sync", "disable-dev-shm-usage", "hide-scrollbars"),
+        f"user-data-dir={profile}",
+    ):
+        options.add_argument(f"--{flag}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options, webdriver.ChromeService(str(DRIVER)))
+    try:
+        yield Browser(driver)
+    finally:
+        driver.quit()
+
+
+class Browser:
+    """A browser as a person uses it: by what is to be read, and by what can be pressed."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def open(self, address: str) -> None:
+        self.driver.get(address)
+
+    def find(self, css: str) -> Any:
+        """Wait for an element that is shown."""
+        return self.until(lambda: next((e for e in self.all(css) if e.is_displayed()), None), css)
+
+    def all(self, css: str) -> list[Any]:
+        return self.driver.find_elements(By.CSS_SELECTOR, css)
+
+    def until(self, condition: Any, what: str = "") -> Any:
+        """Wait until a condition gives something."""
+        changing = (StaleElementReferenceException,)  # a page that gives way to the next one
+        wait = WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02, ignored_exceptions=changing)
+        try:
+            return wait.until(lambda _: condition())
+        except TimeoutException:
+            pytest.fail(f"{what} is not at {self.driver.current_url}: {self.text}")
+
+    @property
+    def text(self) -> str:
+        return str(self.driver.find_element(By.TAG_NAME, "body").text)
+
+    @property
+    def path(self) -> str:
+        return urlsplit(self.driver.current_url).path
+
+    def log_in(self, user: str, password: str) -> None:
+        """Fill in the login and send it."""
+        for name, value in (("user", user), ("password", password)):
+            field = self.find(f"input[name={name}]")
+            field.clear()
+            field.send_keys(value)
+        self.find("form.login button").click()
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        return self.driver.execute_script(script, *arguments)
+
+    def show_as(self, theme: str, size: tuple[int, int]) -> None:
+        """Choose colours and the size of the window."""
+        width, height = size
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500},
+        )
+        self.driver.execute_cdp_cmd(
+            "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
+        )
+
+    def screenshot(self, file: Path, *, whole: bool = True) -> None:
+        """Take a picture, of the whole page or of the window."""
+        import base64
+
+        height = self.run("return document.documentElement.scrollHeight")
+        width = self.run("return innerWidth")
+        parameters: dict[str, Any] = {"format": "png", "captureBeyondViewport": whole}
+        if whole:
+            parameters["clip"] = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
+        data = self.driver.execute_cdp_cmd("Page.captureScreenshot", parameters)["data"]
+        file.write_bytes(base64.b64decode(data))
+
+    def faults(self) -> list[str]:
+        """Read what the browser complained of since it was asked last."""
+        return [entry["message"] for entry in self.driver.get_log("browser")]
+
+    def traffic(self) -> tuple[set[str], int]:
+        """Read the hosts that were asked, and the bytes that came, since it was asked last."""
+        hosts, length = set(), 0
+        for entry in self.driver.get_log("performance"):
+            message = json.loads(entry["message"])["message"]
+            if message["method"] == "Network.requestWillBeSent":
+                url = urlsplit(message["params"]["request"]["url"])
+                if url.scheme in ("http", "https", "ws", "wss", "ftp"):
+                    hosts.add(url.netloc)
+            elif message["method"] == "Network.loadingFinished":
+                length += int(message["params"]["encodedDataLength"])
+        return hosts, length

@@ -1,0 +1,269 @@
+"""The live page in a real browser: a running service, a simulated module, an OPC UA client beside it."""
+
+import asyncio
+import json
+import os
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+import pytest_asyncio
+from asyncua import Client, ua
+
+from impactcell.records import Snapshot
+from impactcell.scada import Role
+from impactcell.scada.users import User, read_users, with_password, write_users
+from tests.browser.chromium import DESK, PHONE, Browser, chromium, need_chromium
+from tests.integration.processes import simulator, write_cell
+from tests.integration.watched import Watched, serving
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(300), pytest.mark.asyncio(loop_scope="module")]
+
+T = TypeVar("T")
+CELL = "press-1"
+SCRIPT = "<script>document.title='owned'</script>"
+PASSWORDS = {"eva": "engineer-1", "otto": "operator-1", "olga": "observer-1"}
+ROLES = {"eva": Role.ENGINEER, "otto": Role.OPERATOR, "olga": Role.OBSERVER}
+PAGES = {"cells": "/", "cell": f"/cells/{CELL}", "alarms": "/alarms", "system": "/system"}
+AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
+MOST_BYTES = 200_000
+"""What is asked of a page with all that belongs to it."""
+
+
+@dataclass
+class Shop:
+    """A cell that runs, with its page."""
+
+    watched: Watched
+    directory: Path
+
+    @property
+    def page(self) -> str:
+        return self.watched.service.pages[CELL]
+
+    @property
+    def endpoint(self) -> str:
+        return self.watched.service.endpoints[CELL]
+
+    @property
+    def last(self) -> Snapshot:
+        return self.watched.snapshots[CELL][-1]
+
+    async def beside(self, work: Callable[[], T]) -> T:
+        """Let a person do something in a thread, while the service runs on."""
+        return await asyncio.to_thread(work)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
+    need_chromium()
+    directory = tmp_path_factory.mktemp("shop")
+    users = {name: with_password(User(name, role), PASSWORDS[name]) for name, role in ROLES.items()}
+    write_users(directory / "users.yaml", users)
+    scenario = {
+        "strikes": {"period_s": 0.5, "velocities_mm_per_min": [4000]},
+        "wear": {"mu_s_per_1000_cycles": 4.0},
+        "batches": [{"from_cycle": 1, "id": "A"}, {"from_cycle": 12, "id": SCRIPT[:16]}],
+    }
+    async with simulator(directory, **scenario) as module:
+        cell = write_cell(
+            directory,
+            module["port"],
+            CELL,
+            alarms={"wear_limit": 0.21},
+            signature={"learning_cycles": 10},
+            web={"endpoint": "http://127.0.0.1:0"},
+        )
+        async with serving(cell) as watched:
+            await watched.until(CELL, 20)
+            yield Shop(watched, directory)
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    need_chromium()
+    with chromium(tmp_path / "profile") as started:
+        yield started
+
+
+def enter(browser: Browser, shop: Shop, user: str) -> None:
+    browser.open(shop.page)
+    browser.log_in(user, PASSWORDS[user])
+    browser.until(lambda: browser.path == "/", "the cells")
+
+
+async def test_a_cycle_is_seen_within_a_second_of_its_end(shop: Shop, browser: Browser) -> None:
+    await shop.beside(lambda: enter(browser, shop, "olga"))
+    card = f'[data-cell="{CELL}"]'
+    late_s = []
+    for _ in range(5):
+        seen = len(shop.watched.snapshots[CELL])
+        cycle = (await shop.watched.until(CELL, seen + 1))[-1].cycle
+
+        def is_shown(cycle: int = cycle) -> bool:
+            return int(browser.all(card)[0].get_attribute("data-cycle") or 0) >= cycle
+
+        await shop.beside(lambda: browser.until(is_shown, "the cycle"))
+        late_s.append(time.time() - 1e-9 * shop.watched.snapshots[CELL][seen].time_ns)
+    print("seen after, s:", [f"{late:.2f}" for late in late_s])
+    assert min(late_s) < 1.0
+    shown = await shop.beside(lambda: browser.find(f"{card} [data-field=mu_s]").text)
+    assert float(shown) == pytest.approx(shop.last.friction.mu_s.value, abs=0.05)
+
+
+async def test_an_alarm_that_is_acknowledged_here_is_acknowledged_over_opc_ua(
+    shop: Shop, browser: Browser
+) -> None:
+    await shop.watched.alarm(CELL, "WearLimit", active=True)
+    comment = f"seen {SCRIPT}"
+
+    def acknowledge() -> None:
+        enter(browser, shop, "otto")
+        browser.open(f"{shop.page}/alarms")
+        form = f'[data-alarm="{CELL}-WearLimit"] form'
+        browser.find(f"{form} input[name=comment]").send_keys(comment)
+        browser.find(f"{form} button[value=acknowledge]").click()
+        browser.find(f'[data-alarm="{CELL}-WearLimit"] .said')
+
+    client = Client(shop.endpoint)
+    client.set_user("olga")
+    client.set_password(PASSWORDS["olga"])
+    async with client:
+        index = await client.get_namespace_index("urn:impactcell:cells")
+
+        def node(path: str) -> object:
+            return client.get_node(ua.NodeId(f"{CELL}/WearLimit/{path}", index))
+
+        assert not await node("AckedState/Id").read_value()  # type: ignore[attr-defined]
+        await shop.beside(acknowledge)
+        assert await node("AckedState/Id").read_value()  # type: ignore[attr-defined]
+        assert (await node("Comment").read_value()).Text == comment  # type: ignore[attr-defined]
+    text = await shop.beside(lambda: browser.text)
+    assert comment in text
+    assert await shop.beside(lambda: browser.driver.title) == "Alarms · impactcell"
+    journal = await shop.watched.service.running[CELL].worker.query_journal(lambda j: j.audit())
+    assert journal is not None
+    assert [entry.user for entry in journal if entry.action == "acknowledge"] == [
+        "otto (operator) from 127.0.0.1"
+    ]
+
+
+async def test_a_wrong_password_leads_nowhere(shop: Shop, browser: Browser) -> None:
+    def guess() -> str:
+        browser.open(f"{shop.page}/system")
+        browser.log_in("eva", "not-this-one")
+        browser.find("[role=alert]")
+        return browser.path
+
+    assert await shop.beside(guess) == "/login"
+    await shop.beside(lambda: browser.log_in("eva", PASSWORDS["eva"]))
+    await shop.beside(lambda: browser.until(lambda: browser.path == "/system", "where it was going"))
+
+
+async def test_an_observer_sees_all_and_is_offered_nothing(shop: Shop, browser: Browser) -> None:
+    await shop.watched.alarm(CELL, "WearLimit", active=True)
+
+    def look() -> list[object]:
+        enter(browser, shop, "olga")
+        browser.open(f"{shop.page}/alarms")
+        browser.find(f'[data-alarm="{CELL}-WearLimit"]')
+        return browser.all('form[action="/alarms/act"]')
+
+    assert await shop.beside(look) == []
+    token = await shop.beside(lambda: browser.all("input[name=csrf]")[0].get_attribute("value"))
+    script = """
+        const [csrf, cell] = arguments;
+        const body = new URLSearchParams({csrf, cell, alarm: "WearLimit", action: "shelve", minutes: "5"});
+        return fetch("/alarms/act", {method: "POST", body}).then((answer) => answer.status);
+    """
+    assert await shop.beside(lambda: browser.run(script, token, CELL)) == 403
+
+
+async def test_a_session_that_ends_leads_to_the_login(shop: Shop, browser: Browser) -> None:
+    users = read_users(shop.directory / "users.yaml")
+    guest = with_password(User("guest", Role.OBSERVER), "for-a-while")
+    write_users(shop.directory / "users.yaml", {**users, "guest": guest})
+
+    def come() -> None:
+        browser.open(shop.page)
+        browser.log_in("guest", "for-a-while")
+        browser.find(f'[data-cell="{CELL}"][data-cycle]')
+
+    await shop.beside(come)
+    write_users(shop.directory / "users.yaml", users)
+    await shop.beside(lambda: browser.until(lambda: browser.path == "/login", "the login"))
+    assert "The session is over" in await shop.beside(lambda: browser.text)
+
+
+async def test_a_script_in_a_batch_id_is_shown_as_text(shop: Shop, browser: Browser) -> None:
+    def look() -> None:
+        enter(browser, shop, "olga")
+        for path in PAGES.values():
+            browser.open(shop.page + path)
+            browser.find("main")
+            if path in ("/", PAGES["cell"]):
+                browser.until(lambda: SCRIPT[:16] in browser.text, "the batch")
+            assert "owned" not in browser.driver.title
+            assert not browser.run(
+                "return [...document.scripts].some((s) => s.textContent.includes('owned'))"
+            )
+
+    await shop.beside(look)
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+@pytest.mark.parametrize(("theme", "size"), [("light", DESK), ("dark", DESK), ("light", PHONE)], ids=str)
+async def test_every_page(
+    shop: Shop, browser: Browser, tmp_path: Path, language: str, theme: str, size: tuple[int, int]
+) -> None:
+    """Is small, asks nobody else, fits, and has nothing that keeps people from using it."""
+    await shop.watched.alarm(CELL, "WearLimit", active=True)
+    pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
+    suffix = f"{'phone' if size == PHONE else theme}{'' if language == 'en' else f'-{language}'}"
+
+    def look() -> None:
+        browser.show_as(theme, size)
+        browser.open(f"{shop.page}/login?lang={language}")
+        faults = judge(browser, "login", pictures / f"page-login-{suffix}.png", size[0])
+        browser.log_in("eva", PASSWORDS["eva"])
+        browser.until(lambda: browser.path == "/", "the cells")
+        for name, path in PAGES.items():
+            browser.driver.execute_cdp_cmd("Network.clearBrowserCache", {})
+            browser.traffic()
+            browser.open(shop.page + path)
+            if path in ("/", PAGES["cell"]):
+                browser.find(f'[data-cell="{CELL}"][data-cycle]')
+            if name == "cell":
+                browser.until(lambda: len(browser.all("canvas")) == 4, "four charts")
+            opening_s = 1e-3 * browser.run(
+                "return performance.getEntriesByType('navigation')[0].loadEventEnd"
+            )
+            hosts, length = browser.traffic()
+            print(f"{name} {suffix}: opened in {opening_s:.3f} s, {length} bytes")
+            assert hosts == {shop.page.removeprefix("http://")}
+            assert 1_000 < length < MOST_BYTES
+            faults += judge(browser, name, pictures / f"page-{name}-{suffix}.png", size[0])
+        assert not faults, json.dumps(faults, indent=1)
+
+    await shop.beside(look)
+
+
+def judge(browser: Browser, name: str, picture: Path, width: int) -> list[str]:
+    """Take a picture; say what is too wide, what the browser complains of, what axe-core finds serious."""
+    browser.screenshot(picture)
+    faults = [f"{name}: {fault}" for fault in browser.faults()]
+    if browser.run("return Math.max(document.documentElement.scrollWidth, innerWidth)") > width:
+        faults.append(f"{name}: is too wide")
+    if not AXE.is_file():
+        if os.environ.get("IMPACTCELL_CI"):
+            pytest.fail("CI installs axe-core; it is missing")
+        return faults
+    # The policy of the page lets no script in; this one comes in as a debugger's.
+    browser.driver.execute_cdp_cmd("Runtime.evaluate", {"expression": AXE.read_text()})
+    run = "const done = arguments[arguments.length - 1]; axe.run().then((found) => done(found.violations));"
+    violations = browser.driver.execute_async_script(run)
+    serious = [v for v in violations if v["impact"] in ("serious", "critical")]
+    return faults + [f"{name}: {v['id']}: {[node['html'][:160] for node in v['nodes']]}" for v in serious]
