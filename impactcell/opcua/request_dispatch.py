@@ -108,7 +108,7 @@ class RequestDispatcher:
         except StatusCodeError as fault:
             answer = service_fault(handle, fault.code)
         except DecodingError as error:
-            _log.warning("request from %s: %s", connection.address, error)
+            _log.warning("request from %s: %s", connection.address, ascii(str(error))[1:-1])
             answer = service_fault(handle, ua.StatusCodes.BadDecodingError)
         except Exception:  # noqa: BLE001 - a fault of ours in one request must not end the others
             _log.exception("request %s from %s", kind, connection.address)

@@ -214,7 +214,8 @@ class TcpConnection(asyncio.Protocol):
         """Send an Error message and close."""
         if self._transport is not None and not self._transport.is_closing():
             level = logging.INFO if code == ua.StatusCodes.BadServerHalted else logging.WARNING
-            _log.log(level, "connection from %s closed: %s", self.address, reason)
+            # a client's words may stand in the reason: no line break or half character gets into the log
+            _log.log(level, "connection from %s closed: %s", self.address, ascii(reason)[1:-1])
             message = ua.ErrorMessage(ua.StatusCode(code), ua.StatusCode(code).name)
             body = encode(message)
             self._transport.write(HEADER.pack(b"ERR", b"F", HEADER.size + len(body)) + body)

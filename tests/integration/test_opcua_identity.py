@@ -107,7 +107,9 @@ async def test_an_open_request_signed_by_another_key(here: Site, policy: Securit
     assert await refusal_of_opening(client, lambda data: data) == codes.BadSecurityChecksFailed
 
 
-async def test_an_open_request_that_was_changed_on_its_way(here: Site) -> None:
+async def test_an_open_request_that_was_changed_on_its_way(
+    here: Site, caplog: pytest.LogCaptureFixture
+) -> None:
     """Wherever a byte is changed, the connection ends with a code that says what is wrong."""
     rng, found = random.Random(1), set[int]()
 
@@ -124,6 +126,7 @@ async def test_an_open_request_that_was_changed_on_its_way(here: Site) -> None:
         codes.BadCertificateInvalid,
         codes.BadDecodingError,
     }
+    assert caplog.text.isascii()
 
 
 async def refusal_of_opening(client: Client, change: Callable[[bytes], bytes]) -> int:
