@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from impactcell.physics.effect import LawKind
-from impactcell.physics.effects import LIBRARY
+from impactcell.physics.effects import find_effect
 from impactcell.physics.law_table import build_law_table, parameter_vector
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Capture, Samples
@@ -18,7 +18,7 @@ CHORD_SPEED_M_S = 2.0**-4
 
 def acts_on_speed(identifier: str) -> bool:
     """Whether an effect accelerates a free part, friction that changes from place to place apart."""
-    return not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(LIBRARY[identifier].laws)
+    return not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(find_effect(identifier).laws)
 
 
 def model_acceleration(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | None:
@@ -61,7 +61,7 @@ def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
     mass, g, sign = tap.mass_kg, plant.gravity_m_s2, tap.direction
     total = np.zeros(len(speed_m_s))
     for identifier, spans in zip(program.effects, program.parameter_spans, strict=True):
-        laws, p = LIBRARY[identifier].laws, [values[first] for first, _ in spans]
+        laws, p = find_effect(identifier).laws, [values[first] for first, _ in spans]
         body, kinetic = laws.get(LawKind.BODY), laws.get(LawKind.KINETIC)
         if body is not None:
             total += [sign * body(tap.start_m, sign * v, mass, g, p) / mass for v in speed_m_s.tolist()]
@@ -80,7 +80,7 @@ def linear_resistance(plant: Plant) -> float:
     values = parameter_vector(plant, table)
     total = 0.0
     for identifier, spans in zip(table.effects, table.parameter_spans, strict=True):
-        body = LIBRARY[identifier].laws.get(LawKind.BODY)
+        body = find_effect(identifier).laws.get(LawKind.BODY)
         if body is not None:
             p = [values[first] for first, _ in spans]
             force = [body(0.0, v, 1.0, plant.gravity_m_s2, p) for v in (0.0, CHORD_SPEED_M_S)]

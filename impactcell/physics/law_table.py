@@ -10,8 +10,8 @@ import numpy as np
 from impactcell.errors import PhysicsError
 from impactcell.numerics.jit import IntArray, address
 from impactcell.physics import memory_layout as at
-from impactcell.physics.effect import Covariates, Effect, LawKind
-from impactcell.physics.effects import LIBRARY
+from impactcell.physics.effect import Covariates, LawKind
+from impactcell.physics.effects import find_effect
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
@@ -61,7 +61,7 @@ class LawTable:
         parameters[:, at.FIRST_EFFECT_PARAMETER :] = values[:, 4:]
         shots: Covariates | None = None
         for identifier, spans in zip(self.effects, self.parameter_spans, strict=True):
-            effect = LIBRARY[identifier]
+            effect = find_effect(identifier)
             if effect.between is None:
                 continue
             if shots is None:
@@ -127,13 +127,6 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
     )
 
 
-def find_effect(identifier: str) -> Effect:
-    """Look an effect up; raises `PhysicsError` with what there is."""
-    if identifier not in LIBRARY:
-        raise PhysicsError(f"no effect is called {identifier!r}; there are {', '.join(LIBRARY)}")
-    return LIBRARY[identifier]
-
-
 def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Samples:
     """Parameters of `plant` in the order of `program.names`; effects it lacks are at their null value.
 
@@ -145,7 +138,7 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
     values = [plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k]
     for identifier in program.effects:
         given = plant.effects.get(identifier, {})
-        effect = LIBRARY[identifier]
+        effect = find_effect(identifier)
         unknown = set(given) - {parameter.name for parameter in effect.parameters}
         if unknown:
             raise PhysicsError(
@@ -196,7 +189,7 @@ def parameter_range(name: str) -> tuple[float, float, float]:
         typical = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.2, "mu_k": 0.15}[name]
         return 0.0, math.inf, typical
     identifier, rest = name.split(".", 1)
-    for parameter in LIBRARY[identifier].parameters:
+    for parameter in find_effect(identifier).parameters:
         if parameter.name == rest.partition("[")[0]:
             return parameter.lower, parameter.upper, parameter.typical
     raise PhysicsError(f"no parameter is called {name}")

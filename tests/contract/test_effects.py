@@ -19,7 +19,6 @@ from impactcell.physics import (
     Plant,
     TapInput,
     effects,
-    law_table,
     simulate_free_slide,
     simulate_tap,
 )
@@ -246,7 +245,7 @@ def test_a_new_file_is_all_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "misnamed.py").unlink()
     library = effects._discover()
     assert set(library) == {*LIBRARY, "constant_pull"}
-    monkeypatch.setattr(law_table, "LIBRARY", library)
+    monkeypatch.setattr(effects, "LIBRARY", library)
     pulled = Plant(*NOMINAL, effects={"constant_pull": {"pull_n": 5.0}})
     moved = simulate_free_slide(pulled, TapInput(1.0, 18.9), 0.1)
     assert moved.displacement_m == pytest.approx(0.1**2 / 2.0 / (0.152 * 9.81 - 5.0 / 18.9), rel=1e-9)

@@ -1,6 +1,7 @@
 """A set of shots fitted by the plant: predictions, least squares, derivatives, intervals."""
 
 from impactcell.discrepancy.model.block_selection import decided_blocks, usable_blocks
+from impactcell.discrepancy.model.constraints import Constraints, Roughness
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
 from impactcell.discrepancy.model.least_squares import Fit, fit, refit_shot_parameters
@@ -20,17 +21,21 @@ from impactcell.discrepancy.model.parameters import (
     parameter_name,
 )
 from impactcell.discrepancy.model.phases import phase_positions, sample_phases, trajectory_of
-from impactcell.discrepancy.model.problem import Problem, remove_jumps
+from impactcell.discrepancy.model.problem import FitState, Problem, remove_jumps
+from impactcell.discrepancy.model.shot_parameters import normal_equations
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 
 __all__ = [
     "NOMINAL_PARAMETERS",
+    "Constraints",
     "Coordinate",
     "DirectionProducts",
     "Fit",
+    "FitState",
     "LinearisedFit",
     "ParameterEstimate",
     "Problem",
+    "Roughness",
     "Scores",
     "SplitFits",
     "concatenate_products",
@@ -42,6 +47,7 @@ __all__ = [
     "fit_nominal",
     "fit_split",
     "linearise",
+    "normal_equations",
     "parameter_name",
     "phase_positions",
     "refit_shot_parameters",

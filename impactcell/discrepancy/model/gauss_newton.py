@@ -63,13 +63,15 @@ def gauss_newton(problem: Problem, state: FitState, most_steps: int, tolerance: 
         if not keep_jacobian:
             J, Jl = problem.linearise(state)
         H, g, equations = normal_equations(problem, J, Jl, state)
+        H, g = H + problem.penalty_matrix, g - problem.penalty_matrix @ state.theta
+        penalty = problem.penalty(state.theta)
         trial: FitState | None = None
         for _attempt in range(1 if keep_jacobian else STEPS.attempts):
             theta = _damped_step(state.theta, H, g, damping, bounds)
             moved = problem.step_shot_parameters(state.shot_parameters, equations.steps(theta - state.theta))
             attempt = problem.evaluate(theta, moved, state.spread)
             attempt = correct_shot_parameters(problem, attempt, Jl, equations)
-            if attempt.cost < state.cost:
+            if attempt.cost + problem.penalty(theta) < state.cost + penalty:
                 trial = attempt
                 break
             damping *= STEPS.raise_damping
@@ -84,7 +86,8 @@ def gauss_newton(problem: Problem, state: FitState, most_steps: int, tolerance: 
         # Derivatives are worth having anew only when the parameters have moved since.
         keep_jacobian = float(np.abs(trial.theta - state.theta).max(initial=0.0)) < STEPS.still
         damping = max(damping / STEPS.lower_damping, STEPS.smallest_damping)
-        gain, spread_before = state.cost - trial.cost, state.spread
+        fall = penalty - problem.penalty(trial.theta)
+        gain, spread_before = state.cost - trial.cost + fall, state.spread
         state = _with_fitted_spread(trial)
         excess = max(state.cost - state.residual.size, 0.0)
         is_settled = abs(math.log(state.spread / spread_before)) < STEPS.settled_spread

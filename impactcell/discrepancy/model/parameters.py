@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from impactcell.physics import Parameter, ParameterKind
-from impactcell.physics.effects import LIBRARY
+from impactcell.physics.effects import find_effect
 from impactcell.records import Samples
 
 NOMINAL_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
@@ -97,7 +97,7 @@ def nominal_coordinates(free: tuple[str, ...]) -> tuple[Coordinate, ...]:
 def effect_coordinates(identifier: str, batches: int) -> tuple[Coordinate, ...]:
     """Free numbers of an effect."""
     coordinates: list[Coordinate] = []
-    for parameter in LIBRARY[identifier].parameters:
+    for parameter in find_effect(identifier).parameters:
         numbers = range(1, batches) if parameter.per_batch else (0,)
         coordinates += [_coordinate(identifier, parameter, batch) for batch in numbers]
     return tuple(coordinates)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.discrepancy.data import IndexArray, ShotSet
+from impactcell.discrepancy.model.constraints import UNCONSTRAINED, Constraints
 from impactcell.discrepancy.model.forward import ForwardModel, ShotParameters
 from impactcell.discrepancy.model.parameters import (
     Coordinate,
@@ -65,13 +66,22 @@ class Problem:
         How many batches the whole campaign has.
     effects : tuple of str
         Of the model, beside the nominal plant.
+    constraints : Constraints
+        What is held, and what is penalised.
     """
 
-    def __init__(self, shots: ShotSet, batches: int, effects: tuple[str, ...] = ()) -> None:
-        self._set(ForwardModel(shots, batches), effects)
+    def __init__(
+        self,
+        shots: ShotSet,
+        batches: int,
+        effects: tuple[str, ...] = (),
+        constraints: Constraints = UNCONSTRAINED,
+    ) -> None:
+        self._set(ForwardModel(shots, batches), effects, constraints)
 
-    def _set(self, forward: ForwardModel, effects: tuple[str, ...]) -> None:
+    def _set(self, forward: ForwardModel, effects: tuple[str, ...], constraints: Constraints) -> None:
         self.forward = forward
+        self.constraints = constraints
         self.shots = shots = forward.shots
         self.batches = forward.batches
         self.effects = effects
@@ -79,7 +89,10 @@ class Problem:
         self.sizes = np.diff(shots.bounds)
         self.coordinates: tuple[Coordinate, ...] = nominal_coordinates(
             shots.excitation.free_plant_parameters
-        ) + tuple(coordinate for effect in effects for coordinate in effect_coordinates(effect, self.batches))
+        ) + constraints.free(
+            tuple(coordinate for effect in effects for coordinate in effect_coordinates(effect, self.batches))
+        )
+        self.penalty_matrix = constraints.penalty(self.coordinates)
         self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items])
         self.unknown_mass &= shots.excitation.mass_is_visible
         self.shot_parameter_names = (
@@ -89,15 +102,20 @@ class Problem:
 
     def with_effects(self, effects: tuple[str, ...]) -> "Problem":
         """Return another model on the same shots."""
-        if effects == self.effects:
-            return self
+        return self if effects == self.effects else self._like(effects, self.constraints)
+
+    def constrained(self, effects: tuple[str, ...], constraints: Constraints) -> "Problem":
+        """Return another model on the same shots, told what to hold and what to penalise."""
+        return self._like(effects, constraints)
+
+    def _like(self, effects: tuple[str, ...], constraints: Constraints) -> "Problem":
         other = object.__new__(Problem)
-        other._set(self.forward, effects)
+        other._set(self.forward, effects, constraints)
         return other
 
     def select(self, indices: IndexArray) -> "Problem":
         """Return the same model on some of the shots."""
-        return Problem(self.shots.select(indices), self.batches, self.effects)
+        return Problem(self.shots.select(indices), self.batches, self.effects, self.constraints)
 
     def bounds(self) -> tuple[Samples, Samples]:
         """Lower and upper end of every coordinate, shape (p,) each."""
@@ -117,7 +135,12 @@ class Problem:
     def plant_parameters(self, theta: Samples) -> Samples:
         """Parameter vector of the plant at some coordinates."""
         names = self.forward.names(self.effects)
-        return plant_parameters(self.coordinates, theta, names, default_parameters(names))
+        held = self.constraints.hold(names, default_parameters(names))
+        return plant_parameters(self.coordinates, theta, names, held)
+
+    def penalty(self, theta: Samples) -> float:
+        """Penalty of a free-form term's roughness, in squared standard deviations."""
+        return float(theta @ self.penalty_matrix @ theta)
 
     def residual(self, theta: Samples, shot_parameters: ShotParameters) -> Samples:
         """Whitened residuals, shape (N,)."""

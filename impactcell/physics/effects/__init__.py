@@ -24,4 +24,31 @@ def _discover() -> Mapping[str, Effect]:
 
 
 LIBRARY: Mapping[str, Effect] = _discover()
-"""Every effect by its identifier."""
+"""Every effect of the product by its identifier."""
+
+_ADDED: dict[str, Effect] = {}
+"""Effects that joined while running: free-form terms and laws that nobody had listed."""
+
+
+def add_effect(effect: Effect) -> None:
+    """Let plants and fits use an effect that the library does not have; it is never offered by itself.
+
+    Raises
+    ------
+    PhysicsError
+        Another effect has this identifier: what was worked out with it would change its meaning.
+    """
+    known = LIBRARY.get(effect.identifier) or _ADDED.get(effect.identifier)
+    if known is not None and known is not effect:
+        raise PhysicsError(
+            f"an effect called {effect.identifier!r} is there already; give yours another name"
+        )
+    _ADDED[effect.identifier] = effect
+
+
+def find_effect(identifier: str) -> Effect:
+    """Look an effect up, of the library or added; raises `PhysicsError` with what there is."""
+    effect = LIBRARY.get(identifier) or _ADDED.get(identifier)
+    if effect is None:
+        raise PhysicsError(f"no effect is called {identifier!r}; there are {', '.join((*LIBRARY, *_ADDED))}")
+    return effect

@@ -1,0 +1,178 @@
+"""A free-form term fitted through the simulation, as smooth as shots that it was not fitted to want it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.discrepancy.data import IndexArray
+from impactcell.discrepancy.laws.covariates import Visited, visited
+from impactcell.discrepancy.model import (
+    Constraints,
+    Fit,
+    FitState,
+    Problem,
+    Roughness,
+    fit,
+    normal_equations,
+    refit_shot_parameters,
+)
+from impactcell.errors import DiscrepancyError
+from impactcell.physics.free_forms import COEFFICIENTS, FREE_FORMS, LOWER, UPPER, FreeForm
+from impactcell.records import Samples
+
+SMOOTHNESS = (1e-6, 1e-4, 1e-2, 1.0)
+"""Weights of the roughness that are tried, over the information that the data have of the coefficients."""
+RIDGE = 1e-9
+"""Weight, over the same, of the size of the term: what the data cannot see of it stays at zero."""
+MOST_STEPS = 9
+"""Gauss-Newton steps of a free-form fit."""
+PLACES = 4
+"""Places that are fitted, of those that promise most to first order."""
+FIRST_TRY = 1e-4
+"""Weight of the roughness at which places are compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeTerm:
+    """A fitted free-form term.
+
+    Attributes
+    ----------
+    form : FreeForm
+    visited : Visited
+    problem : Problem
+        Training shots with the term in the model.
+    fit : Fit
+    smoothness : float
+        Weight of the roughness that was chosen.
+    check : float
+        Mean squared residual of the training shots on which it was chosen, over the noise floor.
+    """
+
+    form: FreeForm
+    visited: Visited
+    problem: Problem
+    fit: Fit
+    smoothness: float
+    check: float
+
+    @property
+    def columns(self) -> IndexArray:
+        """Places of the coefficients among the coordinates."""
+        return np.array(
+            [i for i, item in enumerate(self.fit.coordinates) if item.effect == self.form.effect.identifier],
+            dtype=np.int64,
+        )
+
+    @property
+    def coefficients(self) -> Samples:
+        """Coefficients of the spline in the form's unit, shape (COEFFICIENTS,)."""
+        items = self.fit.coordinates
+        return np.array([items[i].value(float(self.fit.theta[i])) for i in self.columns.tolist()])
+
+
+def candidate_terms(problem: Problem, base: Fit, places: Sequence[str] = tuple(FREE_FORMS)) -> list[str]:
+    """Places at which a free-form term promises most, to first order, the best first.
+
+    The promise is the fall of the squared residuals over one step of all parameters, half of g' H⁺ g.
+    """
+    promise: dict[str, float] = {}
+    for place in places:
+        form = FREE_FORMS[place]
+        span = visited(problem, base, form)
+        if span is None or not _may_act(problem, base, form):
+            continue
+        extended, state = _start(problem, base, form, span, FIRST_TRY)
+        H, g = _equations(extended, state)
+        if np.isfinite(H).all() and np.isfinite(g).all():
+            promise[place] = float(g @ np.linalg.lstsq(H + extended.penalty_matrix, g, rcond=1e-12)[0])
+    return sorted(promise, key=lambda place: -promise[place])
+
+
+def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
+    """Fit a term at each of the most promising places; the one that predicts other shots best comes first."""
+    inner, check = problem.shots.excitation.split(problem.shots.items, seed)
+    parts = problem.select(inner), problem.select(check)
+    inner_base = _of_shots(base, inner, parts[0])
+    terms = []
+    for place in candidate_terms(problem, base)[:PLACES]:
+        form = FREE_FORMS[place]
+        span = visited(problem, base, form)
+        if span is None:
+            continue
+        tried: list[tuple[float, float]] = []
+        for smoothness in SMOOTHNESS:
+            try:
+                fitted = _fit(parts[0], inner_base, form, span, smoothness)
+            except DiscrepancyError:
+                continue
+            held = refit_shot_parameters(parts[1].constrained(*_model(fitted)), fitted[1])
+            tried.append((float(np.mean(held.residual**2)), smoothness))
+        if not tried:
+            continue
+        error, smoothness = min(tried)
+        extended, whole = _fit(problem, base, form, span, smoothness)
+        terms.append(FreeTerm(form, span, extended, whole, smoothness, error))
+    return sorted(terms, key=lambda term: term.check)
+
+
+def _may_act(problem: Problem, base: Fit, form: FreeForm) -> bool:
+    """Whether the excitation shows the term, and no effect of the model takes its only place."""
+    has_contact = problem.shots.excitation.has_contact
+    in_contact = form.covariate in {"indentation", "indentation_rate", "gap", "time", "force"}
+    if in_contact and not has_contact:
+        return False
+    return not (form.covariate == "gap" and "adhesion" in base.effects)
+
+
+def _of_shots(base: Fit, indices: IndexArray, part: Problem) -> Fit:
+    """Give the same fit, of some of its shots."""
+    shot_parameters = base.shot_parameters.select(indices)
+    residual = part.with_effects(base.effects).residual(base.theta, shot_parameters)
+    return Fit(base.effects, base.coordinates, base.theta, shot_parameters, base.spread, residual)
+
+
+def _model(fitted: tuple[Problem, Fit]) -> tuple[tuple[str, ...], Constraints]:
+    return fitted[0].effects, fitted[0].constraints
+
+
+def _start(
+    problem: Problem, base: Fit, form: FreeForm, span: Visited, smoothness: float
+) -> tuple[Problem, FitState]:
+    """Model with the term still at zero, its roughness weighed by what the data know of its coefficients."""
+    identifier = form.effect.identifier
+    held = {
+        **problem.constraints.held,
+        f"{identifier}.{LOWER}": span.lower,
+        f"{identifier}.{UPPER}": span.upper,
+    }
+    effects = (*base.effects, identifier)
+    bare = problem.constrained(effects, Constraints(held))
+    theta = np.concatenate([base.theta, np.zeros(COEFFICIENTS)])
+    state = bare.evaluate(theta, base.shot_parameters, base.spread)
+    if not np.isfinite(state.cost):
+        return bare, state
+    H, _ = _equations(bare, state)
+    scale = float(np.trace(H[-COEFFICIENTS:, -COEFFICIENTS:])) / COEFFICIENTS
+    differences = np.diff(np.eye(COEFFICIENTS), n=2, axis=0)
+    rows = np.vstack(
+        [np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(COEFFICIENTS)]
+    )
+    weighed = Constraints(held, (Roughness(identifier, form.coefficients, rows),))
+    return problem.constrained(effects, weighed), state
+
+
+def _equations(problem: Problem, state: FitState) -> tuple[Samples, Samples]:
+    """Information and gradient of the shared coordinates, each shot's own eliminated."""
+    J, Jl = problem.linearise(state)
+    H, g, _ = normal_equations(problem, J, Jl, state)
+    return H, g
+
+
+def _fit(
+    problem: Problem, base: Fit, form: FreeForm, span: Visited, smoothness: float
+) -> tuple[Problem, Fit]:
+    extended, state = _start(problem, base, form, span, smoothness)
+    fitted = fit(extended, state.theta, state.shot_parameters, spread=base.spread, most_steps=MOST_STEPS)
+    return extended, fitted

@@ -1,0 +1,60 @@
+"""What a fit is told beside its data: parameters that are held, and how rough a free-form term may be."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from impactcell.discrepancy.model.parameters import Coordinate, parameter_name
+from impactcell.records import Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roughness:
+    """Quadratic penalty |D c|² on coordinates c of one effect, in squared standard deviations.
+
+    Attributes
+    ----------
+    effect : str
+    parameters : tuple of str
+        Names of the coordinates it is about, in the order of the columns of D.
+    rows : ndarray, shape (r, len(parameters))
+        D, the square root of its weight in it.
+    """
+
+    effect: str
+    parameters: tuple[str, ...]
+    rows: Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Constraints:
+    """Parameters that do not move, by name as the plant has them, and penalties."""
+
+    held: Mapping[str, float] = field(default_factory=dict)
+    roughness: tuple[Roughness, ...] = ()
+
+    def free(self, coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
+        """Coordinates that a fit may move."""
+        return tuple(item for item in coordinates if parameter_name(item) not in self.held)
+
+    def hold(self, names: tuple[str, ...], values: Samples) -> Samples:
+        """Parameter vector of `names` with what is held at its value."""
+        for name, value in self.held.items():
+            if name in names:
+                values[names.index(name)] = value
+        return values
+
+    def penalty(self, coordinates: tuple[Coordinate, ...]) -> Samples:
+        """Matrix P, shape (p, p), of the penalty theta' P theta."""
+        matrix = np.zeros((len(coordinates), len(coordinates)))
+        places = {(item.effect, item.parameter): place for place, item in enumerate(coordinates)}
+        for term in self.roughness:
+            if all((term.effect, name) in places for name in term.parameters):
+                columns = [places[term.effect, name] for name in term.parameters]
+                matrix[np.ix_(columns, columns)] += term.rows.T @ term.rows
+        return matrix
+
+
+UNCONSTRAINED = Constraints()
+"""Nothing is held, nothing penalised."""

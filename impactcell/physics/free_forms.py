@@ -1,0 +1,283 @@
+"""Free-form terms: a smooth function of one covariate wherever a law may act in the equations of motion.
+
+Each is an effect like any other, with the coefficients of a cubic B-spline on uniform knots as its parameters
+(de Boor, A Practical Guide to Splines, 1978): `lower` and `upper` say where the knots lie and are held in a
+fit, `c0`, `c1`, ... are fitted. Beyond the knots the spline goes on along its tangent. What physics asks is
+built into the place: no force without indentation, no drag without speed, no pull at the end of its reach.
+They are no named effects: nobody accepts one, and no YAML offers them.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from impactcell.numerics.jit import FloatPointer, Law, compiled
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effects import add_effect
+from impactcell.records import Samples
+
+SPANS = 7
+"""Polynomial pieces of a spline: an S with a fold is followed, a single sample is not. Own choice."""
+COEFFICIENTS = SPANS + 3
+"""Of a cubic spline on that many pieces."""
+LOWER, UPPER = "lower", "upper"
+"""Names of the parameters that say where the knots lie."""
+
+
+@compiled
+def spline(u: float, p: FloatPointer) -> float:
+    """Cubic B-spline at u; knots from p[0] to p[1], coefficients from p[2] on; straight beyond."""
+    width = (p[1] - p[0]) / SPANS
+    w = (u - p[0]) / width
+    inside = min(max(w, 0.0), float(SPANS))
+    i = min(int(inside), SPANS - 1)
+    t = inside - i
+    a, b, c, d = p[2 + i], p[3 + i], p[4 + i], p[5 + i]
+    s = 1.0 - t
+    value = (
+        a * s * s * s + b * (3.0 * t * t * t - 6.0 * t * t + 4.0)
+        + c * (1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t * t * t) + d * t * t * t
+    ) / 6.0  # fmt: skip
+    slope = (-a * s * s + b * (3.0 * t * t - 4.0 * t) + c * (1.0 + 2.0 * t - 3.0 * t * t) + d * t * t) / 2.0
+    return value + slope * (w - inside)
+
+
+def _friction_over_speed(speed: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """s(|x'|), added to mu_k."""
+    return spline(speed, p)
+
+
+def _friction_over_position(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """1 + s(x), factor of mu_s and mu_k."""
+    return 1.0 + spline(x, p)
+
+
+def _force_over_position(x: float, _v: float, _m: float, _g: float, p: FloatPointer) -> float:
+    """s(x) on the part."""
+    return spline(x, p)
+
+
+def _drag_over_speed(_x: float, v: float, _m: float, _g: float, p: FloatPointer) -> float:
+    """-x' s(|x'|) on the part: odd, and nothing at rest."""
+    return -v * spline(abs(v), p)
+
+
+def _stiffness_over_indentation(d: float, _rate: float, _k: float, _b: float, p: FloatPointer) -> float:
+    """D s(d): nothing where contact is lost."""
+    return d * spline(d, p)
+
+
+def _damping_over_indentation(d: float, rate: float, _k: float, _b: float, p: FloatPointer) -> float:
+    """D' s(d)."""
+    return rate * spline(d, p)
+
+
+def _damping_over_rate(_d: float, rate: float, _k: float, _b: float, p: FloatPointer) -> float:
+    """D' s(d')."""
+    return rate * spline(rate, p)
+
+
+def _pull_over_gap(gap: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """(1 - gap/upper) s(gap) while the gap is below `upper`."""
+    return (1.0 - gap / p[1]) * spline(gap, p)
+
+
+def _reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """Gap at which the pull ends."""
+    return p[1]
+
+
+def _speed_over_time(t: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """1 + s(t), factor of the actuator's speed."""
+    return 1.0 + spline(t, p)
+
+
+def _reading_over_force(force: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """F (1 + s(F)) is shown."""
+    return force * (1.0 + spline(force, p))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeForm:
+    """A place in the equations of motion at which a free-form term may act.
+
+    Attributes
+    ----------
+    effect : Effect
+        What enters the plant.
+    covariate : str
+        `speed`, `position`, `indentation`, `indentation_rate`, `gap`, `time` or `force`.
+    covariate_unit : str
+    law_kind : LawKind
+    around : str
+        How the function s of the covariate u enters, as Python of the law's own four numbers a, b, c and d,
+        e.g. `-b * s`.
+    argument : str
+        Python of the covariate in the same four numbers.
+    """
+
+    effect: Effect
+    covariate: str
+    covariate_unit: str
+    law_kind: LawKind
+    around: str
+    argument: str
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of the parameters that a fit moves."""
+        return tuple(parameter.name for parameter in self.effect.parameters[2:])
+
+    @property
+    def unit(self) -> str:
+        """Unit of the function."""
+        return self.effect.parameters[2].unit
+
+
+_CONTACT = (Phase.LOADING, Phase.UNLOADING)
+_SLIP = (Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN)
+
+
+def _form(
+    identifier: str,
+    law: Law,
+    covariate: tuple[str, str, str],
+    function: tuple[LawKind, str, str, float],
+    equation: str,
+    *,
+    extra: Mapping[LawKind, Law] = MappingProxyType({}),
+) -> FreeForm:
+    """Declare a place: its covariate (name, unit, argument), and how its function enters.
+
+    `function` holds the kind of law, how s enters, its unit, and the size at which it is clearly visible.
+    """
+    name, covariate_unit, argument = covariate
+    kind, around, unit, typical = function
+    knots = tuple(
+        Parameter(end, covariate_unit, null=math.nan, lower=-math.inf, upper=math.inf, typical=1.0)
+        for end in (LOWER, UPPER)
+    )
+    coefficients = tuple(
+        Parameter(f"c{i}", unit, null=0.0, lower=-1e3 * typical, upper=1e3 * typical, typical=typical)
+        for i in range(COEFFICIENTS)
+    )
+    effect = Effect(
+        identifier=identifier,
+        kind=_KINDS[kind],
+        equation=equation,
+        reference="Free-form term: cubic B-spline, de Boor (1978)",
+        phases=_CONTACT if kind in {LawKind.CONTACT, LawKind.READING, LawKind.SPEED} else _SLIP,
+        parameters=(*knots, *coefficients),
+        laws={kind: law, **extra},
+    )
+    add_effect(effect)
+    return FreeForm(effect, name, covariate_unit, kind, around, argument)
+
+
+_KINDS = {
+    LawKind.KINETIC: Kind.FRICTION,
+    LawKind.SCALE: Kind.FRICTION,
+    LawKind.BODY: Kind.BODY,
+    LawKind.CONTACT: Kind.CONTACT,
+    LawKind.PULL: Kind.CONTACT,
+    LawKind.SPEED: Kind.ACTUATOR,
+    LawKind.READING: Kind.SENSOR,
+}
+"""What a law of each kind acts on."""
+
+_DECLARED = (
+    _form(
+        "free_friction_over_speed",
+        _friction_over_speed,
+        ("speed", "m/s", "a"),
+        (LawKind.KINETIC, "s", "1", 0.03),
+        "mu_k + s(|x'|)",
+    ),
+    _form(
+        "free_friction_over_position",
+        _friction_over_position,
+        ("position", "m", "a"),
+        (LawKind.SCALE, "1.0 + s", "1", 0.1),
+        "mu (1 + s(x))",
+    ),
+    _form(
+        "free_force_over_position",
+        _force_over_position,
+        ("position", "m", "a"),
+        (LawKind.BODY, "s", "N", 3.0),
+        "s(x) on the part",
+    ),
+    _form(
+        "free_drag_over_speed",
+        _drag_over_speed,
+        ("speed", "m/s", "abs(b)"),
+        (LawKind.BODY, "-b * s", "N s/m", 50.0),
+        "-x' s(|x'|)",
+    ),
+    _form(
+        "free_stiffness_over_indentation",
+        _stiffness_over_indentation,
+        ("indentation", "m", "a"),
+        (LawKind.CONTACT, "a * s", "N/m", 1e5),
+        "d s(d)",
+    ),
+    _form(
+        "free_damping_over_indentation",
+        _damping_over_indentation,
+        ("indentation", "m", "a"),
+        (LawKind.CONTACT, "b * s", "N s/m", 100.0),
+        "d' s(d)",
+    ),
+    _form(
+        "free_damping_over_rate",
+        _damping_over_rate,
+        ("indentation_rate", "m/s", "b"),
+        (LawKind.CONTACT, "b * s", "N s/m", 100.0),
+        "d' s(d')",
+    ),
+    _form(
+        "free_pull_over_gap",
+        _pull_over_gap,
+        ("gap", "m", "a"),
+        (LawKind.PULL, "s", "N", 3.0),
+        "pull (1 - gap/l) s(gap), gap < l",
+        extra={LawKind.REACH: _reach},
+    ),
+    _form(
+        "free_speed_over_time",
+        _speed_over_time,
+        ("time", "s", "a"),
+        (LawKind.SPEED, "1.0 + s", "1", 0.05),
+        "y' = v (1 + s(t))",
+    ),
+    _form(
+        "free_reading_over_force",
+        _reading_over_force,
+        ("force", "N", "a"),
+        (LawKind.READING, "a * (1.0 + s)", "1", 0.03),
+        "F (1 + s(F)) is shown",
+    ),
+)
+
+FREE_FORMS: Mapping[str, FreeForm] = MappingProxyType({form.effect.identifier: form for form in _DECLARED})
+"""Every place by the identifier of its effect."""
+
+
+def spline_basis(u: ArrayLike, lower: float, upper: float) -> Samples:
+    """Values of the B-splines, shape (n, COEFFICIENTS), at u of shape (n,); straight beyond the knots."""
+    points = np.atleast_1d(np.asarray(u, dtype=np.float64))
+    w = (points - lower) * (SPANS / (upper - lower))
+    inside = np.clip(w, 0.0, float(SPANS))
+    i = np.minimum(inside.astype(np.int64), SPANS - 1)
+    t = inside - i
+    beyond = w - inside
+    value = np.stack([(1.0 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, 1 + 3 * t + 3 * t**2 - 3 * t**3, t**3]) / 6.0
+    slope = np.stack([-((1.0 - t) ** 2), 3 * t**2 - 4 * t, 1 + 2 * t - 3 * t**2, t**2]) / 2.0
+    basis = np.zeros((len(points), COEFFICIENTS))
+    for k in range(4):
+        basis[np.arange(len(points)), i + k] += value[k] + slope[k] * beyond
+    return basis
