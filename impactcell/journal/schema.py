@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import cast
 
 from impactcell.journal.checksums import CHECKED, SqlValue
-from impactcell.quantities import BY_COLUMN, QUALITY_BY_COLUMN, DataType, Quantity
+from impactcell.quantities import BY_COLUMN, QUALITY_BY_COLUMN
 from impactcell.records import Capture, Quality, Snapshot
+from impactcell.records.quantity import DataType, Quantity
 
 APPLICATION_ID = 0x49435243
 """`PRAGMA application_id` by which a file says that it is a journal: the letters ICRC."""

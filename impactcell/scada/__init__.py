@@ -15,7 +15,7 @@ from impactcell.opcua.host_interface import (
     ServerLimits,
     ServerSettings,
 )
-from impactcell.quantities import Ranges
+from impactcell.records.quantity import Ranges
 from impactcell.scada.interface import (
     Actions,
     AlarmPage,

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from impactcell.alarms import EventKind
 from impactcell.opcua.host_interface import Actor, HistoryRequest
-from impactcell.quantities import Ranges
 from impactcell.records import Alarm, Quality
+from impactcell.records.quantity import Ranges
 
 
 def default_application_uri() -> str:

@@ -12,7 +12,8 @@ from typing import Any, Final
 from jinja2 import Environment, StrictUndefined
 
 from impactcell.alarms import RULES
-from impactcell.quantities import CYCLE, FOLDERS, MODULE, Quantity, Ranges, Unit
+from impactcell.quantities import CYCLE, FOLDERS, MODULE
+from impactcell.records.quantity import Quantity, Ranges, Unit
 
 MODEL_FILE: Final = Path(__file__).parent / "model" / "ImpactCell.NodeSet2.xml"
 

@@ -8,8 +8,9 @@ from asyncua import ua
 
 from impactcell.opcua.type_instances import read_attribute
 from impactcell.opcua.variable_store import GOOD, StoredVariable, VariableStore, moment
-from impactcell.quantities import CYCLE, MODULE, Value
+from impactcell.quantities import CYCLE, MODULE
 from impactcell.records import ModuleStatus, Quality, Snapshot
+from impactcell.records.quantity import Value
 from impactcell.scada.cell_nodes import CellSpace
 
 BAD: Final = ua.StatusCode(ua.StatusCodes.Bad)

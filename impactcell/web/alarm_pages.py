@@ -37,7 +37,7 @@ def _open_alarms(context: PageContext) -> list[OpenAlarm]:
     alarms = [
         (cell, alarm, event_id(cell, alarm).hex())
         for cell, view in context.feed.views.items()
-        for alarm in view.alarms.values()
+        for alarm in view.conditions.values()
         if is_retained(alarm) or alarm.shelving is not Shelving.UNSHELVED
     ]
     return sorted(alarms, key=lambda a: (a[1].acknowledged, not a[1].active, -a[1].severity, -a[1].time_ns))

@@ -10,6 +10,7 @@ from impactcell.errors import JournalError
 from impactcell.journal.trend import TrendColumn
 from impactcell.web.cell_view import number
 from impactcell.web.event_stream import MAX_VIEWERS, EventStream
+from impactcell.web.figures import figures
 from impactcell.web.interface import CellFacts
 from impactcell.web.page_context import PageContext
 from impactcell.web.past import SPANS_S
@@ -24,7 +25,14 @@ async def overview(context: PageContext, request: Request, session: BrowserSessi
 
 async def cell(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show one cell."""
-    return context.page(request, "cell.html.j2", session, cell=_cell(context, request), spans=tuple(SPANS_S))
+    return context.page(
+        request,
+        "cell.html.j2",
+        session,
+        cell=_cell(context, request),
+        spans=tuple(SPANS_S),
+        folders=figures(context.language(request)),
+    )
 
 
 async def live(context: PageContext, request: Request, session: BrowserSession) -> Response | ASGIApp:

@@ -1,14 +1,17 @@
 """What the page remembers of one cell, and what it sends of it as JSON, in the units of the nodes."""
 
-import json
 import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
-from impactcell.quantities import BY_PATH
-from impactcell.records import Alarm, Channel, Coefficient, ModuleStatus, Samples, Snapshot
+import msgspec
+import numpy as np
+
+from impactcell.quantities import BY_PATH, CYCLE, MODULE
+from impactcell.records import Alarm, Channel, ModuleStatus, Quality, Samples, Snapshot
+from impactcell.records.quantity import Quantity, S
 from impactcell.scada.alarm_events import event_id
 from impactcell.web.curves import Curve, decimate, envelope
 from impactcell.web.interface import CellNews, Freshness
@@ -25,6 +28,10 @@ DIGITS = 5
 """Significant digits of what is sent: more than a chart can show."""
 
 
+KINDS: Final = ("recent", "alarms", "card", "detail")
+"""What is sent of a cell: the curve so far, its alarms, its values, and its last tap in curves."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tap:
     """One tap in curves, to compare later ones with."""
@@ -36,8 +43,8 @@ class _Tap:
 
 
 def to_json(value: object) -> bytes:
-    """Encode for the browser; there is no NaN in what is sent."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()
+    """Encode for the browser; what is not finite becomes null."""
+    return msgspec.json.encode(value)
 
 
 def number(value: float) -> float | None:
@@ -45,9 +52,13 @@ def number(value: float) -> float | None:
     return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
 
 
-def numbers(values: Samples, per_si: float = 1.0) -> list[float | None]:
-    """Shorten a series of numbers."""
-    return [number(value) for value in (values * per_si).tolist()]
+def numbers(values: Samples, per_si: float = 1.0) -> list[float]:
+    """Shorten numbers to so many digits of the largest; what is not finite becomes null when it is sent."""
+    shown = values * per_si
+    largest = float(np.max(np.abs(shown), initial=0.0, where=np.isfinite(shown)))
+    decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
+    rounded: list[float] = np.round(shown, decimals).tolist()
+    return rounded
 
 
 class CellView:
@@ -58,27 +69,37 @@ class CellView:
         self.snapshot: Snapshot | None = None
         self.status = ModuleStatus()
         self.freshness = Freshness.LOST
-        self.alarms: dict[str, Alarm] = {}
-        self._alarm_json: dict[str, tuple[Alarm, dict[str, Any]]] = {}
+        self.conditions: dict[str, Alarm] = {}
         self._recent: deque[list[float | None]] = deque(maxlen=RECENT_CYCLES)
         self._taps: deque[_Tap] = deque(maxlen=USUAL_TAPS + 1)
         self._positioning: deque[dict[str, Any]] = deque(maxlen=SHOWN_TAPS)
         self._deviant: dict[str, Any] | None = None
 
-    def take(self, news: CellNews) -> None:
-        """Take what has happened."""
-        if news.status is not None:
+    def take(self, news: CellNews) -> set[str]:
+        """Take what has happened; returns which of `KINDS` have changed by it."""
+        changed = set()
+        if news.status is not None and news.status != self.status:
             self.status = news.status
-        if news.freshness is not None:
+            changed.add("card")
+        if news.freshness is not None and news.freshness is not self.freshness:
             self.freshness = news.freshness
+            changed.add("card")
         alarms = news.alarms
         if news.snapshot is not None:
             self._take_snapshot(news.snapshot)
             alarms = news.snapshot.alarms
+            changed |= {"card", "detail"}
         if news.capture is not None and news.snapshot is not None:
             self._take_tap(news.snapshot, news.capture.force, news.capture.position)
         for alarm in alarms:
-            self.alarms[alarm.name] = alarm
+            if self.conditions.get(alarm.name) is not alarm:
+                self.conditions[alarm.name] = alarm
+                changed.add("alarms")
+        return changed
+
+    def encode(self, kind: str) -> bytes:
+        """Encode what is sent of one of `KINDS`."""
+        return to_json({"cell": self.cell} | getattr(self, kind)())
 
     def _take_snapshot(self, snapshot: Snapshot) -> None:
         previous, self.snapshot = self.snapshot, snapshot
@@ -122,26 +143,30 @@ class CellView:
             )
         )
 
-    def card(self) -> bytes:
-        """Encode what a card shows."""
-        content: dict[str, Any] = {
-            "cell": self.cell,
-            "freshness": self.freshness.value,
-            "link": _link(self.status),
-            "alarms": [self._alarm(alarm) for alarm in self.alarms.values()],
-            "recent": list(self._recent),
-        }
-        if self.snapshot is not None:
-            content |= _cycle(self.snapshot)
-        return to_json(content)
+    def recent(self) -> dict[str, Any]:
+        """Give the small curve as it is when somebody comes; from then on a card brings each new point."""
+        return {"recent": list(self._recent)}
 
-    def detail(self) -> bytes:
-        """Encode what the cell's own page shows beside the card: the last tap against the usual ones."""
+    def alarms(self) -> dict[str, Any]:
+        """Give every alarm; they are sent when one of them has moved."""
+        return {"alarms": [alarm_content(self.cell, alarm) for alarm in self.conditions.values()]}
+
+    def card(self) -> dict[str, Any]:
+        """Give what a card shows: every published value, and why some are not good."""
         content: dict[str, Any] = {
-            "cell": self.cell,
-            "taps": list(self._positioning),
-            "deviant": self._deviant,
+            "freshness": self.freshness.value,
+            "link_reason": "" if self.status.connected else self.status.reason,
         }
+        values, qualities = _published(MODULE, self.status)
+        if self.snapshot is not None:
+            of_cycle = _published(CYCLE, self.snapshot)
+            values, qualities = values | of_cycle[0], qualities | of_cycle[1]
+            content |= _beside_values(self.snapshot)
+        return content | {"values": values, "qualities": qualities}
+
+    def detail(self) -> dict[str, Any]:
+        """Give what the cell's own page shows beside the card: the last tap against the usual ones."""
+        content: dict[str, Any] = {"taps": list(self._positioning), "deviant": self._deviant}
         if self._taps and self.snapshot is not None:
             tap, earlier = self._taps[-1], list(self._taps)[:-1]
             alike = [
@@ -152,15 +177,7 @@ class CellView:
             content["position"] = _compared(tap.position, (t.position for t in alike), 1e3, 1e3)
             content["signature"] = _compared(tap.signature, (t.signature for t in alike), 1e3, 1.0)
             content["signature"]["std"] = numbers(self.snapshot.signature.friction_std)
-        return to_json(content)
-
-    def _alarm(self, alarm: Alarm) -> dict[str, Any]:
-        """Encode an alarm; from cycle to cycle it is the same record nearly always."""
-        last = self._alarm_json.get(alarm.name)
-        if last is None or last[0] is not alarm:
-            last = alarm, alarm_content(self.cell, alarm)
-            self._alarm_json[alarm.name] = last
-        return last[1]
+        return content
 
 
 def _compared(
@@ -207,80 +224,30 @@ def alarm_content(cell: str, alarm: Alarm) -> dict[str, Any]:
     }
 
 
-def _link(status: ModuleStatus) -> dict[str, Any]:
+def _published(quantities: Iterable[Quantity[S]], source: S) -> tuple[dict[str, Any], dict[str, str]]:
+    """Read every published value but the arrays, which are curves; and the qualities that are not good."""
+    values: dict[str, Any] = {}
+    qualities: dict[str, str] = {}
+    for quantity in quantities:
+        if quantity.is_array:
+            continue
+        value, quality = quantity.read(source)
+        values[quantity.path] = number(value) if isinstance(value, float) else value
+        if quality is not Quality.GOOD:
+            qualities[quantity.path] = quality.name.lower()
+    return values, qualities
+
+
+def _beside_values(snapshot: Snapshot) -> dict[str, Any]:
+    """Give what is said of a cycle beside its published values."""
     return {
-        "connected": status.connected,
-        "reason": "" if status.connected else status.reason,
-        "round_trip_ms": number(status.round_trip_s * 1e3),
-        "received": status.received,
-        "missed": status.missed,
-        "unreadable": status.unreadable,
-        "discarded": status.discarded,
-        "restarts": status.restarts,
-        "reconnects": status.reconnects,
-    }
-
-
-def _coefficient(coefficient: Coefficient) -> dict[str, Any]:
-    return {
-        "value": number(coefficient.value),
-        "std": number(coefficient.std),
-        "quality": coefficient.quality.name.lower(),
-        "reason": coefficient.reason,
-    }
-
-
-def _cycle(snapshot: Snapshot) -> dict[str, Any]:
-    friction, wear, batch, task = snapshot.friction, snapshot.wear, snapshot.batch, snapshot.positioning
-    signature = snapshot.signature
-    return {
-        "cycle": snapshot.cycle,
         "time_ms": snapshot.time_ns // 1_000_000,
-        "velocity": number(snapshot.velocity_m_s * 60e3),
         "mass": number(snapshot.mass_kg),
-        "mu_s": _coefficient(friction.mu_s),
-        "mu_k": _coefficient(friction.mu_k),
-        "by_force": _coefficient(friction.by_force),
-        "by_distance": _coefficient(friction.by_distance),
-        "estimator": friction.estimator.value,
-        "peak_force": number(friction.peak_force_n),
-        "sliding_distance": number(friction.sliding_distance_m * 1e6),
-        "wear": {
-            "level": number(wear.level),
-            "std": number(wear.level_std),
-            "rate_per_1000": number(wear.rate_per_cycle * 1e3),
-            "limit": number(wear.limit),
-            "cycles": number(wear.cycles_to_limit),
-            "cycles_low": number(wear.cycles_to_limit_low),
-            "cycles_high": number(wear.cycles_to_limit_high),
-            "quality": wear.quality.name.lower(),
-            "reason": wear.reason,
+        "estimator": snapshot.friction.estimator.value,
+        "reasons": {
+            "mu_s": snapshot.friction.mu_s.reason,
+            "wear": snapshot.wear.reason,
+            "signature": snapshot.signature.reason,
+            "positioning": snapshot.positioning.reason,
         },
-        "batch": {
-            "id": batch.batch_id,
-            "offset": number(batch.offset),
-            "std": number(batch.offset_std),
-            "last_shift": number(batch.last_shift),
-            "last_shift_cycle": batch.last_shift_cycle or None,
-            "quality": batch.quality.name.lower(),
-        },
-        "signature_test": {
-            "t_squared": number(signature.t_squared),
-            "spe": number(signature.spe),
-            "deviates_at": number(signature.deviates_at_m * 1e3),
-            "quality": signature.quality.name.lower(),
-            "reason": signature.reason,
-        },
-        "positioning": {
-            "running": task.running,
-            "taps": task.taps,
-            "target": number(task.target_m * 1e3),
-            "remaining": number(task.remaining_m * 1e3),
-            "next_velocity": number(task.next_velocity_m_s * 60e3),
-            "next_stroke": number(task.next_stroke_m * 1e3),
-            "reason": task.reason,
-        },
-        "model": snapshot.model_name,
-        "gap": number(snapshot.gap),
-        "gap_quality": snapshot.gap_quality.name.lower(),
     }

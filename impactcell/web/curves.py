@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.records import Channel, Samples
 
@@ -31,22 +33,29 @@ class Curve:
 def decimate(channel: Channel, columns: int = COLUMNS) -> Curve:
     """Give the smallest and largest value in each of at most `columns` columns of equally many samples.
 
-    No peak is lost, however narrow, unlike with every n-th sample.
+        No peak is lost, however narrow, unlike with every n-th sample.
 
-    >>> import numpy as np
-    >>> spike = np.zeros(1000)
-    >>> spike[77] = 5.0
-    >>> float(decimate(Channel(np.arange(1000.0), spike), 10).high.max())
-    5.0
+        >>> import numpy as np
+    from numpy.typing import NDArray
+        >>> spike = np.zeros(1000)
+        >>> spike[77] = 5.0
+        >>> float(decimate(Channel(np.arange(1000.0), spike), 10).high.max())
+        5.0
     """
     count = len(channel.values)
     if count <= columns:
         return Curve(channel.time_s, channel.values, channel.values)
-    edges = np.linspace(0, count, columns + 1).astype(np.intp)[:-1]
-    last = np.append(edges[1:], count) - 1
+    edges, last = _column_edges(count, columns)
     middle = 0.5 * (channel.time_s[edges] + channel.time_s[last])
     low, high = np.minimum.reduceat(channel.values, edges), np.maximum.reduceat(channel.values, edges)
     return Curve(middle, low, high)
+
+
+@lru_cache(maxsize=16)
+def _column_edges(count: int, columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Give the first and the last sample of each column; captures of a cell have mostly the same length."""
+    edges = np.linspace(0, count, columns + 1).astype(np.intp)
+    return edges[:-1], edges[1:] - 1
 
 
 def envelope(curves: Sequence[Curve], x: Samples) -> Curve | None:

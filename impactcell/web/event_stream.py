@@ -42,7 +42,9 @@ class EventStream:
         self, feed: LiveFeed, cells: Sequence[str], detail: str | None, may_go_on: Callable[[], bool]
     ) -> None:
         self._feed = feed
-        self._streams = [("card", cell) for cell in cells] + ([("detail", detail)] if detail else [])
+        self._streams = [(kind, cell) for cell in cells for kind in ("recent", "alarms", "card")]
+        if detail:
+            self._streams.append(("detail", detail))
         self._may_go_on = may_go_on
         self._sent: dict[tuple[str, str], int] = {}
 
@@ -65,26 +67,22 @@ class EventStream:
         changed = self._feed.subscribe()
         try:
             while not self._feed.is_closed:
+                changed.clear()  # before the frame is made: what comes from here on is in the next
                 body = self._next_frame()
                 if not self._may_go_on():
                     break
                 await _send(send, body or b": still here\n\n")
                 await asyncio.sleep(FRAME_S)
-                changed.clear()
-                if not self._is_behind():
-                    with contextlib.suppress(TimeoutError):
-                        await asyncio.wait_for(changed.wait(), HEARTBEAT_S)
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(changed.wait(), HEARTBEAT_S)
             await _send(send, b"event: ended\ndata: {}\n\n", more=False)
         finally:
             self._feed.unsubscribe(changed)
 
-    def _is_behind(self) -> bool:
-        return any(self._sent.get(key) != self._feed.version(key[1]) for key in self._streams)
-
     def _next_frame(self) -> bytes:
         frames = []
         for key in self._streams:
-            version = self._feed.version(key[1])
+            version = self._feed.version(*key)
             if self._sent.get(key) != version:
                 self._sent[key] = version
                 frames.append(self._feed.frame(*key))

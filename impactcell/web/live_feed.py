@@ -9,7 +9,7 @@ import threading
 from collections import deque
 from collections.abc import Iterable
 
-from impactcell.web.cell_view import CellView
+from impactcell.web.cell_view import KINDS, CellView
 from impactcell.web.interface import CellNews
 
 WAITING_NEWS = 256
@@ -28,7 +28,7 @@ class LiveFeed:
         self._lock = threading.Lock()
         self._is_woken = False
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._versions = dict.fromkeys(self.views, 0)
+        self._versions = {(kind, cell): 1 for kind in KINDS for cell in self.views}
         self._encoded: dict[tuple[str, str], tuple[int, bytes]] = {}
         self._changed: set[asyncio.Event] = set()
         self.is_closed = False
@@ -74,17 +74,16 @@ class LiveFeed:
         """How many look on."""
         return len(self._changed)
 
-    def version(self, cell: str) -> int:
-        """Count the changes of a cell."""
-        return self._versions[cell]
+    def version(self, kind: str, cell: str) -> int:
+        """Count the changes of one kind of content of a cell, from 1 on."""
+        return self._versions[kind, cell]
 
     def frame(self, kind: str, cell: str) -> bytes:
-        """Encode a cell, once for all who look at it; `kind` is `card` or `detail`."""
-        version = self._versions[cell]
+        """Encode one of `cell_view.KINDS`, once for all who look at it."""
+        version = self._versions[kind, cell]
         last = self._encoded.get((kind, cell))
-        if last is None or last[0] != version:
-            view = self.views[cell]
-            data = view.card() if kind == "card" else view.detail()
+        if last is None or last[0] != version or kind == "recent":
+            data = self.views[cell].encode(kind)
             last = version, b"event: " + kind.encode() + b"\ndata: " + data + b"\n\n"
             self._encoded[kind, cell] = last
         return last[1]
@@ -92,9 +91,12 @@ class LiveFeed:
     def _take_news(self) -> None:
         with self._lock:
             self._is_woken = False
+        has_changed = False
         while self._inbox:
             news = self._inbox.popleft()
-            self.views[news.cell].take(news)
-            self._versions[news.cell] += 1
-        for event in self._changed:
-            event.set()
+            for kind in self.views[news.cell].take(news):
+                self._versions[kind, news.cell] += 1
+                has_changed = True
+        if has_changed:
+            for event in self._changed:
+                event.set()

@@ -56,6 +56,15 @@ class PageContext:
     past: Past
     _templates: Environment = field(default_factory=_environment)
 
+    @staticmethod
+    def language(request: Request) -> str:
+        """Choose the language of who asks."""
+        return preferred_language(
+            request.query_params.get("lang"),
+            request.cookies.get("language"),
+            request.headers.get("accept-language", ""),
+        )
+
     def page(
         self,
         request: Request,
@@ -66,10 +75,7 @@ class PageContext:
         **values: object,
     ) -> Response:
         """Render a page in the language and the colours of who asks for it."""
-        asked = request.query_params.get("lang")
-        language = preferred_language(
-            asked, request.cookies.get("language"), request.headers.get("accept-language", "")
-        )
+        asked, language = request.query_params.get("lang"), self.language(request)
         theme = request.cookies.get("theme", "auto")
         messages = Messages(language)
         html = self._templates.get_template(template).render(

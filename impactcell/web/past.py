@@ -13,7 +13,7 @@ from typing import Final, TypeVar
 
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
-from impactcell.journal.trend import TrendColumn, trend
+from impactcell.journal.trend import Finished, TrendColumn, trend
 from impactcell.records import Alarm
 
 T = TypeVar("T")
@@ -32,6 +32,7 @@ class Past:
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="page-past")
         self._trends: dict[tuple[Path, str], tuple[float, tuple[TrendColumn, ...]]] = {}
+        self._finished: dict[tuple[Path, str], Finished] = {}
 
     async def run(self, work: Callable[[], T]) -> T:
         """Do some work in the thread of the past, one thing after the other."""
@@ -60,8 +61,8 @@ class Past:
     def _trend(self, path: Path, span: str) -> tuple[TrendColumn, ...]:
         read_s, columns = self._trends.get((path, span), (-1e9, ()))
         if time.monotonic() - read_s > FRESH_S[span]:
-            end_ns = time.time_ns()
-            columns = trend(path, end_ns - int(SPANS_S[span] * 1e9), end_ns, COLUMNS)
+            end_ns, finished = time.time_ns(), self._finished.setdefault((path, span), {})
+            columns = trend(path, end_ns - int(SPANS_S[span] * 1e9), end_ns, COLUMNS, finished)
             self._trends[path, span] = time.monotonic(), columns
         return columns
 

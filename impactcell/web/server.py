@@ -15,14 +15,13 @@ import uvicorn
 from impactcell.errors import SettingsError
 from impactcell.scada.users import Users
 from impactcell.web.app import page_app
+from impactcell.web.connections import Connection
 from impactcell.web.interface import CellFacts, PageBackend, PageContent, PageSettings
 from impactcell.web.live_feed import LiveFeed
 from impactcell.web.sessions import SessionTable
 
 _log = logging.getLogger(__name__)
 
-MAX_CONNECTIONS: Final = 250
-"""Connections served at once; those beyond are told to come back."""
 BACKLOG: Final = 128
 """Connections the system keeps waiting to be taken."""
 KEEP_ALIVE_S: Final = 10
@@ -76,7 +75,7 @@ class PageServer:
         config = uvicorn.Config(
             app,
             loop="asyncio",
-            http="h11",
+            http=Connection,
             ws="none",
             lifespan="off",
             log_config=None,
@@ -84,7 +83,6 @@ class PageServer:
             access_log=False,
             server_header=False,
             proxy_headers=False,
-            limit_concurrency=MAX_CONNECTIONS,
             timeout_keep_alive=KEEP_ALIVE_S,
             timeout_graceful_shutdown=SHUTDOWN_S,
             ssl_certfile=certificate,

@@ -98,5 +98,5 @@ def _cell_system(context: PageContext, facts: CellFacts) -> CellSystem:
     if facts.journal is not None:
         for path in (facts.journal, facts.journal.with_name(facts.journal.name + "-wal")):
             size += path.stat().st_size if path.exists() else 0
-    fault = view.alarms.get(journal_fault.NAME)
+    fault = view.conditions.get(journal_fault.NAME)
     return CellSystem(facts, view.status, size, fault.message if fault is not None and fault.active else "")

@@ -15,6 +15,7 @@ UNTOUCHED: Mapping[str, str] = {
     "impactcell/journal/schema.py": "order of the columns of format 3; later ones follow by themselves",
     "impactcell/records/friction.py": "where values are computed into, published or not",
     "impactcell/demo/view.py": "shows some values that it chose",
+    "tests/unit/alarms/test_alarm_set.py": "tries the set with rules that there are; others may join",
     "tests/data/contents.py": "reads journals of earlier versions",
     "tests/data/make_journal.py": "makes journals of earlier versions",
     "tests/contract/test_effects.py": "holds the effects that are used from outside; others may join",

@@ -55,7 +55,7 @@ class ConstantPull(Effect):
     def body_force(self, x: float, v: float, t: float) -> float:
         return self._pull_n
 '''
-QUANTITY = '''    _Q("Model/CombinedFriction", 6901, "mu_s by equation (6).",
+QUANTITY = '''    _Q("Model/CombinedFriction", 6901, "mu_s by equation (6).", ("µs by (6)", "µs nach (6)"),
        lambda s: s.friction.combined.value, lambda s: s.friction.combined.quality, ONE, _friction_range,
        column="mu_combined", quality_column="mu_combined_quality", has_history=True),
 )
@@ -119,4 +119,7 @@ def test_a_published_value_is_one_row(copy: Path) -> None:
         "tests/unit/journal/test_history.py",
         "tests/unit/journal/test_upgrade.py",
         "tests/integration/test_opcua_values.py",
+        "tests/unit/web/test_figures.py",
     )
+    shown = "from impactcell.web.figures import figures; print(figures('de')['Model'][-1].title)"
+    assert run(copy, "-c", shown) == "µs nach (6)\n"

@@ -16,8 +16,8 @@ async function load() {
 renew.addEventListener("click", load);
 
 follow("/live", {
-  card(card) {
-    told.set(card.cell, JSON.stringify(card.alarms.map((a) => a.event_id)));
+  alarms({ cell, alarms }) {
+    told.set(cell, JSON.stringify(alarms.map((alarm) => alarm.event_id)));
     const now = JSON.stringify([...told]);
     const isFirst = shown === null;
     if (now === shown) return;

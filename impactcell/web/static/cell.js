@@ -1,7 +1,7 @@
 // One cell in depth: its last tap, its trend, its signature.
 import { Chart } from "./charts.js";
 import { moment } from "./frame.js";
-import { coefficient, follow, number, set, showAlarm, showFriction, showState, texts, withUnit } from "./live.js";
+import { coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, withUnit } from "./live.js";
 
 const root = document.querySelector(".cell"), cell = root.dataset.cell;
 const edges = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
@@ -47,45 +47,26 @@ function showDetail(detail) {
 }
 
 function showCard(card) {
+  const { values, reasons } = card;
   showState(root, card);
-  const alarm = root.querySelector(".alarm");
-  showAlarm(alarm, card, "");
-  if (card.cycle === undefined) return;
-  limit = card.wear.limit;
+  if (!hasCycle(card)) return;
+  limit = values["Wear/Limit"];
   showFriction(root, card);
-  const values = {
-    cycle_number: number(card.cycle, 10),
+  showValues(root, card);
+  const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
+  const said = {
     cycle_time: moment(card.time_ms),
-    batch_offset: card.batch.offset === null ? "" : plusMinus({ value: card.batch.offset, std: card.batch.std }),
-    kinetic_friction: plusMinus(card.mu_k),
-    by_force: plusMinus(card.by_force),
-    by_distance: plusMinus(card.by_distance),
+    batch_offset: offset === null ? "" : `${coefficient(offset)} ± ${std === null ? "–" : number(2 * std, 2)}`,
     estimator: texts[card.estimator],
-    peak_force: withUnit(card.peak_force, "N"),
-    sliding_distance: withUnit(card.sliding_distance, "µm"),
-    velocity: withUnit(card.velocity, "mm/min"),
     mass: withUnit(card.mass, "kg"),
-    wear_level: plusMinus({ value: card.wear.level, std: card.wear.std }),
-    wear_rate: coefficient(card.wear.rate_per_1000),
-    wear_limit: coefficient(card.wear.limit),
-    last_shift: card.batch.last_shift_cycle ? `${coefficient(card.batch.last_shift)}, ${texts.since_cycle} ${card.batch.last_shift_cycle}` : "–",
-    t_squared: number(card.signature_test.t_squared, 3),
-    spe: number(card.signature_test.spe, 3),
-    signature_reason: card.signature_test.reason,
-    target: card.positioning.target === null ? texts.no_task : withUnit(card.positioning.target, "mm"),
-    remaining: withUnit(card.positioning.remaining, "mm"),
-    next_tap: card.positioning.next_velocity === null ? "–" : `${withUnit(card.positioning.next_velocity, "mm/min")}, ${withUnit(card.positioning.next_stroke, "mm")}`,
-    positioning_reason: card.positioning.reason,
-    model: card.model,
-    gap: number(card.gap, 3),
-    gap_meaning: card.gap === null ? "" : texts[card.gap < 1.5 ? "at_noise" : "above_noise"],
+    signature_reason: reasons.signature,
+    positioning_reason: values["Positioning/Target"] === null ? texts.no_task : reasons.positioning,
+    gap_meaning: gap === null ? "" : texts[gap < 1.5 ? "at_noise" : "above_noise"],
   };
-  for (const [field, text] of Object.entries(values)) set(root, field, text);
-  root.dataset.cycle = card.cycle;
+  for (const [field, text] of Object.entries(said)) set(root, field, text);
+  root.dataset.cycle = values["Friction/CycleNumber"];
   if (Date.now() - lastTrend > { hour: 3e3, shift: 15e3, month: 60e3 }[span]) loadTrend();
 }
-
-const plusMinus = (c) => (c.value === null ? "–" : `${coefficient(c.value)} ± ${c.std === null ? "–" : number(2 * c.std, 2)}`);
 
 async function loadTrend() {
   if (!charts) return;
@@ -117,4 +98,8 @@ function start() {
   loadTrend();
   if (waiting) showDetail(waiting);
 }
-follow(`/live?cell=${encodeURIComponent(cell)}`, { card: showCard, detail: showDetail });
+follow(`/live?cell=${encodeURIComponent(cell)}`, {
+  card: showCard,
+  detail: showDetail,
+  alarms: ({ alarms }) => showAlarm(root.querySelector(".alarm"), alarms, ""),
+});

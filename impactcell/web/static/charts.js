@@ -73,6 +73,11 @@ export class Chart {
     const axis = { stroke: colour("soft"), grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1 }, labelSize: 18, labelFont: "12px system-ui, sans-serif" };
     const numbers = new Intl.NumberFormat(document.documentElement.lang, { maximumSignificantDigits: 6 });
     const format = (_, values) => values.map((value) => (value === null ? "" : numbers.format(value)));
+    const lang = document.documentElement.lang, clock = { hour: "2-digit", minute: "2-digit", hourCycle: "h23" };
+    const times = (_, splits, axis, space, step) => {
+      const form = new Intl.DateTimeFormat(lang, step >= 86400 ? { day: "numeric", month: "short" } : step >= 60 ? clock : { ...clock, second: "2-digit" });
+      return splits.map((seconds) => form.format(new Date(seconds * 1e3)));
+    };
     const range = (plot, low, high) => {
       const values = [low, high, ...this.marks.map((mark) => mark.y)].filter((value) => Number.isFinite(value));
       if (!values.length) return [0, 1];
@@ -84,7 +89,7 @@ export class Chart {
       scales: { x: { time: this.time }, y: { range } },
       legend: { show: false },
       cursor: { drag: { x: true, y: false }, points: { size: 6 } },
-      axes: [{ ...axis, size: this.time ? 44 : 50, ...(this.time ? {} : { label: this.xUnit, values: format }) }, { ...axis, size: 64, label: this.unit, values: format }],
+      axes: [{ ...axis, size: this.time ? 44 : 50, ...(this.time ? { values: times, space: 80 } : { label: this.xUnit, values: format }) }, { ...axis, size: 64, label: this.unit, values: format }],
       series: [{}, ...this.series.map((s) => ({
         stroke: s.colour ? colour(s.colour) : "transparent", width: s.width ?? 0, dash: s.dash,
         points: { show: false }, spanGaps: false,

@@ -18,38 +18,64 @@ export function set(root, field, text) {
   for (const place of root.querySelectorAll(`[data-field="${field}"]`)) if (place.textContent !== text) place.textContent = text;
 }
 
+/** Where a published value is not good it says so: `card.qualities` has only those. */
+export const quality = (card, path) => card.qualities[path] ?? "good";
+
+/** Writes every published value that the page has a place for, each in the form of its unit. */
+export function showValues(root, card) {
+  for (const place of root.querySelectorAll("[data-quantity]")) {
+    const { quantity: path, unit, form } = place.dataset, value = card.values[path];
+    let text = "–";
+    if (typeof value === "boolean") text = value ? texts.yes : texts.no;
+    else if (typeof value === "string") text = value || "–";
+    else if (form === "coefficient") text = coefficient(value);
+    else if (form === "count") text = number(value, 10);
+    else text = unit ? withUnit(value, unit) : number(value);
+    const std = card.values[`${path}StdDev`];
+    if (std !== undefined && std !== null && text !== "–") text += ` ± ${number(2 * std, 2)}`;
+    const kind = quality(card, path);
+    if (text !== "–" && kind !== "good") text += ` (${texts[kind]})`;
+    if (place.textContent !== text) place.textContent = text;
+  }
+}
+
 export function showState(root, card) {
-  const kind = card.freshness === "live" && card.cycle === undefined ? "waiting" : card.freshness;
+  const kind = card.freshness === "live" && !hasCycle(card) ? "waiting" : card.freshness;
   const sign = { live: "●", waiting: "○", stale: "⏱", lost: "✕" }[kind];
   for (const place of root.querySelectorAll('[data-field="state"]')) {
     place.className = `state ${{ live: "good", waiting: "plain", stale: "warn", lost: "bad" }[kind]}`;
     place.textContent = `${sign} ${texts[kind]}`;
-    place.title = card.link.reason;
+    place.title = card.link_reason;
   }
 }
+export const hasCycle = (card) => card.time_ms !== undefined;
 
-export function cyclesLeft(wear) {
-  if (wear.level !== null && wear.limit !== null && wear.level > wear.limit) return texts.passed;
-  if (wear.cycles === null) return texts.not_reached;
-  const range = wear.cycles_low === null ? "" : ` (${texts.from} ${number(wear.cycles_low, 2)}${wear.cycles_high === null ? "" : ` ${texts.to} ${number(wear.cycles_high, 2)}`})`;
-  return `${number(wear.cycles, 2)}${range}`;
+export function cyclesLeft(values) {
+  const level = values["Wear/Level"], limit = values["Wear/Limit"], cycles = values["Wear/CyclesToLimit"];
+  const low = values["Wear/CyclesToLimitLow"], high = values["Wear/CyclesToLimitHigh"];
+  if (level !== null && limit !== null && level > limit) return texts.passed;
+  if (cycles === null) return texts.not_reached;
+  const range = low === null ? "" : ` (${texts.from} ${number(low, 2)}${high === null ? "" : ` ${texts.to} ${number(high, 2)}`})`;
+  return `${number(cycles, 2)}${range}`;
 }
 
 export function showFriction(root, card) {
-  set(root, "mu_s", coefficient(card.mu_s.value));
-  set(root, "mu_s_band", card.mu_s.std === null ? "" : `± ${number(2 * card.mu_s.std, 2)}`);
-  set(root, "mu_s_quality", card.mu_s.quality === "good" ? "" : `${texts[card.mu_s.quality]}: ${card.mu_s.reason}`);
-  set(root, "wear", `${coefficient(card.wear.level)} / ${coefficient(card.wear.limit)}`);
+  const { values } = card, level = values["Wear/Level"], limit = values["Wear/Limit"] ?? 1;
+  const std = values["Friction/StaticFrictionStdDev"], kind = quality(card, "Friction/StaticFriction");
+  set(root, "mu_s", coefficient(values["Friction/StaticFriction"]));
+  set(root, "mu_s_band", std === null ? "" : `± ${number(2 * std, 2)}`);
+  set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons.mu_s}`);
+  set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}`);
   for (const meter of root.querySelectorAll('[data-field="wear_meter"]')) {
-    Object.assign(meter, { max: card.wear.limit ?? 1, value: card.wear.level ?? 0, high: 0.9 * (card.wear.limit ?? 1), optimum: 0 });
+    Object.assign(meter, { max: limit, value: level ?? 0, high: 0.9 * limit, optimum: 0 });
   }
-  set(root, "cycles_left", cyclesLeft(card.wear));
-  set(root, "batch", card.batch.id || "–");
+  set(root, "cycles_left", cyclesLeft(values));
+  set(root, "batch", values["Batch/BatchId"] || "–");
 }
 
 /** The alarm that matters most: open before over, then the latest. */
-export function lastAlarm(card) {
-  const told = card.alarms.filter((alarm) => alarm.time_ms > 0 && alarm.message.en);
+export function lastAlarm(alarms) {
+  const told = alarms.filter((alarm) => alarm.time_ms > 0 && alarm.message.en);
   const rank = (alarm) => (alarm.active ? 2 : 0) + (alarm.acknowledged ? 0 : 1);
   return told.sort((a, b) => rank(b) - rank(a) || b.time_ms - a.time_ms)[0];
 }
@@ -63,8 +89,8 @@ export function evidence(alarm) {
   return parts.join(", ");
 }
 
-export function showAlarm(place, card, emptyText) {
-  const alarm = lastAlarm(card);
+export function showAlarm(place, alarms, emptyText) {
+  const alarm = lastAlarm(alarms);
   const open = alarm && isOpen(alarm);
   place.classList.toggle("is-open", Boolean(open));
   const lines = alarm ? [`${open ? "▲ " : "○ "}${texts[alarm.name]}${alarm.acknowledged ? "" : ` (${texts.acknowledge})`}: ${alarm.message[language] || alarm.message.en}`, evidence(alarm)] : [emptyText];
@@ -89,15 +115,15 @@ export function follow(address, handlers) {
     else if (source.readyState === EventSource.CLOSED) setTimeout(() => location.reload(), 5000);
   });
   source.addEventListener("ended", () => { source.close(); setTimeout(() => location.reload(), 1000); });
-  source.addEventListener("card", (event) => {
-    const card = JSON.parse(event.data);
-    openAlarms.set(card.cell, card.alarms.filter(isOpen).length);
+  const listen = (kind, show) => source.addEventListener(kind, (event) => show(JSON.parse(event.data)));
+  listen("alarms", (cell) => {
+    openAlarms.set(cell.cell, cell.alarms.filter(isOpen).length);
     const total = [...openAlarms.values()].reduce((sum, n) => sum + n, 0);
     count.hidden = total === 0;
     count.textContent = total;
     count.setAttribute("aria-label", `${total} ${total === 1 ? texts.open_one : texts.open_many}`);
-    handlers.card(card);
+    handlers.alarms?.(cell);
   });
-  source.addEventListener("detail", (event) => handlers.detail?.(JSON.parse(event.data)));
+  for (const kind of ["recent", "card", "detail"]) listen(kind, (content) => handlers[kind]?.(content));
   addEventListener("pagehide", () => source.close());
 }

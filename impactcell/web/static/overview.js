@@ -1,5 +1,9 @@
 // A card a cell.
-import { follow, number, set, showAlarm, showFriction, showState, texts } from "./live.js";
+import { follow, hasCycle, number, set, showAlarm, showFriction, showState, texts } from "./live.js";
+
+const SHOWN = 120; // cycles of the small curve; the service remembers as many
+const curves = new Map();
+const cardOf = (cell) => document.querySelector(`[data-cell="${CSS.escape(cell)}"]`);
 
 function spark(svg, recent) {
   const values = recent.map((entry) => entry[1]).filter((value) => value !== null);
@@ -13,15 +17,22 @@ function spark(svg, recent) {
 }
 
 follow("/live", {
+  recent({ cell, recent }) { curves.set(cell, recent); },
+  alarms({ cell, alarms }) {
+    const root = cardOf(cell);
+    if (root) showAlarm(root.querySelector(".alarm"), alarms, `✓ ${texts.last_alarm}: ${texts.no_alarm}`);
+  },
   card(card) {
-    const root = document.querySelector(`[data-cell="${CSS.escape(card.cell)}"]`);
+    const root = cardOf(card.cell);
     if (!root) return;
     showState(root, card);
-    showAlarm(root.querySelector(".alarm"), card, `✓ ${texts.last_alarm}: ${texts.no_alarm}`);
-    if (card.cycle === undefined) return;
+    if (!hasCycle(card)) return;
+    const cycle = card.values["Friction/CycleNumber"], curve = curves.get(card.cell) ?? [];
+    if (curve.at(-1)?.[0] !== cycle) curve.push([cycle, card.values["Friction/StaticFriction"]]);
+    if (curve.length > SHOWN) curve.shift();
     showFriction(root, card);
-    set(root, "cycle", number(card.cycle, 10));
-    spark(root.querySelector(".spark"), card.recent);
-    root.dataset.cycle = card.cycle;
+    set(root, "cycle", number(cycle, 10));
+    spark(root.querySelector(".spark"), curve);
+    root.dataset.cycle = cycle;
   },
 });

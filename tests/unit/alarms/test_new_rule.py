@@ -21,6 +21,8 @@ NAME = "Sticky"
 
 
 def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
+    if inputs.friction is None:
+        return RuleResult(NAME, None)
     ratio = inputs.friction.mu_s.value / inputs.wear.level
     if ratio <= context.threshold:
         return RuleResult(NAME, holds=False)
@@ -85,6 +87,7 @@ def test_a_rule_is_one_file(tmp_path: Path) -> None:
             tree / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "node")
         )
     (tmp_path / "impactcell" / "alarms" / "rules" / "sticky.py").write_text(RULE, encoding="utf-8")
+    shutil.copy2(tree / "pyproject.toml", tmp_path)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     run = subprocess.run(
         [sys.executable, "-c", SEEN, str(tree / "config" / "cells" / "prototype.yaml")],
@@ -95,6 +98,24 @@ def test_a_rule_is_one_file(tmp_path: Path) -> None:
         check=False,
     )
     assert run.returncode == 0, run.stderr
+    others = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-n0",
+            "-p",
+            "no:cacheprovider",
+            "tests/unit/alarms/test_alarm_set.py",
+        ],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert others.returncode == 0, others.stdout
 
 
 def test_every_rule_lies_in_a_file_of_its_name() -> None:

@@ -7,6 +7,7 @@ import pytest
 
 import impactcell.web
 from impactcell.alarms import EventKind
+from impactcell.quantities import FOLDERS
 from impactcell.records import Estimator, Quality
 from impactcell.scada import Role
 from impactcell.web.alarm_pages import ACTIONS
@@ -50,6 +51,7 @@ def test_no_text_is_left_over_or_missing() -> None:
         *(f"span_{span}" for span in SPANS_S),
         *(f"live_{quality.name.lower()}" for quality in Quality),
         *(f"live_{estimator.value}" for estimator in Estimator),
+        *(f"folder_{folder}" for folder in FOLDERS),
     }
     for key in CATALOGUE:
         word = key.removeprefix("live_")

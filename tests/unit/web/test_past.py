@@ -2,6 +2,7 @@
 
 import csv
 import io
+import sqlite3
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import openpyxl
 import pytest
 
 from impactcell.journal.store import Journal
-from impactcell.journal.trend import CYCLES_PER_COLUMN, trend
+from impactcell.journal.trend import CYCLES_PER_COLUMN, Finished, trend
 from impactcell.records import Alarm
 from impactcell.scada import Role
 from impactcell.web.alarm_export import HEADER, to_csv, to_xlsx
@@ -32,15 +33,48 @@ def store(path: Path, times_ns: list[int], batches: dict[int, str], alarms: tupl
 
 
 def test_columns_are_what_their_cycles_were(tmp_path: Path) -> None:
-    times = [1000 * SECOND + i * SECOND for i in range(60)]
+    times = [i * SECOND for i in range(60)]
     store(tmp_path / "j.sqlite", times, {1: "A", 31: "B"})
-    columns = trend(tmp_path / "j.sqlite", 0, times[-1] + SECOND, 6)
+    columns = trend(tmp_path / "j.sqlite", 0, 60 * SECOND, 6)
     assert [column.cycles for column in columns] == [10] * 6
     assert [column.mu_s_low for column in columns] == pytest.approx([0.001 + 0.01 * i for i in range(6)])
     assert [column.mu_s_high for column in columns] == pytest.approx([0.010 + 0.01 * i for i in range(6)])
     assert [column.level for column in columns] == pytest.approx([0.0055 + 0.01 * i for i in range(6)])
     assert [column.batch_id for column in columns] == ["A"] * 3 + ["B"] * 3
     assert [column.time_ns for column in columns] == times[::10]
+
+
+def test_a_short_past_fills_the_chart_too(tmp_path: Path) -> None:
+    times = [1000 * SECOND + i * SECOND for i in range(60)]
+    store(tmp_path / "j.sqlite", times, {1: "A"})
+    columns = trend(tmp_path / "j.sqlite", 0, 1060 * SECOND, 60)
+    assert 30 <= len(columns) <= 61
+    assert sum(column.cycles for column in columns) == 60
+
+
+def test_what_is_over_is_read_once_and_what_comes_is_seen(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    store(path, [i * SECOND for i in range(60)], {1: "A"})
+    finished: Finished = {}
+    before = trend(path, 0, 60 * SECOND, 6, finished)
+    with sqlite3.connect(path) as database:  # nobody does this; it shows what is read again
+        database.execute("UPDATE cycles SET mu_s = mu_s + 1, crc = NULL")
+    after = trend(path, 0, 60 * SECOND, 6, finished)
+    assert after[:5] == before[:5]
+    assert after[5].mu_s_low == pytest.approx(1.051)
+    assert next(column.mu_s_low for column in trend(path, 0, 60 * SECOND, 6)) == pytest.approx(1.001)
+
+
+def test_a_damaged_row_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    store(path, [i * SECOND for i in range(20)], {1: "A"})
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE cycles SET mu_s = 7.0 WHERE cycle = 15")
+        database.execute("UPDATE cycles SET batch_id = 'Z' WHERE cycle = 20")
+    first, second = trend(path, 0, 20 * SECOND, 2)
+    assert (first.cycles, second.cycles) == (10, 8)
+    assert second.mu_s_high == pytest.approx(0.019)
+    assert second.batch_id == "A"
 
 
 def test_empty_stretches_are_left_out_and_full_ones_are_sampled(tmp_path: Path) -> None:

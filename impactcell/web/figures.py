@@ -1,0 +1,49 @@
+"""Which published values the page of a cell lists, and how it writes them: all that the table has."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from impactcell.quantities import CYCLE, MODULE, ONE
+from impactcell.records.quantity import DataType, Quantity, Ranges
+from impactcell.web.messages import LANGUAGES
+
+STD_SUFFIX = "StdDev"
+"""Ends the path of a value's standard deviation, which is written behind that value as ±2 of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A published value on the page; `form` is `coefficient`, `count`, or empty for any other."""
+
+    path: str
+    title: str
+    unit: str
+    form: str
+
+
+def figures(language: str) -> dict[str, list[Figure]]:
+    """List what can be shown in one line, by folder, in the order of the table.
+
+    >>> [figure.title for figure in figures("de")["Model"]]
+    ['Modell', 'Abweichung']
+    """
+    index = list(LANGUAGES).index(language)
+    listed: dict[str, list[Figure]] = {}
+    quantities: tuple[Quantity[Any], ...] = (*CYCLE, *MODULE)
+    paths = {quantity.path for quantity in quantities}
+    for quantity in quantities:
+        is_std = quantity.path.endswith(STD_SUFFIX) and quantity.path.removesuffix(STD_SUFFIX) in paths
+        if quantity.is_array or is_std:
+            continue
+        unit = quantity.unit.symbol if quantity.unit is not None else ""
+        figure = Figure(quantity.path, quantity.title[index], unit, _form(quantity))
+        listed.setdefault(quantity.path.partition("/")[0], []).append(figure)
+    return listed
+
+
+def _form(quantity: Quantity[Any]) -> str:
+    if quantity.data_type is DataType.UINT32:
+        return "count"
+    bounds = quantity.node_range(Ranges())
+    is_coefficient = quantity.unit is ONE and bounds is not None and bounds[1] <= Ranges().friction
+    return "coefficient" if is_coefficient else ""

@@ -1,0 +1,96 @@
+"""Connections that say nothing, or too slowly, or are too many: they go, the page stays for the others."""
+
+import asyncio
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from impactcell.scada.users import User, write_users
+from impactcell.web import connections
+from impactcell.web.interface import CellFacts, PageSettings
+from impactcell.web.server import PageServer
+from tests.unit.web.page import CELL, NAMES, Backend
+
+Streams = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[PageServer]:
+    users = tmp_path / "users.yaml"
+    write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
+    settings = PageSettings("http://127.0.0.1:0", users, tmp_path / "pki")
+    server = PageServer(settings, [CellFacts(CELL, "m", "o")], Backend(users))
+    server.start()
+    yield server
+    server.stop()
+
+
+async def connect(server: PageServer) -> Streams:
+    url = urlsplit(server.endpoint)
+    return await asyncio.open_connection(url.hostname, url.port)
+
+
+async def answer(streams: Streams, request: bytes) -> bytes:
+    reader, writer = streams
+    writer.write(request)
+    await writer.drain()
+    async with asyncio.timeout(20):
+        return await reader.readline()
+
+
+async def ended(streams: Streams) -> None:
+    """Wait until the other end has closed."""
+    async with asyncio.timeout(20):
+        try:
+            while await streams[0].read(4096):
+                pass
+        except ConnectionError:
+            pass
+        finally:
+            streams[1].close()
+
+
+WHOLE = b"GET /login HTTP/1.1\r\nHost: h\r\n\r\n"
+
+
+@pytest.mark.parametrize("said", [b"", b"GET /login HTTP/1.1\r\nHost: h\r\n"], ids=["nothing", "half a head"])
+async def test_who_does_not_finish_a_head_is_let_go(
+    server: PageServer, said: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "HEADER_S", 0.05)
+    streams = await connect(server)
+    streams[1].write(said)
+    await ended(streams)
+
+
+async def test_the_second_head_has_its_time_too(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "HEADER_S", 0.3)
+    streams = await connect(server)
+    assert await answer(streams, WHOLE) == b"HTTP/1.1 200 OK\r\n"
+    streams[1].write(WHOLE[:12])
+    await ended(streams)
+
+
+async def test_an_address_has_so_many_connections_and_no_more(
+    server: PageServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "MAX_PER_ADDRESS", 3)
+    held = [await connect(server) for _ in range(3)]
+    for streams in held:
+        assert await answer(streams, WHOLE) == b"HTTP/1.1 200 OK\r\n"
+    await ended(await connect(server))
+    held[0][1].close()
+    async with asyncio.timeout(20):
+        while True:  # the server hears of the one that left in its own time
+            streams = await connect(server)
+            try:
+                if await answer(streams, WHOLE) == b"HTTP/1.1 200 OK\r\n":
+                    break
+            except ConnectionError:
+                pass
+            finally:
+                streams[1].close()
+    for streams in held[1:]:
+        streams[1].close()

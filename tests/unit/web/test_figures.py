@@ -1,0 +1,56 @@
+"""What the page shows of a cycle is the table of published quantities, whatever stands in it."""
+
+import json
+
+import pytest
+
+from impactcell.quantities import CYCLE, MODULE
+from impactcell.records import ModuleStatus
+from impactcell.web.cell_view import CellView
+from impactcell.web.figures import figures
+from impactcell.web.interface import CellNews
+from tests.snapshots import make_capture, make_snapshot
+
+ALL = (*CYCLE, *MODULE)
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_every_value_has_its_line_in_both_languages(language: str) -> None:
+    listed = [figure for folder in figures(language).values() for figure in folder]
+    shown = {figure.path for figure in listed} | {f"{figure.path}StdDev" for figure in listed}
+    assert {quantity.path for quantity in ALL if not quantity.is_array} <= shown
+    titles = {quantity.path: quantity.title[language == "de"] for quantity in ALL}
+    assert all(figure.title == titles[figure.path] for figure in listed)
+    assert len({figure.title for figure in listed}) == len(listed), "two lines of one name"
+
+
+def test_a_card_has_every_value_in_the_unit_of_its_node() -> None:
+    snapshot, status = make_snapshot(make_capture(3)), ModuleStatus(connected=True, received=3)
+    view = CellView("press-1")
+    view.take(CellNews("press-1", snapshot, status=status))
+    card = json.loads(view.encode("card"))
+    sources = [(quantity, snapshot) for quantity in CYCLE] + [(quantity, status) for quantity in MODULE]  # type: ignore[misc]
+    for quantity, source in sources:
+        if quantity.is_array:
+            continue
+        value, quality = quantity.read(source)  # type: ignore[arg-type]
+        shown = card["values"][quantity.path]
+        if isinstance(value, float):
+            assert (
+                shown is None
+                if value != value or abs(value) == float("inf")
+                else shown == pytest.approx(value, rel=1e-4)
+            )
+        else:
+            assert shown == value
+        assert card["qualities"].get(quantity.path, "good") == quality.name.lower()
+
+
+def test_only_what_has_changed_is_said_to_have() -> None:
+    view = CellView("press-1")
+    first = make_snapshot(make_capture(1))
+    assert view.take(CellNews("press-1", first)) == {"card", "detail", "alarms"}
+    later = make_snapshot(make_capture(2))
+    object.__setattr__(later, "alarms", first.alarms)  # as a cycle in which no alarm moves
+    assert view.take(CellNews("press-1", later)) == {"card", "detail"}
+    assert view.take(CellNews("press-1", status=view.status)) == set()
