@@ -9,6 +9,9 @@ migration of its own.
 from collections.abc import Mapping
 from typing import Final
 
+import numpy as np
+
+from impactcell.positioning import displacement_discrepancy, prediction_watch, scatter_hypotheses
 from impactcell.serialization import Migration
 from impactcell.serialization.tree import Tree
 
@@ -40,6 +43,32 @@ def _state_2(content: dict[str, Tree]) -> dict[str, Tree]:
         **content,
         "state": {**state, "alarms": {**of_cell, **by_name}},
         "snapshot": None if snapshot is None else {**snapshot, "alarms": []},
+        "belief": None if content["belief"] is None else _planner_2(content["belief"]),
+    }
+
+
+def _planner_2(belief: dict[str, Tree]) -> dict[str, Tree]:
+    """Give what the planner has learned a discrepancy, and kinds of scatter, of which it knows nothing yet.
+
+    Format 1 had the variance of friction as inverse-gamma: its probabilities are those of its density.
+    """
+    means, covs = np.asarray(belief["means"]), np.asarray(belief["covs"])
+    count, size = means.shape
+    weights = len(displacement_discrepancy.PRIOR_STD)
+    wide = np.zeros((count, size + weights, size + weights))
+    wide[:, :size, :size] = covs
+    wide[:, size:, size:] = np.diag(displacement_discrepancy.PRIOR_STD**2)
+    std = scatter_hypotheses.FRICTION_STD
+    logarithm = -2.0 * belief["shape"] * np.log(std) - belief["rate"] / std**2
+    friction = np.exp(logarithm - logarithm.max())
+    others = scatter_hypotheses.PRIOR_WEIGHTS.reshape(std.size, -1).sum(axis=0)
+    kept = {key: belief[key] for key in ("weights", "taps", "surprise")}
+    return {
+        **kept,
+        "means": np.concatenate([means, np.zeros((count, weights))], axis=1),
+        "covs": wide,
+        "scatter_weights": np.outer(friction / friction.sum(), others).ravel(),
+        "watch": {"log_sums": np.full(len(prediction_watch.BETS), -np.inf), "score": 0.0, "doubted": False},
     }
 
 

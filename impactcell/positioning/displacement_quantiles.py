@@ -12,7 +12,9 @@ import numpy as np
 
 from impactcell.numerics.jit import compiled
 from impactcell.physics.closed_form import displacements
-from impactcell.positioning.planner_posterior import FRICTION, PlannerPosterior
+from impactcell.positioning.displacement_discrepancy import FEATURES, discrepancy_features
+from impactcell.positioning.planner_posterior import FRICTION, PARAMETERS, PlannerPosterior
+from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
 
 ACROSS = 4
@@ -22,31 +24,67 @@ ACROSS = 4
 class Scenarios(NamedTuple):
     """What a tap may meet.
 
-    `plants` are rows (k, b, mu_s, mu_k, k_v), shape (nodes + 2 ACROSS, 5): those along the line, then a
-    standard deviation above and below it in each direction across. `part` as in `displacements`.
+    Attributes
+    ----------
+    plants : ndarray, shape (nodes + 2 ACROSS, 5)
+        Rows (k, b, mu_s, mu_k, k_v): those along the line, then a standard deviation above and below it in
+        each direction across.
+    weights : ndarray, shape (nodes + 2 ACROSS, FEATURES)
+        Of the discrepancy, with each of these.
+    root : ndarray, shape (FEATURES, FEATURES)
+        phi @ root @ root.T @ phi is the variance of the discrepancy that goes with no parameter.
+    scatter : ndarray, shape (nodes, 2)
+        Of the displacement and of the contact, at each node.
+    part, place : ndarray
+        As in `displacements` and in `discrepancy_features`.
     """
 
     plants: Samples
+    weights: Samples
+    root: Samples
+    scatter: Samples
     part: Samples
+    place: Samples
 
 
-def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples) -> Scenarios:
-    """Draw up what a tap of this part may meet, along the line at the nodes z."""
+def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, place: Samples) -> Scenarios:
+    """Draw up what a tap of this part at this place may meet, along the line at the nodes z."""
     cov = posterior.cov.copy()
-    cov[FRICTION, FRICTION] += posterior.scatter**2
-    sigma = math.sqrt(cov[FRICTION, FRICTION])
-    along = cov[FRICTION] / sigma
-    across = cov[1:, 1:] - np.outer(along[1:], along[1:])
-    values, vectors = np.linalg.eigh(across)
-    steps = (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    theta = np.empty((z.size + 2 * ACROSS, 5))
+    scales = quantile_scales(posterior.scatter_weights, z)
+    scatter = scales[:, 0]
+    known = cov[FRICTION, FRICTION]
+    sigma = np.sqrt(known + scatter**2)
+    along = cov[FRICTION] / sigma[:, None]
+    along[:, FRICTION] = sigma
+    mean_line = cov[FRICTION] / math.sqrt(known + posterior.scatter**2)
+    across = cov[1:, 1:] - np.outer(mean_line[1:], mean_line[1:])
+    aside = PARAMETERS - 1
+    values, vectors = np.linalg.eigh(across[:aside, :aside])
+    lengths = np.sqrt(np.maximum(values, 0.0))
+    steps = (vectors * lengths).T
+    # weights that go with each of these directions, and what is left of theirs
+    going = (across[aside:, :aside] @ vectors / np.maximum(lengths, 1e-12)).T
+    left = across[aside:, aside:] - going.T @ going
+    own, axes = np.linalg.eigh(left)
+    theta = np.empty((z.size + 2 * ACROSS, PARAMETERS + FEATURES))
     theta[:] = posterior.mean
-    theta[: z.size] += np.outer(z, along)
+    theta[: z.size] += z[:, None] * along
     # ln(1 + s z) to second order: a factor of friction is normal, not log-normal
-    theta[: z.size, FRICTION] -= 0.5 * min(sigma, 0.1) ** 2 * z**2
-    theta[z.size : z.size + ACROSS, 1:] += steps
-    theta[z.size + ACROSS :, 1:] -= steps
-    return Scenarios(plant_parameters(theta), part)
+    theta[: z.size, FRICTION] -= 0.5 * np.minimum(sigma, 0.1) ** 2 * z**2
+    theta[z.size : z.size + ACROSS, 1:PARAMETERS] += steps
+    theta[z.size + ACROSS :, 1:PARAMETERS] -= steps
+    theta[z.size : z.size + ACROSS, PARAMETERS:] += going
+    theta[z.size + ACROSS :, PARAMETERS:] -= going
+    root = axes * np.sqrt(np.maximum(own, 0.0))
+    weights = np.ascontiguousarray(theta[:, PARAMETERS:])
+    return Scenarios(
+        plant_parameters(theta),
+        weights,
+        np.ascontiguousarray(root),
+        np.ascontiguousarray(scales[:, 1:]),
+        part,
+        place,
+    )
 
 
 def plant_parameters(theta: Samples) -> Samples:
@@ -66,31 +104,56 @@ def displacement_quantiles(
     velocity: float, strokes: Samples, scenarios: Scenarios, z: Samples, out: Samples
 ) -> None:
     """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m."""
-    rows, part = scenarios.plants, scenarios.part
+    rows, part, weights = scenarios.plants, scenarios.part, scenarios.weights
     nodes, count = z.size, strokes.size
     middle = nodes // 2
     across = (rows.shape[0] - nodes) // 2
     course = np.empty(count)
     square = np.zeros(count)
+    features = np.empty((count, weights.shape[1]))
+    tap = np.empty(3)
+    tap[0], tap[2] = velocity, rows[middle, 3] * part[0] * part[1] / rows[middle, 0]
+    displacements(velocity, strokes, rows[middle], part, course)
+    for j in range(count):
+        tap[1] = strokes[j]
+        discrepancy_features(tap, course[j], part, scenarios.place, features[j])
     for q in range(nodes):
         displacements(velocity, strokes, rows[q], part, course)
         for j in range(count):
-            out[j, q] = course[j]
+            out[j, q] = course[j] * math.exp(product(features[j], weights[q]))
     other = np.empty(count)
     for a in range(across):
         p, n = nodes + a, nodes + across + a
         displacements(velocity, strokes, rows[p], part, course)
         displacements(velocity, strokes, rows[n], part, other)
         for j in range(count):
-            step = max(abs(course[j] - out[j, middle]), abs(other[j] - out[j, middle]))
+            above = course[j] * math.exp(product(features[j], weights[p]))
+            below = other[j] * math.exp(product(features[j], weights[n]))
+            step = max(abs(above - out[j, middle]), abs(below - out[j, middle]))
             square[j] += step * step
     line = np.empty(nodes)
+    root = scenarios.root
     for j in range(count):
         line[:] = out[j]
-        aside = math.sqrt(square[j])
+        share = 0.0
+        for a in range(root.shape[1]):
+            share += product(features[j], root[:, a]) ** 2
+        square[j] += share * line[middle] ** 2
         for q in range(nodes):
             if q != middle:
+                by_contact = scenarios.scatter[q, 1] * min(tap[2], line[middle])
+                by_itself = scenarios.scatter[q, 0] * line[middle]
+                aside = math.sqrt(square[j] + by_itself**2 + by_contact**2)
                 out[j, q] = max(reach(line, z, q, middle, aside), 0.0)
+
+
+@compiled
+def product(a: Samples, b: Samples) -> float:
+    """Scalar product of two short vectors."""
+    total = 0.0
+    for n in range(a.size):
+        total += a[n] * b[n]
+    return total
 
 
 @compiled

@@ -7,15 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.positioning.action_selection import ActionSpace
+from impactcell.positioning.displacement_discrepancy import FEATURES, MASS_KG, POSITION_M
 from impactcell.positioning.displacement_quantiles import (
     parameter_scenarios,
     plant_parameters,
     quantile_table,
 )
 from impactcell.positioning.dynamic_programming import Goal, ValueFunction, solve_value_function
-from impactcell.positioning.planner_posterior import PlannerPosterior, anticipate_learning
+from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior, anticipate_learning
 from impactcell.positioning.quadrature import COARSE_Z, coarse_nodes
 from impactcell.positioning.safety_limits import allowed_strokes
+from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
 
 SLOWEST_M_S = 0.005  # velocity of the table that hardly moves a part
@@ -23,9 +25,12 @@ VELOCITIES = 24  # of the table; neighbours are 14 % apart
 STROKES = 60  # of the table
 MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
 SAME_MASS = 0.03  # relative difference of parts that share a table
-STALE = np.array([0.02, 0.04, 0.08, 0.03, 2.0])
+STALE = np.concatenate([[0.02, 0.04, 0.08, 0.03, 2.0], np.full(FEATURES, 0.03)])
 """Change of the posterior's mean or standard deviation, in its units, after which a table is made anew."""
-STALE_SCATTER = (0.9, 1.1)  # bounds of the ratio of two scatters that share a table
+SCATTER_Z = np.array([1.0, 3.0])
+"""Nodes at which scatter is compared."""
+STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02], [6e-3, 6e-3, 0.04]])
+"""Change of the scatter at these nodes after which a table is made anew."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,12 +78,19 @@ class PlannerLimits:
 
 
 class LookaheadTable(NamedTuple):
-    """Taps and cost to go for parts of one mass, and the posterior they were worked out from."""
+    """Taps and cost to go for parts of one mass, and the posterior they were worked out from.
+
+    `table` (m), shape (velocities, strokes, nodes), holds for `place`; `sliding` is the share of each
+    displacement that friction acts on, shape (velocities, strokes).
+    """
 
     part: Samples
+    place: Samples
     caution: float
     posterior: PlannerPosterior
+    scatter: Samples
     table: Samples
+    sliding: Samples
     value: ValueFunction
 
     @property
@@ -86,19 +98,29 @@ class LookaheadTable(NamedTuple):
         """Largest median displacement; 0 where nothing moves the part."""
         return float(np.nanmax(self.table[:, :, COARSE_Z.size // 2], initial=0.0))
 
-    def serves(self, part: Samples, caution: float, posterior: PlannerPosterior) -> bool:
-        """Whether it need not be made anew for this part and posterior."""
+    def serves(self, part: Samples, caution: float, posterior: PlannerPosterior, scatter: Samples) -> bool:
+        """Whether it need not be made anew for this part, posterior, and scatter at `SCATTER_Z`."""
         if caution != self.caution or part.size != self.part.size:
             return False
         if abs(part[0] / self.part[0] - 1.0) > SAME_MASS or not np.allclose(part[1:], self.part[1:], 0.02):
             return False
-        now, then = np.sqrt(np.diag(posterior.cov)), np.sqrt(np.diag(self.posterior.cov))
-        if not STALE_SCATTER[0] < posterior.scatter / self.posterior.scatter < STALE_SCATTER[1]:
+        if not (np.abs(scatter - self.scatter) < STALE_SCATTER + 0.1 * self.scatter).all():
             return False
+        now, then = np.sqrt(np.diag(posterior.cov)), np.sqrt(np.diag(self.posterior.cov))
         return bool(
             (np.abs(posterior.mean - self.posterior.mean) < STALE).all()
             and (np.abs(now - then) < STALE).all()
         )
+
+    def at(self, place: Samples) -> Samples:
+        """`table` for a part that lies elsewhere: the discrepancy of the position moves with it."""
+        along, by_mass, direction = self.posterior.mean[PARAMETERS + np.array([3, 4, 9])]
+        slope = (along + by_mass * MASS_KG / self.part[0]) * (place[0] - self.place[0]) / POSITION_M
+        slope += direction * (place[1] - self.place[1])
+        if abs(slope) < 1e-3:
+            return self.table
+        moved: Samples = self.table * np.exp(self.sliding * slope)[:, :, None]
+        return moved
 
 
 def stiffest(posterior: PlannerPosterior) -> Samples:
@@ -109,23 +131,39 @@ def stiffest(posterior: PlannerPosterior) -> Samples:
 
 
 def build_lookahead(
-    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, caution: float
+    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples, caution: float
 ) -> LookaheadTable:
-    """Work out taps and cost to go; `part` as in `displacements`."""
-    table = _quantiles(limits, posterior, part)
+    """Work out taps and cost to go; `part` and `place` as in `Scenarios`."""
+    table = _quantiles(limits, posterior, part, place)
     value = ValueFunction(1.0, np.ones(1), np.ones(1))
     if np.nanmax(table[:, :, COARSE_Z.size // 2], initial=0.0) > 0.0:
         later = anticipate_learning(posterior)
         will_learn = (np.diag(posterior.cov) > 1.2 * np.diag(later.cov)).any()
-        ahead = _quantiles(limits, later, part) if will_learn else table
+        ahead = _quantiles(limits, later, part, place) if will_learn else table
         if math.isinf(limits.max_stroke_m):
             ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
         value = solve_value_function(ahead, coarse_nodes(), limits.goal(caution))
-    return LookaheadTable(part, caution, posterior, table, value)
+    scatter = quantile_scales(posterior.scatter_weights, SCATTER_Z)
+    sliding = _sliding_share(limits, posterior, part, table[:, :, COARSE_Z.size // 2])
+    return LookaheadTable(part, place, caution, posterior, scatter, table, sliding, value)
 
 
-def _quantiles(limits: PlannerLimits, posterior: PlannerPosterior, part: Samples) -> Samples:
+def _sliding_share(
+    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, middle: Samples
+) -> Samples:
+    """F + c of `discrepancy_features` for each tap of a table."""
+    plant = plant_parameters(posterior.mean[None])[0]
+    indentation = plant[3] * part[0] * part[1] / plant[0]
+    pushed = np.where(np.isfinite(limits.strokes), limits.strokes - indentation, 0.0)
+    size = np.maximum(middle, 1e-9)
+    f = np.clip((middle - pushed) / size, 0.0, 1.0)
+    share: Samples = np.nan_to_num(f + (1.0 - f) * np.minimum(indentation / size, 1.0))
+    return share
+
+
+def _quantiles(limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples) -> Samples:
     velocities, strokes = limits.velocities, limits.strokes
-    table = quantile_table(velocities, strokes, parameter_scenarios(posterior, COARSE_Z, part), COARSE_Z)
+    scenarios = parameter_scenarios(posterior, COARSE_Z, part, place)
+    table = quantile_table(velocities, strokes, scenarios, COARSE_Z)
     table[strokes > limits.longest_strokes(posterior, part)[:, None]] = math.nan
     return table

@@ -9,26 +9,35 @@ import numpy as np
 
 from impactcell.errors import PositioningError
 from impactcell.physics import Plant, free_motion
-from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning import planner_posterior
 from impactcell.positioning.action_selection import select_action
 from impactcell.positioning.displacement_quantiles import (
     displacement_quantiles,
     parameter_scenarios,
-    plant_parameters,
 )
 from impactcell.positioning.dynamic_programming import Goal
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
-from impactcell.positioning.lookahead_table import LookaheadTable, PlannerLimits, build_lookahead, stiffest
-from impactcell.positioning.planner_posterior import PlannerPosterior
+from impactcell.positioning.lookahead_table import (
+    SCATTER_Z,
+    LookaheadTable,
+    PlannerLimits,
+    build_lookahead,
+    stiffest,
+)
+from impactcell.positioning.planner_posterior import PlannerPosterior, with_score
 from impactcell.positioning.posterior_update import update_posterior
+from impactcell.positioning.prediction_watch import score_of
 from impactcell.positioning.quadrature import Z
 from impactcell.positioning.safety_limits import largest_force
+from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.positioning.tap import Tap, Unreachable
+from impactcell.positioning.tap_model import model_of_tap
 from impactcell.records import Quality, Samples, Signature
 
-CAUTION = (1.0, 20.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
+CAUTION = (1.0, 20.0, 400.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
+GAP_EVIDENCE = math.log(1e4)
+"""ln of the Bayes factor from which on the model is said to lack something: 1 in 10 000 cells is false."""
 REMEMBERED = 64  # tables, of parts of different mass
 
 
@@ -109,7 +118,14 @@ class TapPlanner:
         """Go on from what had been learned earlier."""
         self._posterior = posterior
 
-    def next_tap(self, remaining_m: float, mass_kg: float) -> Tap | Unreachable | None:
+    @property
+    def lacks_something(self) -> bool:
+        """Whether the taps say, beyond chance, that the model lacks something or its predictions are off."""
+        return self._posterior.gap_evidence >= GAP_EVIDENCE or self._posterior.watch.alarming
+
+    def next_tap(
+        self, remaining_m: float, mass_kg: float, position_m: float = 0.0
+    ) -> Tap | Unreachable | None:
         """Choose the next tap of a task; None where the part is in place.
 
         Parameters
@@ -117,6 +133,8 @@ class TapPlanner:
         remaining_m : float
             Target minus position along +1; negative when the part lies beyond its target.
         mass_kg : float
+        position_m : float
+            Where the part lies along +1; what the model lacks may depend on it.
 
         Returns
         -------
@@ -140,17 +158,18 @@ class TapPlanner:
             )
         distance = abs(remaining_m)
         part = self._part(mass_kg)
-        scenarios = parameter_scenarios(self._posterior, Z, part)
+        place = np.array([position_m, math.copysign(1.0, remaining_m)])
+        scenarios = parameter_scenarios(self._posterior, Z, part, place)
         least = 1.0
         for caution in CAUTION:
-            lookahead = self._lookahead(part, caution)
+            lookahead = self._lookahead(part, place, caution)
             if not lookahead.furthest_m > 0.0:
                 return Unreachable(
                     f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
                     f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
                 )
             action, safest = select_action(
-                distance, lookahead.table, lookahead.value, self._limits.space(self._posterior, part),
+                distance, lookahead.at(place), lookahead.value, self._limits.space(self._posterior, part),
                 scenarios, self._limits.goal(caution), self.overshoot_probability,
             )  # fmt: skip
             if action is not None:
@@ -162,19 +181,17 @@ class TapPlanner:
                 f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
                 f"(the safest with {least:.2g})"
             )
-        moved = np.empty((1, BAND_Z.size))
-        stroke = np.array([action.stroke_m])
-        band = parameter_scenarios(self._posterior, BAND_Z, part)
-        displacement_quantiles(action.velocity_m_s, stroke, band, BAND_Z, moved)
+        moved = self._band(action.velocity_m_s, action.stroke_m, part, place)
         return Tap(
             velocity_m_s=action.velocity_m_s,
             stroke_m=action.stroke_m,
             direction=1 if remaining_m > 0.0 else -1,
-            expected_m=float(moved[0, BAND_Z.size // 2]),
+            expected_m=float(moved[BAND_Z.size // 2]),
             lowest_m=float(moved.min()),
             highest_m=float(moved.max()),
             expected_taps=action.cost,
             overshoot_probability=action.overshoot,
+            position_m=position_m,
         )
 
     def observe(self, tap: Tap, moved_m: float, mass_kg: float) -> None:
@@ -189,14 +206,12 @@ class TapPlanner:
             raise PositioningError(f"cannot learn from a displacement of {moved_m} m of {mass_kg} kg")
 
         part = self._part(mass_kg)
-
-        def response(states: Samples) -> Samples:
-            factor = np.maximum(1.0 + states[:, 5], 0.05)
-            return displacement_of(
-                tap.velocity_m_s, tap.stroke_m, plant_parameters(states[:, :5]), factor, part
-            )
-
-        self._posterior = update_posterior(self._posterior, response, moved_m)
+        place = np.array([tap.position_m, float(tap.direction)])
+        band = self._band(tap.velocity_m_s, tap.stroke_m, part, place)
+        if np.isfinite(band).all() and band[BAND_Z.size // 2] > 0.0:
+            self._posterior = with_score(self._posterior, score_of(moved_m, band, BAND_Z))
+        model = model_of_tap(tap, self._posterior, part)
+        self._posterior = update_posterior(self._posterior, model, moved_m)
 
     def observe_friction(self, mu_k: float, std: float, batch_changed: bool = False) -> None:  # noqa: FBT001, FBT002
         """Take over the tracker's kinetic coefficient; `batch_changed`: friction has just stepped.
@@ -236,13 +251,22 @@ class TapPlanner:
             [[mass_kg, self._gravity], [] if self._profile is None else self._profile.warp()]
         )
 
-    def _lookahead(self, part: Samples, caution: float) -> LookaheadTable:
+    def _band(self, velocity: float, stroke: float, part: Samples, place: Samples) -> Samples:
+        """Displacements (m) of a tap at the nodes `BAND_Z`."""
+        moved = np.empty((1, BAND_Z.size))
+        scenarios = parameter_scenarios(self._posterior, BAND_Z, part, place)
+        displacement_quantiles(velocity, np.array([stroke]), scenarios, BAND_Z, moved)
+        band: Samples = moved[0]
+        return band
+
+    def _lookahead(self, part: Samples, place: Samples, caution: float) -> LookaheadTable:
         """Outlook for this part, made anew where the posterior has moved on."""
+        scatter = quantile_scales(self._posterior.scatter_weights, SCATTER_Z)
         for n, lookahead in enumerate(self._lookaheads):
-            if lookahead.serves(part, caution, self._posterior):
+            if lookahead.serves(part, caution, self._posterior, scatter):
                 self._lookaheads.append(self._lookaheads.pop(n))
                 return lookahead
-        lookahead = build_lookahead(self._limits, self._posterior, part, caution)
+        lookahead = build_lookahead(self._limits, self._posterior, part, place, caution)
         self._lookaheads.append(lookahead)
         del self._lookaheads[:-REMEMBERED]
         return lookahead
@@ -254,11 +278,12 @@ def _ready() -> None:
     posterior = planner_posterior.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
     limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
     part = np.array([20.0, 9.81])
-    lookahead = build_lookahead(limits, posterior, part, 1.0)
+    place = np.array([0.0, 1.0])
+    lookahead = build_lookahead(limits, posterior, part, place, 1.0)
     select_action(
         2e-3, lookahead.table, lookahead.value, limits.space(posterior, part),
-        parameter_scenarios(posterior, Z, part), Goal(50e-6, 100.0), 0.1,
+        parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,
     )  # fmt: skip
-    plant = plant_parameters(posterior.mean[None])
-    displacement_of(0.02, 2e-4, plant, np.ones(1), part)
-    largest_force(0.02, 2e-4, plant[0], 20.0, 9.81)
+    tap = Tap(0.02, 2e-4)
+    model_of_tap(tap, posterior, part)
+    largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(posterior), 20.0, 9.81)

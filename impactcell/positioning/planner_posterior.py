@@ -4,10 +4,11 @@ Parameters are Gaussian in logarithms, where a plant that is 10 % off is 0.1 off
 
     theta = (ln mu_k, ln k, ln b, ln(mu_s / mu_k), k_v)
 
-and each tap has a friction factor of its own, 1 + sigma z, z ~ N(0, 1), on mu_s and mu_k alike; sigma²
-is inverse-gamma. The displacement folds over as friction varies by more than some 10 %, so that one
-observation may have two explanations: friction that is not known better than that is a sum of narrower
-Gaussians, weighted by how well each foretold what happened (`impactcell.positioning.posterior_update`).
+and with them the weights of what the model lacks (`impactcell.positioning.displacement_discrepancy`). How
+much taps scatter is learned beside (`impactcell.positioning.scatter_hypotheses`). The displacement folds over
+as friction varies by more than some 10 %, so that one observation may have two explanations: friction that
+is not known better than that is a sum of narrower Gaussians, weighted by how well each foretold what
+happened (`impactcell.positioning.posterior_update`).
 """
 
 import math
@@ -15,55 +16,75 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from impactcell.positioning.displacement_discrepancy import LEARNED_STD as LEARNED_WEIGHTS_STD
+from impactcell.positioning.displacement_discrepancy import PRIOR_STD as PRIOR_WEIGHTS_STD
+from impactcell.positioning.displacement_discrepancy import log_bayes_factor
+from impactcell.positioning.prediction_watch import PredictionWatch, place_bets
+from impactcell.positioning.scatter_hypotheses import mean_variances, prior_weights
 from impactcell.records import Samples
 
 FRICTION, STIFFNESS, DAMPING, RATIO, VISCOUS = range(5)
 """Where each parameter lies in theta."""
-LEARNED_STD = np.array([0.015, 0.03, 0.05, 0.02, 3.0])  # left after a handful of taps
+PARAMETERS = 5
+"""Of theta; the weights of the discrepancy follow."""
+LEARNED_STD = np.concatenate([[0.015, 0.03, 0.05, 0.02, 3.0], LEARNED_WEIGHTS_STD])
+"""Left after a handful of taps."""
+DOUBT_SHARE = 0.5
+"""Of the prior's standard deviation that the weights have on top, once predictions have been off."""
+SHARPENED = 6.0
+"""Power of the scatter's probabilities that a handful of taps leaves: what is likely becomes likelier."""
 BATCH_STD = 0.08  # of friction, after a batch step whose size the tracker has not measured yet
 LEVEL_STD = 0.007  # the tracker's level is believed no better than this: successive levels are correlated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannerPosterior:
-    """Sum of Gaussians over the parameters and inverse-gamma over the variance of the friction factor.
+    """Sum of Gaussians over the parameters and the discrepancy, and a grid over the scatter.
 
     Attributes
     ----------
     weights : ndarray, shape (c,)
         Probability of each component.
-    means : ndarray, shape (c, 5)
-    covs : ndarray, shape (c, 5, 5)
-    shape, rate : float
-        Of the inverse-gamma distribution of sigma².
+    means : ndarray, shape (c, n)
+        n = 5 parameters and the weights of the discrepancy.
+    covs : ndarray, shape (c, n, n)
+    scatter_weights : ndarray, shape (g,)
+        Probability of each combination of `impactcell.positioning.scatter_hypotheses`.
     taps : int
         Displacements learned from.
     surprise : float
         Last normalised innovation, with its sign.
+    watch : PredictionWatch
+        Whether predictions have been calibrated.
     """
 
     weights: Samples
     means: Samples
     covs: Samples
-    shape: float = 12.0
-    rate: float = field(default=11.0 * 0.03**2)
+    scatter_weights: Samples = field(default_factory=prior_weights)
     taps: int = 0
     surprise: float = 0.0
+    watch: PredictionWatch = field(default_factory=PredictionWatch)
 
     @property
     def scatter(self) -> float:
         """Predictive standard deviation of a tap's friction factor."""
-        return math.sqrt(self.rate / (self.shape - 1.0))
+        return math.sqrt(float(mean_variances(self.scatter_weights)[0]))
+
+    @property
+    def gap_evidence(self) -> float:
+        """Natural logarithm of the Bayes factor for a discrepancy against none."""
+        return log_bayes_factor(self.mean[PARAMETERS:], self.cov[PARAMETERS:, PARAMETERS:])
 
     @property
     def mean(self) -> Samples:
-        """Mean of the parameters, shape (5,)."""
+        """Mean of parameters and weights, shape (n,)."""
         mean: Samples = self.weights @ self.means
         return mean
 
     @property
     def cov(self) -> Samples:
-        """Covariance of the parameters, shape (5, 5)."""
+        """Their covariance, shape (n, n)."""
         apart = self.means - self.mean
         cov: Samples = np.einsum("c,cij->ij", self.weights, self.covs) + (apart.T * self.weights) @ apart
         return cov
@@ -101,6 +122,8 @@ def prior(
         ]
     )
     std = np.array([friction_std, 0.12, 0.13, 0.03, 0.5 + 0.15 * viscous])
+    mean = np.concatenate([mean, np.zeros(PRIOR_WEIGHTS_STD.size)])
+    std = np.concatenate([std, PRIOR_WEIGHTS_STD])
     return PlannerPosterior(np.ones(1), mean[None], np.diag(std**2)[None])
 
 
@@ -112,7 +135,25 @@ def anticipate_learning(posterior: PlannerPosterior) -> PlannerPosterior:
     """
     mean, cov = posterior.mean, posterior.cov
     factor = np.minimum(1.0, LEARNED_STD / np.sqrt(np.diag(cov)))
-    return with_single_gaussian(posterior, mean, cov * np.outer(factor, factor))
+    scatter = posterior.scatter_weights**SHARPENED
+    anticipated = with_single_gaussian(posterior, mean, cov * np.outer(factor, factor))
+    return replace(anticipated, scatter_weights=scatter / scatter.sum())
+
+
+def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
+    """Posterior after one more score of its predictions; where they turn out to be off, taps become cautious.
+
+    A planner in doubt knows less of discrepancy and scatter than it thought: the covariance of the weights
+    grows, and the probabilities of the scatter move halfway back to where they began.
+    """
+    watched = place_bets(posterior.watch, score)
+    if posterior.watch.doubted or not watched.doubted:
+        return replace(posterior, watch=watched)
+    covs = posterior.covs.copy()
+    weights = np.arange(PARAMETERS, covs.shape[1])
+    covs[:, weights, weights] += (DOUBT_SHARE * PRIOR_WEIGHTS_STD) ** 2
+    scatter = np.sqrt(posterior.scatter_weights * prior_weights())
+    return replace(posterior, covs=covs, scatter_weights=scatter / scatter.sum(), watch=watched)
 
 
 def condition_on_friction(

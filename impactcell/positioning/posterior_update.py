@@ -9,59 +9,88 @@ learned from little.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from impactcell.positioning.planner_posterior import BATCH_STD, FRICTION, STIFFNESS, PlannerPosterior
+from impactcell.positioning.displacement_discrepancy import FEATURES
+from impactcell.positioning.planner_posterior import (
+    BATCH_STD,
+    FRICTION,
+    PARAMETERS,
+    STIFFNESS,
+    PlannerPosterior,
+)
+from impactcell.positioning.scatter_hypotheses import mean_variances, update_weights
+from impactcell.positioning.tap_model import Response, TapModel
 from impactcell.records import Samples
 
 DEGREES = 8.0  # of freedom of the likelihood
 POSITION_NOISE_M = 0.5e-6  # standard deviation of a displacement by an encoder of 1 um: 1 um / sqrt 12, twice
-MODEL_ERROR = 2e-3  # of a displacement: what the nominal model leaves out
 # Random walk a tap, in units of the parameters: wear of friction, a slow change of the contact.
-WALK = np.array([1.5e-3, 3e-4, 6e-4, 3e-4, 0.02])
+WALK = np.concatenate([[1.5e-3, 3e-4, 6e-4, 3e-4, 0.02], np.zeros(FEATURES)])
 NARROW = {FRICTION: 0.05, STIFFNESS: 0.04}  # standard deviations that one Gaussian is trusted with
 NEGLIGIBLE = 1e-4  # weight of a component that is dropped
 ITERATIONS = 4  # of the linearisation; the last change is below a twentieth of a standard deviation
-CLIPPED = 3.5  # standard deviations of a tap's factor, beyond which more does not count as scatter
 CROOKED = 0.1  # of the first regression's remainder that stays, whatever the later ones leave over
 
-Response = Callable[[Samples], Samples]
-"""Displacements (m), shape (n,), for rows of (theta, z sigma), shape (n, 6)."""
+
+class Step(NamedTuple):
+    """One Gaussian after one displacement.
+
+    `likelihood` is a logarithm, `surprise` the normalised innovation; `innovation` (m), its `variance` but
+    for scatter (m²) and the `reaches` of the scatter (m), shape (3,), are those foretold before it.
+    """
+
+    mean: Samples
+    cov: Samples
+    likelihood: float
+    surprise: float
+    innovation: float
+    variance: float
+    reaches: Samples
 
 
-def update_posterior(posterior: PlannerPosterior, response: Response, moved_m: float) -> PlannerPosterior:
+def update_posterior(
+    posterior: PlannerPosterior, response: Response | TapModel, moved_m: float
+) -> PlannerPosterior:
     """Posterior after a tap displaced the part by `moved_m`, `response` being the model of that tap."""
+    model = response if isinstance(response, TapModel) else TapModel(response)
     posterior = split_components(posterior)
+    scatter = mean_variances(posterior.scatter_weights)
     steps = [
-        update_component(mean, cov + np.diag(WALK**2), posterior.scatter, response, moved_m)
+        update_component(mean, cov + np.diag(WALK**2), scatter, model, moved_m)
         for mean, cov in zip(posterior.means, posterior.covs, strict=True)
     ]
     with np.errstate(divide="ignore"):
-        logarithm = np.log(posterior.weights) + [s[2] for s in steps]
+        logarithm = np.log(posterior.weights) + [step.likelihood for step in steps]
     if not np.isfinite(logarithm).any():
         return replace(posterior, taps=posterior.taps + 1)
     weights = np.exp(logarithm - logarithm.max())
     weights /= weights.sum()
+    possible = np.isfinite(logarithm)
+    scatter_weights = update_weights(
+        posterior.scatter_weights,
+        posterior.weights[possible],
+        np.array([step.innovation for step in steps])[possible],
+        np.array([step.variance for step in steps])[possible],
+        np.array([step.reaches for step in steps])[possible],
+    )
     keep = weights > NEGLIGIBLE
     weights = weights[keep] / weights[keep].sum()
-    kept = [s for s, k in zip(steps, keep, strict=True) if k]
-    surprise = float(weights @ np.array([s[3] for s in kept]))
-    told = float(weights @ np.array([s[4] for s in kept]))
-    square = float(weights @ np.array([s[5] for s in kept]))
-    covs = np.array([s[1] for s in kept])
+    kept = [step for step, k in zip(steps, keep, strict=True) if k]
+    surprise = float(weights @ np.array([step.surprise for step in kept]))
+    covs = np.array([step.cov for step in kept])
     if abs(surprise) > 3.0 and posterior.surprise * surprise > 6.0:
         # Two in a row on one side: friction has changed and nobody said so.
         covs[:, FRICTION, FRICTION] += BATCH_STD**2
     learned = replace(
         posterior,
         weights=weights,
-        means=np.array([s[0] for s in kept]),
+        means=np.array([step.mean for step in kept]),
         covs=covs,
-        shape=posterior.shape + 0.5 * told,
-        rate=posterior.rate + 0.5 * square,
+        scatter_weights=scatter_weights,
         taps=posterior.taps + 1,
         surprise=surprise,
     )
@@ -102,38 +131,35 @@ def merge_components(posterior: PlannerPosterior) -> PlannerPosterior:
     return replace(posterior, weights=np.ones(1), means=posterior.mean[None], covs=posterior.cov[None])
 
 
-def update_component(
-    mean: Samples, cov: Samples, sigma: float, response: Response, moved_m: float
-) -> tuple[Samples, Samples, float, float, float, float]:
-    """One Gaussian after one displacement.
+def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapModel, moved_m: float) -> Step:
+    """One Gaussian after one displacement; `scatter` has the expected squares of the three of it.
 
-    Returns
-    -------
-    mean, cov : ndarray, shapes (5,) and (5, 5)
-    likelihood : float
-        Its logarithm.
-    surprise : float
-        Normalised innovation.
-    told, square : float
-        How much the tap says of its own friction factor, 0 to 1, and the square of that factor's
-        deviation.
+    What is regressed are the parameters and the tap's friction factor; the weights of the discrepancy act on
+    the logarithm, and their slope is known.
     """
+    size = mean.size
+    regressed = np.append(np.arange(PARAMETERS), size)
     before = np.append(mean, 0.0)
-    prior = np.zeros((6, 6))
-    prior[:5, :5] = cov
-    prior[5, 5] = sigma**2
-    noise = POSITION_NOISE_M**2 + (MODEL_ERROR * moved_m) ** 2
+    prior = np.zeros((size + 1, size + 1))
+    prior[:size, :size] = cov
+    prior[size, size] = scatter[0]
+    by_itself, by_contact = moved_m, min(model.indentation_m, abs(moved_m))
+    noise = POSITION_NOISE_M**2 + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
     point, after = before.copy(), prior
     weight, surprise, likelihood, crooked = 1.0, 0.0, -math.inf, 0.0
-    gain, variance, innovation = np.zeros(6), 1.0, 0.0
+    foretold, rest, reaches = 0.0, 1.0, np.zeros(3)
+    slope = np.zeros(size + 1)
     for iteration in range(ITERATIONS):
-        root = np.linalg.cholesky(after + 1e-12 * np.diag(np.diag(prior)))
-        values = response(point + POINTS @ root.T)
+        block = after[np.ix_(regressed, regressed)]
+        root = np.linalg.cholesky(block + 1e-12 * np.diag(np.diag(prior)[regressed]))
+        factor = math.exp(float(model.features @ point[PARAMETERS:size]))
+        values = factor * model.response(point[regressed] + POINTS @ root.T)
         if not np.isfinite(values).all():
-            return mean, cov, -math.inf, 0.0, 0.0, 0.0
+            return Step(mean, cov, -math.inf, 0.0, 0.0, 1.0, np.zeros(3))
         centre = float(values.mean())
         white = POINTS.T @ (values - centre) / len(POINTS)
-        slope = np.linalg.solve(root.T, white)
+        slope[regressed] = np.linalg.solve(root.T, white)
+        slope[PARAMETERS:size] = centre * model.features
         bent = float(((values - centre - POINTS @ white) ** 2).sum()) / (len(POINTS) - 7)
         crooked = max(bent, CROOKED * crooked)
         innovation = moved_m - centre - float(slope @ (before - point))
@@ -143,6 +169,8 @@ def update_component(
             weight = min(1.0, (DEGREES + 1.0) / (DEGREES + surprise**2))
             likelihood = -0.5 * math.log(variance)
             likelihood -= 0.5 * (DEGREES + 1.0) * math.log1p(surprise**2 / DEGREES)
+            reaches = np.array([slope[size], by_itself, by_contact])
+            foretold, rest = innovation, variance - float(scatter @ reaches**2)
         gain = prior @ slope / variance
         new = before + weight * gain * innovation
         settled = bool(np.all(np.abs(new - point) < 0.05 * np.sqrt(np.diag(prior))))
@@ -151,10 +179,15 @@ def update_component(
         after = 0.5 * (after + after.T)
         if settled and iteration > 0:
             break
-    told = float(gain[5]) ** 2 * variance / sigma**2
-    # Of the factor's variance it says factor² / told; an outlier counts as one of 3.5 standard deviations.
-    square = min(float(gain[5] * innovation) ** 2, CLIPPED**2 * told * sigma**2)
-    return point[:5], after[:5, :5], likelihood, surprise, told, square
+    return Step(
+        point[:size],
+        after[:size, :size],
+        likelihood,
+        surprise,
+        foretold,
+        max(rest, POSITION_NOISE_M**2),
+        reaches,
+    )
 
 
 def _spread_evenly(count: int, seed: int) -> Samples:

@@ -21,6 +21,8 @@ class Tap:
         Taps still needed, this one included.
     overshoot_probability : float
         That this tap or one of those to come overshoots.
+    position_m : float
+        Where the part lies before it, along +1.
     """
 
     velocity_m_s: float
@@ -31,6 +33,7 @@ class Tap:
     highest_m: float = math.inf
     expected_taps: float = math.nan
     overshoot_probability: float = math.nan
+    position_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

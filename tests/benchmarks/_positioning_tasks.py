@@ -112,7 +112,7 @@ class Known(Learned):
         plant = Plant(task.stiffness, task.damping, task.mu_s, RATIO * task.mu_s)
         self.planner = TapPlanner(tolerance_m=task.tolerance_m, plant=plant)
         belief = self.planner.posterior
-        std = np.full(5, 1e-4)
+        std = np.full(belief.mean.size, 1e-4)
         std[[FRICTION, STIFFNESS, DAMPING]] = 0.01, 1e-4, 1e-4
         self.planner.resume(with_single_gaussian(belief, belief.mean, np.diag(std**2)))
 
@@ -123,7 +123,9 @@ class Fixed(Learned):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         belief = self.planner.posterior
-        self.planner.resume(with_single_gaussian(belief, belief.mean, np.diag(np.full(5, 1e-4) ** 2)))
+        self.planner.resume(
+            with_single_gaussian(belief, belief.mean, np.diag(np.full(belief.mean.size, 1e-4) ** 2))
+        )
 
     def start(self, task: Task) -> None:
         pass

@@ -10,6 +10,7 @@ from impactcell.cell import CellState
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import StoredState, unpack_state
+from impactcell.positioning.planner_posterior import PARAMETERS
 from impactcell.records import Alarm
 from impactcell.tracking.model_gap.gap_cusum import GapState
 from impactcell.tracking.signature.tracker import SignatureState
@@ -194,12 +195,16 @@ def _planner(durable: StoredState) -> dict[str, Any]:
     assert belief is not None
     return {
         "weights": _floats(belief.weights),
-        "means": {"shape": list(belief.means.shape), "numbers": _floats(belief.means)},
-        "covariances": {"shape": list(belief.covs.shape), "numbers": _floats(belief.covs)},
-        "scatter's shape and rate": _floats([belief.shape, belief.rate]),
+        "means": _of_parameters(belief.means[:, :PARAMETERS]),
+        "covariances": _of_parameters(belief.covs[:, :PARAMETERS, :PARAMETERS]),
+        "scatter of friction": round(belief.scatter, 2),
         "taps": belief.taps,
         "surprise": belief.surprise.hex(),
     }
+
+
+def _of_parameters(values: np.ndarray) -> dict[str, Any]:
+    return {"shape": list(values.shape), "numbers": _floats(values)}
 
 
 def _snapshot(durable: StoredState) -> dict[str, Any]:

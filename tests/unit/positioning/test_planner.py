@@ -128,7 +128,9 @@ def test_the_bound_on_overshoot_is_kept_by_the_true_distribution() -> None:
     # one part, contact and friction known: the share of 20 000 outcomes beyond the tolerance
     planner = TapPlanner(tolerance_m=10e-6, plant=NOMINAL, overshoot_probability=0.02)
     belief = planner.posterior
-    planner.resume(type(belief)(np.ones(1), belief.mean[None], np.diag(np.full(5, 1e-10))[None]))
+    planner.resume(
+        type(belief)(np.ones(1), belief.mean[None], np.diag(np.full(belief.mean.size, 1e-10))[None])
+    )
     rng = np.random.default_rng(3)
     factor = 1.0 + 0.03 * rng.standard_normal(20_000)
     for mass, remaining in ((7.0, 1.3e-3), (15.0, 6e-3), (30.0, 3.3e-3)):
@@ -188,3 +190,53 @@ def test_friction_along_the_stroke_is_planned_with() -> None:
     same = planner.next_tap(10e-3, 10.0)
     assert same == after
     assert (after.velocity_m_s, after.stroke_m) != (before.velocity_m_s, before.stroke_m)
+
+
+def test_what_the_model_lacks_is_learned_and_told() -> None:
+    """Viscous friction that the planner knows nothing of: no overshoot, and it says that it lacks it."""
+    rng = np.random.default_rng(21)
+    planner, told = TapPlanner(tolerance_m=50e-6, plant=NOMINAL), []
+    counts = []
+    for _ in range(25):
+        mass, position = math.exp(rng.uniform(math.log(5.0), math.log(40.0))), 0.0
+        target, taps = rng.uniform(2e-3, 40e-3), 0
+        while isinstance(tap := planner.next_tap(target - position, mass, position), Tap):
+            mu_s = 0.2 * (1.0 + 0.03 * rng.standard_normal())
+            moved = nominal_taps(
+                6.5e5, 465.0, mu_s, 0.76 * mu_s, mass, tap.velocity_m_s, tap.stroke_m, viscous_n_s_per_m=85.0
+            ).displacement_m[0]
+            assert tap.position_m == position
+            planner.observe(tap, float(moved), mass)
+            position += float(moved)
+            taps += 1
+        assert tap is None
+        assert abs(target - position) <= 50e-6
+        counts.append(taps)
+        told.append(planner.lacks_something)
+    assert any(told[:10])
+    assert told[-1]
+    assert np.mean(counts[10:]) < 4.0
+
+
+def test_nothing_is_said_to_be_missing_where_the_model_is_right() -> None:
+    planner, rng = TapPlanner(tolerance_m=50e-6, plant=NOMINAL), np.random.default_rng(22)
+    for _ in range(25):
+        mass = math.exp(rng.uniform(math.log(5.0), math.log(40.0)))
+        deliver(planner, NOMINAL, mass, rng.uniform(2e-3, 40e-3), rng)
+        assert not planner.lacks_something
+    weights = planner.posterior.mean[5:]
+    assert (np.abs(weights) < 3.5 * np.sqrt(np.diag(planner.posterior.cov)[5:])).all()
+
+
+def test_learning_survives_being_stored() -> None:
+    """A planner that goes on from what another has stored plans the same tap, and has the same doubts."""
+    from impactcell.serialization import Versioned
+
+    planner = TapPlanner(tolerance_m=50e-6, plant=NOMINAL)
+    deliver(planner, NOMINAL, 12.0, 22e-3, np.random.default_rng(8))
+    form = Versioned("what it has learned", type(planner.posterior), ())
+    again = TapPlanner(tolerance_m=50e-6, plant=NOMINAL)
+    again.resume(form.unpack(form.pack(planner.posterior)))
+    assert again.next_tap(7e-3, 9.0, 1e-3) == planner.next_tap(7e-3, 9.0, 1e-3)
+    assert again.posterior.watch.evidence == planner.posterior.watch.evidence
+    assert again.posterior.gap_evidence == planner.posterior.gap_evidence

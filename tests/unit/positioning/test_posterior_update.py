@@ -134,5 +134,5 @@ def test_foreseen_never_knows_less() -> None:
     later = anticipate_learning(START)
     assert (std(later) <= std(START) * (1.0 + 1e-12)).all()
     assert std(later)[0] < 0.02
-    tight = with_single_gaussian(START, START.mean, np.diag(np.full(5, 1e-8)))
+    tight = with_single_gaussian(START, START.mean, np.diag(np.full(START.mean.size, 1e-8)))
     np.testing.assert_allclose(anticipate_learning(tight).cov, tight.cov)
