@@ -5,6 +5,7 @@
     ImpactCellError
     ├── SettingsError             a cell, map, model or scenario file: file:line:column and the way out
     ├── CampaignError             a campaign directory: file, line and the way out
+    ├── MeasurementError          a measurement file that cannot be imported: file, line or column
     ├── SeriesError               a series for `impactcell track`: file, line and the way out
     ├── PhysicsError              the plant model cannot answer
     │   ├── NoBreakawayError      the part never moved
@@ -49,6 +50,10 @@ class SettingsError(ImpactCellError):
 
 class CampaignError(ImpactCellError):
     """A campaign directory that cannot be read; the message names file and line."""
+
+
+class MeasurementError(ImpactCellError):
+    """A measurement file that cannot be imported; the message names file, line or column and the way out."""
 
 
 class SeriesError(ImpactCellError):

@@ -10,11 +10,20 @@ from impactcell.errors import (
     ForeignJournalError,
     ImpactCellError,
     MapError,
+    MeasurementError,
     SeriesError,
     SettingsError,
 )
 
-_BAD_INPUT = (AccessError, CampaignError, ForeignJournalError, MapError, SeriesError, SettingsError)
+_BAD_INPUT = (
+    AccessError,
+    CampaignError,
+    ForeignJournalError,
+    MapError,
+    MeasurementError,
+    SeriesError,
+    SettingsError,
+)
 
 
 class ExitCode(enum.IntEnum):

@@ -1,0 +1,148 @@
+"""`impactcell import`: measurement files become a campaign, and what was guessed of them is shown."""
+
+import json
+from collections.abc import Mapping as AbstractMapping
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements import (
+    Dialect,
+    Imported,
+    Limits,
+    Mapping,
+    Table,
+    guess,
+    make_campaign,
+    read_tables,
+    write_campaign,
+)
+from impactcell.measurements.given import read_given
+from impactcell.process.console import print_note, print_result
+
+
+@dataclass(frozen=True, slots=True)
+class ImportOptions:
+    """What was said on the command line of how to read the files.
+
+    Attributes
+    ----------
+    said : mapping
+        Lists of `NAME=VALUE` by `columns`, `units`, `signs` and `constants`.
+    mapping : Path or None
+        YAML that says the same; the command line goes before it.
+    dialect : Dialect
+    excitation, trigger : str or None
+    """
+
+    said: AbstractMapping[str, Sequence[str]] = field(default_factory=dict)
+    mapping: Path | None = None
+    dialect: Dialect = field(default_factory=Dialect)
+    excitation: str | None = None
+    trigger: str | None = None
+
+
+def import_files(
+    files: Sequence[Path],
+    output: Path | None,
+    options: ImportOptions,
+    *,
+    dry_run: bool = False,
+    as_json: bool = False,
+) -> None:
+    """Read measurement files and write a campaign directory; a dry run only says what would be in it.
+
+    Raises
+    ------
+    MeasurementError, CampaignError
+        What is wrong, by file and line or column, and the way out; nothing has been written.
+    """
+    if output is None and not dry_run:
+        raise MeasurementError("say where to write with -o CAMPAIGN, or --dry-run to see what is guessed")
+    if dry_run:
+        output = None
+    given = read_given(options.said, options.mapping, options.excitation, options.trigger)
+    limits = Limits()
+    if len(files) > limits.files:
+        raise MeasurementError(
+            f"{len(files)} files are more than the {limits.files} that are imported at once"
+        )
+    tables = [table for file in files for table in read_tables(file, limits, options.dialect)]
+    mapping = guess(tables, given)
+    if not as_json:
+        _print_guess(tables, mapping)
+    imported = make_campaign(tables, mapping) if output is None else write_campaign(tables, mapping, output)
+    if as_json:
+        print_result(json.dumps(_summary(tables, mapping, imported, output), ensure_ascii=False, indent=1))
+        return
+    for note in imported.notes:
+        print_note(note)
+    shots = len(imported.campaign.shots)
+    where = "nothing written (--dry-run)" if output is None else f"in {output}"
+    print_result(f"{shots} shots of excitation {imported.campaign.excitation}, {where}")
+
+
+def named_dialect(delimiter: str | None, decimal: str | None, encoding: str | None) -> Dialect:
+    """Give a dialect from the words of the command line.
+
+    Raises
+    ------
+    MeasurementError
+        The delimiter is no single character, or the decimal mark neither point nor comma.
+    """
+    delimiter = {"tab": "\t", "\\t": "\t", "space": " ", "semicolon": ";", "comma": ","}.get(
+        delimiter or "", delimiter
+    )
+    decimal = {"point": ".", "comma": ","}.get(decimal or "", decimal)
+    if delimiter is not None and len(delimiter) != 1:
+        raise MeasurementError(
+            f"delimiter {delimiter!r} is not one character; tab and space are said by name"
+        )
+    if decimal not in (None, ".", ","):
+        raise MeasurementError(f"decimal {decimal!r} is neither point nor comma")
+    return Dialect(delimiter, decimal, encoding)
+
+
+def _print_guess(tables: Sequence[Table], mapping: Mapping) -> None:
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table as Grid
+
+    grid = Grid("column", "quantity", "unit", "why", "sure", box=SIMPLE)
+    for item in mapping.assignments:
+        unit = "-" if item.unit is None else item.unit.symbol
+        grid.add_row(
+            _plain(item.column), item.quantity, _plain(unit), _plain(item.why), f"{item.confidence:.0%}"
+        )
+    console = Console(stderr=True)
+    console.print(f"{len(tables)} tables; the first: {_plain('; '.join(tables[0].notes))}", markup=False)
+    console.print(grid)
+
+
+def _plain(text: str) -> str:
+    """Text of a file as a terminal may show it: no control characters, no markup."""
+    return "".join(sign if sign.isprintable() else "�" for sign in text).replace("[", "\\[")
+
+
+def _summary(
+    tables: Sequence[Table], mapping: Mapping, imported: Imported, output: Path | None
+) -> dict[str, Any]:
+    return {
+        "tables": [{"name": table.title, "rows": len(table), "notes": list(table.notes)} for table in tables],
+        "columns": [
+            {
+                "column": item.column,
+                "quantity": str(item.quantity),
+                "unit": None if item.unit is None else item.unit.symbol,
+                "why": item.why,
+                "confidence": round(item.confidence, 2),
+            }
+            for item in mapping.assignments
+        ],
+        "excitation": str(imported.campaign.excitation),
+        "shots": len(imported.campaign.shots),
+        "notes": list(imported.notes),
+        "campaign": None if output is None else str(output),
+    }

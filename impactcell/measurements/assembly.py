@@ -1,0 +1,164 @@
+"""Makes a campaign of records: excitation, shots, t = 0, directions, and what is constant in each."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from impactcell.campaign import Campaign, Excitation, Sensor
+from impactcell.campaign import write as write_directory
+from impactcell.errors import MeasurementError
+from impactcell.measurements.captures import channel_of, described
+from impactcell.measurements.mapping import Given, Mapping
+from impactcell.measurements.recognition import CHANNELS, Quantity
+from impactcell.measurements.recorded import MAX_FAULTS_TOLD, Record, records_of
+from impactcell.measurements.table import Table
+from impactcell.measurements.taps import taps_of
+from impactcell.records import Capture, Channel, Samples
+
+STANDARD_GRAVITY_M_S2 = 9.81
+"""Acceleration of free fall where nothing is given; the campaign format's own default."""
+PULSE_SHARE = 0.4
+"""Share of a record in which the force is above half its range: a tap's contact is shorter, a drive is
+not."""
+DRIVE_REVERSAL = 0.25
+"""Force of the other sign as a share of the largest from which on it drives both ways; a contact only
+pushes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Imported:
+    """A campaign made of measurement files, and what was decided on the way.
+
+    Attributes
+    ----------
+    campaign : Campaign
+    notes : tuple of str
+        What was guessed of shots and of what is constant in them, and what that leaves uncertain.
+    """
+
+    campaign: Campaign
+    notes: tuple[str, ...]
+
+
+def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
+    """Make a campaign of tables whose columns have been understood.
+
+    Raises
+    ------
+    MeasurementError
+        What is missing or wrong, by file and line or column, and the way out.
+    """
+    if mapping.faults:
+        raise MeasurementError("\n".join(mapping.faults))
+    given = mapping.given
+    records = records_of(tables, mapping)
+    notes: list[str] = []
+    excitation = given.excitation or _excitation(records, notes)
+    _check_channels(records, excitation)
+    if excitation is Excitation.TAP:
+        captures, notes_of_taps = taps_of(records, given)
+        notes += notes_of_taps
+    else:
+        captures = [_whole(number, record, given) for number, record in enumerate(records, 1)]
+    if all(math.isnan(capture.mass_kg) for capture in captures):
+        notes.append(
+            "no mass is stated: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
+        )
+    campaign = Campaign(
+        excitation,
+        tuple(captures),
+        gravity_m_s2=given.constants.get("gravity", STANDARD_GRAVITY_M_S2),
+        stroke_m=given.constants.get("stroke", math.inf) if excitation is Excitation.TAP else math.inf,
+        sensors=_sensors(captures),
+        columns=_columns(captures, excitation),
+    )
+    return Imported(campaign, tuple(notes))
+
+
+def write_campaign(tables: Sequence[Table], mapping: Mapping, directory: Path) -> Imported:
+    """Make a campaign and write it to a directory that does not exist yet, complete or not at all.
+
+    Raises
+    ------
+    MeasurementError, CampaignError
+        Nothing has been written.
+    """
+    imported = make_campaign(tables, mapping)
+    write_directory(imported.campaign, directory)
+    return imported
+
+
+def _excitation(records: Sequence[Record], notes: list[str]) -> Excitation:
+    """Tell contacts, which push for a short while, from a drive; without force the part slides freely."""
+    forces = [record.values[Quantity.FORCE] for record in records if Quantity.FORCE in record.values]
+    if not forces:
+        notes.append("excitation free_slide: no force was recorded (--excitation says otherwise)")
+        return Excitation.FREE_SLIDE
+    drives = 0
+    for force in forces:
+        centred = force - np.median(force)
+        largest = float(np.abs(centred).max())
+        pulse = float(np.mean(np.abs(centred) > 0.5 * largest)) < PULSE_SHARE
+        both = min(centred.max(), -centred.min()) > DRIVE_REVERSAL * largest
+        drives += both or not pulse
+    if 2 * drives > len(forces):
+        notes.append(
+            "excitation driven: the force acts all the time or both ways (--excitation says otherwise)"
+        )
+        return Excitation.DRIVEN
+    notes.append("excitation tap: the force is a short push (--excitation says otherwise)")
+    return Excitation.TAP
+
+
+def _check_channels(records: Sequence[Record], excitation: Excitation) -> None:
+    needed = {
+        Excitation.TAP: {Quantity.FORCE},
+        Excitation.FREE_SLIDE: {Quantity.POSITION},
+        Excitation.DRIVEN: {Quantity.FORCE, Quantity.POSITION},
+    }[excitation]
+    faults = [
+        f"{record.place}: has no {' and no '.join(sorted(needed - set(record.values)))}, which a campaign of "
+        f"excitation {excitation} needs"
+        for record in records
+        if needed - set(record.values)
+    ]
+    if faults:
+        raise MeasurementError("\n".join(faults[:MAX_FAULTS_TOLD]))
+
+
+def _whole(number: int, record: Record, given: Given) -> Capture:
+    """Give a record as it is, times counted from its first sample."""
+    first = min(float(time[0]) for time in record.times.values())
+    return described(number, record, given, {str(q): channel_of(record, q, first) for q in CHANNELS})
+
+
+def _columns(captures: Sequence[Capture], excitation: Excitation) -> tuple[str, ...]:
+    names = ["shot"]
+    if excitation is Excitation.TAP:
+        names += ["velocity_mm_per_min"]
+    names += ["mass_kg"]
+    if excitation is not Excitation.DRIVEN:
+        names += ["direction"]
+    if any(capture.batch_id is not None for capture in captures):
+        names.append("batch")
+    if any(math.isfinite(capture.dwell_s) for capture in captures):
+        names.append("dwell_s")
+    if any(capture.start_m != 0.0 for capture in captures):
+        names.append("start_m")
+    return (*names, *dict.fromkeys(name for capture in captures for name in capture.covariates))
+
+
+def _sensors(captures: Sequence[Capture]) -> dict[str, Sensor]:
+    sensors = {}
+    for name in ("force", "position", "actuator"):
+        channels: list[Channel] = [c for capture in captures if (c := getattr(capture, name)) is not None]
+        if channels:
+            steps: list[Samples] = [
+                np.diff(channel.time_s) for channel in channels if len(channel.time_s) > 1
+            ]
+            step = float(np.median(np.concatenate(steps))) if steps else math.nan
+            sensors[name] = Sensor(float(f"{1.0 / step:.6g}") if step > 0.0 else None, None)
+    return sensors

@@ -1,0 +1,139 @@
+"""Finds where contact begins in a record of force, cuts a long record into taps, and puts t = 0 there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.records import Samples
+
+THRESHOLD_STD = 6.0
+"""Force of a contact in standard deviations of a sample: noise alone passes it once in 1e9 samples."""
+THRESHOLD_SHARE = 0.01
+"""Force of a contact as a share of the largest: what a sensor creeps is less."""
+CONFIRMING_SAMPLES = 3
+"""Samples in a row above the threshold: a spike of one or two samples is no contact."""
+SHOT_GAP_S = 0.2
+"""Time without contact after which a new tap begins; a part slides for 30 to 120 ms, and may be struck
+again meanwhile."""
+REST_S = 0.05
+"""Time kept before a contact, and at the end of the slide."""
+SYNCHRONOUS_SHARE = 0.5
+"""Spread of the onsets in sampling steps below which sampling was started by the tap itself: where in the
+step it
+then begins cannot be told. Four onsets anywhere in the step are that close once in three times, eight once
+in 30."""
+NORMAL_SCALE = 1.4826
+"""Standard deviation over median absolute deviation of a normal distribution."""
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Force without contact [N]: its value, the noise of a sample, the threshold of contact above it."""
+
+    offset: float
+    noise_std: float
+    threshold: float
+
+
+def noise_of(values: Samples) -> float:
+    """Give the standard deviation of the white noise of a channel, from its second differences.
+
+    The median of their magnitude is that of the noise where less than half of the samples lie on a kink; the
+    second difference of white noise has a variance of 6.
+    """
+    if len(values) < 5:
+        return 0.0
+    second = np.diff(values, 2)
+    return float(NORMAL_SCALE * np.median(np.abs(second)) / np.sqrt(6.0))
+
+
+def pulse_sign(force: Samples) -> int:
+    """Sign of the contact force: that of the larger excursion from the median."""
+    middle = float(np.median(force))
+    return 1 if force.max() - middle >= middle - force.min() else -1
+
+
+def baseline_of(force: Samples, threshold_n: float | None = None) -> Baseline:
+    """Force without contact: the median of the samples in the lower half of its range."""
+    low, high = float(force.min()), float(force.max())
+    resting = force[force <= 0.5 * (low + high)]
+    offset = float(np.median(resting))
+    noise = max(
+        noise_of(force),
+        float(NORMAL_SCALE * np.median(np.abs(resting - offset))) if len(resting) > 10 else 0.0,
+    )
+    if threshold_n is None:
+        threshold_n = max(THRESHOLD_STD * noise, THRESHOLD_SHARE * (high - offset))
+    return Baseline(offset, noise, threshold_n)
+
+
+def contact_onsets(time: Samples, force: Samples, baseline: Baseline) -> list[int]:
+    """Index of the first sample of each tap's first contact."""
+    above = force - baseline.offset > baseline.threshold
+    run = above.copy()
+    for step in range(1, CONFIRMING_SAMPLES):
+        run[:-step] &= above[step:]
+    starts = np.flatnonzero(run & ~np.concatenate([[False], run[:-1]]))
+    onsets: list[int] = []
+    touching = np.flatnonzero(above)
+    for start in starts.tolist():
+        earlier = touching[touching < start]
+        is_new = not earlier.size or time[start] - time[earlier[-1]] > SHOT_GAP_S
+        if is_new:
+            onsets.append(start)
+    return onsets
+
+
+def rest_end(time: Samples, position: Samples, from_s: float) -> float:
+    """Time at which the part has been at rest for `REST_S` after `from_s`; the last one if it never is."""
+    after = np.flatnonzero(time >= from_s)
+    if len(after) < 10:
+        return float(time[-1])
+    step = float(np.median(np.diff(time)))
+    width = max(3, round(REST_S / step))
+    band = 8.0 * max(noise_of(position), 1e-9)
+    moving_from = float(position[after[0]])
+    for begin in range(int(after[0]), len(time) - width, max(1, width // 4)):
+        stretch = position[begin : begin + width]
+        if np.ptp(stretch) < band and abs(float(np.median(stretch)) - moving_from) > band:
+            return float(time[begin + width - 1])
+    return float(time[-1])
+
+
+def onset_within_sample(
+    time: list[Samples], force: list[Samples], onsets: list[int], velocities: list[float]
+) -> list[float]:
+    """Time of first contact of each tap [s], between the last sample without and the first with contact.
+
+    While the part still sticks F = b v + k v (t - t0). A line through the first samples of contact gives k v
+    and, at the first of them, b v + k v delta with delta the time since contact, anywhere within a step. Over
+    the taps the smallest of (b v + k v delta) / v is b, so each delta follows; with fewer than four taps, or
+    where this does not hold, it is half a step, and about half a step where all are nearly the same.
+
+    Parameters
+    ----------
+    time, force : list of ndarray
+        Of each tap, s and N without offset.
+    onsets : list of int
+        First sample of contact.
+    velocities : list of float
+        Of the actuator, m/s.
+    """
+    intercepts, slopes, steps = [], [], []
+    for t, f, i, v in zip(time, force, onsets, velocities, strict=True):
+        stretch = slice(i, i + 4)
+        slope, value = (
+            np.polyfit(t[stretch] - t[i], f[stretch], 1) if len(t[stretch]) == 4 else (np.nan, np.nan)
+        )
+        intercepts.append(value / v)
+        slopes.append(slope / v)
+        steps.append(t[i] - t[i - 1])
+    b, k, step = float(np.min(intercepts)), float(np.median(slopes)), float(np.median(steps))
+    deltas = (np.array(intercepts) - b) / k if k > 0.0 else np.full(len(steps), np.nan)
+    if len(steps) < 4 or not np.all(np.isfinite(deltas)) or deltas.max() > 1.5 * step:
+        return [float(t[i] - 0.5 * s) for t, i, s in zip(time, onsets, steps, strict=True)]
+    if deltas.max() < SYNCHRONOUS_SHARE * step:
+        deltas = deltas - deltas.mean() + 0.5 * step
+    else:
+        deltas = np.minimum(deltas + step / (len(steps) + 1), step)
+    return [float(t[i] - delta) for t, i, delta in zip(time, onsets, deltas.tolist(), strict=True)]

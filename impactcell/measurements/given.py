@@ -1,0 +1,153 @@
+"""What the user says of his files, on the command line or in a YAML, instead of letting it be guessed."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import yaml
+
+from impactcell.campaign import Excitation
+from impactcell.errors import MeasurementError
+from impactcell.measurements.mapping import Given
+from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.recognition import Quantity
+from impactcell.measurements.taps import NO_TRIGGER
+from impactcell.measurements.units import Dimension, parse_unit
+
+CONSTANTS: dict[str, tuple[tuple[Dimension, ...], str]] = {
+    "mass": ((Dimension.MASS, Dimension.INERTIA), "18.9 kg"),
+    "velocity": ((Dimension.VELOCITY, Dimension.ANGULAR_VELOCITY), "3000 mm/min"),
+    "direction": ((Dimension.NONE,), "1 or -1"),
+    "stroke": ((Dimension.LENGTH, Dimension.ANGLE), "1.5 mm"),
+    "rate": ((Dimension.FREQUENCY,), "10 kHz"),
+    "gravity": ((Dimension.ACCELERATION,), "9.81 m/s2"),
+    "dwell": ((Dimension.TIME,), "30 s"),
+}
+"""What can be said to hold for all shots: its units, and an example."""
+NAMES = {"rate": "rate_hz"}
+"""Names of constants that carry their unit."""
+SECTIONS = ("columns", "units", "signs", "constants")
+"""Blocks of a mapping file; beside them `excitation` and `trigger`."""
+
+
+def read_given(
+    said: Mapping[str, Sequence[str]],
+    file: Path | None = None,
+    excitation: str | None = None,
+    trigger: str | None = None,
+) -> Given:
+    """Put together what was said as `NAME=VALUE` and in a file; what was said goes before the file.
+
+    Raises
+    ------
+    MeasurementError
+        Every name and value that is not known.
+    """
+    sections, from_file = _read(file) if file is not None else ({}, {})
+    for section in SECTIONS:
+        for text in said.get(section, ()):
+            name, equals, value = text.partition("=") if section != "units" else _split_last(text)
+            if not equals or not name.strip() or not value.strip():
+                raise MeasurementError(f"{text!r} is not NAME=VALUE")
+            sections.setdefault(section, {})[name.strip()] = value.strip()
+    faults: list[str] = []
+    given = Given(
+        {q: name for key, name in sections.get("columns", {}).items() if (q := _quantity(key, faults))},
+        sections.get("units", {}),
+        {
+            q: _sign(key, text, faults)
+            for key, text in sections.get("signs", {}).items()
+            if (q := _quantity(key, faults))
+        },
+        _excitation(excitation or from_file.get("excitation"), faults),
+        _trigger(trigger or from_file.get("trigger"), faults),
+        {
+            NAMES.get(key, key): _constant(key, text, faults)
+            for key, text in sections.get("constants", {}).items()
+        },
+    )
+    if faults:
+        raise MeasurementError("\n".join(faults))
+    return given
+
+
+def _split_last(text: str) -> tuple[str, str, str]:
+    return text.rpartition("=")
+
+
+def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise MeasurementError(f"{file}: cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        line = "" if mark is None else f":{mark.line + 1}"
+        raise MeasurementError(f"{file}{line}: is not YAML") from error
+    if not isinstance(content, dict):
+        raise MeasurementError(f"{file}: has to hold blocks {', '.join(SECTIONS)}, excitation and trigger")
+    known = (*SECTIONS, "excitation", "trigger")
+    faults = [
+        f"{file}: unknown key {key!r}; known: {', '.join(known)}" for key in content if key not in known
+    ]
+    faults += [
+        f"{file}: {key} has to be a block of `name: value`"
+        for key in SECTIONS
+        if key in content and not isinstance(content[key], dict)
+    ]
+    if faults:
+        raise MeasurementError("\n".join(faults))
+    sections = {key: {str(k): str(v) for k, v in content[key].items()} for key in SECTIONS if key in content}
+    return sections, {key: str(content[key]) for key in ("excitation", "trigger") if key in content}
+
+
+def _quantity(key: str, faults: list[str]) -> Quantity | None:
+    if key in set(Quantity):
+        return Quantity(key)
+    faults.append(f"{key!r} is no quantity; known: {', '.join(Quantity)}")
+    return None
+
+
+def _sign(key: str, text: str, faults: list[str]) -> int:
+    if text in ("1", "+1", "-1"):
+        return int(text)
+    faults.append(f"the sign of {key} is {text!r}; it has to be 1 or -1")
+    return 1
+
+
+def _excitation(text: str | None, faults: list[str]) -> Excitation | None:
+    if text is None or text in set(Excitation):
+        return None if text is None else Excitation(text)
+    faults.append(f"excitation {text!r} is not known; say one of {', '.join(Excitation)}")
+    return None
+
+
+def _trigger(text: str | None, faults: list[str]) -> float | str | None:
+    if text is None or text == NO_TRIGGER:
+        return text
+    match = re.fullmatch(r"(\S+?)\s*([a-zA-Z]*)", text.strip())
+    value = parse_number(match.group(1)) if match else None
+    unit = parse_unit(match.group(2) or "N") if match else None
+    fits = unit is not None and unit.dimension in (Dimension.FORCE, Dimension.TORQUE)
+    if value is None or unit is None or not fits or not 0.0 < value < math.inf:
+        faults.append(f"trigger {text!r} is neither a force, as '5 N', nor {NO_TRIGGER}")
+        return None
+    return value * unit.factor
+
+
+def _constant(key: str, text: str, faults: list[str]) -> float:
+    if key not in CONSTANTS:
+        faults.append(f"{key!r} cannot be set; known: {', '.join(CONSTANTS)}")
+        return math.nan
+    dimensions, example = CONSTANTS[key]
+    match = re.fullmatch(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(.*)", text)
+    value = parse_number(match.group(1)) if match else None
+    unit = parse_unit(match.group(2) or "1") if match else None
+    if value is None or unit is None or unit.dimension not in dimensions or not math.isfinite(value):
+        faults.append(f"{key} is {text!r}; write it with its unit, as {key}={example}")
+        return math.nan
+    number = value * unit.factor
+    if number == 0.0 or (number < 0.0 and key != "direction"):
+        faults.append(f"{key} is {text!r}; it has to be positive")
+    return number

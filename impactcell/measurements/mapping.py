@@ -1,0 +1,268 @@
+"""What each column of a table means: guessed, with the reason and how sure, or given."""
+
+from collections.abc import Mapping as AbstractMapping
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.campaign import Excitation
+from impactcell.errors import MeasurementError
+from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.recognition import (
+    CHANNELS,
+    RATE_WORDS,
+    STEP_WORDS,
+    UNIT_ALONE,
+    UNIT_MATCH,
+    VOCABULARY,
+    Quantity,
+    name_score,
+    normalised,
+)
+from impactcell.measurements.table import Column, Table
+from impactcell.measurements.units import Dimension, Unit, parse_unit
+
+SURE = 0.5
+"""Confidence from which on a guess is used without being confirmed."""
+GIVEN = 1.0
+"""Confidence of what was given."""
+UNITLESS = (Quantity.SHOT, Quantity.DIRECTION, Quantity.BATCH, Quantity.COVARIATE, Quantity.IGNORED)
+"""Quantities that need no unit."""
+ASCENDING_SHARE = 0.8
+"""Share of steps forward from which on a column may be a time: it begins anew with each shot of a file."""
+PRIORITY = (
+    Quantity.TIME, Quantity.FORCE, Quantity.ACTUATOR, Quantity.POSITION, Quantity.SHOT, Quantity.VELOCITY,
+    Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
+)  # fmt: skip
+"""Order in which equally sure guesses are taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What the user says instead of letting it be guessed; empty where he says nothing.
+
+    Attributes
+    ----------
+    columns : mapping
+        Column of a quantity, as `force`: `Kraft 1`.
+    units : mapping
+        Unit of a column by its name.
+    signs : mapping
+        +1 or -1 for a channel, as `force`: -1.
+    excitation : Excitation or None
+    trigger : float or str or None
+        Threshold of the force [N] at which contact begins; `none` where t = 0 is the contact already.
+    constants : mapping
+        Mass, velocity, direction, stroke, rate and gravity of all shots, in SI units, by their names.
+    """
+
+    columns: AbstractMapping[Quantity, str] = field(default_factory=dict)
+    units: AbstractMapping[str, str] = field(default_factory=dict)
+    signs: AbstractMapping[Quantity, int] = field(default_factory=dict)
+    excitation: Excitation | None = None
+    trigger: float | str | None = None
+    constants: AbstractMapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """What one column means.
+
+    Attributes
+    ----------
+    column : str
+    quantity : Quantity
+    unit : Unit or None
+        None where the file says none and none was given: such a column cannot be used where one is needed.
+    confidence : float
+        0 to 1; 1 where it was given.
+    why : str
+    """
+
+    column: str
+    quantity: Quantity
+    unit: Unit | None
+    confidence: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """What the columns of tables with the same columns mean.
+
+    Attributes
+    ----------
+    assignments : tuple of Assignment
+        One a column, in their order.
+    given : Given
+    faults : tuple of str
+        What has to be given before a campaign can be written, each with the way out.
+    """
+
+    assignments: tuple[Assignment, ...]
+    given: Given
+    faults: tuple[str, ...]
+
+    def of(self, quantity: Quantity) -> Assignment | None:
+        """Give the column of a quantity that only one can have."""
+        return next((item for item in self.assignments if item.quantity is quantity), None)
+
+
+def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
+    """Say what each column of the tables means.
+
+    Columns that several tables share are one; of a quantity that only one can have, the surest gets it.
+
+    Raises
+    ------
+    MeasurementError
+        A column or unit that was given is not there.
+    """
+    given = given or Given()
+    columns: dict[str, Column] = {}
+    for table in tables:
+        for column in table.columns:
+            columns.setdefault(column.name, column)
+    _check_given(columns, given)
+    candidates = [
+        candidate
+        for column in columns.values()
+        for candidate in _candidates(column, given, list(columns.values()))
+    ]
+    candidates.sort(key=lambda item: (-item.confidence, PRIORITY.index(item.quantity)))
+    chosen: dict[str, Assignment] = {}
+    quantities: dict[Quantity, Assignment] = {}
+    for item in candidates:
+        taken = quantities.get(item.quantity)
+        if taken is not None and taken.confidence < GIVEN and abs(taken.confidence - item.confidence) < 0.05:
+            unsure = replace(
+                taken,
+                confidence=min(taken.confidence, 0.4),
+                why=f"{taken.why}; {item.column!r} could be it too",
+            )
+            quantities[item.quantity] = chosen[taken.column] = unsure
+        if taken is None and item.column not in chosen:
+            chosen[item.column] = quantities[item.quantity] = item
+    assignments = tuple(chosen.get(name) or _further(column, given) for name, column in columns.items())
+    mapping = Mapping(assignments, given, ())
+    return replace(mapping, faults=tuple(_faults(mapping, tables)))
+
+
+def _check_given(columns: AbstractMapping[str, Column], given: Given) -> None:
+    known = ", ".join(repr(name) for name in columns)
+    faults = [
+        f"there is no column {name!r}; the columns are {known}"
+        for name in (*given.columns.values(), *given.units)
+        if name not in columns
+    ]
+    faults += [
+        f"the unit {unit!r} of {name!r} is not known; write it as mm, N, mm/min or deg, say"
+        for name, unit in given.units.items()
+        if parse_unit(unit) is None
+    ]
+    if faults:
+        raise MeasurementError("\n".join(faults))
+
+
+def _unit_of(column: Column, given: Given) -> Unit | None:
+    text = given.units.get(column.name) or column.unit
+    return None if text is None else parse_unit(text)
+
+
+def _candidates(column: Column, given: Given, columns: Sequence[Column]) -> list[Assignment]:
+    """Whatever a column could be, with how sure it is."""
+    unit = _unit_of(column, given)
+    named = [quantity for quantity, name in given.columns.items() if name == column.name]
+    if named:
+        return [Assignment(column.name, named[0], unit, GIVEN, "given")]
+    found = []
+    for quantity in PRIORITY:
+        if quantity in given.columns:
+            continue
+        score, why = _score(column, quantity, unit, columns, given)
+        if score > 0.0:
+            found.append(Assignment(column.name, quantity, unit, score, why))
+    return found
+
+
+def _score(
+    column: Column, quantity: Quantity, unit: Unit | None, columns: Sequence[Column], given: Given
+) -> tuple[float, str]:
+    is_text = column.text is not None
+    if is_text != (quantity is Quantity.BATCH) and not (quantity is Quantity.BATCH and not is_text):
+        return 0.0, ""
+    score, word = name_score(column.name, quantity)
+    fits = unit is not None and unit.dimension in VOCABULARY[quantity].dimensions
+    if unit is not None and unit.dimension is not Dimension.NONE and not fits:
+        return 0.0, ""
+    if quantity is Quantity.TIME and not np.mean(np.diff(column.values) > 0.0) > ASCENDING_SHARE:
+        return 0.0, ""
+    if score:
+        why = f"named {word!r}"
+        return (min(score + UNIT_MATCH, 0.99), f"{why}, unit fits") if fits and unit else (score, why)
+    alone = quantity in (Quantity.TIME, Quantity.FORCE, Quantity.POSITION)
+    if fits and alone and unit is not None and unit.dimension is not Dimension.NONE:
+        same = [
+            other for other in columns if (of := _unit_of(other, given)) and of.dimension is unit.dimension
+        ]
+        if len(same) == 1:
+            return UNIT_ALONE + 0.1, f"the only column in {unit.symbol}"
+        return UNIT_ALONE, f"by its unit {unit.symbol}"
+    return 0.0, ""
+
+
+def _further(column: Column, given: Given) -> Assignment:
+    """Take a column that is none of the quantities for a covariate: it may still explain friction."""
+    unit = _unit_of(column, given)
+    return Assignment(column.name, Quantity.COVARIATE, unit, SURE, "none of the known quantities")
+
+
+def sampling_step_s(table: Table, given: Given) -> float | None:
+    """Step of time of a table without a column of it, as given or as the file says beside its columns."""
+    if "rate_hz" in given.constants:
+        return 1.0 / given.constants["rate_hz"]
+    for key, text in table.attributes.items():
+        name = normalised(key)
+        number = _first_number(text)
+        if number is None or number <= 0.0:
+            continue
+        if any(word == name or name.startswith(word) for word in RATE_WORDS.split()):
+            return 1.0 / (number * (1e3 if "khz" in (key + text).lower() else 1.0))
+        if any(word == name or name.startswith(word) for word in STEP_WORDS.split()):
+            unit = parse_unit(text.split()[-1]) if len(text.split()) > 1 else None
+            return number * (unit.factor if unit and unit.dimension is Dimension.TIME else 1.0)
+    return None
+
+
+def _first_number(text: str) -> float | None:
+    first = text.split(maxsplit=1)[0] if text.split() else ""
+    value = parse_number(first)
+    return value if value is not None else parse_number(first, ",")
+
+
+def _faults(mapping: Mapping, tables: Sequence[Table]) -> list[str]:
+    """Say what has to be given first."""
+    faults = []
+    for item in mapping.assignments:
+        if item.quantity in UNITLESS:
+            continue
+        if item.unit is None:
+            faults.append(
+                f"column {item.column!r} ({item.quantity}) has no unit; say --unit '{item.column}="
+                f"{VOCABULARY[item.quantity].dimensions[0].value}', or which it is"
+            )
+        if item.confidence < SURE and item.quantity in (Quantity.TIME, *CHANNELS):
+            faults.append(
+                f"column {item.column!r} may be the {item.quantity} ({item.why}); confirm it with --column "
+                f"'{item.quantity}={item.column}', or name the right one"
+            )
+    if mapping.of(Quantity.TIME) is None and any(sampling_step_s(t, mapping.given) is None for t in tables):
+        faults.append("no column of time was found; name it with --column time=NAME, or give --rate in Hz")
+    if mapping.of(Quantity.POSITION) is None and mapping.of(Quantity.FORCE) is None:
+        names = ", ".join(repr(item.column) for item in mapping.assignments)
+        faults.append(
+            f"neither position nor force was found among {names}; name them with --column position=NAME and "
+            f"--column force=NAME"
+        )
+    return faults

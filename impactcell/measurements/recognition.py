@@ -1,0 +1,149 @@
+"""What the name of a column says of its quantity, in English and German."""
+
+import enum
+import re
+from dataclasses import dataclass
+
+from impactcell.measurements.units import Dimension
+
+
+class Quantity(enum.StrEnum):
+    """What a column can be for a campaign."""
+
+    TIME = "time"
+    FORCE = "force"
+    POSITION = "position"
+    ACTUATOR = "actuator"
+    SHOT = "shot"
+    VELOCITY = "velocity"
+    MASS = "mass"
+    DIRECTION = "direction"
+    BATCH = "batch"
+    DWELL = "dwell"
+    START = "start"
+    COVARIATE = "covariate"
+    IGNORED = "ignored"
+
+
+CHANNELS = (Quantity.FORCE, Quantity.POSITION, Quantity.ACTUATOR)
+"""Quantities that vary within a shot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Names under which a quantity is met.
+
+    Attributes
+    ----------
+    words : str
+        Separated by spaces, lower case, umlauts written out; a name of several is joined by an underscore.
+    symbols : str
+        Signs of a formula, which alone say less.
+    dimensions : tuple of Dimension
+        Units that fit; the first is that of translation.
+    """
+
+    words: str
+    symbols: str
+    dimensions: tuple[Dimension, ...]
+
+
+VOCABULARY = {
+    Quantity.TIME: Words(
+        "time zeit timestamp elapsed zeitstempel messzeit datetime datum uhrzeit timestamps relzeit x_value",
+        "t",
+        (Dimension.TIME,),
+    ),
+    Quantity.FORCE: Words(
+        "force kraft contact_force kontaktkraft load_cell kraftsensor kraftaufnehmer dms torque moment "
+        "drehmoment drive_force antriebskraft loadcell",
+        "f fx fz f1 m tau",
+        (Dimension.FORCE, Dimension.TORQUE),
+    ),
+    Quantity.POSITION: Words(
+        "position weg pos displacement lage verschiebung auslenkung part_position teil bauteil werkstueck "
+        "part "
+        "slider travel encoder angle winkel laser wegsensor distance displ",
+        "x s q theta phi x1",
+        (Dimension.LENGTH, Dimension.ANGLE),
+    ),
+    Quantity.ACTUATOR: Words(
+        "actuator aktor aktuator ram stoessel pusher plunger tool schieber stempel actuator_position axis "
+        "achse "
+        "antriebsweg",
+        "y z",
+        (Dimension.LENGTH, Dimension.ANGLE),
+    ),
+    Quantity.SHOT: Words(
+        "shot cycle schuss versuch zyklus hub trial run stroke_number shot_number versuchsnummer tap messung",
+        "nr n",
+        (Dimension.NONE,),
+    ),
+    Quantity.VELOCITY: Words(
+        "velocity geschwindigkeit vorschub speed feed commanded_velocity tempo feedrate",
+        "v",
+        (Dimension.VELOCITY, Dimension.ANGULAR_VELOCITY),
+    ),
+    Quantity.MASS: Words(
+        "mass masse gewicht weight part_mass inertia traegheit traegheitsmoment",
+        "m j",
+        (Dimension.MASS, Dimension.INERTIA),
+    ),
+    Quantity.DIRECTION: Words("direction richtung dir", "", (Dimension.NONE,)),
+    Quantity.BATCH: Words("batch charge los lot material batch_id chargennummer", "", (Dimension.NONE,)),
+    Quantity.DWELL: Words("dwell liegezeit wartezeit ruhezeit dwell_time", "", (Dimension.TIME,)),
+    Quantity.START: Words("start start_position startposition startlage", "", (Dimension.LENGTH,)),
+}
+"""How columns are called."""
+
+WORD_MATCH, TOKEN_MATCH, SYMBOL_MATCH = 0.65, 0.55, 0.4
+"""How sure a name makes one: the whole name, a word of it, a letter."""
+UNIT_MATCH, UNIT_ALONE = 0.3, 0.45
+"""What a unit that fits adds to a name, and how sure it makes one alone."""
+RATE_WORDS = "sample_rate sampling_rate rate_hz abtastrate samplerate fs sampling_frequency abtastfrequenz"
+"""Names under which a file says how often it was sampled."""
+STEP_WORDS = "dt sample_interval wf_increment abtastzeit sampling_interval abtastintervall delta_x increment"
+"""Names under which a file says the step of its time."""
+
+
+def normalised(name: str) -> str:
+    """Lower case, words joined by underscores, umlauts written out.
+
+    Examples
+    --------
+    >>> normalised("Stößel-Weg"), normalised("partPosition"), normalised("x'")
+    ('stoessel_weg', 'part_position', 'x')
+    """
+    text = re.sub(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])", "_", name).lower()
+    for sign, plain in (
+        ("ä", "ae"),
+        ("ö", "oe"),
+        ("ü", "ue"),
+        ("ß", "ss"),
+        ("θ", "theta"),
+        ("φ", "phi"),
+        ("τ", "tau"),
+    ):
+        text = text.replace(sign, plain)
+    return re.sub(r"[^a-z0-9]+", "_", text).strip("_")
+
+
+def name_score(name: str, quantity: Quantity) -> tuple[float, str]:
+    """How sure the name of a column makes that it is of this quantity, 0 to 1, and the word that says so."""
+    words = VOCABULARY[quantity]
+    text = normalised(name)
+    known, symbols = words.words.split(), words.symbols.split()
+    if text in known:
+        return WORD_MATCH, text
+    if text in symbols:
+        return SYMBOL_MATCH, text
+    tokens = [re.sub(r"\d+$", "", token) for token in text.split("_")]
+    for word in known:
+        parts = word.split("_")
+        if all(part in tokens for part in parts):
+            return TOKEN_MATCH, word
+    for word in known:
+        # German joins words: Kontaktkraftsensor
+        if len(word) >= 4 and any(word in token for token in tokens):
+            return TOKEN_MATCH - 0.1, word
+    return 0.0, ""

@@ -1,0 +1,251 @@
+"""Records in SI units: what the columns of a file are once it is said what they mean."""
+
+from collections.abc import Mapping as AbstractMapping
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements.mapping import Mapping, sampling_step_s
+from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.recognition import (
+    CHANNELS,
+    TOKEN_MATCH,
+    VOCABULARY,
+    Quantity,
+    name_score,
+    normalised,
+)
+from impactcell.measurements.table import Lines, Table
+from impactcell.measurements.units import Dimension, parse_unit, split_unit
+from impactcell.records import Samples
+
+SCALARS = (
+    Quantity.VELOCITY, Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
+)  # fmt: skip
+"""Quantities of which a shot has one value."""
+MAX_FAULTS_TOLD = 10
+"""Faults told of one import."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Record:
+    """Channels that were recorded together, and what is constant meanwhile.
+
+    Attributes
+    ----------
+    place : str
+        Where it is from, as faults name it.
+    times, values : mapping
+        Of each channel, shape (n,), s and SI units; only samples that are there.
+    scalars : mapping
+        Quantities and covariates that are constant, SI units or text.
+    """
+
+    place: str
+    times: AbstractMapping[Quantity, Samples]
+    values: AbstractMapping[Quantity, Samples]
+    scalars: AbstractMapping[str, float | str] = field(default_factory=dict)
+
+
+def records_of(tables: Sequence[Table], mapping: Mapping) -> list[Record]:
+    """Give the records of tables: one a shot where there is a column of shots, else one a table.
+
+    Tables of one file whose channels differ belong to one record; those with the same channels are several.
+
+    Raises
+    ------
+    MeasurementError
+        A file lacks a column, its time does not increase, or a text stands where a number has to.
+    """
+    faults: list[str] = []
+    records: list[tuple[str, Record]] = []
+    for table in tables:
+        for part, place in _parts(table, mapping, faults):
+            record = _record(part, place, mapping, faults)
+            if record is None:
+                continue
+            before = records[-1] if records else None
+            if before and before[0] == table.source and not set(before[1].values) & set(record.values):
+                records[-1] = (table.source, _together(before[1], record))
+            elif record.values:
+                records.append((table.source, record))
+    if faults:
+        rest = len(faults) - MAX_FAULTS_TOLD
+        more = [f"and {rest} more faults"] if rest > 0 else []
+        raise MeasurementError("\n".join(faults[:MAX_FAULTS_TOLD] + more))
+    if not records:
+        raise MeasurementError("no table holds a channel")
+    return [record for _, record in records]
+
+
+def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Table, str]]:
+    """Rows of each shot, in order of appearance."""
+    shot = mapping.of(Quantity.SHOT)
+    column = None if shot is None else table.column(shot.column)
+    if column is None:
+        return [(table, table.title)]
+    keys = np.array(column.text) if column.text is not None else column.values
+    if column.text is None and np.isnan(keys).any():
+        row = int(np.flatnonzero(np.isnan(keys))[0])
+        faults.append(f"{table.place(row)}: column {column.name!r} is empty; every row needs its shot")
+        return []
+    distinct, first = np.unique(keys, return_index=True)
+    if len(distinct) > max(0.2 * len(keys), 1) and len(keys) > 50:
+        faults.append(
+            f"{table.title}: column {column.name!r} has {len(distinct)} values in {len(keys)} rows, so it "
+            f"does not "
+            f"number shots; say --column {column.name!r} is something else with --column shot=NAME or "
+            f"ignored=NAME"
+        )
+        return []
+    parts = []
+    for key in distinct[np.argsort(first)]:
+        rows = np.flatnonzero(keys == key)
+        parts.append(
+            (
+                _rows(table, rows),
+                f"{table.title}: {column.name} {key:g}" if column.text is None else f"{table.title}: {key}",
+            )
+        )
+    return parts
+
+
+def _rows(table: Table, rows: Lines) -> Table:
+    columns = tuple(
+        replace(c, values=c.values[rows], text=None if c.text is None else tuple(c.text[row] for row in rows))
+        for c in table.columns
+    )
+    return replace(table, columns=columns, lines=None if table.lines is None else table.lines[rows])
+
+
+def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Record | None:
+    time = _time(table, mapping, faults)
+    if time is None:
+        return None
+    times: dict[Quantity, Samples] = {}
+    values: dict[Quantity, Samples] = {}
+    for quantity in CHANNELS:
+        item = mapping.of(quantity)
+        column = None if item is None else table.column(item.column)
+        if item is None or column is None or item.unit is None:
+            continue
+        present = np.isfinite(column.values)
+        if column.text is not None:
+            faults.append(f"{table.title}: column {column.name!r} holds text, where the {quantity} is needed")
+        elif not present.any():
+            faults.append(f"{table.title}: column {column.name!r} ({quantity}) has no value at all")
+        else:
+            times[quantity] = time[present]
+            values[quantity] = (
+                item.unit.factor * mapping.given.signs.get(quantity, 1) * column.values[present]
+            )
+    return Record(place, times, values, {**_said(table), **_scalars(table, mapping)})
+
+
+def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
+    item = mapping.of(Quantity.TIME)
+    column = None if item is None else table.column(item.column)
+    if item is None or column is None:
+        step = sampling_step_s(table, mapping.given)
+        if step is None:
+            faults.append(
+                f"{table.title}: has no column of time; name it, or give the rate with --set rate=10kHz"
+            )
+            return None
+        return np.asarray(step * np.arange(len(table)), dtype=np.float64)
+    if item.unit is None:
+        faults.append(
+            f"{table.title}: column {column.name!r} (time) has no unit; say --unit '{column.name}=s'"
+        )
+        return None
+    time = item.unit.factor * column.values
+    empty = np.flatnonzero(np.isnan(time))
+    if empty.size:
+        faults.append(
+            f"{table.place(int(empty[0]))}: column {column.name!r} is empty in {empty.size} rows; every "
+            f"row needs its time"
+        )
+        return None
+    back = np.flatnonzero(np.diff(time) <= 0.0) + 1
+    if back.size:
+        row = int(back[0])
+        faults.append(
+            f"{table.place(row)}: time does not increase: {column.values[row]:.9g} after "
+            f"{column.values[row - 1]:.9g} "
+            f"({back.size} such rows); several shots in one file need a column that numbers them"
+        )
+        return None
+    return time
+
+
+def _scalars(table: Table, mapping: Mapping) -> dict[str, float | str]:
+    """Give what is constant, from columns: the value where it does not change, else its mean."""
+    scalars: dict[str, float | str] = {}
+    for item in mapping.assignments:
+        column = table.column(item.column)
+        if column is None or item.quantity not in (*SCALARS, Quantity.COVARIATE):
+            continue
+        factor = 1.0 if item.unit is None else item.unit.factor
+        name = str(item.quantity)
+        if item.quantity is Quantity.COVARIATE:
+            name = covariate_name(item.column, item.unit.dimension if item.unit else None)
+        if column.text is not None:
+            distinct = list(dict.fromkeys(column.text))
+            if len(distinct) == 1 and distinct[0]:
+                scalars[name] = distinct[0]
+            continue
+        present = column.values[np.isfinite(column.values)]
+        if present.size:
+            scalars[name] = float(factor * (present[0] if np.ptp(present) == 0.0 else present.mean()))
+    return scalars
+
+
+def covariate_name(column: str, dimension: Dimension | None) -> str:
+    """Name of a covariate in `shots.csv`: of the column, with its SI unit.
+
+    Examples
+    --------
+    >>> covariate_name("Druck p1", Dimension.PRESSURE), covariate_name("Öl", None)
+    ('druck_p1_pa', 'oel')
+    """
+    name = normalised(column)
+    if dimension is None or dimension is Dimension.NONE:
+        return name
+    return f"{name}_{normalised(dimension.value.replace('²', '2').replace('/', ' per '))}"
+
+
+def _said(table: Table) -> dict[str, float | str]:
+    """Quantities that the file says beside its columns, as `Masse: 18,9 kg`."""
+    said: dict[str, float | str] = {}
+    for key, text in table.attributes.items():
+        name, unit_text = split_unit(key)
+        for quantity in SCALARS:
+            score, _ = name_score(name, quantity)
+            if score < TOKEN_MATCH:
+                continue
+            words = text.split()
+            number = parse_number(words[0]) if words else None
+            if number is None and words:
+                number = parse_number(words[0], ",")
+            unit = parse_unit(unit_text or " ".join(words[1:]))
+            if quantity is Quantity.BATCH:
+                said[str(quantity)] = text
+            elif quantity is Quantity.DIRECTION and number is not None:
+                said[str(quantity)] = number
+            elif (
+                number is not None and unit is not None and unit.dimension in VOCABULARY[quantity].dimensions
+            ):
+                said[str(quantity)] = number * unit.factor
+            break
+    return said
+
+
+def _together(first: Record, second: Record) -> Record:
+    return Record(
+        first.place,
+        {**first.times, **second.times},
+        {**first.values, **second.values},
+        {**first.scalars, **second.scalars},
+    )

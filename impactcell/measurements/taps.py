@@ -1,0 +1,220 @@
+"""Cuts records into taps: where contact begins is t = 0, what lay before is kept as pretrigger."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements import contacts
+from impactcell.measurements.captures import channel_of, described, scalar
+from impactcell.measurements.mapping import Given
+from impactcell.measurements.recognition import CHANNELS, Quantity
+from impactcell.measurements.recorded import MAX_FAULTS_TOLD, Record
+from impactcell.records import Capture, Channel, Samples
+
+START_STD = 10.0
+"""Place of a part, in standard deviations of a sample, from which on the positions count from the table's
+zero."""
+NO_TRIGGER = "none"
+"""Said of records whose t = 0 is the first contact already."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tap:
+    """One tap of a record.
+
+    `onset` is the index of the first force sample in contact, None where the record has no sample before it.
+    """
+
+    record: Record
+    onset: int | None
+    velocity_m_s: float
+
+
+def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], list[str]]:
+    """Give the taps of records as captures, and what was decided.
+
+    Raises
+    ------
+    MeasurementError
+        A record shows no contact, or the velocity of the actuator is not known.
+    """
+    notes: list[str] = []
+    faults: list[str] = []
+    signed = _signed(records, given, notes)
+    taps: list[_Tap] = []
+    for record in signed:
+        taps += _taps(record, given, faults)
+    if faults:
+        rest = len(faults) - MAX_FAULTS_TOLD
+        more = [f"and {rest} more faults"] if rest > 0 else []
+        raise MeasurementError("\n".join(faults[:MAX_FAULTS_TOLD] + more))
+    if len(taps) > len(records):
+        notes.append(f"{len(records)} records cut into {len(taps)} taps where the force begins anew")
+    starts = _contact_times(taps, notes)
+    return [
+        _capture(n, tap, t0, given) for n, (tap, t0) in enumerate(zip(taps, starts, strict=True), 1)
+    ], notes
+
+
+def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[Record]:
+    """Turn the force so that compression is positive."""
+    signs = [contacts.pulse_sign(record.values[Quantity.FORCE]) for record in records]
+    sign = 1 if sum(signs) >= 0 or Quantity.FORCE in given.signs else -1
+    if sign < 0:
+        notes.append("force turned: it was negative in compression (--sign force=1 leaves it)")
+    turned = []
+    for record in records:
+        force = sign * record.values[Quantity.FORCE]
+        turned.append(
+            Record(record.place, record.times, {**record.values, Quantity.FORCE: force}, record.scalars)
+        )
+    return turned
+
+
+def _taps(record: Record, given: Given, faults: list[str]) -> list[_Tap]:
+    time, force = record.times[Quantity.FORCE], record.values[Quantity.FORCE]
+    if given.trigger == NO_TRIGGER:
+        return _with_velocity([(record, None)], given, faults)
+    threshold = given.trigger if isinstance(given.trigger, float) else None
+    baseline = contacts.baseline_of(force, threshold)
+    onsets = contacts.contact_onsets(time, force, baseline) if np.ptp(force) > 0.0 else []
+    if not onsets:
+        faults.append(
+            f"{record.place}: the force shows no contact (largest {force.max():.3g} N above noise of "
+            f"{baseline.noise_std:.2g} N); give its threshold with --trigger, or --excitation driven"
+        )
+        return []
+    if len(onsets) == 1 and onsets[0] == 0:
+        return _with_velocity([(record, None)], given, faults)
+    parts: list[tuple[Record, int | None]] = []
+    for number, onset in enumerate(onsets):
+        if onset == 0:
+            continue  # a tap whose beginning was not recorded
+        if len(onsets) == 1:
+            parts.append((record, onset))
+            continue
+        end_s = float(time[onsets[number + 1]]) - contacts.REST_S if number + 1 < len(onsets) else math.inf
+        parts.append(_part(record, onset, _end(record, float(time[onset]), end_s)))
+    return _with_velocity(parts, given, faults)
+
+
+def _end(record: Record, onset_s: float, next_s: float) -> float:
+    """When the part has come to rest, and the record says no more of this tap."""
+    if Quantity.POSITION not in record.values:
+        return next_s
+    time, position = record.times[Quantity.POSITION], record.values[Quantity.POSITION]
+    stretch = (time >= onset_s) & (time < next_s)
+    if stretch.sum() < 10:
+        return next_s
+    return min(contacts.rest_end(time[stretch], position[stretch], onset_s), next_s)
+
+
+def _part(record: Record, onset: int, end_s: float) -> tuple[Record, int]:
+    """Cut one tap out of a record that has several."""
+    time = record.times[Quantity.FORCE]
+    begin_s = time[onset] - contacts.REST_S
+    kept = {q: (t >= begin_s) & (t <= end_s) for q, t in record.times.items()}
+    part = Record(
+        f"{record.place}: tap at {time[onset]:.6g} s",
+        {q: record.times[q][rows] for q, rows in kept.items()},
+        {q: record.values[q][rows] for q, rows in kept.items()},
+        record.scalars,
+    )
+    return part, int(onset - np.count_nonzero(time[:onset] < begin_s))
+
+
+def _with_velocity(parts: Sequence[tuple[Record, int | None]], given: Given, faults: list[str]) -> list[_Tap]:
+    taps = []
+    for record, onset in parts:
+        velocity = given.constants.get("velocity", record.scalars.get("velocity"))
+        if not isinstance(velocity, float) and Quantity.ACTUATOR in record.values:
+            velocity = _slope(record, onset)
+        if not isinstance(velocity, float) or not abs(velocity) > 0.0:
+            faults.append(
+                f"{record.place}: the velocity of the actuator is not known; name its column with --column "
+                f"velocity=NAME, or give --set 'velocity=3000 mm/min'"
+            )
+            continue
+        taps.append(_Tap(record, onset, abs(velocity)))
+    return taps
+
+
+def _slope(record: Record, onset: int | None) -> float:
+    """Velocity of the actuator about first contact, from its own channel."""
+    time, position = record.times[Quantity.ACTUATOR], record.values[Quantity.ACTUATOR]
+    t0 = record.times[Quantity.FORCE][onset or 0]
+    near = (time >= t0 - 0.01) & (time <= t0 + 0.003)
+    if near.sum() < 4:
+        return math.nan
+    return float(np.polyfit(time[near] - t0, position[near], 1)[0])
+
+
+def _contact_times(taps: Sequence[_Tap], notes: list[str]) -> list[float]:
+    """Time of first contact of each tap in its record [s]."""
+    triggered = [tap for tap in taps if tap.onset is not None]
+    if triggered:
+        times, forces, onsets, velocities = [], [], [], []
+        for tap in triggered:
+            force = tap.record.values[Quantity.FORCE]
+            times.append(tap.record.times[Quantity.FORCE])
+            forces.append(force - _rest_force(force, tap.onset))
+            onsets.append(tap.onset or 0)
+            velocities.append(tap.velocity_m_s)
+        refined = iter(contacts.onset_within_sample(times, forces, onsets, velocities))
+        step = float(np.median([np.median(np.diff(time)) for time in times]))
+        notes.append(
+            f"t = 0 put where the force begins, in {len(triggered)} taps, good to a part of the sampling "
+            f"step of "
+            f"{1e3 * step:.3g} ms; what lies before is kept as pretrigger"
+        )
+    else:
+        refined = iter(())
+    started = (
+        [] if len(triggered) == len(taps) else ["no samples before contact: the records' own t = 0 is taken"]
+    )
+    notes += started
+    return [0.0 if tap.onset is None else next(refined) for tap in taps]
+
+
+def _rest_force(force: Samples, onset: int | None) -> float:
+    """Force without contact, from the samples before it [N]."""
+    before = force[: max((onset or 0) - 1, 0)]
+    return float(np.median(before)) if len(before) >= 3 else 0.0
+
+
+def _capture(number: int, tap: _Tap, t0: float, given: Given) -> Capture:
+    record = tap.record
+    channels: dict[str, Channel | None] = {str(q): channel_of(record, q, t0) for q in CHANNELS}
+    force = channels["force"]
+    if force is not None:
+        offset = _rest_force(force.values, tap.onset)
+        channels["force"] = Channel(force.time_s, force.values - offset)
+    position = channels["position"]
+    start = 0.0
+    direction = scalar(record, given, Quantity.DIRECTION)
+    if position is not None:
+        start = _start(position)
+        channels["position"] = Channel(position.time_s, position.values - start)
+        if math.isnan(direction):
+            direction = 1.0 if position.values[-5:].mean() >= start else -1.0
+    actuator = channels["actuator"]
+    if actuator is not None:
+        touching = float(np.interp(0.0, actuator.time_s, actuator.values))
+        channels["actuator"] = Channel(actuator.time_s, actuator.values - touching)
+    return described(
+        number, record, given, channels,
+        velocity_m_s=tap.velocity_m_s, start_m=start, direction=-1.0 if direction < 0.0 else 1.0,
+    )  # fmt: skip
+
+
+def _start(position: Channel) -> float:
+    """Place where the part lay [m]; 0 where the positions count from there already."""
+    before = position.values[position.time_s < 0.0]
+    if len(before) < 3:
+        before = position.values[:3]
+    place = float(np.mean(before))
+    noise = contacts.noise_of(position.values)
+    return place if abs(place) > START_STD * noise / math.sqrt(len(before)) else 0.0

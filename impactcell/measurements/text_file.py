@@ -1,0 +1,245 @@
+"""Reads a text file of numbers in any dialect; every cell that is no number is told with its line."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
+from impactcell.measurements.limits import Limits
+from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.table import Column, Lines, Table, unique_names
+from impactcell.measurements.text_layout import Layout, find_layout, is_comment
+from impactcell.records import Samples
+
+CHUNK_ROWS = 20_000
+"""Rows whose cells are held as text at a time: some 10 MB."""
+MAX_FAULTS_TOLD = 10
+"""Faults told of one file."""
+
+
+def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
+    """Read the one table of a text file.
+
+    Raises
+    ------
+    MeasurementError
+        Every cell that is no number and every row of another length, with its line.
+    """
+    source = str(path)
+    text, encoding = decode(path.read_bytes(), source, given.encoding)
+    lines = _lines(text, source, limits)
+    delimiter, decimal, how = detect([line for line in lines if not is_comment(line)], given)
+    layout = find_layout(lines, source, delimiter, decimal)
+    limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
+    columns, numbers = _Rows(source, lines, layout, delimiter, decimal).read()
+    notes = [how, f"encoding {encoding.removesuffix('-sig')}", _where(layout)]
+    skipped = len(lines) - layout.first_row - len(numbers)
+    if skipped:
+        notes.append(f"{skipped} blank or comment lines left out")
+    return (
+        Table(
+            source,
+            _kept(layout, columns),
+            attributes=layout.attributes,
+            notes=tuple(notes),
+            lines=numbers,
+        ),
+    )
+
+
+def _lines(text: str, source: str, limits: Limits) -> list[str]:
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    while lines and not lines[-1].strip(" \t\x1a"):
+        lines.pop()
+    if not lines:
+        raise MeasurementError(f"{source}: is empty")
+    if '"' in text[:100_000]:
+        lines = _joined(lines)
+    limits.check_shape(source, len(lines), 1)
+    return lines
+
+
+def _joined(lines: list[str]) -> list[str]:
+    """Lines with what a quoted cell broke in two put together; the rest of it becomes blank lines."""
+    joined = list(lines)
+    for index in range(min(len(lines), 200)):
+        count = 0
+        while joined[index].count('"') % 2 and count < 3 and index + count + 1 < len(lines):
+            count += 1
+            joined[index] += " " + joined[index + count]
+            joined[index + count] = ""
+    return joined
+
+
+def _where(layout: Layout) -> str:
+    if layout.header_line is None:
+        return f"no header, numbers from line {layout.first_row + 1}"
+    units = "" if layout.unit_line is None else f", units in line {layout.unit_line}"
+    return f"header in line {layout.header_line}{units}, numbers from line {layout.first_row + 1}"
+
+
+class _Rows:
+    """Rows of a text file, parsed in chunks."""
+
+    def __init__(
+        self, source: str, lines: Sequence[str], layout: Layout, delimiter: str, decimal: str
+    ) -> None:
+        self._source = source
+        self._lines = lines
+        self._layout = layout
+        self._delimiter = delimiter
+        self._decimal = decimal
+        self._width = len(layout.names)
+        self._faults: list[str] = []
+        self._fault_count = 0
+
+    def read(self) -> tuple[list[Samples | list[str]], Lines]:
+        """Columns, and the line of each row."""
+        parts: list[list[Samples | list[str]]] = []
+        numbers: list[int] = []
+        for chunk in self._chunks():
+            rows = self._cells(chunk)
+            numbers += [number for number, _ in rows]
+            parts.append([self._column(place, rows) for place in range(self._width)])
+        if self._faults:
+            rest = self._fault_count - len(self._faults)
+            more = [f"{self._source}: and {rest} more faults"] if rest else []
+            raise MeasurementError("\n".join(self._faults + more))
+        columns: list[Samples | list[str]] = []
+        for place in range(self._width):
+            pieces = [part[place] for part in parts]
+            if place in self._layout.numeric:
+                columns.append(np.concatenate([np.asarray(piece, dtype=np.float64) for piece in pieces]))
+            else:
+                columns.append([str(cell) for piece in pieces for cell in piece])
+        return columns, np.array(numbers, dtype=np.int64)
+
+    def _chunks(self) -> Iterator[list[tuple[int, str]]]:
+        chunk: list[tuple[int, str]] = []
+        for index in range(self._layout.first_row, len(self._lines)):
+            line = self._lines[index]
+            if is_comment(line):
+                continue
+            chunk.append((index + 1, line))
+            if len(chunk) == CHUNK_ROWS:
+                yield chunk
+                chunk = []
+        if chunk:
+            yield chunk
+
+    def _cells(self, chunk: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
+        rows = []
+        for number, line in chunk:
+            cells = split_cells(line, self._delimiter)
+            if len(cells) != self._width:
+                if number == len(self._lines) and len(cells) < self._width:
+                    continue  # a recording that was cut off in the middle of a line
+                self._fault(number, f"{len(cells)} cells where the table has {self._width}")
+                continue
+            rows.append((number, cells))
+        return rows
+
+    def _column(self, place: int, rows: list[tuple[int, list[str]]]) -> Samples | list[str]:
+        cells = [row[1][place] for row in rows]
+        if place not in self._layout.numeric:
+            return cells
+        values = _plain_numbers(cells, self._decimal)
+        if values is None:
+            values = self._parsed(place, rows)
+        if np.isinf(values).any():
+            row = int(np.flatnonzero(np.isinf(values))[0])
+            self._fault(rows[row][0], f"column {self._name(place)} is infinite")
+        return values
+
+    def _parsed(self, place: int, rows: list[tuple[int, list[str]]]) -> Samples:
+        values = np.full(len(rows), np.nan)
+        for row, (number, cells) in enumerate(rows):
+            value = parse_number(cells[place], self._decimal)
+            if value is None:
+                mark = "point" if self._decimal == "." else "comma"
+                self._fault(
+                    number,
+                    f"column {self._name(place)}: {cells[place][:40]!r} is not a number with decimal {mark}; "
+                    f"correct the cell, or leave it empty",
+                )
+            else:
+                values[row] = value
+        return values
+
+    def _name(self, place: int) -> str:
+        return repr(self._layout.names[place] or f"column {place + 1}")
+
+    def _fault(self, line: int, message: str) -> None:
+        self._fault_count += 1
+        if len(self._faults) < MAX_FAULTS_TOLD:
+            self._faults.append(f"{self._source}:{line}: {message}")
+
+
+def _plain_numbers(cells: list[str], decimal: str) -> Samples | None:
+    """Numbers that Python reads as they are, but for the decimal mark; None where one cell is another."""
+    if any("_" in cell for cell in cells):
+        return None
+    if decimal == ",":
+        cells = [cell.replace(".", "x").replace(",", ".") for cell in cells]
+    try:
+        return np.fromiter(map(float, cells), dtype=np.float64, count=len(cells))
+    except ValueError:
+        return None
+
+
+def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[Column, ...]:
+    """Columns of the table; those without name and content, as a delimiter at line ends makes them, go."""
+    kept = []
+    names = unique_names(list(layout.names))
+    for place, content in enumerate(columns):
+        unit = layout.units[place]
+        if isinstance(content, np.ndarray):
+            kept.append(Column(names[place], unit, content))
+        elif any(content) or layout.names[place]:
+            moments = _moments(content)
+            if moments is None:
+                kept.append(Column(names[place], unit, np.full(len(content), np.nan), tuple(content)))
+            else:
+                kept.append(Column(names[place], "s", moments))
+    return tuple(kept)
+
+
+_CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?"
+_DATES: tuple[tuple[str, Callable[[re.Match[str]], tuple[int, int, int]]], ...] = (
+    (
+        r"(\d{4})-(\d{2})-(\d{2})[T ]+" + _CLOCK + r"(?:Z|[+-]\d{2}:?\d{2})?",
+        lambda m: (int(m[1]), int(m[2]), int(m[3])),
+    ),
+    (r"(\d{1,2})\.(\d{1,2})\.(\d{4}),?[T ]+" + _CLOCK, lambda m: (int(m[3]), int(m[2]), int(m[1]))),
+    (r"()()()" + _CLOCK, lambda _: (1970, 1, 1)),
+)
+"""Writings of a moment, and their year, month and day; a clock alone counts from midnight."""
+
+
+def _moments(cells: list[str]) -> Samples | None:
+    """Seconds from the first of a column of dates or clock times; None where it is none."""
+    for pattern, date in _DATES:
+        compiled = re.compile(pattern)
+        if not compiled.fullmatch(cells[0]):
+            continue
+        seconds = np.full(len(cells), np.nan)
+        for row, cell in enumerate(cells):
+            match = compiled.fullmatch(cell)
+            if match is None:
+                return None
+            try:
+                day = datetime(*date(match), tzinfo=UTC)
+            except ValueError:
+                return None
+            seconds[row] = (
+                day.timestamp()
+                + 3600 * int(match[4])
+                + 60 * int(match[5])
+                + float((match[6] or "0").replace(",", "."))
+            )
+        return np.asarray(np.round(seconds - seconds[0], 9), dtype=np.float64)
+    return None

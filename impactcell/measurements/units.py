@@ -1,0 +1,206 @@
+"""Units as people write them in a header, and their factors to SI."""
+
+import enum
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+
+
+class Dimension(enum.Enum):
+    """What a unit measures; the value names its SI unit."""
+
+    TIME = "s"
+    LENGTH = "m"
+    ANGLE = "rad"
+    FORCE = "N"
+    TORQUE = "N m"
+    MASS = "kg"
+    INERTIA = "kg m²"
+    VELOCITY = "m/s"
+    ANGULAR_VELOCITY = "rad/s"
+    ACCELERATION = "m/s²"
+    PRESSURE = "Pa"
+    FREQUENCY = "Hz"
+    VOLTAGE = "V"
+    CURRENT = "A"
+    TEMPERATURE = "K"
+    NONE = "1"
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit.
+
+    Attributes
+    ----------
+    symbol : str
+        As it is printed.
+    dimension : Dimension
+    factor : float
+        A number in this unit times `factor` is in SI; for temperatures of a difference only.
+    """
+
+    symbol: str
+    dimension: Dimension
+    factor: float
+
+
+_PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
+"""Prefixes of the SI that are met in records of machines, BIPM SI brochure (2019), table 7."""
+_SI = (
+    ("s", Dimension.TIME, 1.0, "num"),
+    ("m", Dimension.LENGTH, 1.0, "numcdk"),
+    ("rad", Dimension.ANGLE, 1.0, "um"),
+    ("N", Dimension.FORCE, 1.0, "umkM"),
+    ("Nm", Dimension.TORQUE, 1.0, "umckM"),
+    ("g", Dimension.MASS, 1e-3, "mk"),
+    ("Pa", Dimension.PRESSURE, 1.0, "kM"),
+    ("bar", Dimension.PRESSURE, 1e5, "m"),
+    ("Hz", Dimension.FREQUENCY, 1.0, "kM"),
+    ("V", Dimension.VOLTAGE, 1.0, "um"),
+    ("A", Dimension.CURRENT, 1.0, "um"),
+)
+"""Symbol, dimension, factor, and the prefixes it is met with."""
+_POUND_KG, _INCH_M, _KILOPOND_N = 0.45359237, 0.0254, 9.80665
+"""International yard and pound agreement (1959); standard acceleration of free fall, CGPM 1901."""
+_FURTHER = (
+    ("min", Dimension.TIME, 60.0),
+    ("h", Dimension.TIME, 3600.0),
+    ("in", Dimension.LENGTH, _INCH_M),
+    ("mil", Dimension.LENGTH, 1e-3 * _INCH_M),
+    ("ft", Dimension.LENGTH, 12.0 * _INCH_M),
+    ("deg", Dimension.ANGLE, math.pi / 180.0),
+    ("rev", Dimension.ANGLE, 2.0 * math.pi),
+    ("kgf", Dimension.FORCE, _KILOPOND_N),
+    ("kp", Dimension.FORCE, _KILOPOND_N),
+    ("lbf", Dimension.FORCE, _POUND_KG * _KILOPOND_N),
+    ("daN", Dimension.FORCE, 10.0),
+    ("Nmm", Dimension.TORQUE, 1e-3),
+    ("t", Dimension.MASS, 1000.0),
+    ("lb", Dimension.MASS, _POUND_KG),
+    ("kgm2", Dimension.INERTIA, 1.0),
+    ("kgcm2", Dimension.INERTIA, 1e-4),
+    ("kgmm2", Dimension.INERTIA, 1e-6),
+    ("gcm2", Dimension.INERTIA, 1e-7),
+    ("psi", Dimension.PRESSURE, _POUND_KG * _KILOPOND_N / _INCH_M**2),
+    ("rpm", Dimension.ANGULAR_VELOCITY, 2.0 * math.pi / 60.0),
+    ("K", Dimension.TEMPERATURE, 1.0),
+    ("degC", Dimension.TEMPERATURE, 1.0),
+    ("degF", Dimension.TEMPERATURE, 5.0 / 9.0),
+    ("%", Dimension.NONE, 0.01),
+    ("1", Dimension.NONE, 1.0),
+)
+_WORDS = {
+    "sec": "s", "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "msec": "ms",
+    "millisekunden": "ms", "milliseconds": "ms", "microseconds": "us", "usec": "us", "minutes": "min",
+    "newton": "N", "newtons": "N", "kilonewton": "kN", "newtonmeter": "Nm", "meter": "m", "metre": "m",
+    "meters": "m", "metres": "m", "millimeter": "mm", "millimetre": "mm", "millimeters": "mm", "micron": "um",
+    "microns": "um", "mikrometer": "um", "micrometer": "um", "inch": "in", "inches": "in", '"': "in",
+    "degree": "deg", "degrees": "deg", "grad": "deg", "°": "deg", "radian": "rad", "radians": "rad",
+    "lbs": "lb", "°c": "degC", "°f": "degF", "u/min": "rpm", "1/min": "rpm", "1/s": "Hz", "volt": "V",
+    "ampere": "A", "kilogram": "kg", "kilogramm": "kg", "percent": "%", "-": "1", "hz": "Hz", "khz": "kHz",
+    "kn": "kN", "dan": "daN", "pa": "Pa", "mpa": "MPa",
+}  # fmt: skip
+"""Other writings of a unit, in lower case."""
+_RATES = {
+    (Dimension.LENGTH, 1): Dimension.VELOCITY,
+    (Dimension.LENGTH, 2): Dimension.ACCELERATION,
+    (Dimension.ANGLE, 1): Dimension.ANGULAR_VELOCITY,
+}
+_SUFFIX_WORDS = {"n": "N", "nm": "nm", "v": "V", "a": "A", "k": "K", "hz": "Hz", "kn": "kN", "pa": "Pa"}
+"""Units of a name in lower case, as in `force_n`, that lower case would hide."""
+
+
+@cache
+def _symbols() -> dict[str, Unit]:
+    table = {}
+    for symbol, dimension, factor, prefixes in _SI:
+        for prefix in ("", *prefixes):
+            table[prefix + symbol] = Unit(prefix + symbol, dimension, _PREFIXES[prefix] * factor)
+    for symbol, dimension, factor in _FURTHER:
+        table[symbol] = Unit(symbol, dimension, factor)
+    return table
+
+
+def parse_unit(text: str) -> Unit | None:
+    """Give the unit that `text` writes, None where it is none that is known.
+
+    Examples
+    --------
+    >>> parse_unit("[mm/min]").factor * 60.0
+    0.001
+    >>> parse_unit("kg·m²").dimension.value
+    'kg m²'
+    >>> parse_unit("furlong") is None
+    True
+    """
+    shown = text.strip().strip("[]()").strip()
+    plain = re.sub(r"[\s·⋅*.]|\^", "", shown.replace("²", "2").replace("µ", "u").replace("μ", "u"))
+    if not plain:
+        return None
+    unit = _single(plain) or _rate(plain)
+    return None if unit is None else Unit(shown, unit.dimension, unit.factor)
+
+
+def _single(plain: str) -> Unit | None:
+    symbols = _symbols()
+    return symbols.get(plain) or symbols.get(_WORDS.get(plain.lower(), ""))
+
+
+def _rate(plain: str) -> Unit | None:
+    """Something by time, as mm/min, m/s2 or deg/s."""
+    above, slash, below = plain.partition("/")
+    if not slash:
+        return None
+    power = 2 if below.endswith("2") else 1
+    upper, lower = _single(above), _single(below.removesuffix("2"))
+    if upper is None or lower is None or lower.dimension is not Dimension.TIME:
+        return None
+    dimension = _RATES.get((upper.dimension, power))
+    return None if dimension is None else Unit(plain, dimension, upper.factor / lower.factor**power)
+
+
+def split_unit(header: str) -> tuple[str, str | None]:
+    """Take the unit off a column's name: `Force [N]`, `Kraft (N)`, `F / N`, `Weg in mm`, `position_mm`.
+
+    Returns
+    -------
+    name : str
+    unit : str or None
+        As written; None where the name holds none. What stands in brackets is taken for a unit only if it is
+        one, or if the brackets are square.
+
+    Examples
+    --------
+    >>> split_unit("Kraft in kN"), split_unit("velocity_mm_per_min"), split_unit("Force")
+    (('Kraft', 'kN'), ('velocity', 'mm/min'), ('Force', None))
+    """
+    text = " ".join(header.split())
+    bracket = re.fullmatch(r"(.*\S)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\})", text)
+    if bracket:
+        name, *units = bracket.groups()
+        unit = next(part for part in units if part is not None).strip()
+        if parse_unit(unit) or bracket.group(2) is not None:
+            return name, unit or None
+    for pattern in (r"(.*\S)\s*/\s*(\S+(?: \S+)?)", r"(.*\S) in (\S+(?: \S+)?)", r"(.*\S),\s+(\S+)"):
+        match = re.fullmatch(pattern, text)
+        if match and parse_unit(match.group(2)):
+            return match.group(1), match.group(2)
+    match = re.fullmatch(r"(.*[^\s_])\s(\S+)", text)
+    if match and len(match.group(2)) > 1 and parse_unit(match.group(2)):
+        return match.group(1), match.group(2)
+    return _suffix(text)
+
+
+def _suffix(text: str) -> tuple[str, str | None]:
+    parts = text.split("_")
+    for count in range(min(4, len(parts) - 1), 0, -1):
+        tail = parts[-count:]
+        unit = "".join("/" if part == "per" else _SUFFIX_WORDS.get(part, part) for part in tail)
+        unit = {"Nm": "Nm", "kgm2": "kgm2", "m/s": "m/s", "ms": "ms", "m/s2": "m/s2"}.get(unit, unit)
+        if count == 2 and tail in (["m", "s"], ["rad", "s"], ["mm", "s"]):
+            unit = "/".join(tail)
+        if parse_unit(unit) and parts[0] and unit not in ("1", "t", "h"):
+            return "_".join(parts[:-count]), unit
+    return text, None

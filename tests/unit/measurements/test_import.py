@@ -1,0 +1,190 @@
+"""From files as people have them to a campaign: meaning of columns, trigger, cuts, what is told."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell import campaign
+from impactcell.api.friction import calibrated, with_masses
+from impactcell.campaign import Excitation
+from impactcell.cli.app import run_verb
+from impactcell.errors import MeasurementError
+from impactcell.features import extract
+from impactcell.measurements import (
+    Column,
+    Given,
+    Quantity,
+    Table,
+    guess,
+    make_campaign,
+    read_tables,
+    write_campaign,
+)
+from impactcell.prediction import estimate_from_features
+from impactcell.prediction.joint_plant_fit import fit_plant
+from tests.unit.measurements.records import PLACE_M, sampled, taps, write_logger_file
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    directory, rng = tmp_path_factory.mktemp("logger"), np.random.default_rng(5)
+    paths = []
+    for number, tap in enumerate(taps(), 1):
+        paths.append(directory / f"shot{number:02d}.csv")
+        write_logger_file(paths[-1], tap, rng)
+    return paths
+
+
+def read(paths: list[Path]) -> tuple[Table, ...]:
+    return tuple(table for path in paths for table in read_tables(path))
+
+
+def table(**columns: tuple[str | None, np.ndarray]) -> Table:
+    return Table("a.csv", tuple(Column(name, unit, values) for name, (unit, values) in columns.items()))
+
+
+def test_a_loggers_files_become_taps_with_the_right_friction(files: list[Path], tmp_path: Path) -> None:
+    tables = read(files)
+    imported = write_campaign(tables, guess(tables), tmp_path / "campaign")
+    back = campaign.read(tmp_path / "campaign")
+    assert back.excitation is Excitation.TAP
+    for shot, tap in zip(back.shots, taps(), strict=True):
+        assert shot.velocity_m_s == pytest.approx(tap.velocity_m_s, rel=1e-9)
+        assert (shot.mass_kg, shot.direction) == (tap.mass_kg, tap.direction)
+        assert shot.start_m == pytest.approx(PLACE_M, abs=1e-6)
+        assert shot.force is not None
+        assert shot.force.time_s[0] == pytest.approx(-0.03, abs=2e-4)
+        assert abs(float(np.median(shot.force.values[:200]))) < 0.1
+    assert any("force turned" in note for note in imported.notes)
+    features = with_masses([extract(shot) for shot in back.shots])
+    fitted = fit_plant(features, back.gravity_m_s2)
+    model = calibrated(fitted.model, [feature.capture for feature in features])
+    for feature in features:
+        friction = estimate_from_features(feature, model, fitted.gap)
+        assert friction.mu_k.value == pytest.approx(0.152, rel=0.01)
+
+
+def test_a_long_record_is_cut_into_its_taps(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    parts = [sampled(tap, rng, tail_s=0.5) for tap in taps((3000, 4000), (18.9,))]
+    time = np.arange(sum(len(part[0]) for part in parts)) * 1e-4
+    force, position = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
+    tables = [table(Time=("s", time), Force=("N", force), Position=("m", position))]
+    given = Given(constants={"mass": 18.9, "velocity": 0.05})
+    imported = make_campaign(tables, guess(tables, given))
+    shots = imported.campaign.shots
+    assert [shot.direction for shot in shots] == [1, -1, 1, -1]
+    assert "1 records cut into 4 taps where the force begins anew" in imported.notes
+    for shot in shots:
+        assert shot.position is not None
+        assert shot.position.time_s[0] < -0.02
+        assert shot.position.time_s[-1] < 0.4
+        assert np.ptp(shot.position.values[-50:]) < 2e-5
+
+
+def test_a_column_numbers_the_shots_and_a_word_is_the_batch() -> None:
+    rng = np.random.default_rng(7)
+    parts = [sampled(tap, rng) for tap in taps((3000,), (18.9, 25.2))]
+    numbers = np.concatenate([np.full(len(part[0]), 10.0 + n) for n, part in enumerate(parts)])
+    columns = {
+        "t": ("s", np.concatenate([part[0] for part in parts])),
+        "F": ("N", np.concatenate([part[1] for part in parts])),
+        "x": ("m", np.concatenate([part[2] for part in parts])),
+        "Versuch": (None, numbers),
+        "Druck": ("bar", numbers),
+    }
+    batch = Column("Charge", None, np.full(len(numbers), np.nan), tuple(f"B{n:g}" for n in numbers))
+    made = table(**columns)
+    tables = [Table("a.csv", (*made.columns, batch))]
+    given = Given(constants={"mass": 18.9, "velocity": 0.05}, units={}, columns={})
+    shots = make_campaign(tables, guess(tables, given)).campaign.shots
+    assert [shot.batch_id for shot in shots] == ["B10", "B11", "B12", "B13"]
+    assert [shot.covariates["druck_pa"] for shot in shots] == pytest.approx([1e6, 1.1e6, 1.2e6, 1.3e6])
+
+
+TIME = np.arange(200) * 1e-3
+WAVE = np.sin(40.0 * TIME)
+
+
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        (
+            {"t": (None, TIME), "F": ("N", WAVE), "x": ("m", WAVE)},
+            "column 't' (time) has no unit; say --unit 't=s'",
+        ),
+        ({"t": ("s", TIME), "F": ("N", WAVE), "x": (None, WAVE)}, "column 'x' (position) has no unit"),
+        ({"F": ("N", WAVE), "x": ("m", WAVE)}, "no column of time was found"),
+        ({"t": ("s", TIME), "u": ("V", WAVE)}, "neither position nor force was found among 't', 'u'"),
+        ({"t": ("s", TIME), "a": ("m", WAVE), "b": ("m", WAVE)}, "may be the position"),
+        ({"t": ("s", TIME % 0.1), "F": ("N", WAVE), "x": ("m", WAVE)}, "time does not increase"),
+    ],
+)
+def test_what_cannot_be_understood_is_told_and_nothing_written(
+    columns: dict, told: str, tmp_path: Path
+) -> None:
+    tables = [table(**columns)]
+    with pytest.raises(MeasurementError) as caught:
+        write_campaign(tables, guess(tables), tmp_path / "out")
+    assert told in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_given_goes_before_what_is_guessed() -> None:
+    tables = [table(t=("s", TIME), F=("N", WAVE), Fx=("N", WAVE), x=("mm", WAVE))]
+    with pytest.raises(MeasurementError, match="there is no column 'G'"):
+        guess(tables, Given(columns={Quantity.FORCE: "G"}))
+    mapping = guess(tables, Given(columns={Quantity.FORCE: "Fx"}, units={"x": "um"}))
+    force, position = mapping.of(Quantity.FORCE), mapping.of(Quantity.POSITION)
+    assert force is not None
+    assert position is not None
+    assert (force.column, force.confidence) == ("Fx", 1.0)
+    assert position.unit is not None
+    assert position.unit.factor == 1e-6
+    assert make_campaign(tables, mapping).campaign.excitation is Excitation.DRIVEN
+
+
+def test_the_verb_shows_what_it_guessed_and_writes(
+    files: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    named = [str(path) for path in files]
+
+    def run(*arguments: str) -> None:
+        with pytest.raises(SystemExit) as ended:
+            run_verb(["import", *named, *arguments])
+        assert ended.value.code == 0
+
+    run("--dry-run", "--json")
+    said = json.loads(capsys.readouterr().out)
+    assert said["shots"] == len(files)
+    assert [(c["column"], c["quantity"], c["unit"]) for c in said["columns"]] == [
+        ("Zeit", "time", "ms"), ("Kraft", "force", "N"), ("Weg", "position", "µm"),
+    ]  # fmt: skip
+    run("--out", str(tmp_path / "c"), "--set", "mass=12.6kg", "--set", "stroke=1.5mm", "--sign", "force=-1")
+    told = capsys.readouterr()
+    assert f"{len(files)} shots of excitation tap, in {tmp_path / 'c'}" in told.out
+    back = campaign.read(tmp_path / "c")
+    assert back.stroke_m == pytest.approx(1.5e-3)
+    assert {shot.mass_kg for shot in back.shots} == {12.6}
+    with pytest.raises(MeasurementError, match="mass is '12'; write it with its unit"):
+        run_verb(["import", *named, "--dry-run", "--set", "mass=12"])
+    with pytest.raises(MeasurementError, match="say where to write"):
+        run_verb(["import", *named])
+
+
+def test_a_mapping_file_says_the_same(files: list[Path], tmp_path: Path) -> None:
+    mapping = tmp_path / "map.yaml"
+    mapping.write_text(
+        "columns: {force: Kraft}\nunits: {Kraft: kN}\nconstants: {mass: 5 kg}\ntrigger: 5 kN\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(SystemExit):
+        run_verb(["import", str(files[0]), "--mapping", str(mapping), "-o", str(tmp_path / "c")])
+    (shot,) = campaign.read(tmp_path / "c").shots
+    assert shot.force is not None
+    assert shot.force.values.max() > 1e4
+    mapping.write_text("colums: {}\n", encoding="utf-8")
+    with pytest.raises(MeasurementError, match="unknown key 'colums'"):
+        run_verb(["import", str(files[0]), "--mapping", str(mapping), "-o", str(tmp_path / "d")])

@@ -1,0 +1,213 @@
+"""What was written in any dialect is read back exactly; what cannot be read is told with its line."""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements import Dialect, Limits, Table, read_tables
+
+DIALECTS = [(";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), ("|", ","), (" ", "."), (" ", ",")]
+HEADERS = [("Time", "Force", "Position"), ("Zeit", "Kraft", "Weg"), ("Größe t", "Schlag µ", "x°")]
+PREAMBLES = ["", "Measured by hand\n", "Messung: 12\nDatum: 22.11.2026\n\n", "# exported\n# Masse: 18,9 kg\n"]
+
+
+def one(path: Path, dialect: Dialect | None = None, limits: Limits | None = None) -> Table:
+    (table,) = read_tables(path, limits, dialect)
+    return table
+
+
+def grouped(text: str, separator: str) -> str:
+    whole, point, rest = text.partition(".")
+    sign, digits = ("-", whole[1:]) if whole.startswith("-") else ("", whole)
+    if "e" in text or len(digits) < 4:
+        return text
+    head = len(digits) % 3 or 3
+    parts = [digits[:head], *(digits[i : i + 3] for i in range(head, len(digits), 3))]
+    return sign + separator.join(parts) + point + rest
+
+
+def localised(value: float, decimal: str, thousands: str | None) -> str:
+    text = repr(value)
+    if thousands:
+        text = grouped(text, "\0")
+    return text.replace(".", decimal).replace("\0", thousands or "")
+
+
+@given(data=st.data())
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_round_trip_over_dialects(data: st.DataObject, tmp_path: Path) -> None:
+    delimiter, decimal = data.draw(st.sampled_from(DIALECTS))
+    encoding = data.draw(st.sampled_from(["utf-8", "utf-8-sig", "cp1252", "utf-16"]))
+    ending = data.draw(st.sampled_from(["\n", "\r\n", "\r"]))
+    preamble = data.draw(st.sampled_from(PREAMBLES))
+    names = data.draw(st.sampled_from(HEADERS))
+    units = data.draw(st.sampled_from([None, "header", "row"])) if delimiter != " " else None
+    quoted = data.draw(st.booleans()) and delimiter != " "
+    separators = [None] if delimiter == " " else [None, "'", ","] if decimal == "." else [None, "'", "."]
+    thousands = data.draw(st.sampled_from([s for s in separators if s != delimiter]))
+    trailing = data.draw(st.booleans()) and not quoted and delimiter in ";\t"
+    count = data.draw(st.integers(8, 60))
+    finite = st.floats(-1e7, 1e7, allow_nan=False).map(lambda value: value + 0.0)
+    columns = [
+        [0.1 * i + 0.05 for i in range(count)],
+        data.draw(st.lists(finite, min_size=count, max_size=count)),
+        data.draw(st.lists(finite, min_size=count, max_size=count)),
+    ]
+    header = [name.replace(" ", "_") if delimiter == " " else name for name in names]
+    if units == "header":
+        header = [f"{name} [{unit}]" for name, unit in zip(header, ("s", "N", "mm"), strict=True)]
+    rows = [header] + ([["s", "N", "mm"]] if units == "row" else [])
+    rows += [[localised(value, decimal, thousands) for value in row] for row in zip(*columns, strict=True)]
+    if quoted:
+        out = io.StringIO()
+        csv.writer(out, delimiter=delimiter, quoting=csv.QUOTE_ALL, lineterminator="\n").writerows(rows)
+        body = out.getvalue()
+    else:
+        body = "".join(delimiter.join(row) + (delimiter if trailing else "") + "\n" for row in rows)
+    path = tmp_path / "record.csv"
+    path.write_bytes((preamble + body).replace("\n", ending).encode(encoding))
+    table = one(path)
+    assert [column.name for column in table.columns] == [
+        name.replace(" ", "_") if delimiter == " " else name for name in names
+    ]
+    if units:
+        assert [column.unit for column in table.columns] == ["s", "N", "mm"]
+    for column, values in zip(table.columns, columns, strict=True):
+        np.testing.assert_array_equal(column.values, values)
+
+
+@given(content=st.binary(max_size=400))
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_bytes_are_read_or_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "any.csv"
+    path.write_bytes(content)
+    try:
+        table = one(path)
+    except MeasurementError as error:
+        told = str(error)
+    else:
+        told = str(path)
+        assert len({len(column.values) for column in table.columns}) == 1
+    assert str(path) in told
+
+
+def rows(count: int, form: str = "{0};{1}") -> str:
+    return "".join(form.format(i, 2 * i + 1) + "\n" for i in range(count))
+
+
+def test_lines_of_rows_and_what_is_beside_them(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "Masse: 18,9 kg\nAnlage;7\n\nZeit;Kraft\n[ms];[kN]\n" + rows(30) + "\n# end\n", encoding="utf-8"
+    )
+    table = one(path)
+    assert table.attributes == {"Masse": "18,9 kg", "Anlage": "7"}
+    assert [(c.name, c.unit) for c in table.columns] == [("Zeit", "ms"), ("Kraft", "kN")]
+    assert table.place(0) == f"{path}:6"
+    assert "header in line 4, units in line 5, numbers from line 6" in table.notes
+
+
+def test_dates_and_clock_times_become_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "Datum;F\n" + "".join(f"22.11.2026 23:59:{58 + i},5;{i}\n" for i in range(2)) * 1, encoding="utf-8"
+    )
+    path.write_text(
+        "Uhrzeit;F\n" + "".join(f"2026-11-22T10:00:{i:02d}.250;{i}\n" for i in range(30)), encoding="utf-8"
+    )
+    column = one(path).columns[0]
+    assert column.unit == "s"
+    np.testing.assert_allclose(column.values, np.arange(30.0), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("t;F\n" + rows(20) + "7;x\n" + rows(20), ":22: column 'F': 'x' is not a number with decimal point"),
+        ("t;F\n1;x\n" + rows(40), ":2: '1;x' is neither a header nor a row of numbers"),
+        ("t;F\n" + rows(20) + "7\n" + rows(20), ":22: 1 cells where the table has 2"),
+        ("t;F\n" + rows(20) + "7;8;9\n" + rows(20), ":22: 3 cells where the table has 2"),
+        ("t;F\n" + rows(20) + "7;1e999\n" + rows(20), ":22: column 'F' is infinite"),
+        ("a;b;c;d\n" + rows(40, "{0};{1};{0}"), ":1: 4 cells where the rows below have 3"),
+        ("t;F\n" + rows(40).replace(";21\n", ";1_000\n"), ":12: column 'F': '1_000' is not a number"),
+        ("nothing here\nat all\n", "no table of numbers"),
+        ("\n\n \n", "is empty"),
+    ],
+)
+def test_faults_name_their_line(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(MeasurementError) as caught:
+        one(path)
+    assert str(caught.value).startswith(str(path))
+    assert told in str(caught.value)
+
+
+def test_a_record_cut_off_in_its_last_line_is_read_without_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + rows(20) + "20", encoding="utf-8")
+    table = one(path)
+    assert len(table) == 20
+    assert "1 blank or comment lines left out" in table.notes[-1] or "cut off" in table.notes[-1]
+
+
+def test_a_number_that_may_be_thousands_is_told_and_can_be_given(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + "".join(f"{i};{i + 1},250\n" for i in range(20)), encoding="utf-8")
+    table = one(path)
+    assert table.columns[1].values[0] == 1.25
+    assert "could be thousands" in table.notes[0]
+    assert one(path, Dialect(decimal=".")).columns[1].values[0] == 1250.0
+
+
+@pytest.mark.parametrize(
+    ("limits", "told"),
+    [
+        (Limits(file_bytes=100), "more than the 0 MB that are read"),
+        (Limits(rows=10), "rows, more than the 10"),
+        (Limits(columns=1), "has 2 columns, more than the 1"),
+        (Limits(cells=50), "cells, more than the 50"),
+    ],
+)
+def test_what_is_too_large_is_refused(tmp_path: Path, limits: Limits, told: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + rows(40), encoding="utf-8")
+    with pytest.raises(MeasurementError, match=told):
+        one(path, limits=limits)
+
+
+def test_two_gigabytes_are_refused_without_being_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.csv"
+    with path.open("wb") as file:
+        file.truncate(2_000_000_000)  # a sparse file: nothing of it is on the disk
+    with pytest.raises(MeasurementError, match="has 2000 MB, more than the 500 MB"):
+        one(path)
+
+
+def test_ten_thousand_columns_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "wide.csv"
+    line = ";".join("1" * 10_000) + "\n"
+    path.write_text(";".join(f"c{i}" for i in range(10_000)) + "\n" + line * 5, encoding="utf-8")
+    with pytest.raises(MeasurementError, match="has 10000 columns, more than the 1000"):
+        one(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" * 9, "is neither text nor"), (b"", "is empty")],
+)
+def test_what_is_no_text_is_refused(tmp_path: Path, content: bytes, told: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    with pytest.raises(MeasurementError, match=told):
+        one(path)
+    with pytest.raises(MeasurementError, match="No such file"):
+        one(tmp_path / "missing.csv")
+    with pytest.raises(MeasurementError, match="is not a file"):
+        one(tmp_path)
