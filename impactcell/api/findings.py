@@ -13,7 +13,7 @@ from typing import Any
 
 from impactcell.api.friction import calibrated
 from impactcell.campaign import Campaign, Excitation, read
-from impactcell.discrepancy.report import json_text, result_document, verdict_sentence, write_report
+from impactcell.discrepancy.report import headline, json_text, result_document, write_report
 from impactcell.discrepancy.workflow import DiscrepancyResult, extended_plant, investigate
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.prediction import Model
@@ -33,7 +33,7 @@ class DiscrepancyFindings:
     Attributes
     ----------
     verdict : str
-        `no_gap`, `named`, `tied` or `unknown`, as in `result.json`.
+        `no_gap`, `named`, `tied`, `unknown` or `untested`, as in `result.json`.
     headline : str
         The verdict in a sentence.
     effects : tuple of str
@@ -122,7 +122,7 @@ def discrepancy(
     outcome = result_document(result)
     return DiscrepancyFindings(
         verdict=result.verdict,
-        headline=verdict_sentence(result),
+        headline=headline(result),
         effects=result.added,
         tied_with={entry["effect"]: tuple(entry["tied_with"]) for entry in outcome["effects"]},
         parameters={
@@ -131,8 +131,8 @@ def discrepancy(
             }
             for entry in outcome["effects"]
         },
-        gap_before=result.validation.before.whole,
-        gap_after=result.validation.after.whole,
+        gap_before=result.validation.gap_before,
+        gap_after=result.validation.gap_after,
         result=outcome,
         _campaign=data,
         _findings=result,
@@ -188,8 +188,8 @@ def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nomin
             "from": source,
             "seed": str(result.seed),
             "verdict": result.verdict,
-            "held-out gap before": f"{result.validation.before.whole:.4g}",
-            "held-out gap after": f"{result.validation.after.whole:.4g}",
+            "held-out gap before": f"{result.validation.gap_before:.4g}",
+            "held-out gap after": f"{result.validation.gap_after:.4g}",
         },
     )
     if data.excitation is not Excitation.TAP:

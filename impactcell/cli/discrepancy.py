@@ -12,7 +12,7 @@ from impactcell.api.findings import write_findings
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
 from impactcell.cli.paths import note_damage, open_journal
-from impactcell.discrepancy.report import verdict_sentence
+from impactcell.discrepancy.report import headline
 from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError, DiscrepancyError
@@ -74,7 +74,7 @@ def discrepancy(
         result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
         report_step("writing the report")
         write_findings(result, data, output, source, name)
-    print_result(f"{verdict_sentence(result)}\n{output / 'report.html'}")
+    print_result(f"{headline(result)}\n{output / 'report.html'}")
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:

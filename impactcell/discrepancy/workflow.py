@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.data import (
     IndexArray,
@@ -13,7 +11,6 @@ from impactcell.discrepancy.data import (
     ReplicateSpread,
     decimate,
     prepare,
-    replicate_spread,
     sensor_noise,
     shot_set,
     split_held_out,
@@ -30,22 +27,29 @@ from impactcell.discrepancy.model import (
     usable_blocks,
 )
 from impactcell.discrepancy.search import (
+    UNKNOWN,
+    Conclusion,
     Mapper,
+    ModelEvidence,
+    OpenedShots,
     Proposal,
     SearchContext,
     SelectionResult,
+    Simulation,
     UnexplainedGap,
     Validation,
+    conclude,
     describe_gap,
+    missing_shots,
+    nested_models,
+    only_test,
     propose_experiments,
     select_model,
-    validate,
+    simulate_held_out,
 )
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
 
-# Verdicts, as `result.json` has them.
-NO_GAP, NAMED, TIED, UNKNOWN = "no_gap", "named", "tied", "unknown"
 COARSE_SAMPLES = 400
 """Samples of a channel and shot that a search among many models reads."""
 
@@ -56,8 +60,8 @@ class DiscrepancyResult:
 
     Attributes
     ----------
-    verdict : str
-        `no_gap`, `named`, `tied` or `unknown`.
+    conclusion : Conclusion
+        What is established, and what remains.
     training, held_out : IndexArray
         Places of the shots.
     problem, held_problem : Problem
@@ -69,7 +73,7 @@ class DiscrepancyResult:
         Of the final model.
     """
 
-    verdict: str
+    conclusion: Conclusion
     prepared: PreparedCampaign
     floor: NoiseFloor
     replicates: ReplicateSpread
@@ -84,14 +88,20 @@ class DiscrepancyResult:
     selection: SelectionResult
     parameters: tuple[ParameterEstimate, ...]
     validation: Validation
+    simulation: Simulation
     unexplained: UnexplainedGap | None
     experiments: tuple[Proposal, ...]
     seed: int
 
     @property
+    def verdict(self) -> str:
+        """Return `no_gap`, `named`, `tied`, `unknown` or `untested`."""
+        return self.conclusion.verdict
+
+    @property
     def added(self) -> tuple[str, ...]:
         """Effects that joined the nominal model."""
-        return self.selection.added
+        return self.conclusion.established
 
 
 def investigate(
@@ -140,7 +150,7 @@ def investigate(
             training = training[kept]
             problem = _problem(prepared, floor, training)
             nominal = fit_nominal(problem, plant)
-    report_step("locating the gap and naming effects")
+    missing = missing_shots(len(training), len(held_out))
     context = SearchContext(
         problem,
         _coarse(problem),
@@ -151,38 +161,49 @@ def investigate(
         # What is above the floor is a gap where noise is stated, or sampled fast enough to be seen.
         floor_is_certain="stated" in floor.source or prepared.excitation.floor_is_certain,
     )
-    selection = select_model(context, nominal)
-    final = selection.accepted or nominal
+    report_step("locating the gap and naming effects")
+    selection = only_test(context, nominal) if missing else select_model(context, nominal)
+    nested = nested_models(context, selection)
     report_step("proving on held-out shots")
     held_problem = _problem(prepared, floor, held_out)
     if prepared.excitation.selects_blocks:
-        held_out = held_out[decided_blocks(held_problem, refit_shot_parameters(held_problem, final))]
+        largest = nested[-1][1] if nested else nominal
+        held_out = held_out[decided_blocks(held_problem, refit_shot_parameters(held_problem, largest))]
         held_problem = _problem(prepared, floor, held_out)
-    held = refit_shot_parameters(held_problem, nominal), refit_shot_parameters(held_problem, final)
-    replicates = _replicates(prepared, (training, held_out), (final, held[1]))
-    validation = validate((problem, nominal, final), (held_problem, *held), floor, replicates, seed)
-    verdict = _verdict(selection)
+        missing = missing or missing_shots(len(training), len(held_out))
+    opened = OpenedShots(prepared, floor, (training, held_out), (problem, held_problem), seed)
+    outcome = opened.validate(nominal, () if missing else nested)
+    final = outcome.final
+    conclusion = conclude(selection, _evidence(context, selection, final), outcome.validation, missing)
     report_step("planning the next experiment")
     return DiscrepancyResult(
-        verdict=verdict,
+        conclusion=conclusion,
         prepared=prepared,
         floor=floor,
-        replicates=replicates,
+        replicates=outcome.replicates,
         training=training,
         held_out=held_out,
         problem=problem,
         held_problem=held_problem,
         nominal=nominal,
         final=final,
-        held_nominal=held[0],
-        held_final=held[1],
+        held_nominal=outcome.held_nominal,
+        held_final=outcome.held_final,
         selection=selection,
         parameters=estimate_parameters(final, linearise(problem, final)),
-        validation=validation,
-        unexplained=describe_gap(problem, selection.nominal) if verdict == UNKNOWN else None,
-        experiments=propose_experiments(problem, final, _tied_models(selection)),
+        validation=outcome.validation,
+        simulation=simulate_held_out(held_problem, nominal, final),
+        unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,
+        experiments=propose_experiments(problem, final, _tied_models(selection, conclusion.established)),
         seed=seed,
     )
+
+
+def _evidence(context: SearchContext, selection: SelectionResult, final: Fit) -> ModelEvidence:
+    """Evidence against the final model, as the search has it or made anew."""
+    if not final.effects or final.effects == selection.nominal.fit.effects:
+        return selection.nominal
+    return selection.final if selection.is_accepted(final) else context.test_model(final)
 
 
 def _problem(prepared: PreparedCampaign, floor: NoiseFloor, indices: IndexArray) -> Problem:
@@ -210,26 +231,11 @@ def _left_out(training: IndexArray, kept: IndexArray) -> str:
     )
 
 
-def _replicates(
-    prepared: PreparedCampaign, indices: tuple[IndexArray, IndexArray], fits: tuple[Fit, Fit]
-) -> ReplicateSpread:
-    log_factor = np.empty(len(prepared.shots))
-    for of_shots, model in zip(indices, fits, strict=True):
-        log_factor[of_shots] = model.shot_parameters.log_factor
-    return replicate_spread(prepared.shots, log_factor, len(prepared.batches))
-
-
-def _verdict(selection: SelectionResult) -> str:
-    if selection.accepted is None:
-        return UNKNOWN
-    if not selection.added:
-        return NO_GAP
-    return TIED if any(selection.ties.values()) else NAMED
-
-
-def _tied_models(selection: SelectionResult) -> list[tuple[str, str, Fit]]:
+def _tied_models(selection: SelectionResult, established: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
     models = []
     for effect, rivals in selection.ties.items():
+        if effect not in established:
+            continue
         for rival in rivals:
             tied_set = {rival if name == effect else name for name in selection.added}
             for alternative in selection.alternatives:

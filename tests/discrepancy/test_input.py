@@ -104,7 +104,7 @@ def test_unequal_rates_and_gaps_in_time_cost_nothing_but_are_said() -> None:
 
     found = investigate(changed(given, spoilt))
     assert found.added == ("viscous_friction",)
-    assert found.validation.after.trace == pytest.approx(1.0, abs=0.06)
+    assert found.validation.held_out.after.trace == pytest.approx(1.0, abs=0.06)
     assert any("has a gap in time" in note for note in result_document(found)["notes"])
 
 
@@ -113,7 +113,7 @@ def test_a_shot_without_force_among_others_is_used_all_the_same() -> None:
     part = changed(given, lambda shot: replace(shot, force=None) if shot.cycle % 3 == 0 else shot)
     found = investigate(part)
     assert found.verdict == "no_gap"
-    assert found.validation.before.trace == pytest.approx(1.0, abs=0.04)
+    assert found.validation.held_out.before.trace == pytest.approx(1.0, abs=0.04)
 
 
 def test_without_positions_the_loss_of_power_is_said() -> None:

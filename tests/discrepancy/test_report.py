@@ -7,13 +7,13 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
+from impactcell.discrepancy.report.headline import headline, phrase
 from impactcell.discrepancy.report.page import (
     format_number,
     page_context,
-    phrase,
-    verdict_sentence,
     write_report,
 )
+from impactcell.discrepancy.search.conclusion import Place, Remaining
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import make
@@ -88,7 +88,7 @@ def test_the_page_is_whole_and_fetches_nothing(tied: DiscrepancyResult, tmp_path
 def test_a_tie_is_told_in_the_sentence(tied: DiscrepancyResult) -> None:
     first, second = (phrase(one) for one in (tied.added[0], *tied.selection.ties[tied.added[0]]))
     assert {first, second} == {"mass error", "force sensor gain"}
-    sentence = verdict_sentence(tied)
+    sentence = headline(tied)
     assert sentence.startswith(f"Missing: {first} or {second}, which these shots cannot tell apart; the held")
 
 
@@ -101,18 +101,19 @@ def test_an_unknown_gap_leads_to_the_guide(unknown: DiscrepancyResult, tmp_path:
     assert unknown.unexplained is not None
     assert f"largest in phase {phrase(unknown.unexplained.phase)}" in page.text
     assert "→" not in page.text
-    assert verdict_sentence(unknown).startswith("No known effect explains a held-out gap of")
+    assert headline(unknown).startswith("No known effect explains a held-out gap of")
 
 
-def test_what_was_named_before_an_unknown_gap_stays_in_the_sentence(
-    tied: DiscrepancyResult, unknown: DiscrepancyResult
+def test_what_remains_beside_an_established_effect_is_a_sentence_of_its_own(
+    tied: DiscrepancyResult, tmp_path: Path
 ) -> None:
-    both = replace(tied, verdict="unknown", unexplained=unknown.unexplained)
-    sentence = verdict_sentence(both)
-    assert sentence.startswith(
-        f"Missing: {phrase(tied.added[0])}, and something that no known effect explains"
-    )
-    assert f"falls from {tied.validation.before.whole:.2f} to {tied.validation.after.whole:.2f}" in sentence
+    left = Remaining(explained=False, share=0.4, where=(Place("free_slide", ("velocity",)),), level=1.7)
+    both = replace(tied, conclusion=replace(tied.conclusion, remaining=left))
+    sentence = headline(both)
+    assert sentence.startswith(headline(tied))
+    assert f"falls from {tied.validation.gap_before:.2f} to {tied.validation.gap_after:.2f}" in sentence
+    assert sentence.endswith("It leaves 40 % of the gap, in free slide.")
+    assert "in free slide with velocity" in page_of(both, tmp_path).text
 
 
 def test_parameters_have_their_units_and_regions_their_place(tied: DiscrepancyResult) -> None:

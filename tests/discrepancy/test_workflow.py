@@ -46,7 +46,7 @@ def answer(found: DiscrepancyResult) -> tuple[str, set[str]]:
 def test_nothing_is_named_where_nothing_is_hidden() -> None:
     found = investigate(make())
     assert found.verdict == "no_gap"
-    assert found.validation.before.trace == pytest.approx(1.0, abs=0.03)
+    assert found.validation.held_out.before.trace == pytest.approx(1.0, abs=0.03)
     assert np.log(found.parameters[0].value) == pytest.approx(
         np.log(study.scenario(study.Job("single", (), 3)).plant.stiffness_n_per_m), rel=1e-4
     )
@@ -61,7 +61,7 @@ def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
     (estimate,) = [one for one in found.parameters if one.effect == effect]
     half = 0.5 * (estimate.high - estimate.low)
     assert abs(estimate.value - truth) < 3.0 * half
-    assert found.validation.after.trace < 1.05
+    assert found.validation.held_out.after.trace < 1.05
 
 
 def test_a_jump_at_one_sample_is_no_slope() -> None:

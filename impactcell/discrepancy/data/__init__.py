@@ -1,6 +1,6 @@
 """What the workflow works on: shots and blocks, checked, grouped and split, and the noise floor."""
 
-from impactcell.discrepancy.data.excitation import ExcitationStrategy
+from impactcell.discrepancy.data.excitation import MIN_HELD_OUT, MIN_TRAINING, ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.noise_floor import (
     NoiseFloor,
@@ -12,6 +12,7 @@ from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES, Trajectory
 from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign, prepare, shot_set, split_held_out
 from impactcell.discrepancy.data.shots import (
     CHANNELS,
+    FORCE,
     POSITION,
     IndexArray,
     PreparedShot,
@@ -23,6 +24,9 @@ from impactcell.discrepancy.data.shots import (
 __all__ = [
     "BETWEEN_SHOTS",
     "CHANNELS",
+    "FORCE",
+    "MIN_HELD_OUT",
+    "MIN_TRAINING",
     "PHASES",
     "POSITION",
     "ExcitationStrategy",

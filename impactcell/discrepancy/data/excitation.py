@@ -19,6 +19,11 @@ from impactcell.records import Capture, Channel, Samples
 
 HELD_OUT_SHARE = 0.25
 """Share of the shots that is held out: a quarter tests the result, three quarters fit it. Own choice."""
+MIN_TRAINING = 9
+"""Shots or blocks that a test of a step needs: mirrored as a whole, n of them reach p = 2^(1 - n) at best,
+and half of the error of a step is 0.005."""
+MIN_HELD_OUT = 5
+"""Held-out shots or blocks that can say a gap falls: with the signs of n at random p is 2^-n at best."""
 
 NO_DRIVE = np.empty((2, 0))
 """Drive of a part that is not driven."""
@@ -119,7 +124,8 @@ class ExcitationStrategy(ABC):
             count_of_stratum[strata[index]] = int(rank[index]) + 1
         count = np.array([count_of_stratum[stratum] for stratum in strata])
         share = (rank + rng.random(n)) / count
-        held_out = np.sort(np.lexsort((order, share))[: max(round(HELD_OUT_SHARE * n), 1)])
+        wanted = max(round(HELD_OUT_SHARE * n), min(MIN_HELD_OUT, n - MIN_TRAINING), 1)
+        held_out = np.sort(np.lexsort((order, share))[:wanted])
         return np.setdiff1d(np.arange(n), held_out), held_out
 
     def reduce(

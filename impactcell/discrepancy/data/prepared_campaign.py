@@ -24,8 +24,8 @@ STRATEGIES: dict[Excitation, ExcitationStrategy] = {
     strategy.excitation: strategy for strategy in (Tap(), FreeSlide(), Driven())
 }
 """What the workflow asks, by the word in `campaign.yaml`."""
-MIN_SHOTS = 6
-"""With n shots mirrored as a whole no p-value is below 2^(1 - n): 3 % with six, 6 % with five."""
+MIN_SHOTS = 4
+"""Fewer cannot be divided into shots to fit and one to hold out."""
 TIME_GAP_FACTOR = 5.0
 """A step of time this many times the median one is a gap in the record."""
 MIN_DWELL_S = 0.1
@@ -74,8 +74,8 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
         message = (
-            f"{len(captures)} {strategy.unit} are too few: the shot is the unit of every test, and with "
-            f"fewer than {MIN_SHOTS} none can be made. Record at least {MIN_SHOTS}, better 30"
+            f"{len(captures)} {strategy.unit} are too few: the shot is the unit of all fits and tests; with "
+            f"fewer than {MIN_SHOTS} none can be made. Record at least 12, better 30"
         )
         raise CampaignError(message)
     batches = tuple(dict.fromkeys(capture.batch_id or "" for capture, _ in captures))

@@ -4,7 +4,7 @@ from impactcell.discrepancy.model.block_selection import decided_blocks, usable_
 from impactcell.discrepancy.model.constraints import Constraints, Roughness
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
-from impactcell.discrepancy.model.least_squares import Fit, fit, refit_shot_parameters
+from impactcell.discrepancy.model.least_squares import Fit, fit, refit_shot_parameters, simulate_open_loop
 from impactcell.discrepancy.model.linearisation import (
     DirectionProducts,
     LinearisedFit,
@@ -54,6 +54,7 @@ __all__ = [
     "remove_jumps",
     "sample_phases",
     "scores",
+    "simulate_open_loop",
     "trajectory_of",
     "usable_blocks",
 ]

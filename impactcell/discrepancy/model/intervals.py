@@ -18,7 +18,13 @@ MAX_LEVERAGE = 0.98
 
 @dataclass(frozen=True, slots=True)
 class ParameterEstimate:
-    """A parameter with its 95 % interval."""
+    """A parameter with its 95 % interval.
+
+    Attributes
+    ----------
+    at_bound : bool
+        The interval ends at a bound of the parameter's range: it is that bound, not an end that data give.
+    """
 
     effect: str
     parameter: str
@@ -26,6 +32,7 @@ class ParameterEstimate:
     value: float
     low: float
     high: float
+    at_bound: bool
 
 
 def covariance(linearisation: LinearisedFit) -> Samples:
@@ -58,6 +65,7 @@ def estimate_parameters(fit: Fit, linearisation: LinearisedFit) -> tuple[Paramet
     for coordinate, theta, std in zip(fit.coordinates, fit.theta, spread, strict=True):
         half = float(quantile * std)
         ends = sorted(_clipped_value(coordinate, float(theta) + sign * half) for sign in (-1.0, 1.0))
+        at_bound = not coordinate.lower < float(theta) - half <= float(theta) + half < coordinate.upper
         if coordinate.form == "angle":
             middle = coordinate.value(float(theta))
             ends = [middle - coordinate.scale * half, middle + coordinate.scale * half]
@@ -69,6 +77,7 @@ def estimate_parameters(fit: Fit, linearisation: LinearisedFit) -> tuple[Paramet
                 coordinate.value(float(theta)),
                 ends[0],
                 ends[1],
+                at_bound,
             )
         )
     return tuple(parameter_estimates)

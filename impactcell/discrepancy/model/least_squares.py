@@ -17,6 +17,7 @@ from impactcell.discrepancy.model.gauss_newton import gauss_newton
 from impactcell.discrepancy.model.parameters import Coordinate
 from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
 from impactcell.discrepancy.model.shot_parameters import (
+    PINNED_SPREAD,
     THOROUGH_STEPS,
     better_per_shot,
     fit_shot_parameters,
@@ -237,3 +238,9 @@ def refit_shot_parameters(problem: Problem, model: Fit) -> Fit:
 def initial_shot_parameters(problem: Problem, theta: Samples, steps: int = THOROUGH_STEPS) -> ShotParameters:
     """Fit what every shot has of its own from several starts; the best of them shot by shot."""
     return initialise(problem, theta, POLICY.first_spread, steps=steps).shot_parameters
+
+
+def simulate_open_loop(problem: Problem, model: Fit) -> Samples:
+    """Measured minus simulated [N, m, m], shape (N,), with the model's friction and no shot's own."""
+    state = initialise(problem.with_effects(model.effects), model.theta, PINNED_SPREAD)
+    return problem.shots.unwhiten(state.residual)

@@ -1,11 +1,12 @@
 """What the workflow hands over: `result.json`, figures and one page."""
 
-from impactcell.discrepancy.report.page import verdict_sentence, write_report
+from impactcell.discrepancy.report.headline import headline
+from impactcell.discrepancy.report.page import write_report
 from impactcell.discrepancy.report.result import json_text, result_document
 
 __all__ = [
+    "headline",
     "json_text",
     "result_document",
-    "verdict_sentence",
     "write_report",
 ]

@@ -8,15 +8,18 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report import figures
+from impactcell.discrepancy.report.headline import headline, phrase
 from impactcell.discrepancy.report.result import locate_effect
 from impactcell.discrepancy.search import ALPHA, Validation
-from impactcell.discrepancy.workflow import NAMED, NO_GAP, TIED, DiscrepancyResult
+from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import LIBRARY
 
 EFFECT_GUIDE = (Path(__file__).parents[1] / "README.md").as_uri() + "#a-new-effect"
 """Where the report sends whoever wants to write a new effect."""
 LARGE_REGION_RMS = 1.25
 """RMS of a region's residuals, in noise floors, from which on it is shown as large."""
+MM_PER_M = 1e3
+"""Millimetres in a metre: the page shows errors of positions in them."""
 PARAMETER_LABELS = {"ratio": "mu_s/mu_k"}
 PLANT_UNITS = {"stiffness_n_per_m": "N/m", "damping_n_s_per_m": "N s/m"}
 
@@ -34,11 +37,6 @@ def write_report(result: DiscrepancyResult, source: str, file: Path) -> None:
     file.write_text(page, encoding="utf-8")
 
 
-def phrase(identifier: str) -> str:
-    """Name of an effect as one would say it."""
-    return identifier.replace("_", " ")
-
-
 def format_number(value: float) -> str:
     """Five digits, and an exponent only where the number could not be read without."""
     text = f"{value:.5g}"
@@ -48,32 +46,6 @@ def format_number(value: float) -> str:
 def format_thousands(value: float, decimals: int) -> str:
     """Thousands apart."""
     return f"{value:,.{decimals}f}".replace(",", " ")
-
-
-def verdict_sentence(result: DiscrepancyResult) -> str:
-    """Verdict in one sentence."""
-    proof = result.validation
-    before, after = f"{proof.before.whole:.2f}", f"{proof.after.whole:.2f}"
-    if result.verdict == NO_GAP:
-        return f"The nominal model explains these shots: the held-out gap is {before} noise floors."
-    names = " and ".join(phrase(effect) for effect in result.added)
-    if result.verdict == NAMED:
-        return f"Missing: {names}; with it the held-out gap falls from {before} to {after} noise floors."
-    if result.verdict == TIED:
-        ties = result.selection.ties
-        groups = [" or ".join(map(phrase, (effect, *ties.get(effect, ())))) for effect in result.added]
-        return (
-            f"Missing: {', and '.join(groups)}, which these shots cannot tell apart; "
-            f"the held-out gap falls from {before} to {after} noise floors."
-        )
-    gap = result.unexplained
-    phase = phrase(gap.phase) if gap else "some phase"
-    if result.added:
-        return (
-            f"Missing: {names}, and something that no known effect explains: with {names} the held-out gap "
-            f"falls from {before} to {after} noise floors only; what is left is largest in phase {phase}."
-        )
-    return f"No known effect explains a held-out gap of {before} noise floors, largest in phase {phase}."
 
 
 def split_sentence(result: DiscrepancyResult) -> str:
@@ -94,7 +66,7 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
     return {
         "source": source,
         "verdict": result.verdict,
-        "sentence": verdict_sentence(result),
+        "sentence": headline(result),
         "shots": len(result.prepared.shots),
         "training": len(result.training),
         "held_out": len(result.held_out),
@@ -123,7 +95,8 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
                 "equation": LIBRARY[effect].equation,
                 "reference": LIBRARY[effect].reference,
                 "tied": [phrase(item) for item in search.ties.get(effect, ())],
-                "p": search.p_values.get(effect, 1.0),
+                "p": result.validation.of_effects[effect].p_value,
+                "change": result.validation.of_effects[effect],
                 "where": locate_effect(result, effect),
             }
             for effect in result.added
@@ -141,6 +114,10 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
             for item in result.parameters
         ],
         "proof": result.validation,
+        "change_of_gap": result.validation.held_out,
+        "remaining": result.conclusion.remaining,
+        "simulation": result.simulation,
+        "simulation_scale": MM_PER_M if result.simulation.unit == "m" else 1.0,
         "regions": _regions(result.validation),
         "large": LARGE_REGION_RMS,
         "uncertain": 1.0 / math.sqrt(2.0 * max(len(result.held_out), 1)),

@@ -6,12 +6,13 @@ from typing import Any
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS
 from impactcell.discrepancy.model import ParameterEstimate
-from impactcell.discrepancy.search import Gap, ModelEvidence
+from impactcell.discrepancy.report.headline import headline
+from impactcell.discrepancy.search import Gap, GapChange, ModelEvidence, Remaining, Simulation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
 
-FORMAT = 1
+FORMAT = 2
 """Version of `result.json`."""
 DIGITS = 6
 """Significant digits written: more would change with the machine's rounding."""
@@ -33,35 +34,37 @@ def json_text(result: dict[str, Any]) -> str:
 
 def result_document(result: DiscrepancyResult) -> dict[str, Any]:
     """Outcome of the workflow as `result.json` has it."""
-    proof = result.validation
+    proof, change = result.validation, result.validation.held_out
     gap = result.unexplained
-    closed = round_digits(proof.closed)
     return {
         "format": FORMAT,
         "verdict": result.verdict,
+        "headline": headline(result),
         "effects": [_effect(result, effect) for effect in result.added],
+        "unconfirmed": list(result.conclusion.unconfirmed),
+        "remaining": _remaining(result.conclusion.remaining),
         "unexplained": None
         if gap is None
         else {"phase": gap.phase, "depends_on": list(gap.depends_on), "shape": gap.shape},
         "gap": {
             "unit": "1 = noise floor",
             "train": {
-                "before": round_digits(proof.train_before.whole),
-                "after": round_digits(proof.train_after.whole),
+                "before": round_digits(proof.whole(proof.train_before)),
+                "after": round_digits(proof.whole(proof.train_after)),
             },
             "held_out": {
-                "before": round_digits(proof.before.whole),
-                "after": round_digits(proof.after.whole),
-                "closed": closed,
-                "closed_ci95": None
-                if closed is None
-                else [round_digits(proof.low), round_digits(proof.high)],
+                **_change(change),
+                "closed": round_digits(change.closed),
+                "expected_without_gap": [round_digits(proof.whole(bound)) for bound in proof.expected],
             },
             "parts": {
                 "train": {"before": _parts(proof.train_before), "after": _parts(proof.train_after)},
-                "held_out": {"before": _parts(proof.before), "after": _parts(proof.after)},
+                "held_out": {"before": _parts(change.before), "after": _parts(change.after)},
+                "expected_without_gap": [_parts(bound) for bound in proof.expected],
             },
         },
+        "simulation": _simulation(result.simulation),
+        "law": None,
         "next_experiment": [
             {
                 "separates": list(proposal.effects),
@@ -89,11 +92,44 @@ def _parts(gap: Gap) -> dict[str, float | None]:
     return {"traces": round_digits(gap.trace), "friction_factors": round_digits(gap.factor)}
 
 
+def _change(change: GapChange) -> dict[str, Any]:
+    """Gap before and after, and the interval of the share that is closed; null where there was no gap."""
+    closed = None if math.isnan(change.closed) else [round_digits(change.low), round_digits(change.high)]
+    return {
+        "before": round_digits(change.before.of(change.parts)),
+        "after": round_digits(change.after.of(change.parts)),
+        "closed_ci95": closed,
+    }
+
+
+def _remaining(remaining: Remaining) -> dict[str, Any]:
+    return {
+        "explained": remaining.explained,
+        "share": round_digits(remaining.share),
+        "where": [{"phase": place.phase, "depends_on": list(place.depends_on)} for place in remaining.where],
+        "model_error": {"level": round_digits(remaining.level), "unit": "1 = noise floor"},
+    }
+
+
+def _simulation(simulation: Simulation) -> dict[str, Any]:
+    errors = {"before": simulation.before, "after": simulation.after}
+    return {
+        "channel": simulation.channel,
+        "unit": simulation.unit,
+        "rmse": {when: round_digits(error.rmse) for when, error in errors.items()},
+        "fit_percent": {when: round_digits(error.fit_percent) for when, error in errors.items()},
+        "relative_force_error": {when: round_digits(error.relative_force) for when, error in errors.items()},
+    }
+
+
 def _effect(result: DiscrepancyResult, effect: str) -> dict[str, Any]:
+    change = result.validation.of_effects[effect]
     return {
         "effect": effect,
         "tied_with": list(result.selection.ties.get(effect, ())),
-        "p_value": round_digits(result.selection.p_values.get(effect, 1.0)),
+        "p_value": round_digits(change.p_value),
+        "p_search": round_digits(result.selection.p_values.get(effect, 1.0)),
+        "held_out": _change(change) | {"parts": [str(part) for part in change.parts]},
         "where": locate_effect(result, effect),
         "parameters": _parameters([estimate for estimate in result.parameters if estimate.effect == effect]),
     }
@@ -144,9 +180,10 @@ def _parameters(parameter_estimates: list[ParameterEstimate]) -> dict[str, Any]:
     for estimate in parameter_estimates:
         value, ends = round_digits(estimate.value), [round_digits(estimate.low), round_digits(estimate.high)]
         if estimate.batch:
-            entry = document.setdefault(estimate.parameter, {"value": [], "ci95": []})
+            entry = document.setdefault(estimate.parameter, {"value": [], "ci95": [], "at_bound": []})
             entry["value"].append(value)
             entry["ci95"].append(ends)
+            entry["at_bound"].append(estimate.at_bound)
         else:
-            document[estimate.parameter] = {"value": value, "ci95": ends}
+            document[estimate.parameter] = {"value": value, "ci95": ends, "at_bound": estimate.at_bound}
     return document

@@ -1,27 +1,58 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
 from impactcell.discrepancy.search.acceptance import SelectionResult
+from impactcell.discrepancy.search.conclusion import (
+    NAMED,
+    NO_GAP,
+    TIED,
+    UNKNOWN,
+    UNTESTED,
+    Conclusion,
+    Place,
+    Remaining,
+    conclude,
+    missing_shots,
+)
 from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
-from impactcell.discrepancy.search.model_selection import select_model
+from impactcell.discrepancy.search.held_out import OpenedShots
+from impactcell.discrepancy.search.model_selection import nested_models, only_test, select_model
+from impactcell.discrepancy.search.open_loop import Simulation, SimulationError, simulate_held_out
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
-from impactcell.discrepancy.search.validation import Gap, Validation, validate
+from impactcell.discrepancy.search.validation import Gap, GapChange, Part, Validation
 
 __all__ = [
     "ALL",
     "ALPHA",
+    "NAMED",
+    "NO_GAP",
+    "TIED",
+    "UNKNOWN",
+    "UNTESTED",
+    "Conclusion",
     "Gap",
+    "GapChange",
     "Mapper",
     "ModelEvidence",
+    "OpenedShots",
+    "Part",
+    "Place",
     "Proposal",
+    "Remaining",
     "SearchContext",
     "SelectionResult",
+    "Simulation",
+    "SimulationError",
     "UnexplainedGap",
     "Validation",
+    "conclude",
     "describe_gap",
+    "missing_shots",
+    "nested_models",
+    "only_test",
     "propose_experiments",
     "select_model",
-    "validate",
+    "simulate_held_out",
 ]

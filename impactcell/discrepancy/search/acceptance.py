@@ -43,6 +43,10 @@ class SelectionResult:
     p_values: dict[str, float]
     alternatives: tuple[Alternative, ...] = field(default=())
 
+    def is_accepted(self, model: Fit) -> bool:
+        """Whether the search ended with this model."""
+        return self.accepted is not None and self.accepted.effects == model.effects
+
 
 def reject(
     nominal: ModelEvidence, final: ModelEvidence, alternatives: tuple[Alternative, ...]

@@ -82,6 +82,26 @@ def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
     raise AssertionError("the last stage ends every search")
 
 
+def only_test(context: SearchContext, nominal: Fit) -> SelectionResult:
+    """Test the nominal model and look no further, where there are too few shots to name anything."""
+    evidence = context.test_model(nominal)
+    accepted = nominal if context.is_sufficient(evidence) else None
+    return SelectionResult(evidence, evidence, accepted, (), {}, {})
+
+
+def nested_models(context: SearchContext, selection: SelectionResult) -> list[tuple[str, Fit]]:
+    """Effects that were added, each with the model that has it and all before it."""
+    best = selection.accepted
+    if best is None or not selection.added:
+        return []
+    models = [(selection.added[-1], best)]
+    if len(selection.added) > 1:
+        nominal, first = selection.nominal.fit, selection.added[0]
+        reduced = refit_on_all_samples(context, without_each_effect(nominal, best))
+        models[:0] = [(first, single.fit) for single in reduced if single.fit.effects[-1] == first]
+    return models
+
+
 def test_nominal(context: SearchContext, state: SearchState) -> SearchState:
     """Accept the nominal model where nothing is left."""
     if not context.is_sufficient(state.evidence):

@@ -1,9 +1,13 @@
-"""Does the extended model close the gap on shots that were never used? Opened once."""
+"""Does the gap fall on shots that were never used? Opened once, for every effect by itself."""
 
+import enum
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f as fisher
+from scipy.stats import t as student
 
 from impactcell.discrepancy.data import CHANNELS, PHASES, NoiseFloor, ReplicateSpread
 from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
@@ -11,11 +15,25 @@ from impactcell.records import Samples
 
 MIN_OPEN_GAP = 1.05
 """Gap before, in noise floors, above which there is something to close; the floor itself is 1."""
-
 RESAMPLES = 1999
 """Draws of the held-out shots: a quantile at 2.5 % rests on fifty of them."""
-RESAMPLING = 7
-"""Stream of random numbers of these draws, apart from those of split and tests."""
+BOOTSTRAP, SIGN_FLIPS = 7, 8
+"""Streams of random numbers of these draws, apart from those of split and tests."""
+MAX_P_VALUE = 0.05
+"""One-sided error with which held-out shots must say that a gap falls."""
+NOISE_TOLERANCE = 0.05
+"""Relative error of a stated noise: two digits."""
+MAX_EXPECTED_GAP = 1.3
+"""No scatter between shots makes a gap of traces beyond this one to be expected."""
+SHOWN, DECIDING = 0.95, 0.99
+"""Probability of the range of gaps that is shown, and of the one by which a model is at its floor."""
+
+
+class Part(enum.StrEnum):
+    """In what a gap shows; effects between shots show in the friction factors only."""
+
+    TRACES = "traces"
+    FACTORS = "friction_factors"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,133 +51,240 @@ class Gap:
     trace: float
     factor: float
 
+    def of(self, parts: Iterable[Part]) -> float:
+        """Gap in some of its parts: the largest of them."""
+        values = [self.trace if part is Part.TRACES else self.factor for part in parts]
+        return max((value for value in values if not math.isnan(value)), default=math.nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GapChange:
+    """How the held-out gap changes from one model to the next.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        In which it is judged.
+    closed, low, high : float
+        Share of the gap above the noise floor that is closed, and its 95 % interval over shots; nan where
+        there was none.
+    p_value : float
+        That it does not fall: signs of the shots' differences drawn at random, one-sided.
+    """
+
+    parts: tuple[Part, ...]
+    before: Gap
+    after: Gap
+    closed: float
+    low: float
+    high: float
+    p_value: float
+
     @property
-    def whole(self) -> float:
-        """The larger of the two."""
-        return self.trace if math.isnan(self.factor) else max(self.trace, self.factor)
+    def is_real(self) -> bool:
+        """Whether independent shots agree that the gap falls."""
+        return self.low > 0.0 and self.p_value <= MAX_P_VALUE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GapMeasure:
+    """Measures gaps on one set of shots.
+
+    Attributes
+    ----------
+    problem : Problem
+    floor : NoiseFloor
+        Only channels whose noise is stated are counted, if there are any: elsewhere it is a lower bound.
+    replicates : ReplicateSpread
+    seed : int
+    """
+
+    problem: Problem
+    floor: NoiseFloor
+    replicates: ReplicateSpread
+    seed: int
+
+    def gap(self, model: Fit) -> Gap:
+        """Gap of a model whose parameters of each shot have been fitted."""
+        misfit, freedom = self._counted(model)
+        return self._gap(misfit, freedom, model.shot_parameters.log_factor)
+
+    def change(self, before: Fit, after: Fit, parts: Sequence[Part] | None = None) -> GapChange:
+        """Share of the gap of one model that another one closes; by default in the part that falls most."""
+        gaps = self.gap(before), self.gap(after)
+        if parts is None:
+            falls = {part: gaps[0].of([part]) - gaps[1].of([part]) for part in Part}
+            parts = [max(Part, key=lambda part: -math.inf if math.isnan(falls[part]) else falls[part])]
+        closed = low = high = math.nan
+        if gaps[0].of(parts) > MIN_OPEN_GAP:
+            closed = _closed_share(gaps[0].of(parts), gaps[1].of(parts))
+            draws = self._resampled_shares(before, after, parts)
+            if draws:
+                low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
+                low, high = min(low, closed), max(high, closed)
+        p_value = self._p_value(before, after, parts)
+        return GapChange(tuple(parts), *gaps, closed, low, high, p_value)
+
+    def expected(self, model: Fit, probability: float = SHOWN) -> tuple[Gap, Gap]:
+        """Range in which the gap lies where nothing is left.
+
+        Traces: about one by as much as the mean of the shots' misfits is uncertain by their own scatter,
+        which sees correlated noise too. Friction factors: F with the shots and the replicates' degrees of
+        freedom.
+        """
+        misfit, freedom = self._counted(model)
+        per_sample = misfit[freedom > 0.0] / freedom[freedom > 0.0]
+        n = len(per_sample)
+        tails = np.array([0.5 - 0.5 * probability, 0.5 + 0.5 * probability])
+        half = 0.0
+        if n > 1:
+            error = float(per_sample.std(ddof=1) / max(per_sample.mean(), 1e-300)) / math.sqrt(n)
+            half = float(student.ppf(tails[1], n - 1)) * error
+        trace = (
+            math.sqrt(max(1.0 - half, 0.0)) / (1.0 + NOISE_TOLERANCE),
+            min(math.sqrt(1.0 + half) * (1.0 + NOISE_TOLERANCE), MAX_EXPECTED_GAP),
+        )
+        factor = (math.nan, math.nan)
+        if self.replicates.degrees_of_freedom > 0:
+            low, high = fisher.ppf(tails, self.problem.count, self.replicates.degrees_of_freedom)
+            factor = (math.sqrt(low), math.sqrt(high))
+        return Gap(trace[0], factor[0]), Gap(trace[1], factor[1])
+
+    def is_at_floor(self, model: Fit) -> bool:
+        """Whether the gap of a model is one that is to be expected where nothing is left."""
+        gap, (_, high) = self.gap(model), self.expected(model, DECIDING)
+        return gap.trace <= high.trace and not gap.factor > high.factor
+
+    def regions(self, before: Fit, after: Fit) -> tuple[tuple[str, str, float, float], ...]:
+        """RMS of two models in every phase and channel: (phase, channel, before, after)."""
+        shots = self.problem.shots
+        phase = sample_phases(self.problem, trajectory_of(self.problem, after))
+        regions = []
+        for number, name in enumerate(PHASES):
+            for channel, sensor in enumerate(CHANNELS):
+                inside = (phase == number) & (shots.channel == channel)
+                if inside.any():
+                    rms = [float(np.sqrt(np.mean(model.residual[inside] ** 2))) for model in (before, after)]
+                    regions.append((name, sensor, rms[0], rms[1]))
+        return tuple(regions)
+
+    def _counted(self, model: Fit) -> tuple[Samples, Samples]:
+        """Squared residual and degrees of freedom of every shot, over the channels that count."""
+        stated = np.array([source == "stated" for source in self.floor.source])
+        counts = stated if stated.any() else ~stated
+        counted = counts[self.problem.shots.channel]
+        first = self.problem.shots.bounds[:-1]
+        misfit = np.add.reduceat(np.where(counted, model.residual**2, 0.0), first)
+        freedom = np.add.reduceat(counted.astype(np.float64), first) - len(self.problem.shot_parameter_names)
+        return misfit, np.maximum(freedom, 0.0)
+
+    def _gap(self, misfit: Samples, freedom: Samples, log_factor: Samples) -> Gap:
+        trace = math.sqrt(float(misfit.sum() / max(float(freedom.sum()), 1.0)))
+        spread = self.replicates.spread
+        factor = math.sqrt(float(np.mean(log_factor**2))) / spread if spread > 0.0 else math.nan
+        return Gap(trace, factor)
+
+    def _resampled_shares(self, before: Fit, after: Fit, parts: Sequence[Part]) -> list[float]:
+        """Share closed in shots drawn with replacement; draws without a gap are left out."""
+        rng = np.random.default_rng([self.seed, BOOTSTRAP])
+        counted = [(*self._counted(model), model.shot_parameters.log_factor) for model in (before, after)]
+        shares = []
+        for _ in range(RESAMPLES):
+            drawn = rng.integers(0, self.problem.count, self.problem.count)
+            gaps = [
+                self._gap(misfit[drawn], freedom[drawn], factor[drawn]).of(parts)
+                for misfit, freedom, factor in counted
+            ]
+            if gaps[0] > MIN_OPEN_GAP:
+                shares.append(_closed_share(*gaps))
+        return shares
+
+    def _p_value(self, before: Fit, after: Fit, parts: Sequence[Part]) -> float:
+        """Test that shots are as likely to be followed worse as better, signs at random."""
+        spread = self.replicates.spread if self.replicates.spread > 0.0 else after.spread
+        cost = [
+            self._counted(model)[0] * (Part.TRACES in parts)
+            + (model.shot_parameters.log_factor / spread) ** 2 * (Part.FACTORS in parts)
+            for model in (before, after)
+        ]
+        difference = cost[0] - cost[1]
+        rng = np.random.default_rng([self.seed, SIGN_FLIPS])
+        signs = 2.0 * rng.integers(0, 2, (RESAMPLES, self.problem.count)) - 1.0
+        least = difference.sum() - 1e-12 * np.abs(difference).sum()
+        return float(1 + np.sum(signs @ difference >= least)) / (1 + RESAMPLES)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
-    """Gaps of the nominal model (before) and of the extended one (after), in training and held out.
+    """Gaps before and after, in training and held out.
 
     Attributes
     ----------
-    closed, low, high : float
-        Share of the held-out gap above the noise floor that was closed, and its 95 % interval over shots; nan
-        where there was none.
+    train_before, train_after : Gap
+    held_out : GapChange
+        From the nominal model to the final one, judged in the traces, and in the friction factors where
+        their gap is beyond their own scatter, or where an effect that was established acts.
+    of_effects : dict of str to GapChange
+        What each effect that was established does beside those before it.
+    expected : tuple of Gap
+        Range of the held-out gap where nothing is left.
+    is_at_floor : bool
+        The final model's gaps are such, in training and held out.
     regions : tuple of (phase, channel, before, after)
         Held-out RMS region by region.
     """
 
     train_before: Gap
     train_after: Gap
-    before: Gap
-    after: Gap
-    closed: float
-    low: float
-    high: float
+    held_out: GapChange
+    of_effects: dict[str, GapChange]
+    expected: tuple[Gap, Gap]
+    is_at_floor: bool
     regions: tuple[tuple[str, str, float, float], ...]
 
+    def whole(self, gap: Gap) -> float:
+        """Gap in the parts that count."""
+        return gap.of(self.held_out.parts)
 
-def gap(problem: Problem, model: Fit, floor: NoiseFloor, replicates: ReplicateSpread) -> Gap:
-    """Gap of a model whose parameters of each shot have been fitted.
+    @property
+    def gap_before(self) -> float:
+        """Held-out gap of the nominal model."""
+        return self.whole(self.held_out.before)
 
-    Only channels whose noise is stated are counted, if there are any: elsewhere the floor is a lower bound.
-    """
-    misfit, freedom = _counted_misfit(problem, model, floor)
-    return _gap(misfit, freedom, model.shot_parameters.log_factor, replicates.spread)
-
-
-def _counted_misfit(problem: Problem, model: Fit, floor: NoiseFloor) -> tuple[Samples, Samples]:
-    """Squared residual and degrees of freedom of every shot, over the channels that count."""
-    is_stated = np.array([source == "stated" for source in floor.source])
-    counting_channels = is_stated if is_stated.any() else ~is_stated
-    counted = counting_channels[problem.shots.channel]
-    starts = problem.shots.bounds[:-1]
-    misfit = np.add.reduceat(np.where(counted, model.residual**2, 0.0), starts)
-    freedom = np.add.reduceat(counted.astype(np.float64), starts) - len(problem.shot_parameter_names)
-    return misfit, np.maximum(freedom, 0.0)
+    @property
+    def gap_after(self) -> float:
+        """Held-out gap of the final model."""
+        return self.whole(self.held_out.after)
 
 
-def _gap(misfit: Samples, freedom: Samples, log_factor: Samples, spread: float) -> Gap:
-    """Gap from squared residual, degrees of freedom and log friction factor of every shot."""
-    trace = math.sqrt(float(misfit.sum() / max(float(freedom.sum()), 1.0)))
-    factor = math.sqrt(float(np.mean(log_factor**2))) / spread if spread > 0.0 else math.nan
-    return Gap(trace, factor)
+def counted_parts(
+    measure: GapMeasure, models: Sequence[Fit], changes: Iterable[GapChange]
+) -> tuple[Part, ...]:
+    """Parts in which a gap counts: beyond expectation in some model, or where an effect was established."""
+    acting = {part for change in changes for part in change.parts}
+    is_wide = any(measure.gap(model).factor > measure.expected(model)[1].factor for model in models)
+    return (Part.TRACES, Part.FACTORS) if is_wide or Part.FACTORS in acting else (Part.TRACES,)
 
 
-def validate(
-    training: tuple[Problem, Fit, Fit],
-    held_out: tuple[Problem, Fit, Fit],
-    floor: NoiseFloor,
-    replicates: ReplicateSpread,
-    seed: int,
-) -> Validation:
-    """Gaps of two models on training and held-out shots, and the share that the second one closes.
+def confirmed(measure: GapMeasure, nested: Sequence[tuple[str, Fit]], nominal: Fit) -> dict[str, GapChange]:
+    """Effects that held-out shots confirm, one by one in their order; the first that they do not ends it.
 
     Parameters
     ----------
-    training, held_out : tuple of Problem, Fit and Fit
-        Shots, and the model before and after, its parameters of each shot fitted to them.
+    nested : sequence of (str, Fit)
+        Effect, and the model with it and all before it; its parameters of each shot fitted to the held-out ones.
     """
-    problem, before, after = held_out
-    gap_before, gap_after = (gap(problem, model, floor, replicates) for model in (before, after))
-    closed = low = high = math.nan
-    if gap_before.whole > MIN_OPEN_GAP:
-        closed = _closed_share(gap_before, gap_after)
-        draws = _resampled_shares(held_out, floor, replicates, seed)
-        if draws:
-            low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
-            low, high = min(low, closed), max(high, closed)
-    return Validation(
-        gap(training[0], training[1], floor, replicates),
-        gap(training[0], training[2], floor, replicates),
-        gap_before,
-        gap_after,
-        closed,
-        low,
-        high,
-        _regions(problem, before, after),
-    )
+    changes: dict[str, GapChange] = {}
+    before = nominal
+    for effect, model in nested:
+        change = measure.change(before, model)
+        if not change.is_real:
+            break
+        changes[effect] = change
+        before = model
+    return changes
 
 
-def _resampled_shares(
-    held_out: tuple[Problem, Fit, Fit], floor: NoiseFloor, replicates: ReplicateSpread, seed: int
-) -> list[float]:
-    """Share of the gap that is closed in shots drawn with replacement; draws without a gap are left out."""
-    problem, *models = held_out
-    rng = np.random.default_rng([seed, RESAMPLING])
-    counted = [_counted_misfit(problem, model, floor) for model in models]
-    shares = []
-    for _ in range(RESAMPLES):
-        drawn = rng.integers(0, problem.count, problem.count)
-        before, after = (
-            _gap(misfit[drawn], freedom[drawn], model.shot_parameters.log_factor[drawn], replicates.spread)
-            for (misfit, freedom), model in zip(counted, models, strict=True)
-        )
-        if before.whole > MIN_OPEN_GAP:
-            shares.append(_closed_share(before, after))
-    return shares
-
-
-def _closed_share(before: Gap, after: Gap) -> float:
+def _closed_share(before: float, after: float) -> float:
     """Share of what was above the noise floor, 1, that is gone."""
-    return (before.whole - after.whole) / (before.whole - 1.0)
-
-
-def _regions(
-    problem: Problem, held_before: Fit, held_after: Fit
-) -> tuple[tuple[str, str, float, float], ...]:
-    phase = sample_phases(problem, trajectory_of(problem, held_after))
-    regions = []
-    for number, name in enumerate(PHASES):
-        for channel, sensor in enumerate(CHANNELS):
-            in_region = (phase == number) & (problem.shots.channel == channel)
-            if in_region.any():
-                rms = [
-                    float(np.sqrt(np.mean(model.residual[in_region] ** 2)))
-                    for model in (held_before, held_after)
-                ]
-                regions.append((name, sensor, rms[0], rms[1]))
-    return tuple(regions)
+    return (before - after) / (before - 1.0)

@@ -1,0 +1,92 @@
+"""The shots that the search never saw, opened once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.discrepancy.data import (
+    IndexArray,
+    NoiseFloor,
+    PreparedCampaign,
+    ReplicateSpread,
+    replicate_spread,
+)
+from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
+from impactcell.discrepancy.search.validation import GapMeasure, Validation, confirmed, counted_parts
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOutOutcome:
+    """What held-out shots say.
+
+    Attributes
+    ----------
+    final : Fit
+        The model with the effects that they confirm.
+    held_nominal, held_final : Fit
+        The nominal model and this one with the held-out shots' own numbers.
+    replicates : ReplicateSpread
+        Of the friction factors about the law of the largest model.
+    validation : Validation
+    """
+
+    final: Fit
+    held_nominal: Fit
+    held_final: Fit
+    replicates: ReplicateSpread
+    validation: Validation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenedShots:
+    """Training shots and held-out ones.
+
+    Attributes
+    ----------
+    indices : tuple of ndarray
+        Of training and held-out shots in the campaign.
+    problems : tuple of Problem
+        The same.
+    """
+
+    prepared: PreparedCampaign
+    floor: NoiseFloor
+    indices: tuple[IndexArray, IndexArray]
+    problems: tuple[Problem, Problem]
+    seed: int
+
+    def validate(self, nominal: Fit, nested: Sequence[tuple[str, Fit]]) -> HeldOutOutcome:
+        """Add effects to the nominal model as long as held-out shots confirm them.
+
+        Parameters
+        ----------
+        nested : sequence of (str, Fit)
+            Effect, and the model with it and all before it.
+        """
+        problem, held_problem = self.problems
+        models = [nominal, *(model for _, model in nested)]
+        held = [refit_shot_parameters(held_problem, model) for model in models]
+        replicates = self._replicates(models[-1], held[-1])
+        measure = GapMeasure(held_problem, self.floor, replicates, self.seed)
+        training = GapMeasure(problem, self.floor, replicates, self.seed)
+        effects = [effect for effect, _ in nested]
+        changes = confirmed(measure, list(zip(effects, held[1:], strict=True)), held[0])
+        final, held_final = models[len(changes)], held[len(changes)]
+        parts = counted_parts(measure, (held[0], held_final), changes.values())
+        validation = Validation(
+            training.gap(nominal),
+            training.gap(final),
+            measure.change(held[0], held_final, parts),
+            changes,
+            measure.expected(held_final),
+            measure.is_at_floor(held_final) and training.is_at_floor(final),
+            measure.regions(held[0], held_final),
+        )
+        return HeldOutOutcome(final, held[0], held_final, replicates, validation)
+
+    def _replicates(self, trained: Fit, held: Fit) -> ReplicateSpread:
+        log_factor = np.empty(len(self.prepared.shots))
+        for indices, model in zip(self.indices, (trained, held), strict=True):
+            log_factor[indices] = model.shot_parameters.log_factor
+        return replicate_spread(self.prepared.shots, log_factor, len(self.prepared.batches))
