@@ -4,7 +4,13 @@ from impactcell.discrepancy.model.block_selection import decided_blocks, usable_
 from impactcell.discrepancy.model.constraints import Constraints, Roughness
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
-from impactcell.discrepancy.model.least_squares import Fit, fit, refit_shot_parameters, simulate_open_loop
+from impactcell.discrepancy.model.least_squares import (
+    Fit,
+    fit,
+    promised_fall,
+    refit_shot_parameters,
+    simulate_open_loop,
+)
 from impactcell.discrepancy.model.linearisation import (
     DirectionProducts,
     LinearisedFit,
@@ -50,6 +56,7 @@ __all__ = [
     "normal_equations",
     "parameter_name",
     "phase_positions",
+    "promised_fall",
     "refit_shot_parameters",
     "remove_jumps",
     "sample_phases",

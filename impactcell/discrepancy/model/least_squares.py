@@ -22,6 +22,7 @@ from impactcell.discrepancy.model.shot_parameters import (
     better_per_shot,
     fit_shot_parameters,
     initialise,
+    normal_equations,
     shot_equations,
 )
 from impactcell.errors import DiscrepancyError
@@ -238,6 +239,15 @@ def refit_shot_parameters(problem: Problem, model: Fit) -> Fit:
 def initial_shot_parameters(problem: Problem, theta: Samples, steps: int = THOROUGH_STEPS) -> ShotParameters:
     """Fit what every shot has of its own from several starts; the best of them shot by shot."""
     return initialise(problem, theta, POLICY.first_spread, steps=steps).shot_parameters
+
+
+def promised_fall(problem: Problem, model: Fit) -> float:
+    """Fall of the cost that a full Gauss-Newton step inside the bounds promises; 0 at an optimum."""
+    bound, state = problem.with_effects(model.effects), model.state
+    H, g, _ = normal_equations(bound, *bound.linearise(state), state)
+    lower, upper = bound.bounds()
+    free = ~(((model.theta <= lower) & (g < 0.0)) | ((model.theta >= upper) & (g > 0.0)))
+    return float(g[free] @ np.linalg.lstsq(H[np.ix_(free, free)], g[free], rcond=None)[0])
 
 
 def simulate_open_loop(problem: Problem, model: Fit) -> Samples:

@@ -33,6 +33,8 @@ class SelectionResult:
     p_values : dict of str to float
     alternatives : tuple of Alternative
         Everything that was fitted, the likeliest first.
+    unconverged : tuple of tuple of str
+        Sets of effects whose fits came to rest short of an optimum: they neither win nor lose.
     """
 
     nominal: ModelEvidence
@@ -42,6 +44,7 @@ class SelectionResult:
     ties: dict[str, tuple[str, ...]]
     p_values: dict[str, float]
     alternatives: tuple[Alternative, ...] = field(default=())
+    unconverged: tuple[tuple[str, ...], ...] = field(default=())
 
     def is_accepted(self, model: Fit) -> bool:
         """Whether the search ended with this model."""

@@ -15,7 +15,6 @@ from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan
 from impactcell.discrepancy.search.indistinguishability import (
     CandidateFit,
     are_indistinguishable,
-    rank_out_of_shot,
     sort_by_likelihood,
 )
 from impactcell.discrepancy.search.policy import POLICY
@@ -103,7 +102,7 @@ def screen(context: SearchContext, scanned: CandidateScan, max_effects: int) -> 
         if starts:
             model = context.coarse.with_effects((*scanned.fit.effects, effect))
             tasks.append(FitTask(model, tuple(starts), scanned.fit, POLICY.screen_steps))
-    return sort_by_likelihood(context.coarse, _run(context, tasks))
+    return sort_by_likelihood(context.coarse, run_tasks(context, tasks))
 
 
 def refine(context: SearchContext, screened: list[Fit]) -> list[Fit]:
@@ -112,20 +111,20 @@ def refine(context: SearchContext, screened: list[Fit]) -> list[Fit]:
     return sort_by_likelihood(context.coarse, [*refined, *screened[POLICY.max_refined :]])
 
 
-def refit_on_all_samples(context: SearchContext, fits: Sequence[Fit]) -> list[CandidateFit]:
-    """Refit on all samples, the likeliest out of shot first."""
-    return rank_out_of_shot(context.problem, _continue(context, context.problem, fits, POLICY.final_steps))
+def fit_all_samples(context: SearchContext, fits: Sequence[Fit]) -> list[Fit]:
+    """Fit models on from where they stand, to all samples."""
+    return _continue(context, context.problem, fits, POLICY.final_steps)
 
 
 def _continue(context: SearchContext, problem: Problem, fits: Sequence[Fit], steps: int) -> list[Fit]:
     """Fit models further from where they stand."""
-    return _run(
+    return run_tasks(
         context,
         [FitTask(problem.with_effects(model.effects), (AS_IT_STANDS,), model, steps) for model in fits],
     )
 
 
-def _run(context: SearchContext, tasks: Sequence[FitTask]) -> list[Fit]:
+def run_tasks(context: SearchContext, tasks: Sequence[FitTask]) -> list[Fit]:
     """Fit models, in parallel where the mapper is; those that the plant has no answer for are left out."""
     return [fitted for fitted in context.mapper(FitTask.run, tasks) if fitted is not None]
 

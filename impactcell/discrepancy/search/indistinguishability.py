@@ -24,6 +24,12 @@ MAX_FOLD_SHARE = 0.25
 """A group of replicates that holds more of the shots is left out shot by shot."""
 
 
+MAX_LEVERAGE = 0.98
+"""Largest leverage of a fold: beyond it a step away from the fit is no longer a matter of derivatives."""
+UNSEEN_INFORMATION = 1e-10
+"""Share of the largest information, scaled to a unit diagonal, below which a direction is not seen."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CandidateFit:
     """A fitted model with its log-likelihood of every shot out of shot, shape (n,)."""
@@ -59,7 +65,8 @@ def evaluate_out_of_shot(problem: Problem, model: Fit) -> CandidateFit:
     """Log-likelihood of every shot under parameters fitted without its fold.
 
     With u and H the gradient and information of a fold and H_0 those of all shots, the parameters without it
-    lie at -(H_0 - H)^-1 u, where the fold's misfit is larger by 2 u's + s'H s with s = (H_0 - H)^-1 u.
+    lie at -(H_0 - H)^-1 u, where the fold's misfit is larger by 2 u's + s'H s with s = (H_0 - H)^-1 u. What
+    only one fold tells has no such parameters: its leverage is held below one.
     """
     linearisation = linearise(problem, model)
     scale = np.sqrt(np.maximum(np.diag(linearisation.information), 1e-300))
@@ -67,11 +74,22 @@ def evaluate_out_of_shot(problem: Problem, model: Fit) -> CandidateFit:
     u = linearisation.shot_gradient / scale
     log_likelihood = model.log_likelihood(problem.shots)
     fold = folds(problem)
+    whitener = _whitener(H.sum(0))
     for number in np.unique(fold):
         in_fold = fold == number
-        step = np.linalg.pinv(H[~in_fold].sum(0), rcond=1e-10, hermitian=True) @ u[in_fold].sum(0)
+        leverage, axes = np.linalg.eigh(whitener.T @ H[in_fold].sum(0) @ whitener)
+        axes = whitener @ axes
+        step = axes @ ((axes.T @ u[in_fold].sum(0)) / (1.0 - np.minimum(leverage, MAX_LEVERAGE)))
         log_likelihood[in_fold] -= u[in_fold] @ step + 0.5 * np.einsum("a,iab,b->i", step, H[in_fold], step)
     return CandidateFit(model, log_likelihood)
+
+
+def _whitener(information: Samples) -> Samples:
+    """Columns w with w' H w = 1, in the directions that the shots see at all, shape (p, r)."""
+    values, vectors = np.linalg.eigh(information)
+    seen = values > UNSEEN_INFORMATION * max(float(values.max(initial=0.0)), 1e-300)
+    whitener: Samples = vectors[:, seen] / np.sqrt(values[seen])
+    return whitener
 
 
 def rank_out_of_shot(problem: Problem, fits: Iterable[Fit]) -> list[CandidateFit]:

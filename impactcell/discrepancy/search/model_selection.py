@@ -20,18 +20,20 @@ from impactcell.discrepancy.search.acceptance import (
 )
 from impactcell.discrepancy.search.candidate_fits import (
     finalists,
+    fit_all_samples,
     is_at_bound,
     prefer_interior,
     refine,
-    refit_on_all_samples,
     screen,
     without_each_effect,
 )
 from impactcell.discrepancy.search.context import SearchContext
+from impactcell.discrepancy.search.convergence import converge
 from impactcell.discrepancy.search.evidence import CandidateScan, ModelEvidence, scan_candidates
 from impactcell.discrepancy.search.indistinguishability import (
     CandidateFit,
     compare_fits,
+    rank_out_of_shot,
     sort_by_likelihood,
     total_log_likelihood,
 )
@@ -54,6 +56,8 @@ class SearchState:
         Against the best single effect.
     scans : list of CandidateScan
         Second effects beside several first ones.
+    unconverged : list of Fit
+        Trials that came to rest short of their optimum: they neither win nor lose.
     result : SelectionResult or None
         Ends the search.
     """
@@ -64,6 +68,7 @@ class SearchState:
     single_evidence: ModelEvidence | None = None
     scans: list[CandidateScan] = field(default_factory=list)
     pairs: list[CandidateFit] = field(default_factory=list)
+    unconverged: list[Fit] = field(default_factory=list)
     result: SelectionResult | None = None
 
     @property
@@ -78,7 +83,7 @@ def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
     for stage in STAGES:
         state = stage(context, state)
         if state.result is not None:
-            return state.result
+            return replace(state.result, unconverged=tuple(model.effects for model in state.unconverged))
     raise AssertionError("the last stage ends every search")
 
 
@@ -97,8 +102,8 @@ def nested_models(context: SearchContext, selection: SelectionResult) -> list[tu
     models = [(selection.added[-1], best)]
     if len(selection.added) > 1:
         nominal, first = selection.nominal.fit, selection.added[0]
-        reduced = refit_on_all_samples(context, without_each_effect(nominal, best))
-        models[:0] = [(first, single.fit) for single in reduced if single.fit.effects[-1] == first]
+        reduced = fit_all_samples(context, without_each_effect(nominal, best))
+        models[:0] = [(first, single) for single in reduced if single.effects[-1] == first]
     return models
 
 
@@ -115,11 +120,13 @@ def fit_single_effects(context: SearchContext, state: SearchState) -> SearchStat
     screened = refine(context, screen(context, state.evidence.candidate_scan, POLICY.max_screened))
     if not screened:
         return replace(state, result=reject(state.evidence, state.evidence, ()))
-    fitted = refit_on_all_samples(context, finalists(context, screened))
-    singles = prefer_interior(context.problem, fitted)
-    return replace(
-        state, screened=screened, singles=singles, single_evidence=context.test_model(singles[0].fit)
-    )
+    fitted = fit_all_samples(context, finalists(context, screened))
+    converged, others = converge(context, fitted, [state.evidence.fit])
+    state = replace(state, screened=screened, unconverged=others)
+    if not converged:
+        return replace(state, result=reject(state.evidence, state.evidence, ()))
+    singles = prefer_interior(context.problem, rank_out_of_shot(context.problem, converged))
+    return replace(state, singles=singles, single_evidence=context.test_model(singles[0].fit))
 
 
 def accept_single_effect(context: SearchContext, state: SearchState) -> SearchState:
@@ -153,8 +160,12 @@ def fit_pairs(context: SearchContext, state: SearchState) -> SearchState:
     refined = refine(context, sort_by_likelihood(context.coarse, likeliest.values()))
     if not refined:
         return replace(state, result=reject(state.evidence, state.latest, compare_fits(state.singles)))
-    pairs = prefer_interior(context.problem, refit_on_all_samples(context, finalists(context, refined)))
-    if not context.reaches_floor(pairs[0].fit):
+    inner = [state.evidence.fit, *(single.fit for single in state.singles)]
+    on_all_samples = fit_all_samples(context, finalists(context, refined))
+    converged, stuck = converge(context, on_all_samples, inner)
+    state = replace(state, unconverged=[*state.unconverged, *stuck])
+    pairs = prefer_interior(context.problem, rank_out_of_shot(context.problem, converged))
+    if not pairs or not context.reaches_floor(pairs[0].fit):
         alternatives = compare_fits([*pairs, *state.singles])
         return replace(state, result=reject(state.evidence, state.latest, alternatives))
     return replace(state, scans=scans, pairs=pairs)
@@ -162,7 +173,9 @@ def fit_pairs(context: SearchContext, state: SearchState) -> SearchState:
 
 def drop_either_effect(context: SearchContext, state: SearchState) -> SearchState:
     """Fit single effects again from where the best pair stands; accept one that suffices from there."""
-    again = refit_on_all_samples(context, without_each_effect(state.evidence.fit, state.pairs[0].fit))
+    reduced = without_each_effect(state.evidence.fit, state.pairs[0].fit)
+    converged, _ = converge(context, fit_all_samples(context, reduced), [state.evidence.fit])
+    again = rank_out_of_shot(context.problem, converged)
     if not again or total_log_likelihood(context.problem, again[0].fit) <= (
         total_log_likelihood(context.problem, state.singles[0].fit) + POLICY.min_refit_gain
     ):

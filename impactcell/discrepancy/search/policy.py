@@ -31,6 +31,11 @@ class SearchPolicy:
         Share of the (logarithmic) range of a shape that counts as its end.
     max_first_effects, max_second_effects : int
         Effects beside which a second one is looked for, and seconds beside each.
+    max_promise : float
+        Fall of the cost, over the mean squared residual, that a converged fit may still promise; good fits
+        have been seen to rest at 5, as events make the cost uneven.
+    max_nesting_loss : float
+        Log-likelihood by which a fit may be behind a model inside it.
     min_refit_gain : float
         Log-likelihood by which a single effect, fitted again from where a pair stands, must beat the best.
     min_share_explained : float
@@ -55,6 +60,8 @@ class SearchPolicy:
     bound_share: float = 0.01
     max_first_effects: int = 4
     max_second_effects: int = 5
+    max_promise: float = 12.0
+    max_nesting_loss: float = 1.0
     min_refit_gain: float = 2.0
     min_share_explained: float = 0.5
     max_rival_share: float = 0.5
