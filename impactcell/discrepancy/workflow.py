@@ -27,8 +27,10 @@ from impactcell.discrepancy.model import (
     usable_blocks,
 )
 from impactcell.discrepancy.search import (
+    MAX_P_VALUE,
     UNKNOWN,
     Conclusion,
+    HeldOutOutcome,
     Mapper,
     ModelEvidence,
     OpenedShots,
@@ -40,6 +42,7 @@ from impactcell.discrepancy.search import (
     Validation,
     conclude,
     describe_gap,
+    exchanged,
     missing_shots,
     nested_models,
     only_test,
@@ -173,8 +176,11 @@ def investigate(
         missing = missing or missing_shots(len(training), len(held_out))
     opened = OpenedShots(prepared, floor, (training, held_out), (problem, held_problem), seed)
     outcome = opened.validate(nominal, () if missing else nested)
+    search_evidence = selection
+    if not missing and len(outcome.validation.of_effects) < len(selection.added):
+        selection, outcome = _confirmed_rival(context, selection, opened, outcome)
     final = outcome.final
-    conclusion = conclude(selection, _evidence(context, selection, final), outcome.validation, missing)
+    conclusion = conclude(selection, _evidence(context, search_evidence, final), outcome.validation, missing)
     report_step("planning the next experiment")
     return DiscrepancyResult(
         conclusion=conclusion,
@@ -197,6 +203,23 @@ def investigate(
         experiments=propose_experiments(problem, final, _tied_models(selection, conclusion.established)),
         seed=seed,
     )
+
+
+def _confirmed_rival(
+    context: SearchContext, selection: SelectionResult, opened: OpenedShots, outcome: HeldOutOutcome
+) -> tuple[SelectionResult, HeldOutOutcome]:
+    """Exchange what held-out shots do not confirm for what is tied with it and they do, if there is any.
+
+    The error of a rival's test is shared among all of them.
+    """
+    variants = exchanged(selection)
+    for variant in variants:
+        tried = opened.validate(
+            selection.nominal.fit, nested_models(context, variant), MAX_P_VALUE / len(variants)
+        )
+        if len(tried.validation.of_effects) > len(outcome.validation.of_effects):
+            selection, outcome = variant, tried
+    return selection, outcome
 
 
 def _evidence(context: SearchContext, selection: SelectionResult, final: Fit) -> ModelEvidence:
@@ -232,18 +255,13 @@ def _left_out(training: IndexArray, kept: IndexArray) -> str:
 
 
 def _tied_models(selection: SelectionResult, established: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
+    """List each established effect with a rival that is tied with it, and the model that has the rival."""
     models = []
-    for effect, rivals in selection.ties.items():
-        if effect not in established:
-            continue
-        for rival in rivals:
-            tied_set = {rival if name == effect else name for name in selection.added}
-            for alternative in selection.alternatives:
-                if set(alternative.effects) >= tied_set and len(alternative.effects) == len(
-                    selection.accepted.effects if selection.accepted else ()
-                ):
-                    models.append((effect, rival, alternative.fit))
-                    break
+    for variant in exchanged(selection):
+        (effect,) = set(selection.added) - set(variant.added)
+        (rival,) = set(variant.added) - set(selection.added)
+        if effect in established and variant.accepted is not None:
+            models.append((effect, rival, variant.accepted))
     return models
 
 

@@ -1,6 +1,6 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
-from impactcell.discrepancy.search.acceptance import SelectionResult
+from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged
 from impactcell.discrepancy.search.conclusion import (
     NAMED,
     NO_GAP,
@@ -16,16 +16,17 @@ from impactcell.discrepancy.search.conclusion import (
 from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
-from impactcell.discrepancy.search.held_out import OpenedShots
+from impactcell.discrepancy.search.held_out import HeldOutOutcome, OpenedShots
 from impactcell.discrepancy.search.model_selection import nested_models, only_test, select_model
 from impactcell.discrepancy.search.open_loop import Simulation, SimulationError, simulate_held_out
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
-from impactcell.discrepancy.search.validation import Gap, GapChange, Part, Validation
+from impactcell.discrepancy.search.validation import MAX_P_VALUE, Gap, GapChange, Part, Validation
 
 __all__ = [
     "ALL",
     "ALPHA",
+    "MAX_P_VALUE",
     "NAMED",
     "NO_GAP",
     "TIED",
@@ -34,6 +35,7 @@ __all__ = [
     "Conclusion",
     "Gap",
     "GapChange",
+    "HeldOutOutcome",
     "Mapper",
     "ModelEvidence",
     "OpenedShots",
@@ -49,6 +51,7 @@ __all__ = [
     "Validation",
     "conclude",
     "describe_gap",
+    "exchanged",
     "missing_shots",
     "nested_models",
     "only_test",

@@ -1,7 +1,7 @@
 """What a search says at its end: effects accepted, those tied with them, or none."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from impactcell.discrepancy.model import Fit, Problem
 from impactcell.discrepancy.search.candidate_fits import is_at_bound
@@ -49,6 +49,32 @@ class SelectionResult:
     def is_accepted(self, model: Fit) -> bool:
         """Whether the search ended with this model."""
         return self.accepted is not None and self.accepted.effects == model.effects
+
+
+def exchanged(selection: SelectionResult) -> list[SelectionResult]:
+    """Return the same outcome with an effect exchanged for one that is tied with it, each in turn."""
+    variants = []
+    for effect, rivals in selection.ties.items():
+        for rival in rivals:
+            added = tuple(rival if name == effect else name for name in selection.added)
+            fit = _fit_with(selection, added)
+            if fit is None:
+                continue
+            others = tuple(name for name in (effect, *rivals) if name != rival)
+            ties = {rival if name == effect else name: tied for name, tied in selection.ties.items()}
+            p_value = selection.nominal.candidate_scan.p_value_of(rival)
+            p_values = {**selection.p_values, rival: p_value}
+            variants.append(
+                replace(selection, accepted=fit, added=added, ties={**ties, rival: others}, p_values=p_values)
+            )
+    return variants
+
+
+def _fit_with(selection: SelectionResult, added: tuple[str, ...]) -> Fit | None:
+    """Fit that the search made of the nominal model with some effects."""
+    wanted = {*selection.nominal.fit.effects, *added}
+    fits = (alternative.fit for alternative in selection.alternatives)
+    return next((fit for fit in fits if set(fit.effects) == wanted), None)
 
 
 def reject(

@@ -13,7 +13,13 @@ from impactcell.discrepancy.data import (
     replicate_spread,
 )
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
-from impactcell.discrepancy.search.validation import GapMeasure, Validation, confirmed, counted_parts
+from impactcell.discrepancy.search.validation import (
+    MAX_P_VALUE,
+    GapMeasure,
+    Validation,
+    confirmed,
+    counted_parts,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,13 +62,17 @@ class OpenedShots:
     problems: tuple[Problem, Problem]
     seed: int
 
-    def validate(self, nominal: Fit, nested: Sequence[tuple[str, Fit]]) -> HeldOutOutcome:
+    def validate(
+        self, nominal: Fit, nested: Sequence[tuple[str, Fit]], max_p: float = MAX_P_VALUE
+    ) -> HeldOutOutcome:
         """Add effects to the nominal model as long as held-out shots confirm them.
 
         Parameters
         ----------
         nested : sequence of (str, Fit)
             Effect, and the model with it and all before it.
+        max_p : float
+            One-sided error for each of them.
         """
         problem, held_problem = self.problems
         models = [nominal, *(model for _, model in nested)]
@@ -71,7 +81,7 @@ class OpenedShots:
         measure = GapMeasure(held_problem, self.floor, replicates, self.seed)
         training = GapMeasure(problem, self.floor, replicates, self.seed)
         effects = [effect for effect, _ in nested]
-        changes = confirmed(measure, list(zip(effects, held[1:], strict=True)), held[0])
+        changes = confirmed(measure, list(zip(effects, held[1:], strict=True)), held[0], max_p)
         final, held_final = models[len(changes)], held[len(changes)]
         parts = counted_parts(measure, (held[0], held_final), changes.values())
         validation = Validation(
