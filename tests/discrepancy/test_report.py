@@ -7,12 +7,12 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from impactcell.discrepancy.report.headline import headline, phrase
 from impactcell.discrepancy.report.page import (
     format_number,
     page_context,
     write_report,
 )
+from impactcell.discrepancy.report.sentences import headline, phrase
 from impactcell.discrepancy.search.conclusion import Place, Remaining
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY

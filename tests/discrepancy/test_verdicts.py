@@ -10,8 +10,8 @@ from scipy.stats import f as fisher
 from impactcell.campaign import Campaign, Excitation, Sensor
 from impactcell.discrepancy.data.noise_floor import NoiseFloor, ReplicateSpread
 from impactcell.discrepancy.model.least_squares import Fit
-from impactcell.discrepancy.report.headline import headline
 from impactcell.discrepancy.report.result import result_document
+from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search.conclusion import missing_shots
 from impactcell.discrepancy.search.validation import GapMeasure, confirmed
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
@@ -101,6 +101,9 @@ def test_a_gap_that_rises_or_hardly_falls_confirms_nothing(viscous: DiscrepancyR
     rng = np.random.default_rng(4)
     noisy = replace(nominal, residual=nominal.residual + 0.3 * rng.standard_normal(nominal.residual.size))
     assert not measure.change(nominal, noisy).is_real()
+    trifle = measure.change(nominal, replace(nominal, residual=0.9996 * nominal.residual))
+    assert trifle.low > 0.0  # every shot agrees, and it is no fall worth a name
+    assert not trifle.is_real()
 
 
 def test_the_first_effect_that_is_not_confirmed_ends_the_list(viscous: DiscrepancyResult) -> None:
@@ -112,7 +115,7 @@ def test_the_first_effect_that_is_not_confirmed_ends_the_list(viscous: Discrepan
 
 
 def test_what_held_out_shots_do_not_confirm_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("impactcell.discrepancy.search.validation.MAX_P_VALUE", 0.0)
+    monkeypatch.setattr("impactcell.discrepancy.search.validation.MIN_CLOSED_SHARE", 2.0)
     found = investigate(make("viscous_friction", shots=24))
     outcome = result_document(found)
     assert outcome["verdict"] == "unknown"

@@ -8,8 +8,8 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report import figures
-from impactcell.discrepancy.report.headline import headline, phrase
 from impactcell.discrepancy.report.result import locate_effect
+from impactcell.discrepancy.report.sentences import headline, phrase
 from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import LIBRARY

@@ -6,7 +6,7 @@ from typing import Any
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS
 from impactcell.discrepancy.model import ParameterEstimate
-from impactcell.discrepancy.report.headline import headline
+from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search import Gap, GapChange, ModelEvidence, Remaining, Simulation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics import Kind

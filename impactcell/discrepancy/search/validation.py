@@ -22,6 +22,8 @@ BOOTSTRAP, SIGN_FLIPS = 7, 8
 MAX_P_VALUE = 0.1
 """One-sided error of the held-out shots' test, beside an interval above 0: they confirm what other shots have
 found at an error of 1 %, so that both together err once in a thousand."""
+MIN_CLOSED_SHARE = 0.02
+"""Share of the held-out gap that an effect must close: a fall may be certain and still be too small."""
 NOISE_TOLERANCE = 0.05
 """Relative error of a stated noise: two digits."""
 MAX_EXPECTED_GAP = 1.3
@@ -82,8 +84,8 @@ class GapChange:
     p_value: float
 
     def is_real(self, max_p: float = MAX_P_VALUE) -> bool:
-        """Whether independent shots agree that the gap falls."""
-        return self.low > 0.0 and self.p_value <= max_p
+        """Whether independent shots agree that the gap falls, and by more than a trifle."""
+        return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= max_p
 
 
 @dataclass(frozen=True, slots=True, eq=False)

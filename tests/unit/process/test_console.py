@@ -47,7 +47,7 @@ def test_discrepancy(
 ) -> None:
     for name, made in (("_read", ("name", None)), ("investigate", None), ("write_findings", None)):
         monkeypatch.setattr(command, name, lambda *_, made=made, **__: made)
-    monkeypatch.setattr(command, "verdict_sentence", lambda _: "Missing: x")
+    monkeypatch.setattr(command, "headline", lambda _: "Missing: x")
     assert run(capsys, "discrepancy", "shots", "-o", "out", *options) == said
 
 
