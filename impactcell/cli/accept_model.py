@@ -1,15 +1,25 @@
 """`impactcell model accept`: an extended model into service, without losing what the cell has learned."""
 
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from impactcell.cli.calibrate import calibrated_model
+from impactcell.errors import SettingsError
+from impactcell.prediction import Model
 from impactcell.process.console import print_result
 from impactcell.settings import read_cell
 from impactcell.settings.model_file import read_model, write_model
 
+PLANT_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
+"""What a model says of the plant beside its effects."""
 
-def accept_model(cell: Path, extended: Path) -> None:
+
+def accept_model(cell: Path, extended: Path, *, as_json: bool = False) -> None:
     """Calibrate an extended model for the cell and put it in the place of the cell's model file.
 
     The model that it replaces is kept beside it as `<name>.previous.yaml`. A running service sees the new
@@ -25,9 +35,93 @@ def accept_model(cell: Path, extended: Path) -> None:
     cell_config = read_cell(cell)
     model = calibrated_model(replace(cell_config, model=read_model(extended)))
     target = cell_config.settings.model
-    previous = target.with_name(f"{target.stem}.previous{target.suffix}")
+    previous = previous_model(target)
     previous.write_bytes(target.read_bytes())
     write_model(model, target)
-    print_result(
-        f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}"
+    _tell(
+        {"cell": cell_config.name, "model": model.name, "previous": str(previous)},
+        f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}",
+        as_json=as_json,
     )
+
+
+def restore_model(cell: Path, *, as_json: bool = False) -> None:
+    """Put the previous model back; the one in service takes its place, so that this can be undone as well.
+
+    Raises
+    ------
+    SettingsError
+        There is no previous model, or a file cannot be read or written.
+    """
+    cell_config = read_cell(cell)
+    target = cell_config.settings.model
+    previous = previous_model(target)
+    if not previous.is_file():
+        raise SettingsError(f"{previous}: there is none; nothing has been accepted in this cell")
+    model = read_model(previous)
+    in_service = target.read_bytes()
+    write_model(model, target)
+    previous.write_bytes(in_service)
+    _tell(
+        {"cell": cell_config.name, "model": model.name, "previous": str(previous)},
+        f"{cell_config.name} runs with model {model.name} from the next cycle on, as before",
+        as_json=as_json,
+    )
+
+
+def compare_models(cell: Path, extended: Path, *, as_json: bool = False) -> None:
+    """Say what `model accept` would change, and change nothing.
+
+    Raises
+    ------
+    SettingsError
+        A file cannot be read.
+    """
+    cell_config = read_cell(cell)
+    before, after = cell_config.model, read_model(extended)
+    changes = [
+        {"parameter": name, "before": old, "after": new}
+        for name, old, new in _changes(dict(_parameters(before)), dict(_parameters(after)))
+    ]
+    rows = [f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}" for c in changes]
+    _tell(
+        {"cell": cell_config.name, "before": before.name, "after": after.name, "changes": changes},
+        "\n".join([f"{cell_config.name}: {before.name} -> {after.name}", *rows]),
+        as_json=as_json,
+    )
+
+
+def previous_model(model_file: Path) -> Path:
+    """Where the model is kept that the one in service has replaced."""
+    return model_file.with_name(f"{model_file.stem}.previous{model_file.suffix}")
+
+
+def _parameters(model: Model) -> Iterator[tuple[str, float | list[float]]]:
+    for name in PLANT_PARAMETERS:
+        yield name, getattr(model.plant, name)
+    for effect, parameters in model.plant.effects.items():
+        for name, value in parameters.items():
+            yield f"{effect}.{name}", list(value) if isinstance(value, Sequence) else value
+
+
+def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+    for name in dict.fromkeys((*before, *after)):
+        old, new = before.get(name), after.get(name)
+        is_same = old == new or (
+            isinstance(old, float) and isinstance(new, float) and math.isclose(old, new, rel_tol=1e-9)
+        )
+        if not is_same:
+            yield name, old, new
+
+
+def _text(value: float | Sequence[float] | None) -> str:
+    if value is None:
+        return "none"
+    return f"{value:.5g}" if isinstance(value, float | int) else ", ".join(f"{v:.5g}" for v in value)
+
+
+def _tell(content: dict[str, Any], sentence: str, *, as_json: bool) -> None:
+    if as_json:
+        sys.stdout.write(json.dumps(content) + "\n")
+    else:
+        print_result(sentence)

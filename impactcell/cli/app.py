@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from impactcell.cli.access_verbs import certs, users
-from impactcell.cli.options import Cell, Cells, Directory, OptionalCell, verb
+from impactcell.cli.options import AsJson, Cell, Cells, Directory, OptionalCell, verb
 
 app = typer.Typer(
     add_completion=False,
@@ -170,11 +170,14 @@ def discrepancy(
     journal: Annotated[Path | None, typer.Option(metavar="DB", help="Recorded captures instead.")] = None,
     seed: Annotated[int, typer.Option(help="Of the resampling.")] = 0,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler.")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Find where model and measurement disagree, name the missing effect, prove it."""
     from impactcell.cli.discrepancy import discrepancy as run_discrepancy
 
-    run_discrepancy(campaign, output, cell=cell, journal=journal, seed=seed, scheduler=scheduler)
+    run_discrepancy(
+        campaign, output, cell=cell, journal=journal, seed=seed, scheduler=scheduler, as_json=as_json
+    )
 
 
 @verb(app)
@@ -207,11 +210,25 @@ def model_accept(
     extended: Annotated[
         Path, typer.Argument(metavar="MODEL.yaml", help="As the discrepancy workflow wrote it.")
     ],
+    *,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would change.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Put an extended model into service; a running cell takes it over without losing its state."""
-    from impactcell.cli.accept_model import accept_model
+    from impactcell.cli.accept_model import accept_model, compare_models
 
-    accept_model(cell, extended)
+    if dry_run:
+        compare_models(cell, extended, as_json=as_json)
+    else:
+        accept_model(cell, extended, as_json=as_json)
+
+
+@verb(model, "restore")
+def model_restore(cell: Cell, *, as_json: AsJson = False) -> None:
+    """Put the model back into service that the last `model accept` replaced."""
+    from impactcell.cli.accept_model import restore_model
+
+    restore_model(cell, as_json=as_json)
 
 
 def run_verb(arguments: list[str] | None = None) -> None:

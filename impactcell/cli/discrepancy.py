@@ -19,6 +19,7 @@ from impactcell.errors import CampaignError, DiscrepancyError
 from impactcell.physics import Plant
 from impactcell.prediction import Model
 from impactcell.process.console import print_result
+from impactcell.process.progress import named_steps
 
 
 def discrepancy(
@@ -29,6 +30,7 @@ def discrepancy(
     journal: Path | None = None,
     seed: int = 0,
     scheduler: str | None = None,
+    as_json: bool = False,
 ) -> None:
     """Run the discrepancy workflow and write result.json, model.extended.yaml and report.html.
 
@@ -46,6 +48,8 @@ def discrepancy(
         The same data and seed give the same result to the byte.
     scheduler : str, optional
         Address of a dask scheduler that is to do the fits.
+    as_json : bool
+        Print result.json instead of its verdict.
 
     Raises
     ------
@@ -70,11 +74,14 @@ def discrepancy(
         if recording is not None:
             plant, name = recording.plant, recording.name
     source, data = _read(campaign, journal, plant)
-    with _progress() as report_step, _mapper(scheduler) as mapper:
+    with named_steps() as report_step, _mapper(scheduler) as mapper:
         result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
         report_step("writing the report")
         write_findings(result, data, output, source, name)
-    print_result(f"{headline(result)}\n{output / 'report.html'}")
+    if as_json:
+        sys.stdout.write((output / "result.json").read_text(encoding="utf-8"))
+    else:
+        print_result(f"{headline(result)}\n{output / 'report.html'}")
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:
@@ -100,20 +107,6 @@ def _recording_model(journal: Path) -> Model | None:
             return MODEL.loads(store.model) if store.model else None
         except ValueError as error:
             raise CampaignError(f"{journal}: {error}; name the model with --cell") from error
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    if not sys.stderr.isatty():
-        yield lambda _step: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("reading", total=None)
-        yield lambda step: bar.update(task, description=step)
 
 
 @contextmanager

@@ -31,6 +31,7 @@ Cell = Annotated[Path, typer.Argument(metavar="CELL.yaml")]
 OptionalCell = Annotated[
     Path | None, typer.Option("--cell", metavar="CELL.yaml", help="Use this cell's model.")
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Directory = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write.")]
 
 

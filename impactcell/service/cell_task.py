@@ -44,6 +44,12 @@ STALE_AT_LEAST_S = 5.0
 SnapshotCallback = Callable[[str, Snapshot], None]
 
 
+UNCHANGEABLE = (
+    *("cell", "module", "opcua", "web", "journal", "monitoring", "identification", "positioning"),
+)
+"""Sections of a cell file that only a restart takes over."""
+
+
 class CellTask:
     """Module, worker and nodes of one cell.
 
@@ -142,7 +148,7 @@ class CellTask:
             return
         unchangeable = {
             name: getattr(self.cell.settings, name)
-            for name in ("cell", "module", "opcua", "journal", "monitoring", "identification", "positioning")
+            for name in UNCHANGEABLE
             if getattr(reloaded.settings, name) != getattr(self.cell.settings, name)
         }
         if unchangeable:

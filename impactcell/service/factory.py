@@ -115,7 +115,12 @@ def page_settings(cell: CellConfig, section: WebSection) -> PageSettings:
     """How the page of the cell, and of those that share its endpoint, is reached."""
     opcua = cell.settings.opcua
     return PageSettings(
-        section.endpoint, opcua.users_file, opcua.certificates_dir, section.certificate, section.key
+        section.endpoint,
+        opcua.users_file,
+        opcua.certificates_dir,
+        section.studies_dir,
+        section.certificate,
+        section.key,
     )
 
 
@@ -123,7 +128,11 @@ def cell_facts(cell: CellConfig, endpoint: str) -> CellFacts:
     """Say to the page what a cell is that its OPC UA server shows at `endpoint`."""
     module, journal = cell.settings.module, cell.settings.journal
     return CellFacts(
-        cell.name, f"{module.host}:{module.port}", endpoint, None if journal is None else journal.file
+        cell.name,
+        f"{module.host}:{module.port}",
+        endpoint,
+        None if journal is None else journal.file,
+        cell.path.resolve(),
     )
 
 

@@ -1,4 +1,4 @@
-"""What people do over OPC UA, applied to the cells and written into their audit trails."""
+"""What people do, over OPC UA or on the page, applied to the cells and written into their audit trails."""
 
 import json
 import time
@@ -50,6 +50,10 @@ class OperatorCommands:
             await self._cell(cell).abort_positioning(_audit(actor, "AbortPositioning"))
         except PositioningError as error:
             raise RefusedError("BadInvalidState", str(error)) from error
+
+    async def record_model(self, cell: str, action: str, model: str, actor: Actor) -> None:
+        """Write down that somebody has put another model into service."""
+        await self._cell(cell).worker.record_audit(_audit(actor, f"model {action}", Model=model))
 
     async def act_on_condition(
         self,

@@ -1,16 +1,23 @@
 """What people do on the page, brought from the page's thread to the service's own."""
 
 import asyncio
-from collections.abc import Coroutine, Mapping
+import json
+from collections.abc import Coroutine, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from impactcell.errors import AccessError
 from impactcell.opcua.trust_list import der, read_certificate, thumbprint
+from impactcell.process.background import run_verb
 from impactcell.scada import Actor, ConditionAction, RefusedError, Server
 from impactcell.scada.audit_log import audited
+from impactcell.service.operator_commands import OperatorCommands
+from impactcell.settings import CellConfig
 
 T = TypeVar("T")
+
+ACCEPT_S: Final = 1800.0
+"""Longest time for calibrating a model: a law may have to be compiled, at the lowest priority."""
 
 
 class PageGateway:
@@ -20,14 +27,25 @@ class PageGateway:
     ----------
     servers : mapping
         The server that shows each cell; logins go to the first one.
+    commands : OperatorCommands
+        Writes down what people do.
+    cells : sequence of CellConfig
     certificates : Path
         Directory of the trust list.
 
     Made in the service's event loop; the coroutines are awaited in the page's.
     """
 
-    def __init__(self, servers: Mapping[str, Server], certificates: Path) -> None:
+    def __init__(
+        self,
+        servers: Mapping[str, Server],
+        commands: OperatorCommands,
+        cells: Sequence[CellConfig],
+        certificates: Path,
+    ) -> None:
         self._servers = servers
+        self._commands = commands
+        self._cells = {cell.name: cell for cell in cells}
         self._certificates = certificates
         self._loop = asyncio.get_running_loop()
 
@@ -43,6 +61,27 @@ class PageGateway:
     async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
         """Let a client connect whose certificate has been refused."""
         await self._in_service(audited(actor, f"trust certificate {thumbprint!r}", self._trust(thumbprint)))
+
+    async def accept_model(self, cell: str, extended: Path, actor: Actor) -> str:
+        """Calibrate an extended model for the cell, in a process of its own, and put it into service."""
+        work = self._change_model(
+            cell, "accept", ["accept", str(self._cells[cell].path), str(extended)], actor
+        )
+        return await self._in_service(audited(actor, f"{cell}: accept model {extended}", work))
+
+    async def restore_model(self, cell: str, actor: Actor) -> str:
+        """Put the model back into service that the last one has replaced."""
+        work = self._change_model(cell, "restore", ["restore", str(self._cells[cell].path)], actor)
+        return await self._in_service(audited(actor, f"{cell}: restore model", work))
+
+    async def _change_model(self, cell: str, action: str, arguments: list[str], actor: Actor) -> str:
+        outcome = await run_verb(["model", *arguments, "--json"], ACCEPT_S)
+        if not outcome.is_done:
+            said = "\n".join(outcome.messages) or "it took too long"
+            raise RefusedError("BadInvalidState", said)
+        model = str(json.loads(outcome.output)["model"])
+        await self._commands.record_model(cell, action, model, actor)
+        return model
 
     async def _trust(self, thumbprint: str) -> None:
         if not await asyncio.to_thread(_trust_rejected, self._certificates, thumbprint):

@@ -155,7 +155,8 @@ class Service:
         shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in cells}
         settings = page_settings(cells[0], section)
         facts = [cell_facts(cell, self.endpoints[cell.name]) for cell in cells]
-        page = PageServer(settings, facts, PageGateway(shown_by, settings.certificates))
+        gateway = PageGateway(shown_by, OperatorCommands(self.running), cells, settings.certificates)
+        page = PageServer(settings, facts, gateway)
         try:
             await asyncio.to_thread(page.start)
         except SettingsError as error:

@@ -3,9 +3,9 @@
 from typing import Annotated, Self
 from urllib.parse import urlsplit
 
-from pydantic import AfterValidator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from impactcell.settings.fields import InputFile, Section, page_endpoint
+from impactcell.settings.fields import AnyPath, InputFile, Section, page_endpoint
 
 
 class WebSection(Section):
@@ -17,6 +17,8 @@ class WebSection(Section):
     """Certificate (PEM) of the page, for https."""
     key: InputFile | None = None
     """Its private key (PEM)."""
+    studies_dir: AnyPath = Field(default="studies", validate_default=True)
+    """Directory for the measurements that people drop on the page, and for what comes out of them."""
     allow_without_encryption: bool = False
     """Opens plain http beyond loopback, where anybody can listen; every start then warns."""
 

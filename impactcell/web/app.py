@@ -17,10 +17,13 @@ from impactcell.scada import Role
 from impactcell.web import alarm_pages, cell_pages, login_pages, system_page
 from impactcell.web.interface import PageBackend, PageContent, PageSettings
 from impactcell.web.live_feed import LiveFeed
+from impactcell.web.messages import Messages
 from impactcell.web.page_context import STATIC, STATIC_VERSION, PageContext
 from impactcell.web.past import Past
 from impactcell.web.requests import (
+    CSRF_FIELD,
     RequestRefusedError,
+    check_origin,
     check_token,
     cookie_name,
     read_form,
@@ -28,6 +31,8 @@ from impactcell.web.requests import (
 )
 from impactcell.web.security_headers import SecurityHeaders
 from impactcell.web.sessions import BrowserSession, SessionTable
+from impactcell.web.studies import pages as study_pages
+from impactcell.web.studies.queue import StudyQueue
 
 Show = Callable[[PageContext, Request, BrowserSession], Awaitable[Response | ASGIApp]]
 Act = Callable[[PageContext, Request, BrowserSession, dict[str, str]], Awaitable[Response]]
@@ -63,6 +68,11 @@ VIEWS: Final = (
     View("/alarms/history.csv", alarm_pages.history_csv),
     View("/alarms/history.xlsx", alarm_pages.history_xlsx),
     View("/system", system_page.system),
+    View("/studies", study_pages.studies),
+    View("/studies/{study}", study_pages.study),
+    View("/studies/{study}/state", study_pages.study_state, is_page=False),
+    View("/studies/{study}/report", study_pages.report),
+    View("/studies/{study}/files/{name}", study_pages.download),
 )
 """Everything that can be looked at, but for the login and the static files, which are for all."""
 
@@ -70,8 +80,17 @@ ACTIONS: Final = (
     Action("/logout", login_pages.log_out, Role.OBSERVER),
     Action("/alarms/act", alarm_pages.act, Role.OPERATOR),
     Action("/system/trust", system_page.trust, Role.ENGINEER),
+    Action("/studies", study_pages.begin, Role.OPERATOR),
+    Action("/studies/{study}/read", study_pages.read, Role.OPERATOR),
+    Action("/studies/{study}/run", study_pages.run, Role.OPERATOR),
+    Action("/studies/{study}/accept", study_pages.accept, Role.ENGINEER),
+    Action("/studies/{study}/restore", study_pages.restore, Role.ENGINEER),
+    Action("/studies/{study}/remove", study_pages.remove, Role.OPERATOR),
 )
 """Everything that can be done; each form needs the token of the session that it was shown to."""
+
+UPLOADS: Final = (View("/studies/{study}/files", study_pages.upload, Role.OPERATOR, is_page=False),)
+"""Where files are sent, with the token of the session in a header."""
 
 
 def page_app(
@@ -80,13 +99,15 @@ def page_app(
     feed: LiveFeed,
     sessions: SessionTable,
     backend: PageBackend,
+    studies: StudyQueue,
 ) -> ASGIApp:
     """Put the application together."""
-    context = PageContext(settings, content, feed, sessions, backend, Past())
+    context = PageContext(settings, content, feed, sessions, backend, Past(), studies)
     routes = [
         Route("/login", _logged_out(context), methods=["GET", "POST"]),
         *(Route(view.path, _shown(context, view), methods=["GET"]) for view in VIEWS),
         *(Route(action.path, _done(context, action), methods=["POST"]) for action in ACTIONS),
+        *(Route(upload.path, _received(context, upload), methods=["PUT"]) for upload in UPLOADS),
         Mount(f"/static/{STATIC_VERSION}", StaticFiles(directory=STATIC)),
     ]
     return Starlette(
@@ -137,6 +158,32 @@ def _done(context: PageContext, action: Action) -> Callable[[Request], Awaitable
         return await action.act(context, request, session, form)
 
     return handle
+
+
+def _received(context: PageContext, upload: View) -> Callable[[Request], Awaitable[Response]]:
+    """Take a file; whatever is wrong is said in a sentence, since only scripts send files."""
+
+    async def handle(request: Request) -> Response:
+        try:
+            session = _uploader(context, request, upload.role)
+            return await upload.show(context, request, session)  # type: ignore[return-value] # no stream
+        except RequestRefusedError as error:
+            text = Messages(context.language(request))[error.reason]
+            # What still comes of the file is not read: the connection ends with the answer.
+            return JSONResponse({"error": text}, error.status, {"connection": "close"})
+
+    return handle
+
+
+def _uploader(context: PageContext, request: Request, role: Role) -> BrowserSession:
+    session = session_of(request, context.sessions)
+    if session is None:
+        raise RequestRefusedError(401, "session_over")
+    check_origin(request)
+    check_token(session, {CSRF_FIELD: request.headers.get("x-csrf-token", "")})
+    if session.actor.role < role:
+        raise RequestRefusedError(403, "error_role")
+    return session
 
 
 def _refused(context: PageContext) -> Callable[[Request, Exception], Awaitable[Response]]:

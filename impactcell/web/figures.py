@@ -5,7 +5,7 @@ from typing import Any
 
 from impactcell.quantities import CYCLE, MODULE, ONE
 from impactcell.records.quantity import DataType, Quantity, Ranges
-from impactcell.web.messages import LANGUAGES
+from impactcell.web.texts import LANGUAGES
 
 STD_SUFFIX = "StdDev"
 """Ends the path of a value's standard deviation, which is written behind that value as ±2 of it."""

@@ -47,12 +47,15 @@ class CellFacts:
         Where OPC UA clients find it.
     journal : Path or None
         Its journal file.
+    file : Path or None
+        Its cell file, which says which model it runs with.
     """
 
     name: str
     module: str
     endpoint: str
     journal: Path | None = None
+    file: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,8 @@ class PageSettings:
         `http://host:port` or `https://host:port`; port 0 takes a free one.
     users, certificates : Path
         Users file and directory of certificates, those of OPC UA.
+    studies : Path
+        Directory for what people drop, and what comes out of it.
     certificate, key : Path or None
         Of the page itself, PEM, for https.
     """
@@ -72,6 +77,7 @@ class PageSettings:
     endpoint: str
     users: Path
     certificates: Path
+    studies: Path
     certificate: Path | None = None
     key: Path | None = None
 
@@ -92,6 +98,12 @@ class PageBackend(Protocol):
 
     async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
         """Let a client connect whose certificate has been refused."""
+
+    async def accept_model(self, cell: str, extended: Path, actor: Actor) -> str:
+        """Put an extended model into service, as `impactcell model accept` does; returns its name."""
+
+    async def restore_model(self, cell: str, actor: Actor) -> str:
+        """Put the model back into service that the last one has replaced; returns its name."""
 
 
 @dataclass(frozen=True, slots=True)

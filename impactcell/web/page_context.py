@@ -1,9 +1,12 @@
 """What every page is made with: the parts of the application, language, theme and templates."""
 
+import asyncio
 import hashlib
+import time
+from collections.abc import Coroutine
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from starlette.requests import Request
@@ -13,10 +16,12 @@ from impactcell import __version__
 from impactcell.scada import Role
 from impactcell.web.interface import PageBackend, PageContent, PageSettings
 from impactcell.web.live_feed import LiveFeed
-from impactcell.web.messages import LANGUAGES, Messages, preferred_language
+from impactcell.web.messages import Messages, preferred_language
 from impactcell.web.past import Past
 from impactcell.web.requests import session_of
 from impactcell.web.sessions import BrowserSession, SessionTable
+from impactcell.web.studies.queue import StudyQueue
+from impactcell.web.texts import LANGUAGES
 
 STATIC: Final = Path(__file__).parent / "static"
 
@@ -54,7 +59,22 @@ class PageContext:
     sessions: SessionTable
     backend: PageBackend
     past: Past
+    studies: StudyQueue
+    receiving: set[Path] = field(default_factory=set)
+    """Files that are being received."""
+    _beside: set[asyncio.Task[None]] = field(default_factory=set)
     _templates: Environment = field(default_factory=_environment)
+
+    def beside(self, work: Coroutine[Any, Any, None]) -> None:
+        """Do something that no request waits for."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._beside.add(task)
+        task.add_done_callback(self._beside.discard)
+
+    @staticmethod
+    def now_ms() -> int:
+        """Give the time of the day, milliseconds since 1970."""
+        return time.time_ns() // 1_000_000
 
     @staticmethod
     def language(request: Request) -> str:

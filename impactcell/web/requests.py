@@ -47,6 +47,21 @@ def local_path(path: str) -> str:
     return path if is_local and "\\" not in path and path.isprintable() else "/"
 
 
+def check_origin(request: Request) -> None:
+    """See that a request was made by a page of ours.
+
+    Raises
+    ------
+    RequestRefusedError
+        It was made elsewhere.
+    """
+    origin = request.headers.get("origin")
+    site = request.headers.get("sec-fetch-site", "same-origin")
+    expected = f"{request.url.scheme}://{request.headers.get('host', '')}"
+    if site not in ("same-origin", "none") or (origin is not None and origin != expected):
+        raise RequestRefusedError(403, "error_foreign")
+
+
 async def read_form(request: Request) -> dict[str, str]:
     """Read a form that a page of ours has sent.
 
@@ -55,11 +70,7 @@ async def read_form(request: Request) -> dict[str, str]:
     RequestRefusedError
         It comes from elsewhere, is too long, or is no form.
     """
-    origin = request.headers.get("origin")
-    site = request.headers.get("sec-fetch-site", "same-origin")
-    expected = f"{request.url.scheme}://{request.headers.get('host', '')}"
-    if site not in ("same-origin", "none") or (origin is not None and origin != expected):
-        raise RequestRefusedError(403, "error_foreign")
+    check_origin(request)
     if not request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
         raise RequestRefusedError(415, "error_form")
     body = bytearray()

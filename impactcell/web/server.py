@@ -19,6 +19,8 @@ from impactcell.web.connections import Connection
 from impactcell.web.interface import CellFacts, PageBackend, PageContent, PageSettings
 from impactcell.web.live_feed import LiveFeed
 from impactcell.web.sessions import SessionTable
+from impactcell.web.studies.queue import StudyQueue
+from impactcell.web.studies.study import StudyStore
 
 _log = logging.getLogger(__name__)
 
@@ -70,7 +72,9 @@ class PageServer:
         host = url.netloc.rpartition(":")[0]
         self.endpoint = url._replace(netloc=f"{host}:{listener.getsockname()[1]}").geturl()
         sessions = SessionTable(Users(self._settings.users))
-        app = page_app(self._settings, self._content, self.feed, sessions, self._backend)
+        cell_files = {cell.name: cell.file for cell in self._content.cells if cell.file is not None}
+        self._studies = StudyQueue(StudyStore(self._settings.studies), cell_files)
+        app = page_app(self._settings, self._content, self.feed, sessions, self._backend, self._studies)
         certificate, key = self._settings.certificate, self._settings.key
         config = uvicorn.Config(
             app,
@@ -121,6 +125,7 @@ class PageServer:
             await self._server.serve(sockets=[self._listener])
         finally:
             self.feed.close()
+            await self._studies.close()
 
     def _end(self) -> None:
         """End the streams first: the server waits for them."""

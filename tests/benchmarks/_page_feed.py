@@ -36,6 +36,12 @@ class Backend:
     async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
         raise NotImplementedError
 
+    async def accept_model(self, cell: str, extended: Path, actor: Actor) -> str:
+        raise NotImplementedError
+
+    async def restore_model(self, cell: str, actor: Actor) -> str:
+        raise NotImplementedError
+
 
 def cpu_s(thread: int) -> float:
     """Time that a thread of this process has spent computing, for itself and in the system."""
@@ -74,7 +80,7 @@ def main(cells: int, rate_hz: float) -> None:
     with tempfile.TemporaryDirectory() as directory:
         users = Path(directory) / "users.yaml"
         write_users(users, {"olga": User("olga", Role.OBSERVER, password="x")})
-        settings = PageSettings("http://127.0.0.1:0", users, Path(directory))
+        settings = PageSettings("http://127.0.0.1:0", users, Path(directory), Path(directory) / "studies")
         server = PageServer(settings, [CellFacts(name, "", "") for name in names], Backend())
         server.start()
         sys.stdout.write(json.dumps({"endpoint": server.endpoint}) + "\n")

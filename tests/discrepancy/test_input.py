@@ -11,7 +11,6 @@ import pytest
 
 from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign
-from impactcell.cli import discrepancy as command
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.prepared_campaign import prepare
 from impactcell.discrepancy.report.result import result_document
@@ -19,6 +18,7 @@ from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import MODEL
+from impactcell.process.progress import named_steps
 from impactcell.records import Capture, Channel
 from impactcell.settings.model_file import read_model
 from tests.discrepancy.study import strengths
@@ -174,7 +174,7 @@ class Terminal(io.StringIO):
 def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
     for stream, shown in ((Terminal(), True), (io.StringIO(), False)):
         monkeypatch.setattr("sys.stderr", stream)
-        with command._progress() as say:
+        with named_steps() as say:
             say("naming effects")
         assert ("naming effects" in stream.getvalue()) is shown
 

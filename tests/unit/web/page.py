@@ -2,13 +2,14 @@
 
 import asyncio
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import httpx
 
+from impactcell.process.background import VerbOutcome
 from impactcell.records import Alarm
 from impactcell.scada import Actor, ConditionAction, RefusedError, Role
 from impactcell.scada.conditions import event_id
@@ -17,6 +18,8 @@ from impactcell.web.app import page_app
 from impactcell.web.interface import CellFacts, CellNews, PageContent, PageSettings
 from impactcell.web.live_feed import LiveFeed
 from impactcell.web.sessions import SessionTable
+from impactcell.web.studies.queue import RunVerb, StudyQueue
+from impactcell.web.studies.study import StudyStore
 
 ADDRESS = "http://127.0.0.1:8480"
 CELL = "press-1"
@@ -32,6 +35,7 @@ class Backend:
     acted: list[tuple[str, str, ConditionAction, Actor]] = field(default_factory=list)
     trusted: list[str] = field(default_factory=list)
     logins: list[tuple[str, str]] = field(default_factory=list)
+    changed: list[tuple[str, str, str]] = field(default_factory=list)
     refuses: str = ""
 
     async def log_in(self, name: str, password: str, address: str) -> Actor:
@@ -46,10 +50,47 @@ class Backend:
             raise RefusedError(self.refuses)
         self.acted.append((cell, alarm, action, actor))
 
+    async def accept_model(self, cell: str, extended: Path, actor: Actor) -> str:
+        if self.refuses:
+            raise RefusedError("BadInvalidState", self.refuses)
+        self.changed.append((cell, extended.name, actor.user))
+        return "extended"
+
+    async def restore_model(self, cell: str, actor: Actor) -> str:
+        self.changed.append((cell, "", actor.user))
+        return "before"
+
     async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
         if self.refuses:
             raise RefusedError(self.refuses)
         self.trusted.append(thumbprint)
+
+
+@dataclass
+class Verbs:
+    """Runs no verb; remembers what it was asked to, and says what it was told to say."""
+
+    outcomes: dict[str, VerbOutcome] = field(default_factory=dict)
+    asked: list[list[str]] = field(default_factory=list)
+    held: asyncio.Event | None = None
+    """While it is there and not set, every verb waits for it."""
+    running: int = 0
+    most_at_once: int = 0
+
+    async def __call__(
+        self, arguments: Sequence[str], timeout_s: float, on_step: Callable[[str], None] | None = None
+    ) -> VerbOutcome:
+        self.asked.append(list(arguments))
+        self.running += 1
+        self.most_at_once = max(self.most_at_once, self.running)
+        try:
+            if on_step is not None:
+                on_step(f"doing {arguments[0]}")
+            if self.held is not None:
+                await self.held.wait()
+            return self.outcomes.get(arguments[0], VerbOutcome(0, "{}", ()))
+        finally:
+            self.running -= 1
 
 
 class Clock:
@@ -71,6 +112,7 @@ class Page:
     backend: Backend
     users: Path
     clock: Clock
+    studies: StudyQueue
 
     def client(self) -> httpx.AsyncClient:
         """A browser of its own: nobody is logged in."""
@@ -96,16 +138,18 @@ def raised(message: str = "friction is off", **changes: object) -> Alarm:
     )
 
 
-def make_page(directory: Path, journal: Path | None = None) -> Page:
+def make_page(directory: Path, journal: Path | None = None, verbs: RunVerb | None = None) -> Page:
     users = directory / "users.yaml"
     write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
     clock, backend = Clock(), Backend(users)
-    settings = PageSettings(ADDRESS, users, directory / "pki")
+    settings = PageSettings(ADDRESS, users, directory / "pki", directory / "studies")
     feed = LiveFeed([CELL])
     feed.start()
     facts = CellFacts(CELL, "127.0.0.1:502", "opc.tcp://127.0.0.1:4840", journal)
-    app = page_app(settings, PageContent((facts,)), feed, SessionTable(Users(users), clock), backend)
-    return Page(app, feed, backend, users, clock)
+    studies = StudyQueue(StudyStore(settings.studies), {CELL: directory / "press-1.yaml"}, verbs or Verbs())
+    sessions = SessionTable(Users(users), clock)
+    app = page_app(settings, PageContent((facts,)), feed, sessions, backend, studies)
+    return Page(app, feed, backend, users, clock, studies)
 
 
 async def put(page: Page, news: CellNews) -> None:

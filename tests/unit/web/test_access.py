@@ -1,8 +1,11 @@
 """Who may see and do what on the page: every address, every role, and all that must be refused."""
 
+import asyncio
+from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from impactcell.alarms import EventKind
@@ -13,6 +16,7 @@ from impactcell.web.interface import CellNews
 from impactcell.web.requests import MAX_FORM_BYTES
 from impactcell.web.security_headers import HEADERS
 from impactcell.web.sessions import IDLE_S, LONGEST_S
+from impactcell.web.studies.study import Acceptance, Stage, Study
 from tests.unit.web.page import (
     ADDRESS,
     CELL,
@@ -31,13 +35,31 @@ SHOWN = [view for view in VIEWS if view.path != "/live"]
 """The stream does not end by itself: it has tests of its own."""
 
 
+STUDY = "known-study"
+
+
 def address(path: str) -> str:
-    return path.replace("{cell}", CELL)
+    return path.replace("{cell}", CELL).replace("{study}", STUDY).replace("{name}", "result.json")
 
 
 @pytest.fixture
-async def page(tmp_path: Path) -> Page:
-    return make_page(tmp_path)
+async def page(tmp_path: Path) -> AsyncIterator[Page]:
+    """A page with a study that is done, and whose model could be accepted, or has been."""
+    results = tmp_path / "studies" / STUDY / "results"
+    results.mkdir(parents=True)
+    for name in ("result.json", "report.html"):
+        (results / name).write_text("{}")
+    study = Study(STUDY, "shots.csv", NAMES[Role.OPERATOR], 0, CELL, Stage.DONE, files={"shots.csv": 1})
+    study.result = {
+        "verdict": "named",
+        "headline": "Missing: it",
+        "effects": [{"effect": "it", "parameters": {}}],
+    }
+    study.acceptances = [Acceptance("accept", "eva", 0, "with it")]
+    (results.parent / "study.json").write_bytes(msgspec.json.encode(study))
+    page = make_page(tmp_path)
+    yield page
+    await page.studies.close()
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.path)
@@ -55,7 +77,7 @@ async def test_nobody_sees_anything_without_a_login(page: Page, view: View) -> N
 @pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.path)
 async def test_nobody_does_anything_without_a_login(page: Page, action: Action) -> None:
     async with page.client() as client:
-        answer = await client.post(action.path, data=acknowledgement(raised()))
+        answer = await client.post(address(action.path), data=acknowledgement(raised()))
     assert answer.status_code == 303
     assert answer.headers["location"] == "/login"
     assert not page.backend.acted
@@ -76,10 +98,14 @@ async def test_each_role_sees_what_it_may(page: Page, view: View, role: Role) ->
 async def test_each_role_does_what_it_may(page: Page, action: Action, role: Role) -> None:
     async with page.logged_in(role) as client:
         form = {"csrf": await csrf_of(client), "thumbprint": "AB", **acknowledgement(raised())}
-        answer = await client.post(action.path, data=form)
-    assert answer.status_code == (303 if role >= action.role else 403)
+        answer = await client.post(address(action.path), data=form | {"goal": "estimate"})
+        done = 201 if action.path == "/studies" else 303
+        assert answer.status_code == (done if role >= action.role else 403)
+        await asyncio.sleep(0)
     assert len(page.backend.acted) == (action.path == "/alarms/act" and role >= Role.OPERATOR)
     assert len(page.backend.trusted) == (action.path == "/system/trust" and role >= Role.ENGINEER)
+    changes_model = action.path.endswith(("/accept", "/restore"))
+    assert len(page.backend.changed) == (changes_model and role >= Role.ENGINEER)
 
 
 @pytest.mark.parametrize("token", ["", "guess", None])
@@ -87,7 +113,7 @@ async def test_each_role_does_what_it_may(page: Page, action: Action, role: Role
 async def test_a_form_without_its_token_is_refused(page: Page, action: Action, token: str | None) -> None:
     form = acknowledgement(raised()) | ({} if token is None else {"csrf": token})
     async with page.logged_in(Role.ENGINEER) as client:
-        answer = await client.post(action.path, data=form)
+        answer = await client.post(address(action.path), data=form)
         assert answer.status_code == 403
         assert (await client.get("/")).status_code == 200
     assert not page.backend.acted
@@ -296,7 +322,9 @@ async def test_every_answer_has_the_headers(page: Page, path: str) -> None:
 async def test_other_methods_are_refused(page: Page) -> None:
     async with page.logged_in(Role.ENGINEER) as client:
         for view in SHOWN:
-            for method in ("POST", "PUT", "DELETE"):
+            allowed = {"POST"} if view.path in {action.path for action in ACTIONS} else set()
+            for method in {"POST", "PUT", "DELETE"} - allowed:
                 assert (await client.request(method, address(view.path))).status_code == 405
         for action in ACTIONS:
-            assert (await client.get(action.path)).status_code == 405
+            if action.path not in {view.path for view in VIEWS}:
+                assert (await client.get(address(action.path))).status_code == 405

@@ -20,7 +20,7 @@ Streams = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 def server(tmp_path: Path) -> Iterator[PageServer]:
     users = tmp_path / "users.yaml"
     write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
-    settings = PageSettings("http://127.0.0.1:0", users, tmp_path / "pki")
+    settings = PageSettings("http://127.0.0.1:0", users, tmp_path / "pki", tmp_path / "studies")
     server = PageServer(settings, [CellFacts(CELL, "m", "o")], Backend(users))
     server.start()
     yield server

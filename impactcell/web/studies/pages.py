@@ -1,0 +1,228 @@
+"""The pages of studies: drop files, confirm what was read, see what came out, put its model into service."""
+
+import asyncio
+from pathlib import Path
+from typing import Final
+
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
+
+from impactcell.scada import RefusedError, Role
+from impactcell.web.page_context import PageContext
+from impactcell.web.requests import RequestRefusedError
+from impactcell.web.sessions import BrowserSession
+from impactcell.web.studies.study import Acceptance, Goal, Stage, Study
+from impactcell.web.studies.upload import KINDS, MAX_FILES, receive, safe_name
+
+MAX_TITLE: Final = 80
+"""Longest title, in characters."""
+MAX_RECEIVING: Final = 5
+"""Files that are received at once: each holds a connection, and they share one disk."""
+DOWNLOADS: Final = ("result.json", "model.extended.yaml", "report.html", "friction.csv")
+"""Files of a result that can be taken home."""
+REPORT_POLICY: Final = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'self'; sandbox"
+)
+"""What a report may do: show itself. It has its own style and pictures inside, and needs nothing else."""
+
+
+async def studies(context: PageContext, request: Request, session: BrowserSession) -> Response:
+    """List the studies, and offer to drop files."""
+    queue = context.studies
+    listed = [(study, queue.place(study)) for study in queue.store]
+    return context.page(request, "studies.html.j2", session, studies=listed, kinds=",".join(sorted(KINDS)))
+
+
+async def begin(context: PageContext, _: Request, session: BrowserSession, form: dict[str, str]) -> Response:
+    """Begin a study; its files come next."""
+    cell = form.get("cell", "")
+    if cell and context.content.find(cell) is None:
+        raise RequestRefusedError(404, "error_not_found")
+    if context.studies.is_full:
+        raise RequestRefusedError(503, "error_queue_full")
+    title = "".join(c for c in form.get("title", "") if c.isprintable()).strip()[:MAX_TITLE]
+    try:
+        study = await asyncio.to_thread(
+            context.studies.store.begin, title or "data", session.actor.user, cell
+        )
+    except OSError as error:
+        raise RequestRefusedError(507, "error_no_room") from error
+    return JSONResponse({"id": study.id}, 201)
+
+
+async def upload(context: PageContext, request: Request, _: BrowserSession) -> Response:
+    """Receive one file of a study."""
+    study = _study(context, request)
+    if study.stage is not Stage.RECEIVING:
+        raise RequestRefusedError(409, "error_study_stage")
+    name = safe_name(request.query_params.get("name", ""))
+    if len(study.files) >= MAX_FILES or name in study.files:
+        raise RequestRefusedError(409, "error_file_there" if name in study.files else "error_too_many_files")
+    if len(context.receiving) >= MAX_RECEIVING:
+        raise RequestRefusedError(503, "error_queue_full")
+    target = context.studies.store.files(study) / name
+    study.files = {**study.files, name: 0}
+    context.receiving.add(target)
+    try:
+        size = await receive(request, target, sum(study.files.values()))
+        study.files = {**study.files, name: size}
+    except ClientDisconnect:
+        return Response(status_code=400)  # nobody reads it
+    finally:
+        context.receiving.discard(target)
+        if not study.files[name]:
+            study.files = {other: size for other, size in study.files.items() if other != name}
+    context.studies.store.save(study)
+    return JSONResponse({"name": name, "size": size}, 201)
+
+
+async def read(context: PageContext, request: Request, _: BrowserSession, form: dict[str, str]) -> Response:
+    """Have the files read, with what was chosen of columns and units."""
+    study = _study(context, request)
+    if study.is_working or not study.files:
+        raise RequestRefusedError(409, "error_study_stage")
+    study.choices = {name: value.strip() for name, value in form.items() if name != "csrf" and value.strip()}
+    _enqueue_allowed(context)
+    context.studies.read(study)
+    return _to(study)
+
+
+async def run(context: PageContext, request: Request, _: BrowserSession, form: dict[str, str]) -> Response:
+    """Have it studied: what was read is confirmed."""
+    study = _study(context, request)
+    try:
+        goal = Goal(form.get("goal", ""))
+    except ValueError as error:
+        raise RequestRefusedError(400, "error_form") from error
+    if study.stage not in (Stage.CONFIRMING, Stage.DONE) or study.is_working or study.faults:
+        raise RequestRefusedError(409, "error_study_stage")
+    _enqueue_allowed(context)
+    context.studies.begin(study, goal)
+    return _to(study)
+
+
+async def study(context: PageContext, request: Request, session: BrowserSession) -> Response:
+    """Show one study."""
+    return _rendered(context, request, session, "study.html.j2")
+
+
+async def study_state(context: PageContext, request: Request, session: BrowserSession) -> Response:
+    """Show what changes of one study alone, for a page that brings itself up to date."""
+    return _rendered(context, request, session, "_study.html.j2")
+
+
+def _rendered(context: PageContext, request: Request, session: BrowserSession, template: str) -> Response:
+    shown = _study(context, request)
+    may_accept = (
+        session.actor.role >= Role.ENGINEER
+        and bool(shown.cell and shown.result.get("effects"))
+        and not shown.is_working
+    )
+    return context.page(
+        request,
+        template,
+        session,
+        study=shown,
+        place=context.studies.place(shown),
+        may_accept=may_accept,
+        has_report=(context.studies.store.results(shown) / "report.html").is_file(),
+    )
+
+
+async def report(context: PageContext, request: Request, _: BrowserSession) -> Response:
+    """Give the report, which may do nothing but show itself."""
+    path = context.studies.store.results(_study(context, request)) / "report.html"
+    response = _file(path, "text/html; charset=utf-8")
+    response.headers["content-security-policy"] = REPORT_POLICY
+    return response
+
+
+async def download(context: PageContext, request: Request, _: BrowserSession) -> Response:
+    """Give a file of the result."""
+    name = request.path_params["name"]
+    if name not in DOWNLOADS:
+        raise RequestRefusedError(404, "error_not_found")
+    response = _file(
+        context.studies.store.results(_study(context, request)) / name, "application/octet-stream"
+    )
+    response.headers["content-disposition"] = f'attachment; filename="{name}"'
+    return response
+
+
+async def accept(
+    context: PageContext, request: Request, session: BrowserSession, _: dict[str, str]
+) -> Response:
+    """Put the extended model into service in the study's cell."""
+    return await _change_model(context, request, session, "accept")
+
+
+async def restore(
+    context: PageContext, request: Request, session: BrowserSession, _: dict[str, str]
+) -> Response:
+    """Put the model back into service that was there before."""
+    return await _change_model(context, request, session, "restore")
+
+
+async def _change_model(
+    context: PageContext, request: Request, session: BrowserSession, action: str
+) -> Response:
+    study = _study(context, request)
+    extended = context.studies.store.results(study) / "model.extended.yaml"
+    is_possible = study.is_accepted if action == "restore" else bool(study.result.get("effects"))
+    if study.is_working or not study.cell or not is_possible:
+        raise RequestRefusedError(409, "error_study_stage")
+    study.accepting, study.faults = action, []
+
+    async def change() -> None:
+        try:
+            actor = session.actor
+            if action == "accept":
+                model = await context.backend.accept_model(study.cell, extended, actor)
+            else:
+                model = await context.backend.restore_model(study.cell, actor)
+            done = Acceptance(action, actor.user, context.now_ms(), model)
+            study.acceptances = [*study.acceptances, done]
+        except RefusedError as error:
+            study.faults = str(error).splitlines()
+        finally:
+            study.accepting = ""
+            context.studies.store.save(study)
+
+    context.beside(change())
+    return _to(study)
+
+
+async def remove(
+    context: PageContext, request: Request, session: BrowserSession, _: dict[str, str]
+) -> Response:
+    """Forget a study; who began it may, and engineers."""
+    study = _study(context, request)
+    if study.user != session.actor.user and session.actor.role < Role.ENGINEER:
+        raise RequestRefusedError(403, "error_role")
+    if study.accepting:
+        raise RequestRefusedError(409, "error_study_stage")
+    context.studies.forget(study)
+    await asyncio.to_thread(context.studies.store.remove, study)
+    return RedirectResponse("/studies", 303)
+
+
+def _enqueue_allowed(context: PageContext) -> None:
+    if context.studies.is_full:
+        raise RequestRefusedError(503, "error_queue_full")
+
+
+def _study(context: PageContext, request: Request) -> Study:
+    study = context.studies.store.find(request.path_params["study"])
+    if study is None:
+        raise RequestRefusedError(404, "error_not_found")
+    return study
+
+
+def _file(path: Path, media_type: str) -> Response:
+    if not path.is_file():
+        raise RequestRefusedError(404, "error_not_found")
+    return FileResponse(path, media_type=media_type)
+
+
+def _to(study: Study) -> Response:
+    return RedirectResponse(f"/studies/{study.id}", 303)

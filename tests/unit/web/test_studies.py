@@ -1,0 +1,407 @@
+"""Measurements that are dropped: received within limits, studied one after the other, shown without harm."""
+
+import asyncio
+import csv
+import io
+import json
+import shutil
+import zipfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from impactcell.errors import CampaignError
+from impactcell.process.background import VerbOutcome
+from impactcell.scada import Role
+from impactcell.web.studies import archive, pages, upload
+from impactcell.web.studies.archive import unpack_campaign
+from impactcell.web.studies.pages import REPORT_POLICY
+from impactcell.web.studies.queue import MAX_WAITING
+from impactcell.web.studies.study import Stage, Study, StudyStore
+from impactcell.web.studies.upload import safe_name
+from tests.unit.web.page import CELL, Page, Verbs, csrf_of, make_page
+
+RESULT = {
+    "verdict": "named",
+    "headline": "Missing: viscous friction.",
+    "effects": [{"effect": "viscous_friction", "parameters": {"c": {"value": 60.1, "ci95": [57.0, 63.0]}}}],
+    "model": "model.extended.yaml",
+}
+CHANGES = {"before": "old", "after": "new", "changes": [{"parameter": "mu_s", "before": 0.2, "after": 0.21}]}
+
+
+def campaign_zip(below: str = "", **extra: bytes) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr(f"{below}campaign.yaml", "format: 1\n")
+        packed.writestr(f"{below}shots.csv", "shot,velocity_mm_per_min,mass_kg\n1,4000,2.5\n2,5000,3\n")
+        for shot in (1, 2):
+            packed.writestr(f"{below}traces/{shot}.csv", "time_s,force_n,position_m\n0,0,0\n")
+        for name, data in extra.items():
+            packed.writestr(name.replace("__", "/"), data)
+    return content.getvalue()
+
+
+@pytest.fixture
+def verbs() -> Verbs:
+    return Verbs(
+        {
+            "discrepancy": VerbOutcome(0, json.dumps(RESULT), ()),
+            "model": VerbOutcome(0, json.dumps(CHANGES), ()),
+        }
+    )
+
+
+@pytest.fixture
+async def page(tmp_path: Path, verbs: Verbs) -> AsyncIterator[Page]:
+    page = make_page(tmp_path, verbs=verbs)
+    yield page
+    await page.studies.close()
+
+
+async def drop(
+    client: httpx.AsyncClient, name: str, data: bytes, *, cell: str = CELL, read: bool = True
+) -> tuple[str, httpx.Response]:
+    """Do what the script does: begin a study, send a file, have it read."""
+    csrf = await csrf_of(client)
+    begun = await client.post("/studies", data={"csrf": csrf, "cell": cell, "title": name})
+    study: str = begun.json()["id"]
+    answer = await client.put(
+        f"/studies/{study}/files", params={"name": name}, content=data, headers={"x-csrf-token": csrf}
+    )
+    if answer.status_code == 201 and read:
+        assert (await client.post(f"/studies/{study}/read", data={"csrf": csrf})).status_code == 303
+    return study, answer
+
+
+async def until(page: Page, study: str, *stages: Stage) -> Study:
+    async with asyncio.timeout(20):
+        while True:
+            found = page.studies.store.find(study)
+            assert found is not None
+            if found.stage in stages and not found.is_working:
+                return found
+            await asyncio.sleep(0.005)
+
+
+async def test_a_campaign_is_dropped_confirmed_and_studied(page: Page, verbs: Verbs) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip("tuesday/"))
+        found = await until(page, study, Stage.CONFIRMING)
+        assert found.overview["shots"] == 2
+        text = (await client.get(f"/studies/{study}")).text
+        assert "2 shots, 2.5–3 kg, 4000–5000 mm/min" in text
+        assert "force_n [N]" in text
+        assert verbs.asked == []
+        data = {"csrf": await csrf_of(client), "goal": "discrepancy"}
+        assert (await client.post(f"/studies/{study}/run", data=data)).status_code == 303
+        found = await until(page, study, Stage.DONE)
+        text = (await client.get(f"/studies/{study}")).text
+    assert [arguments[0] for arguments in verbs.asked] == ["discrepancy", "model"]
+    assert verbs.asked[0][-2:] == ["--cell", str(page.users.parent / "press-1.yaml")]
+    assert [name for name, _ in found.steps] == [
+        "discrepancy",
+        "doing discrepancy",
+        "model accept",
+        "doing model",
+    ]
+    assert "Missing: viscous friction." in text
+    assert 'data-effect="viscous_friction"' in text
+    assert "<code>mu_s</code>" in text
+    assert "/accept" not in text, "an operator accepts nothing"
+
+
+async def test_an_engineer_accepts_and_takes_back(page: Page) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip())
+        await until(page, study, Stage.CONFIRMING)
+        csrf = {"csrf": await csrf_of(client)}
+        assert (await client.post(f"/studies/{study}/accept", data=csrf)).status_code == 409
+        await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
+        await until(page, study, Stage.DONE)
+        assert (await client.post(f"/studies/{study}/restore", data=csrf)).status_code == 409
+        for action, undone in (("accept", "/restore"), ("restore", "/accept")):
+            assert (await client.post(f"/studies/{study}/{action}", data=csrf)).status_code == 303
+            await until(page, study, Stage.DONE)
+            assert f'action="/studies/{study}{undone}"' in (await client.get(f"/studies/{study}/state")).text
+        page.backend.refuses = "part would not slide"
+        await client.post(f"/studies/{study}/accept", data=csrf)
+        found = await until(page, study, Stage.DONE)
+    assert page.backend.changed == [(CELL, "model.extended.yaml", "eva"), (CELL, "", "eva")]
+    assert [done.action for done in found.acceptances] == ["accept", "restore"]
+    assert found.faults == ["part would not slide"]
+
+
+async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip(), cell="")
+        await until(page, study, Stage.CONFIRMING)
+        results = page.studies.store.results(page.studies.store.find(study))  # type: ignore[arg-type]
+        results.mkdir()
+        rows = [
+            {"shot": n, "mu_s": 0.2 + 0.01 * n, "mu_s_std": 0.001, "mu_k": "", "quality": "good"}
+            for n in (1, 2)
+        ]
+        with (results / "friction.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, rows[0])
+            writer.writeheader()
+            writer.writerows(rows)
+        await client.post(f"/studies/{study}/run", data={"csrf": await csrf_of(client), "goal": "estimate"})
+        found = await until(page, study, Stage.DONE)
+        assert found.result["mu_s"] == pytest.approx({"mean": 0.215, "spread": 0.00707, "n": 2}, abs=1e-5)
+        assert "0.215" in (await client.get(f"/studies/{study}")).text
+        assert (await client.get(f"/studies/{study}/files/friction.csv")).text.startswith("shot,")
+    assert "--cell" not in verbs.asked[0]
+
+
+async def test_faults_of_a_verb_are_shown_with_their_rows(page: Page, verbs: Verbs) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "run.csv", b"a,b\n1,x\n", read=False)
+        place = page.studies.store.files(page.studies.store.find(study))  # type: ignore[arg-type]
+        verbs.outcomes["import"] = VerbOutcome(2, "", (f"{place}/run.csv:2: 'x' is no number", "<b>&</b>"))
+        await client.post(f"/studies/{study}/read", data={"csrf": await csrf_of(client)})
+        await until(page, study, Stage.FAILED)
+        text = (await client.get(f"/studies/{study}")).text
+        assert "<li>run.csv:2: &#39;x&#39; is no number</li>" in text
+        assert "&lt;b&gt;&amp;&lt;/b&gt;" in text
+        answer = await client.post(
+            f"/studies/{study}/run", data={"csrf": await csrf_of(client), "goal": "estimate"}
+        )
+        assert answer.status_code == 409
+        choices = {"csrf": await csrf_of(client), "column.force": "a", "unit.a": "kN", "set.mass": "2 kg"}
+        await client.post(f"/studies/{study}/read", data=choices)
+        await until(page, study, Stage.FAILED)
+    assert verbs.asked[-1][-3:] == ["--column=force=a", "--unit=a=kN", "--set=mass=2kg"]
+
+
+async def test_ten_at_once_are_done_one_after_the_other(page: Page, verbs: Verbs) -> None:
+    verbs.held = asyncio.Event()
+    async with page.logged_in(Role.OPERATOR) as client:
+        ids = [(await drop(client, "shots.csv", b"1\n"))[0] for _ in range(10)]
+        await asyncio.sleep(0)
+        places = [page.studies.place(page.studies.store.find(study)) for study in ids]  # type: ignore[arg-type]
+        assert places == list(range(10))
+        assert "in the queue, place 9" in (await client.get(f"/studies/{ids[-1]}")).text
+        for _ in range(MAX_WAITING - 9):
+            await drop(client, "shots.csv", b"1\n")
+        refused = await client.post("/studies", data={"csrf": await csrf_of(client)})
+        assert refused.status_code == 503
+        verbs.held.set()
+        for study in ids:
+            await until(page, study, Stage.CONFIRMING, Stage.FAILED)
+    assert verbs.most_at_once == 1
+
+
+async def test_what_is_removed_ends_and_the_next_one_begins(page: Page, verbs: Verbs) -> None:
+    verbs.held = asyncio.Event()
+    async with page.logged_in(Role.OPERATOR) as client, page.logged_in(Role.OBSERVER) as other:
+        (first, _), (second, _) = [await drop(client, "shots.csv", b"1\n") for _ in range(2)]
+        await asyncio.sleep(0)
+        data = {"csrf": await csrf_of(other)}
+        assert (await other.post(f"/studies/{first}/remove", data=data)).status_code == 403
+        data = {"csrf": await csrf_of(client)}
+        assert (await client.post(f"/studies/{first}/remove", data=data)).status_code == 303
+        assert (await client.get(f"/studies/{first}")).status_code == 404
+        verbs.held.set()
+        await until(page, second, Stage.CONFIRMING, Stage.FAILED)
+    assert not (page.users.parent / "studies" / first).exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [
+        ("../../etc/passwd.csv", "passwd.csv"),
+        ("C:\\data\\März 3.CSV", "Marz_3.csv"),
+        ("<script>alert(1)</script>.csv", "script_.csv"),
+        (".csv", "data.csv"),
+        ("-rf.csv", "rf.csv"),
+        ("a" * 300 + ".csv", "a" * 76 + ".csv"),
+        ("a\x00b\n.tdms", "a_b_.tdms"),
+    ],
+)
+def test_names_are_made_harmless(name: str, kept: str) -> None:
+    assert safe_name(name) == kept
+
+
+@pytest.mark.parametrize("name", ["", "data", "run.exe", "run.csv.sh", "run.yaml", "campaign/"])
+async def test_other_kinds_are_refused(page: Page, name: str) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        _, answer = await drop(client, name, b"x")
+    assert answer.status_code == 415
+    assert answer.json() == {"error": "Files of this kind cannot be read."}
+
+
+async def test_who_may_not_sends_nothing(page: Page) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "a.csv", b"1", read=False)
+        address = f"/studies/{study}/files?name=b.csv"
+        csrf = await csrf_of(client)
+        for headers in ({}, {"x-csrf-token": "guess"}, {"x-csrf-token": csrf, "origin": "http://elsewhere"}):
+            assert (await client.put(address, content=b"x", headers=headers)).status_code == 403
+    async with page.logged_in(Role.OBSERVER) as client:
+        headers = {"x-csrf-token": await csrf_of(client)}
+        assert (await client.put(address, content=b"x", headers=headers)).status_code == 403
+    async with page.client() as client:
+        assert (await client.put(address, content=b"x")).status_code == 401
+    found = page.studies.store.find(study)
+    assert found is not None
+    assert list(found.files) == ["a.csv"]
+
+
+async def test_too_large_too_much_and_twice(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(upload, "MAX_BYTES", 100)
+
+    async def endless() -> AsyncIterator[bytes]:
+        for _ in range(1000):
+            yield b"x" * 30
+
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "a.csv", b"x" * 60, read=False)
+        headers = {"x-csrf-token": await csrf_of(client)}
+        send: dict[str, Any] = {"url": f"/studies/{study}/files", "headers": headers}
+        assert (await client.put(**send, params={"name": "a.csv"}, content=b"1")).status_code == 409
+        assert (await client.put(**send, params={"name": "b.csv"}, content=b"x" * 60)).status_code == 413
+        assert (await client.put(**send, params={"name": "b.csv"}, content=endless())).status_code == 413
+        assert (await client.put(**send, params={"name": "b.csv"}, content=b"")).status_code == 400
+        monkeypatch.setattr(upload, "ROOM_LEFT_BYTES", 10**18)
+        assert (await client.put(**send, params={"name": "b.csv"}, content=b"x")).status_code == 507
+        monkeypatch.setattr(pages, "MAX_FILES", 1)
+        assert (await client.put(**send, params={"name": "b.csv"}, content=b"x")).status_code == 409
+    kept = page.users.parent / "studies" / study / "files"
+    assert [path.name for path in kept.iterdir()] == ["a.csv"]
+
+
+async def test_an_upload_that_stalls_or_breaks_off_leaves_nothing(
+    page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(upload, "STALLED_S", 0.02)
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "a.csv", b"x", read=False)
+        cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+        csrf = await csrf_of(client)
+    for last, status in ((None, 408), ({"type": "http.disconnect"}, 400)):
+        sent: list[Any] = []
+        messages = [{"type": "http.request", "body": b"half", "more_body": True}, last]
+
+        async def receive(messages: list[Any] = messages) -> Any:
+            message = messages.pop(0)
+            return message if message is not None else await asyncio.Event().wait()
+
+        async def send(message: Any, sent: list[Any] = sent) -> None:
+            sent.append(message)
+
+        headers = {"host": "127.0.0.1:8480", "cookie": cookie, "x-csrf-token": csrf}
+        scope = {
+            "type": "http", "method": "PUT", "path": f"/studies/{study}/files", "query_string": b"name=b.csv",
+            "headers": [(k.encode(), v.encode()) for k, v in headers.items()], "http_version": "1.1",
+            "scheme": "http", "server": ("127.0.0.1", 8480), "client": ("127.0.0.1", 1), "root_path": "",
+        }  # fmt: skip
+        await page.app(scope, receive, send)  # type: ignore[operator]
+        assert sent[0]["status"] == status
+    found = page.studies.store.find(study)
+    assert found is not None
+    assert list(found.files) == ["a.csv"]
+    assert [path.name for path in page.studies.store.files(found).iterdir()] == ["a.csv"]
+
+
+def bomb() -> bytes:
+    return campaign_zip(traces__3=b"", **{"traces__4.csv": b"0" * 50_000_000})
+
+
+def lying() -> bytes:
+    """An archive whose directory says less than what comes of it."""
+    data = bytearray(campaign_zip(**{"traces__3.csv": b"7" * 1000}))
+    at = data.rindex(b"traces/3.csv") - 46
+    data[at + 24 : at + 28] = (10).to_bytes(4, "little")
+    return bytes(data)
+
+
+def many() -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as packed:
+        for number in range(archive.MAX_MEMBERS + 1):
+            packed.writestr(f"traces/{number}.csv", b"")
+        packed.writestr("campaign.yaml", b"")
+    return content.getvalue()
+
+
+@pytest.mark.parametrize(
+    "data",
+    [bomb(), lying(), many(), b"no zip at all", campaign_zip()[:200], b"PK\x03\x04" + b"\0" * 500],
+    ids=["bomb", "lying", "many", "text", "cut off", "zeros"],
+)
+async def test_archives_that_are_refused(page: Page, data: bytes) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, answer = await drop(client, "shots.zip", data)
+        assert answer.status_code == 201
+        found = await until(page, study, Stage.FAILED)
+    assert found.faults
+    assert "fault of this program" not in found.faults[0]
+    assert sum(path.stat().st_size for path in (page.users.parent / "studies").rglob("*.csv")) < 20_000_000
+
+
+def test_nothing_is_unpacked_elsewhere(tmp_path: Path) -> None:
+    target = tmp_path / "a" / "campaign"
+    path = tmp_path / "shots.zip"
+    extra = {"..__..__evil.csv": b"x", "__etc__passwd": b"x", "traces__.._.csv": b"x", "readme.txt": b"x"}
+    path.write_bytes(campaign_zip(**extra))
+    unpack_campaign(path, target)
+    written = sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file())
+    assert written == [
+        *("a/campaign/campaign.yaml", "a/campaign/shots.csv"),
+        *("a/campaign/traces/1.csv", "a/campaign/traces/2.csv", "shots.zip"),
+    ]
+    twice = tmp_path / "twice.zip"
+    shutil.copy(path, twice)
+    with zipfile.ZipFile(twice, "a") as packed, pytest.warns(UserWarning, match="Duplicate"):
+        packed.writestr("shots.csv", b"another")
+    with pytest.raises(CampaignError, match="twice"):
+        unpack_campaign(twice, tmp_path / "b")
+
+
+async def test_a_report_can_do_nothing(page: Page) -> None:
+    async with page.logged_in(Role.OBSERVER) as client:
+        store = page.studies.store
+        study = store.begin("<script>owned()</script>", "otto", CELL)
+        store.results(study).mkdir()
+        (store.results(study) / "report.html").write_text("<script>owned()</script>")
+        study.stage, study.result = Stage.DONE, RESULT | {"headline": "<script>owned()</script>"}
+        answer = await client.get(f"/studies/{study.id}/report")
+        shown = await client.get(f"/studies/{study.id}")
+        listed = await client.get("/studies")
+        for name in ("study.json", "..%2fstudy.json", "model.extended.yaml"):
+            assert (await client.get(f"/studies/{study.id}/files/{name}")).status_code == 404
+    assert answer.headers["content-security-policy"] == REPORT_POLICY
+    assert "script-src" not in REPORT_POLICY
+    assert REPORT_POLICY.endswith("sandbox")
+    for page_shown in (shown, listed):
+        assert "<script>owned" not in page_shown.text
+        assert "script-src 'self'" in page_shown.headers["content-security-policy"]
+
+
+async def test_a_restart_keeps_what_is_done_and_says_what_was_not(tmp_path: Path) -> None:
+    store = StudyStore(tmp_path)
+    done, open_ = store.begin("done", "otto", CELL), store.begin("open", "otto", CELL)
+    done.stage, done.result, open_.stage = Stage.DONE, RESULT, Stage.STUDYING
+    for study in (done, open_):
+        store.save(study)
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "study.json").write_text("{")
+    again = {study.title: study for study in StudyStore(tmp_path)}
+    assert sorted(again) == ["done", "open"]
+    assert again["done"].result == RESULT
+    assert again["open"].stage is Stage.FAILED
+    assert again["open"].faults == ["the service was restarted meanwhile"]
+
+
+def test_the_oldest_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("impactcell.web.studies.study.KEPT_STUDIES", 3)
+    store = StudyStore(tmp_path)
+    for number in range(6):
+        study = store.begin(str(number), "otto", CELL)
+        study.created_ms, study.stage = number, Stage.DONE
+    assert [study.title for study in store] == ["5", "4", "3"]
+    assert len(list(tmp_path.iterdir())) == 3
