@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from impactcell.errors import MeasurementError
+from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements import (
     Dialect,
     Imported,
@@ -73,7 +73,15 @@ def import_files(
     mapping = guess(tables, given)
     if not as_json:
         _print_guess(tables, mapping)
-    imported = make_campaign(tables, mapping) if output is None else write_campaign(tables, mapping, output)
+    try:
+        imported = (
+            make_campaign(tables, mapping) if output is None else write_campaign(tables, mapping, output)
+        )
+    except (MeasurementError, CampaignError) as error:
+        if as_json:  # what was understood, for whoever has to put the rest right
+            faults = {**_understood(tables, mapping), "faults": str(error).splitlines()}
+            print_result(json.dumps(faults, ensure_ascii=False, indent=1))
+        raise
     if as_json:
         print_result(json.dumps(_summary(tables, mapping, imported, output), ensure_ascii=False, indent=1))
         return
@@ -126,9 +134,7 @@ def _plain(text: str) -> str:
     return "".join(sign if sign.isprintable() else "�" for sign in text).replace("[", "\\[")
 
 
-def _summary(
-    tables: Sequence[Table], mapping: Mapping, imported: Imported, output: Path | None
-) -> dict[str, Any]:
+def _understood(tables: Sequence[Table], mapping: Mapping) -> dict[str, Any]:
     return {
         "tables": [{"name": table.title, "rows": len(table), "notes": list(table.notes)} for table in tables],
         "columns": [
@@ -141,6 +147,14 @@ def _summary(
             }
             for item in mapping.assignments
         ],
+    }
+
+
+def _summary(
+    tables: Sequence[Table], mapping: Mapping, imported: Imported, output: Path | None
+) -> dict[str, Any]:
+    return {
+        **_understood(tables, mapping),
         "excitation": str(imported.campaign.excitation),
         "shots": len(imported.campaign.shots),
         "notes": list(imported.notes),

@@ -10,7 +10,7 @@ from impactcell.web.sessions import BrowserSession, SessionTable
 
 MAX_FORM_BYTES: Final = 16_384
 """Longest form: a comment, percent-encoded, with room to spare."""
-MAX_FIELDS: Final = 32
+MAX_FIELDS: Final = 64
 """Fields of a form."""
 CSRF_FIELD: Final = "csrf"
 

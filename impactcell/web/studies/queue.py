@@ -178,13 +178,13 @@ def import_options(choices: Mapping[str, str]) -> list[str]:
     A field is named `column.QUANTITY`, `unit.COLUMN`, `set.NAME`, or as an option itself.
 
     >>> import_options({"column.force": "F1", "unit.F1": "kN", "set.mass": "2 kg", "trigger": ""})
-    ['--column=force=F1', '--unit=F1=kN', '--set=mass=2kg']
+    ['--column=force=F1', '--unit=F1=kN', '--set=mass=2 kg']
     """
     options = []
     for field, value in choices.items():
         option, _, name = field.partition(".")
         if value and name:
-            options.append(f"--{option}={name}={value.replace(' ', '') if option == 'set' else value}")
+            options.append(f"--{option}={name}={value}")
         elif value:
             options.append(f"--{option}={value}")
     return options

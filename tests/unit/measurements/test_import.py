@@ -168,6 +168,11 @@ def test_the_verb_shows_what_it_guessed_and_writes(
     back = campaign.read(tmp_path / "c")
     assert back.stroke_m == pytest.approx(1.5e-3)
     assert {shot.mass_kg for shot in back.shots} == {12.6}
+    with pytest.raises(MeasurementError, match="time"):
+        run_verb(["import", *named, "--dry-run", "--json", "--column", "time=Kraft"])
+    understood = json.loads(capsys.readouterr().out)
+    assert understood["faults"]
+    assert [c["column"] for c in understood["columns"]] == ["Zeit", "Kraft", "Weg"]
     with pytest.raises(MeasurementError, match="mass is '12'; write it with its unit"):
         run_verb(["import", *named, "--dry-run", "--set", "mass=12"])
     with pytest.raises(MeasurementError, match="say where to write"):

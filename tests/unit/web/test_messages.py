@@ -45,7 +45,7 @@ def test_every_condition_role_theme_and_span_has_a_name() -> None:
 def test_no_text_is_left_over_or_missing() -> None:
     everything = sources("templates/*.j2", "*.py", "studies/*.py", "static/*.js")
     asked = set(re.findall(r't\["(\w+)"\]|t\[\'(\w+)\'\]', sources("templates/*.j2")))
-    assert {a or b for a, b in asked} <= set(CATALOGUE) | {"theme_", "span_", "stage_", "did_"}
+    assert {a or b for a, b in asked} <= set(CATALOGUE) | {"theme_", "span_", "stage_", "did_", "all_"}
     scripts = sources("static/*.js")
     assert set(re.findall(r"texts\.(\w+)", scripts)) <= set(Messages("en").for_script())
     by_name = {
@@ -55,7 +55,14 @@ def test_no_text_is_left_over_or_missing() -> None:
         *(f"live_{estimator.value}" for estimator in Estimator),
         *(f"folder_{folder}" for folder in FOLDERS),
         *(f"stage_{stage.value}" for stage in Stage),
-        *("did_accept", "did_restore", *(role.name.lower() for role in Role)),
+        *(
+            "did_accept",
+            "did_restore",
+            "all_mass",
+            "all_velocity",
+            "all_stroke",
+            *(role.name.lower() for role in Role),
+        ),
     }
     for key in CATALOGUE:
         word = key.removeprefix("live_")

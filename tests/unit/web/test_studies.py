@@ -161,20 +161,26 @@ async def test_faults_of_a_verb_are_shown_with_their_rows(page: Page, verbs: Ver
     async with page.logged_in(Role.OPERATOR) as client:
         study, _ = await drop(client, "run.csv", b"a,b\n1,x\n", read=False)
         place = page.studies.store.files(page.studies.store.find(study))  # type: ignore[arg-type]
-        verbs.outcomes["import"] = VerbOutcome(2, "", (f"{place}/run.csv:2: 'x' is no number", "<b>&</b>"))
+        columns = [{"column": "<a>", "quantity": "force", "unit": None, "why": "?", "confidence": 0.2}]
+        understood = json.dumps({"columns": columns, "faults": ["no unit"]})
+        verbs.outcomes["import"] = VerbOutcome(
+            2, understood, (f"{place}/run.csv:2: 'x' is no number", "<b>&</b>")
+        )
         await client.post(f"/studies/{study}/read", data={"csrf": await csrf_of(client)})
-        await until(page, study, Stage.FAILED)
+        await until(page, study, Stage.CONFIRMING)
         text = (await client.get(f"/studies/{study}")).text
         assert "<li>run.csv:2: &#39;x&#39; is no number</li>" in text
         assert "&lt;b&gt;&amp;&lt;/b&gt;" in text
+        assert "<code>&lt;a&gt;</code>" in text
+        assert 'name="unit.&lt;a&gt;"' in text
         answer = await client.post(
             f"/studies/{study}/run", data={"csrf": await csrf_of(client), "goal": "estimate"}
         )
         assert answer.status_code == 409
         choices = {"csrf": await csrf_of(client), "column.force": "a", "unit.a": "kN", "set.mass": "2 kg"}
         await client.post(f"/studies/{study}/read", data=choices)
-        await until(page, study, Stage.FAILED)
-    assert verbs.asked[-1][-3:] == ["--column=force=a", "--unit=a=kN", "--set=mass=2kg"]
+        await until(page, study, Stage.CONFIRMING)
+    assert verbs.asked[-1][-3:] == ["--column=force=a", "--unit=a=kN", "--set=mass=2 kg"]
 
 
 async def test_ten_at_once_are_done_one_after_the_other(page: Page, verbs: Verbs) -> None:
