@@ -5,7 +5,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from impactcell.records import BatchState, Evidence, FrictionEstimate, Quality, Signature, WearState
+from impactcell.records import (
+    BatchState,
+    Evidence,
+    FrictionEstimate,
+    Quality,
+    Signature,
+    TapPredictions,
+    WearState,
+)
 
 
 class ConditionClass(enum.Enum):
@@ -106,6 +114,8 @@ class CycleInputs:
         Of the signature, where the cycle deviates; `judged` says whether that could be told.
     gap : Evidence
         Of the model's residual; `gap_exceeds` None while the usual one is being learned.
+    predictions : TapPredictions or None
+        What positioning taps say of the model.
     false_alarm_cycles, period_s : float
         Designed mean number of cycles between false alarms, mean time between cycles; nan: not known.
     """
@@ -121,6 +131,7 @@ class CycleInputs:
     judged: bool = False
     gap: Evidence = NO_EVIDENCE
     gap_exceeds: bool | None = None
+    predictions: TapPredictions | None = None
     false_alarm_cycles: float = math.nan
     period_s: float = math.nan
 

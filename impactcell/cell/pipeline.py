@@ -204,6 +204,7 @@ def step(
         judged=signed.judged,
         gap=gapped.evidence,
         gap_exceeds=gapped.exceeds,
+        predictions=positioning.predictions,
         false_alarm_cycles=design.false_alarm_cycles,
         period_s=period_s or math.nan,
     )

@@ -18,8 +18,10 @@ from rich.live import Live
 
 from impactcell.demo.auto_teach import AutoTeach
 from impactcell.demo.scenario_setup import USER, DemoSetup, set_up_scenario
+from impactcell.demo.targets import targets_json, targets_table
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
+from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.console import is_quiet, print_note
 from impactcell.process.signals import stop_on_signals
 from impactcell.records import ModuleStatus, Snapshot
@@ -55,6 +57,8 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
             interrupted = asyncio.run(_live(show))
     if as_json:
         print(json.dumps(show.summary()))  # noqa: T201 - the result of the verb
+    elif not is_quiet() and (table := show.table()) is not None:
+        Console().print(table)
     if interrupted:
         raise KeyboardInterrupt
 
@@ -67,6 +71,7 @@ class _DemoRun:
     cycles: int | None
     snapshots: deque[Snapshot] = field(default_factory=lambda: deque(maxlen=SHOWN_CYCLES))
     seen: int = 0
+    outcomes: tuple[TaskOutcome, ...] = ()
     raised: list[dict[str, Any]] = field(default_factory=list)
     service: Service | None = None
     endpoint: str = ""
@@ -93,6 +98,8 @@ class _DemoRun:
             try:
                 await self.service.run(stop, self._started)
             finally:
+                running = self.service.running.get(self.setup.cell.name)
+                self.outcomes = () if running is None else running.task_outcomes
                 await auto_teach.close()
                 watch.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
@@ -163,6 +170,17 @@ class _DemoRun:
             link,
         )
 
+    def table(self) -> RenderableType | None:
+        """Say what became of the parts; None in a scenario without targets."""
+        positioning = self.setup.cell.settings.positioning
+        if positioning is None:
+            return None
+        return targets_table(self.outcomes, positioning.tolerance_um * 1e-6)
+
+    def _targets(self) -> dict[str, Any]:
+        has_targets = self.setup.cell.settings.positioning is not None
+        return {"targets": targets_json(self.outcomes)} if has_targets else {}
+
     def summary(self) -> dict[str, Any]:
         """One object that says how the demo went; null for what is not known."""
         if not self.snapshots:
@@ -199,6 +217,7 @@ class _DemoRun:
                 "last_shift": _number(last.batch.last_shift),
                 "last_shift_cycle": last.batch.last_shift_cycle,
             },
+            **self._targets(),
             "alarms": self.raised,
             "story": [{"cycle": cycle, "what": text} for cycle, text in self.setup.story],
             "told": [{"cycle": cycle, "what": text} for cycle, text in self.messages],

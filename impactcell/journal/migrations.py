@@ -6,6 +6,7 @@ migration as long as no version that writes its result has been released; the ch
 migration of its own.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -140,6 +141,12 @@ _STATE_2_ADDED: Final[Mapping[str, Tree]] = {
     "state.model_changed": False,
     "state.alarms.delays.*.held_back": None,
     "state.alarms.delays.*.waited": 0,
+    "snapshot.positioning.predictions": {
+        "taps": 0,
+        "lacking": False,
+        "depends_on": "",
+        "evidence": dict.fromkeys(FLOATS_OF_EVIDENCE_1, math.nan) | {"change_cycle": 0},
+    },
 }
 """What a state did not keep before."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}

@@ -75,6 +75,25 @@ def discrepancy_features(
     out[9] = f * place[1]
 
 
+DEPENDS_ON = {
+    "slide": (0,),
+    "velocity": (1, 7),
+    "mass": (2, 6),
+    "position": (3, 4),
+    "contact": (5, 8),
+    "direction": (9,),
+}
+"""Which weights speak of what."""
+
+
+def largest_weight(mean: Samples, cov: Samples) -> tuple[str, float, float]:
+    """Return what the displacement that is missed depends on most surely: name, weight and its std."""
+    std = np.sqrt(np.diag(cov))
+    n = int(np.abs(mean / std).argmax())
+    name = next(name for name, weights in DEPENDS_ON.items() if n in weights)
+    return name, float(mean[n]), float(std[n])
+
+
 def log_bayes_factor(mean: Samples, cov: Samples) -> float:
     """Evidence that something is missing: Bayes factor of free weights over zero, natural logarithm.
 

@@ -24,7 +24,7 @@ from impactcell.positioning.lookahead_table import (
     build_lookahead,
     stiffest,
 )
-from impactcell.positioning.planner_posterior import PlannerPosterior, with_score
+from impactcell.positioning.planner_posterior import PlannerPosterior, tap_predictions, with_score
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.prediction_watch import score_of
 from impactcell.positioning.quadrature import Z
@@ -32,12 +32,10 @@ from impactcell.positioning.safety_limits import largest_force
 from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.positioning.tap_model import model_of_tap
-from impactcell.records import Quality, Samples, Signature
+from impactcell.records import Quality, Samples, Signature, TapPredictions
 
 CAUTION = (1.0, 20.0, 400.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
-GAP_EVIDENCE = math.log(1e4)
-"""ln of the Bayes factor from which on the model is said to lack something: 1 in 10 000 cells is false."""
 REMEMBERED = 64  # tables, of parts of different mass
 
 
@@ -119,9 +117,9 @@ class TapPlanner:
         self._posterior = posterior
 
     @property
-    def lacks_something(self) -> bool:
-        """Whether the taps say, beyond chance, that the model lacks something or its predictions are off."""
-        return self._posterior.gap_evidence >= GAP_EVIDENCE or self._posterior.watch.alarming
+    def predictions(self) -> TapPredictions:
+        """What the taps so far say of the model: `lacking` where, beyond chance, it lacks something."""
+        return tap_predictions(self._posterior)
 
     def next_tap(
         self, remaining_m: float, mass_kg: float, position_m: float = 0.0

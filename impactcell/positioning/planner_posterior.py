@@ -18,10 +18,10 @@ import numpy as np
 
 from impactcell.positioning.displacement_discrepancy import LEARNED_STD as LEARNED_WEIGHTS_STD
 from impactcell.positioning.displacement_discrepancy import PRIOR_STD as PRIOR_WEIGHTS_STD
-from impactcell.positioning.displacement_discrepancy import log_bayes_factor
-from impactcell.positioning.prediction_watch import PredictionWatch, place_bets
+from impactcell.positioning.displacement_discrepancy import largest_weight, log_bayes_factor
+from impactcell.positioning.prediction_watch import ALARM, PredictionWatch, place_bets
 from impactcell.positioning.scatter_hypotheses import mean_variances, prior_weights
-from impactcell.records import Samples
+from impactcell.records import Evidence, Samples, TapPredictions
 
 FRICTION, STIFFNESS, DAMPING, RATIO, VISCOUS = range(5)
 """Where each parameter lies in theta."""
@@ -29,6 +29,8 @@ PARAMETERS = 5
 """Of theta; the weights of the discrepancy follow."""
 LEARNED_STD = np.concatenate([[0.015, 0.03, 0.05, 0.02, 3.0], LEARNED_WEIGHTS_STD])
 """Left after a handful of taps."""
+GAP_EVIDENCE = math.log(1e4)
+"""ln of the Bayes factor from which on the model is said to lack something: 1 in 10 000 cells is false."""
 DOUBT_SHARE = 0.5
 """Of the prior's standard deviation that the weights have on top, once predictions have been off."""
 SHARPENED = 6.0
@@ -72,11 +74,6 @@ class PlannerPosterior:
         return math.sqrt(float(mean_variances(self.scatter_weights)[0]))
 
     @property
-    def gap_evidence(self) -> float:
-        """Natural logarithm of the Bayes factor for a discrepancy against none."""
-        return log_bayes_factor(self.mean[PARAMETERS:], self.cov[PARAMETERS:, PARAMETERS:])
-
-    @property
     def mean(self) -> Samples:
         """Mean of parameters and weights, shape (n,)."""
         mean: Samples = self.weights @ self.means
@@ -93,6 +90,20 @@ class PlannerPosterior:
     def mu_k(self) -> float:
         """Kinetic coefficient, median."""
         return math.exp(float(self.mean[FRICTION]))
+
+
+def tap_predictions(posterior: PlannerPosterior) -> TapPredictions:
+    """Say what the taps so far tell of the model: whether it lacks something, and on what that depends."""
+    mean, cov = posterior.mean[PARAMETERS:], posterior.cov[PARAMETERS:, PARAMETERS:]
+    gap = log_bayes_factor(mean, cov)
+    if gap >= GAP_EVIDENCE or not posterior.watch.alarming:
+        depends_on, size, std = largest_weight(mean, cov)
+        evidence = Evidence(statistic=gap, threshold=GAP_EVIDENCE, size=size, size_std=std)
+        return TapPredictions(posterior.taps, gap >= GAP_EVIDENCE, depends_on, evidence)
+    off = math.log(posterior.watch.evidence)
+    size = posterior.watch.score * posterior.scatter
+    evidence = Evidence(statistic=off, threshold=math.log(ALARM), size=size, size_std=posterior.scatter)
+    return TapPredictions(posterior.taps, lacking=True, depends_on="", evidence=evidence)
 
 
 def with_single_gaussian(posterior: PlannerPosterior, mean: Samples, cov: Samples) -> PlannerPosterior:

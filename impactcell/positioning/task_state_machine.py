@@ -56,11 +56,26 @@ class PositioningCell:
 
 
 @dataclass(frozen=True, slots=True)
+class TaskOutcome:
+    """What became of a task; positions along +1, m. `settled`: the part is inside the tolerance."""
+
+    target_m: float
+    start_m: float
+    position_m: float
+    mass_kg: float
+    taps: int
+    settled: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class TaskState:
     """A task between two events.
 
     Attributes
     ----------
+    start_m : float
+        Where the part lay when the task began.
     tap : Tap or None
         To be commanded (COMMANDING), or commanded and not yet observed (WAITING).
     taps : int
@@ -79,6 +94,7 @@ class TaskState:
     taps: int = 0
     reason: str = ""
     evidence: Evidence | None = None
+    start_m: float = math.nan
 
     @property
     def remaining_m(self) -> float:
@@ -89,6 +105,14 @@ class TaskState:
     def running(self) -> bool:
         """Whether a tap is to be commanded or awaited."""
         return self.phase in {TaskPhase.COMMANDING, TaskPhase.WAITING}
+
+    @property
+    def outcome(self) -> TaskOutcome:
+        """What became of it, once it no longer runs."""
+        settled = self.phase is TaskPhase.SETTLED
+        return TaskOutcome(
+            self.target_m, self.start_m, self.position_m, self.mass_kg, self.taps, settled, self.reason
+        )
 
     def published(self) -> PositioningState:
         """Return the task as it is published."""
@@ -163,7 +187,7 @@ def begin_task(
         )
     if not trained:
         raise PositioningError(f"{name}: friction is not known yet; let the estimator see some cycles first")
-    fresh = TaskState(TaskPhase.IDLE, target_m, position_m, mass_kg)
+    fresh = TaskState(TaskPhase.IDLE, target_m, position_m, mass_kg, start_m=position_m)
     begun = _plan(fresh, cell, planner)
     if begun.phase is TaskPhase.FAULTED:
         raise PositioningError(f"{name}: {begun.reason}")
@@ -224,7 +248,7 @@ def aborted(sequence: TaskState, by: str) -> TaskState:
 
 
 def _plan(sequence: TaskState, cell: PositioningCell, planner: TapPlanner) -> TaskState:
-    answer = planner.next_tap(sequence.remaining_m, sequence.mass_kg)
+    answer = planner.next_tap(sequence.remaining_m, sequence.mass_kg, sequence.position_m)
     if answer is None:
         return replace(sequence, phase=TaskPhase.SETTLED, tap=None, reason="in place")
     if isinstance(answer, Unreachable):

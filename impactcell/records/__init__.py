@@ -16,7 +16,7 @@ from impactcell.records.friction import (
     WearState,
 )
 from impactcell.records.module import BatchAnnouncement, CycleId, ModuleStatus
-from impactcell.records.snapshot import PositioningState, Snapshot
+from impactcell.records.snapshot import PositioningState, Snapshot, TapPredictions
 
 __all__ = [
     "Alarm",
@@ -37,6 +37,7 @@ __all__ = [
     "Signature",
     "Snapshot",
     "Summary",
+    "TapPredictions",
     "WearState",
     "uniform_times",
 ]

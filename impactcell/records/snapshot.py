@@ -1,14 +1,37 @@
 """All that one cycle has to say."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from impactcell.records.alarm import Alarm
+from impactcell.records.alarm import Alarm, Evidence
 from impactcell.records.friction import BatchState, FrictionEstimate, Quality, Signature, WearState
 
 
 @dataclass(frozen=True, slots=True)
+class TapPredictions:
+    """What the taps so far say of the planner's model.
+
+    Attributes
+    ----------
+    taps : int
+        Learned from.
+    lacking : bool
+        The model lacks something, beyond chance.
+    depends_on : str
+        What the displacements that it misses depend on most: velocity, mass, position, contact, direction;
+        empty where they are off without a pattern.
+    evidence : Evidence
+        Logarithm of the evidence and of its threshold, and the share of a displacement that is missed.
+    """
+
+    taps: int = 0
+    lacking: bool = False
+    depends_on: str = ""
+    evidence: Evidence = field(default_factory=Evidence)
+
+
+@dataclass(frozen=True, slots=True)
 class PositioningState:
-    """A positioning task: where the part should go, what remains, and the tap that comes next."""
+    """A positioning task: where the part should go, what remains, the tap that comes next, and its model."""
 
     target_m: float = float("nan")
     remaining_m: float = float("nan")
@@ -17,6 +40,7 @@ class PositioningState:
     running: bool = False
     taps: int = 0
     reason: str = ""
+    predictions: TapPredictions = field(default_factory=TapPredictions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

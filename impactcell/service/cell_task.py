@@ -16,6 +16,7 @@ from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry
+from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
     BatchAnnouncement,
@@ -118,6 +119,11 @@ class CellTask:
             alarms_active=sum(alarm.active for alarm in self.worker.alarms),
             journal_ok=not self.worker.journal_fault,
         )
+
+    @property
+    def task_outcomes(self) -> tuple[TaskOutcome, ...]:
+        """What became of the last positioning tasks, in their order."""
+        return () if self._positioning is None else tuple(self._positioning.outcomes)
 
     async def run(self, server: Server, feed: LiveFeed | None = None) -> None:
         """Run until cancelled, shown by a server and on a page."""

@@ -3,7 +3,9 @@
 import asyncio
 import logging
 import math
+from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 
 from impactcell.cell import CellDesign
 from impactcell.errors import FieldbusError, PositioningError
@@ -11,12 +13,14 @@ from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.decoding import PositioningStatus
 from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
 from impactcell.positioning import PlannerPosterior, SafetyLimits, TapPlanner, task_state_machine
-from impactcell.positioning.task_state_machine import TaskPhase, TaskState
+from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, TaskState
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Evidence, PositioningState, Quality, Snapshot
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig
 
+REMEMBERED = 1000
+"""Tasks whose outcome is kept."""
 WATCH_S = 0.1
 """Between two looks at the PLC's target register."""
 
@@ -75,14 +79,17 @@ class PositioningTask:
         self._worker = worker
         self._changed = changed
         self._sequence = TaskState()
+        self.outcomes: deque[TaskOutcome] = deque(maxlen=REMEMBERED)
+        """Of the last tasks, in their order."""
         self._wake = asyncio.Event()
+        self._predictions = self._planner.predictions
         self._plc_target: int | None = None
         self._batch_shift_cycle = 0
 
     @property
     def state(self) -> PositioningState:
         """The task as it is published."""
-        return self._sequence.published()
+        return replace(self._sequence.published(), predictions=self._predictions)
 
     @property
     def fault(self) -> tuple[str, Evidence] | None:
@@ -210,6 +217,7 @@ class PositioningTask:
                 lambda: task_state_machine.observed(waiting, self._cell, self._planner, position_m)  # noqa: B023
             )
             self._worker.belief = self._planner.posterior
+            self._predictions = self._planner.predictions
             if self._sequence is waiting:
                 self._set_sequence(after)
 
@@ -230,5 +238,7 @@ class PositioningTask:
 
     def _set_sequence(self, now: TaskState) -> None:
         if now is not self._sequence:
+            if self._sequence.running and not now.running:
+                self.outcomes.append(now.outcome)
             self._sequence = now
             self._changed()

@@ -122,7 +122,7 @@ class Cell:
         self.level = RATIO * task.mu_s * self.factor * (1.0 + LEVEL_ERROR * self.rng.standard_normal())
         return Attempt(
             self.condition.key, self.number, task.number, task.mass_kg, task.distance_m, task.tolerance_m,
-            taps, end, target - position, int(getattr(planner, "lacks_something", False)), steps, planning,
+            taps, end, target - position, int(planner.predictions.lacking), steps, planning,
             slowest,
         )  # fmt: skip
 

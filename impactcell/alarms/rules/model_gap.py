@@ -1,4 +1,6 @@
-"""ModelGap: the model no longer explains the captures of this cell."""
+"""ModelGap: the model no longer explains the captures of this cell, or how far its taps move parts."""
+
+from dataclasses import replace
 
 from impactcell.alarms.rule import (
     NO_MESSAGE,
@@ -10,16 +12,47 @@ from impactcell.alarms.rule import (
     RuleSettings,
     german,
 )
-from impactcell.records import Evidence
+from impactcell.records import Evidence, TapPredictions
 
 NAME = "ModelGap"
 """Published name."""
 
 
+DEPENDS_ON = {
+    "velocity": ("their velocity", "ihrer Geschwindigkeit"),
+    "mass": ("the mass of the part", "der Masse des Teils"),
+    "position": ("the position of the part", "der Lage des Teils"),
+    "contact": ("the contact", "dem Kontakt"),
+    "direction": ("their direction", "ihrer Richtung"),
+    "slide": ("the slide", "dem Gleitweg"),
+    "": ("nothing that is known of them", "nichts, was von ihnen bekannt ist"),
+}
+"""What the displacement that is missed depends on, in words."""
+
+
 def evaluate(inputs: CycleInputs, _context: RuleContext) -> RuleResult:
-    """Say whether the residual has left its usual level; nothing while that is being learned."""
+    """Say whether the residual has left its usual level, or taps miss; nothing while that is learned."""
+    predictions = inputs.predictions
+    if predictions is not None and predictions.lacking and not inputs.gap_exceeds:
+        since = max(inputs.cycle - predictions.taps + 1, 1)
+        evidence = replace(predictions.evidence, change_cycle=since)
+        return RuleResult(NAME, holds=True, message=_message_of_taps(predictions, since), evidence=evidence)
     message = _message(inputs.gap) if inputs.gap_exceeds else NO_MESSAGE
     return RuleResult(NAME, inputs.gap_exceeds, message, inputs.gap)
+
+
+def _message_of_taps(predictions: TapPredictions, since: int) -> Message:
+    english, german_words = DEPENDS_ON[predictions.depends_on]
+    percent = 100.0 * predictions.evidence.size
+    return Message(
+        f"The model does not say how far taps move a part: over {predictions.taps} taps since cycle {since} "
+        f"what it misses depends on {english} and comes to {percent:+.1f} %. Taps are planned with it, and "
+        "more cautiously; have the taps looked at with `impactcell discrepancy --journal`.",
+        f"Das Modell sagt nicht, wie weit Schläge ein Teil bewegen: über {predictions.taps} Schläge seit "
+        f"Zyklus {since} hängt das Fehlende von {german_words} ab und beträgt {german(percent, '+.1f')} %. "
+        "Schläge werden damit und vorsichtiger geplant; Schläge mit `impactcell discrepancy --journal` "
+        "untersuchen lassen.",
+    )
 
 
 def _message(gap: Evidence) -> Message:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from impactcell import alarms
 from impactcell.alarms import AlarmEvent, AlarmSettings, CycleInputs, EventKind, RuleResult, RuleSettings
 from impactcell.alarms.rules import module_connection
-from impactcell.records import Evidence, Quality, Shelving, WearState
+from impactcell.records import Evidence, Quality, Shelving, TapPredictions, WearState
 from impactcell.serialization import pack, unpack
 
 WEAR = "WearLimit"
@@ -266,3 +266,33 @@ def test_every_batch_shift_is_told_while_the_last_one_still_stands():
         state, RuleResult(BATCH, holds=True, evidence=Evidence(12.0, 11.0, 5, 0.01, 0.1)), cycle=6
     )
     assert state.alarm(BATCH).evidence.change_cycle == 5
+
+
+def predictions(lacking, depends_on="velocity"):
+    evidence = Evidence(statistic=12.0, threshold=9.2, size=-0.07, size_std=0.01)
+    return TapPredictions(taps=31, lacking=lacking, depends_on=depends_on, evidence=evidence)
+
+
+def test_taps_that_the_model_does_not_foretell_raise_the_model_gap():
+    said = judge(SETTINGS, NORMAL, CycleInputs(40, wear(0.0), predictions=predictions(lacking=True)), GAP)
+    assert said.holds
+    assert said.evidence.change_cycle == 10
+    assert (said.evidence.statistic, said.evidence.threshold) == (12.0, 9.2)
+    assert "over 31 taps since cycle 10" in said.message.english
+    assert "depends on their velocity and comes to -7.0 %" in said.message.english
+    assert "von ihrer Geschwindigkeit ab und beträgt -7,0 %" in said.message.german
+    fine = judge(SETTINGS, NORMAL, CycleInputs(40, wear(0.0), predictions=predictions(lacking=False)), GAP)
+    assert not fine.holds
+
+
+def test_every_cause_that_the_planner_may_name_has_its_words():
+    from impactcell.alarms.rules.model_gap import DEPENDS_ON
+    from impactcell.positioning import displacement_discrepancy
+
+    assert set(DEPENDS_ON) == {*displacement_discrepancy.DEPENDS_ON, ""}
+
+
+def test_a_residual_that_exceeds_speaks_before_the_taps():
+    gap = Evidence(statistic=5.0, threshold=4.0, size=1.5, change_cycle=7)
+    inputs = CycleInputs(40, wear(0.0), gap=gap, gap_exceeds=True, predictions=predictions(lacking=True))
+    assert judge(SETTINGS, NORMAL, inputs, GAP).evidence.change_cycle == 7

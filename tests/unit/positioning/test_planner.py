@@ -212,7 +212,7 @@ def test_what_the_model_lacks_is_learned_and_told() -> None:
         assert tap is None
         assert abs(target - position) <= 50e-6
         counts.append(taps)
-        told.append(planner.lacks_something)
+        told.append(planner.predictions.lacking)
     assert any(told[:10])
     assert told[-1]
     assert np.mean(counts[10:]) < 4.0
@@ -223,7 +223,7 @@ def test_nothing_is_said_to_be_missing_where_the_model_is_right() -> None:
     for _ in range(25):
         mass = math.exp(rng.uniform(math.log(5.0), math.log(40.0)))
         deliver(planner, NOMINAL, mass, rng.uniform(2e-3, 40e-3), rng)
-        assert not planner.lacks_something
+        assert not planner.predictions.lacking
     weights = planner.posterior.mean[5:]
     assert (np.abs(weights) < 3.5 * np.sqrt(np.diag(planner.posterior.cov)[5:])).all()
 
@@ -239,4 +239,4 @@ def test_learning_survives_being_stored() -> None:
     again.resume(form.unpack(form.pack(planner.posterior)))
     assert again.next_tap(7e-3, 9.0, 1e-3) == planner.next_tap(7e-3, 9.0, 1e-3)
     assert again.posterior.watch.evidence == planner.posterior.watch.evidence
-    assert again.posterior.gap_evidence == planner.posterior.gap_evidence
+    assert again.predictions == planner.predictions
