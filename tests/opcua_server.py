@@ -3,7 +3,7 @@
 import contextlib
 import tempfile
 import time
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -79,6 +79,7 @@ class LifecycleActions:
     def __init__(self) -> None:
         self.alarms: dict[tuple[str, str], Alarm] = {}
         self.calls: list[tuple[object, ...]] = []
+        self.show: Callable[[str, Alarm], None] = lambda _cell, _alarm: None
 
     def of(self, cell: str, name: str) -> Alarm:
         return self.alarms.get((cell, name), Alarm(name))
@@ -88,6 +89,7 @@ class LifecycleActions:
         if done.refusal is not None:
             raise RefusedError(done.refusal.value)
         self.alarms[cell, name] = done.alarm
+        self.show(cell, done.alarm)
         return done.alarm
 
     async def start_batch(self, cell: str, batch_id: str, *, expected: bool, actor: Actor) -> None:
@@ -111,12 +113,18 @@ class LifecycleActions:
         *,
         comment: str = "",
         shelve_s: float = 0.0,
-    ) -> Alarm:
-        return self.apply(
+        activation: int | None = None,
+    ) -> None:
+        self.apply(
             cell,
             alarm,
             AlarmEvent(
-                event, time_ns=time.time_ns(), user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
+                event,
+                time_ns=time.time_ns(),
+                user=actor.user,
+                comment=comment,
+                shelve_ns=int(shelve_s * 1e9),
+                activation=activation,
             ),
         )
 
@@ -147,7 +155,7 @@ class Site:
         evidence = Evidence(
             statistic=0.95, threshold=0.9, change_cycle=7, size=0.01, size_std=0.002, false_alarm_cycles=1e5
         )
-        alarm = self.actions.apply(
+        return self.actions.apply(
             cell,
             name,
             AlarmEvent(
@@ -159,13 +167,9 @@ class Site:
                 evidence=evidence,
             ),
         )
-        self.server.alarm(cell, alarm)
-        return alarm
 
     def clear_alarm(self, name: str = "WearLimit", cell: str = CELL) -> Alarm:
-        alarm = self.actions.apply(cell, name, AlarmEvent(EventKind.CLEAR, self.cycle, time.time_ns()))
-        self.server.alarm(cell, alarm)
-        return alarm
+        return self.actions.apply(cell, name, AlarmEvent(EventKind.CLEAR, self.cycle, time.time_ns()))
 
     def untrusted(self) -> tuple[Path, Path]:
         """Certificate and key of a client nobody has trusted yet."""
@@ -261,6 +265,7 @@ async def site(
             history,
             actions,
         )
+        actions.show = server.alarm
         async with server:
             yield Site(
                 server, place, history, actions, place / "client" / "cert.der", place / "client" / "key.pem"

@@ -64,6 +64,7 @@ class Refusal(enum.Enum):
     NOT_SHELVED = "BadConditionNotShelved"
     SHELVING_TIME = "BadShelvingTimeOutOfRange"
     INVALID_STATE = "BadInvalidState"
+    ANOTHER_ACTIVATION = "BadEventIdUnknown"
 
 
 class Notification(enum.Enum):
@@ -181,6 +182,8 @@ class AlarmEvent:
         Of an activation; None leaves what is there.
     shelve_ns : int
         How long to shelve; for one-shot shelving the longest time, 0 for no end.
+    activation : int or None
+        The activation that a person's action answers: the alarm may have come again since it was seen.
     """
 
     kind: EventKind
@@ -192,6 +195,7 @@ class AlarmEvent:
     severity: int | None = None
     evidence: Evidence | None = None
     shelve_ns: int = 0
+    activation: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +227,8 @@ def transition(alarm: Alarm, event: AlarmEvent) -> Transition:
     """Apply one event after the tables above; a refused one leaves the alarm as it was."""
     if not alarm.enabled and event.kind in DISABLED:
         return Transition(alarm, refusal=DISABLED[event.kind])
+    if event.activation not in (None, alarm.activation):
+        return Transition(alarm, refusal=Refusal.ANOTHER_ACTIVATION)
     if event.kind is EventKind.SHELVE_TIMED and event.shelve_ns <= 0:
         return Transition(alarm, refusal=Refusal.SHELVING_TIME)
     moved = _apply_tables(alarm, event.kind)

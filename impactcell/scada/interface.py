@@ -89,11 +89,14 @@ class Actions(Protocol):
         *,
         comment: str = "",
         shelve_s: float = 0.0,
-    ) -> Alarm:
-        """Apply a person's action through `impactcell.alarms.apply_event`; the new state of the condition.
+        activation: int | None = None,
+    ) -> None:
+        """Apply a person's action through `impactcell.alarms.apply_event`.
 
-        The action is one of acknowledge, confirm, comment, enable, disable and the three of shelving. A
-        `Transition` that carries a refusal is raised as `RefusedError(refusal.value)`.
+        The action is one of acknowledge, confirm, comment, enable, disable and the three of shelving; the
+        first three name the activation that they answer. A `Transition` that carries a refusal is raised as
+        `RefusedError(refusal.value)`. The new state is shown by `Server.alarm`, before this returns: whoever
+        changes conditions shows them, in the order of the changes.
         """
 
 

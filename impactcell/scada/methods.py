@@ -12,7 +12,6 @@ from impactcell.opcua.method_service import InputArgument, InvalidArgumentError,
 from impactcell.opcua.request_dispatch import RequestContext
 from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.quantities import BY_PATH, MILLIMETRE
-from impactcell.records import Alarm
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.audit_trail import AuditTrail
 from impactcell.scada.cell_nodes import CellSpace
@@ -60,8 +59,6 @@ _CONDITION_METHODS: Final[Mapping[EventKind, tuple[str, tuple[int, ...], tuple[I
         (),
     ),
 }
-
-ShowAlarm = Callable[[str, Alarm], None]
 
 
 class MethodTable:
@@ -129,13 +126,11 @@ def bind_cell(table: MethodTable, space: CellSpace, types: Mapping[str, ua.NodeI
             table.bind(space.node, method_id, area, method, f"{cell}: {name}")
 
 
-def bind_condition(
-    table: MethodTable, space: CellSpace, condition: Condition, actions: Actions, show_alarm: ShowAlarm
-) -> None:
+def bind_condition(table: MethodTable, space: CellSpace, condition: Condition, actions: Actions) -> None:
     """Make the methods of a condition callable, on itself and on its shelving state."""
     shelving = space.path(f"{condition.name}/ShelvingState")
     for event, (name, type_ids, arguments) in _CONDITION_METHODS.items():
-        method = Method(arguments, _action(condition, event, actions, show_alarm))
+        method = Method(arguments, _action(condition, event, actions))
         instance_method = space.path(f"{condition.name}/{name}")
         audit_name = f"{condition.cell}: {condition.name}: {name.rpartition('/')[2]}"
         for owner in (condition.node, shelving) if "/" in name else (condition.node,):
@@ -144,13 +139,14 @@ def bind_condition(
 
 
 def _action(
-    condition: Condition, event: EventKind, actions: Actions, show_alarm: ShowAlarm
+    condition: Condition, event: EventKind, actions: Actions
 ) -> Callable[[RequestContext, Sequence[Any]], Awaitable[None]]:
     async def act(context: RequestContext, arguments: Sequence[Any]) -> None:
-        comment, shelve_s = "", 0.0
+        comment, shelve_s, activation = "", 0.0, None
         if event in NAMES_EVENT:
             if condition.alarm.enabled and not condition.is_current_event(arguments[0]):
                 raise StatusCodeError(ua.StatusCodes.BadEventIdUnknown)
+            activation = condition.alarm.activation
             comment = _comment_text(arguments[1], 1)
         elif event is EventKind.SHELVE_TIMED:
             shelve_s = arguments[0] / 1e3
@@ -158,10 +154,15 @@ def _action(
                 raise StatusCodeError(ua.StatusCodes.BadShelvingTimeOutOfRange)
         elif event is EventKind.SHELVE_ONE_SHOT:
             shelve_s = MAX_SHELVE_S
-        alarm = await actions.act_on_condition(
-            condition.cell, condition.name, event, context.actor, comment=comment, shelve_s=shelve_s
+        await actions.act_on_condition(
+            condition.cell,
+            condition.name,
+            event,
+            context.actor,
+            comment=comment,
+            shelve_s=shelve_s,
+            activation=activation,
         )
-        show_alarm(condition.cell, alarm)
 
     return act
 

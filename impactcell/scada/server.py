@@ -120,7 +120,7 @@ class Server:
             for alarm in RULES:
                 condition = Condition(cell, alarm, values, cell_notifiers(cell))
                 self._conditions[name, alarm] = condition
-                bind_condition(table, cell, condition, self._actions, self.alarm)
+                bind_condition(table, cell, condition, self._actions)
         bind_refresh(table, host.subscription_service, self._conditions)
         await host.start()
         self._host = host
@@ -138,15 +138,14 @@ class Server:
             await self._host.stop()
 
     def publish(self, cell: str, snapshot: Snapshot) -> None:
-        """Show all that one cycle has to say, its alarms included."""
+        """Show the values of one cycle; its alarms are shown by `alarm` alone."""
         self._cells[cell].publish(snapshot)
-        for alarm in snapshot.alarms:
-            self.alarm(cell, alarm)
 
     def alarm(self, cell: str, alarm: Alarm) -> None:
         """Show the state of a condition; an event goes out where it has changed.
 
-        Call it for every condition after a restart too, with the states that were stored.
+        Call it in the order of the changes, for every condition after a restart too, with the states that
+        were stored.
         """
         event = self._conditions[cell, alarm.name].update(alarm)
         if event is not None and self._host is not None:
@@ -185,9 +184,9 @@ class Server:
             The role may not, an argument is out of range, the event has passed, or the state forbids it.
         """
         what = describe_action(cell, alarm, action.event, action.comment, action.shelve_s)
-        self.alarm(cell, await audited(actor, what, self._act(cell, alarm, action, actor)))
+        await audited(actor, what, self._act(cell, alarm, action, actor))
 
-    async def _act(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> Alarm:
+    async def _act(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
         event, comment, shelve_s = action.event, action.comment, action.shelve_s
         if not allowed(actor.role, CONDITION_AREAS[event], Permission.CALL):
             raise RefusedError("BadUserAccessDenied")
@@ -195,12 +194,16 @@ class Server:
             raise RefusedError("BadOutOfRange", f"a comment has at most {MAX_COMMENT} characters")
         if event is EventKind.SHELVE_TIMED and not 0.0 < shelve_s <= MAX_SHELVE_S:
             raise RefusedError("BadShelvingTimeOutOfRange")
-        if event in NAMES_EVENT and not self._conditions[cell, alarm].is_current_event(action.event_id):
-            raise RefusedError("BadEventIdUnknown", "the alarm has come again since; look at it first")
+        activation = None
+        if event in NAMES_EVENT:
+            condition = self._conditions[cell, alarm]
+            if not condition.is_current_event(action.event_id):
+                raise RefusedError("BadEventIdUnknown", "the alarm has come again since; look at it first")
+            activation = condition.alarm.activation
         if event is EventKind.SHELVE_ONE_SHOT:
             shelve_s = MAX_SHELVE_S
-        return await self._actions.act_on_condition(
-            cell, alarm, event, actor, comment=comment, shelve_s=shelve_s
+        await self._actions.act_on_condition(
+            cell, alarm, event, actor, comment=comment, shelve_s=shelve_s, activation=activation
         )
 
     def _event_of(self, cell: str, alarm: Alarm) -> EventNotification:

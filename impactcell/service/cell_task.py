@@ -80,8 +80,7 @@ class CellTask:
             raise
         if damage:
             self.worker.tell_journal_event(damage)
-        self._publisher = CellPublisher(cell.name, self.worker.alarms, self.log)
-        self.publish_alarms = self._publisher.publish_alarms
+        self._publisher = CellPublisher(cell.name, self.worker.alarms, self._positioning_state, self.log)
         self._notes: tuple[str, ...] = ()
         self._on_snapshot = on_snapshot
         self._module = ModuleAcquisition(
@@ -128,6 +127,7 @@ class CellTask:
     async def run(self, server: Server, feed: LiveFeed | None = None) -> None:
         """Run until cancelled, shown by a server and on a page."""
         self._publisher.server, self._publisher.feed = server, feed
+        self.worker.tell_alarms(self._publisher.publish_alarms)
         self._publish_restored()
         try:
             async with asyncio.TaskGroup() as group:
@@ -218,8 +218,9 @@ class CellTask:
     async def _process(self, received: ReceivedCycle) -> None:
         capture = received.capture
         task = self._positioning
-        positioning = PositioningState() if task is None else task.state
-        result = await self.worker.process(capture, positioning, self._announcement(), received.faults)
+        result = await self.worker.process(
+            capture, self._positioning_state(), self._announcement(), received.faults
+        )
         if task is not None:
             await self.worker.run(partial(task.update_friction, result.step_result.snapshot))
         snapshot, notes = result.step_result.snapshot, result.step_result.notes
@@ -230,8 +231,6 @@ class CellTask:
         self._last_cycle_s, self._stale = time.monotonic(), False
         self._publisher.publish(snapshot, capture)
         self._publisher.publish_module(self._module.status)
-        for alarm in result.step_result.changed:  # the snapshot has shown them
-            self._publisher.log_alarm(alarm)
         mu_s, late_s = snapshot.friction.mu_s, time.time() - 1e-9 * capture.time_ns
         self.log.debug(
             "mu_s %.4f ± %.4f (%s), gap %.2f, published %s after its end",
@@ -244,6 +243,9 @@ class CellTask:
         if self._on_snapshot is not None:
             self._on_snapshot(self.cell.name, snapshot)
 
+    def _positioning_state(self) -> PositioningState:
+        return PositioningState() if self._positioning is None else self._positioning.state
+
     def _positioning_changed(self) -> None:
         self._positioning_change.set()
 
@@ -254,8 +256,7 @@ class CellTask:
             self._positioning_change.clear()
             task = self._positioning_task()
             if self.worker.snapshot is not None:
-                snapshot = replace(self.worker.snapshot, positioning=task.state, alarms=self.worker.alarms)
-                self._publisher.publish(snapshot)
+                self._publisher.publish(self.worker.snapshot)
             fault = task.fault
             reason, evidence = fault or ("", Evidence())
             await self._apply_rule_result(positioning_fault.result(reason, evidence))
@@ -286,12 +287,12 @@ class CellTask:
             await self._apply_rule_result(journal_fault.result(fault))
 
     async def _apply_rule_result(self, rule_result: RuleResult) -> None:
-        self._publisher.publish_alarms(await self.worker.apply_rule_result(rule_result, time.time_ns()))
+        await self.worker.apply_rule_result(rule_result, time.time_ns())
 
     async def _tick(self) -> None:
         while True:
             await asyncio.sleep(TICK_S)
-            self._publisher.publish_alarms(await self.worker.expire_shelving(time.time_ns()))
+            await self.worker.expire_shelving(time.time_ns())
             silent_s = time.monotonic() - self._last_cycle_s
             late = silent_s > max(STALE_AT_LEAST_S, STALE_PERIODS * self.worker.period_s)
             if late and not self._stale and self._module.status.connected:
@@ -310,7 +311,7 @@ class CellTask:
             return 0
 
     def _publish_restored(self) -> None:
-        self._publisher.publish_alarms(self.worker.alarms)
+        self._publisher.publish_alarms(self.worker.alarms, unchanged=True)
         self._publisher.publish_module(self._module.status)
         if self.worker.snapshot is not None:
             self._publisher.publish(self.worker.snapshot)

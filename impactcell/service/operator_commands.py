@@ -8,7 +8,6 @@ from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind
 from impactcell.errors import PositioningError
 from impactcell.journal.store import AuditEntry
-from impactcell.records import Alarm
 from impactcell.scada import Actor, RefusedError
 from impactcell.service.cell_task import CellTask
 
@@ -64,17 +63,21 @@ class OperatorCommands:
         *,
         comment: str = "",
         shelve_s: float = 0.0,
-    ) -> Alarm:
-        """Apply an action through the life cycle in `impactcell.alarms`; the new state of the condition."""
+        activation: int | None = None,
+    ) -> None:
+        """Apply an action through the life cycle in `impactcell.alarms`."""
         audit = _audit(actor, event.value, Condition=alarm, Comment=comment or None, Seconds=shelve_s or None)
         alarm_event = AlarmEvent(
-            event, time_ns=audit.time_ns, user=actor.user, comment=comment, shelve_ns=int(shelve_s * 1e9)
+            event,
+            time_ns=audit.time_ns,
+            user=actor.user,
+            comment=comment,
+            shelve_ns=int(shelve_s * 1e9),
+            activation=activation,
         )
         transition = await self._cell(cell).worker.apply_event(alarm, alarm_event, audit)
         if transition.refusal is not None:
             raise RefusedError(transition.refusal.value, f"{cell}: {alarm}: {transition.refusal.value}")
-        self._cells[cell].publish_alarms((transition.alarm,))
-        return transition.alarm
 
 
 def _audit(actor: Actor, action: str, **arguments: object) -> AuditEntry:

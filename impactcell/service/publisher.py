@@ -2,12 +2,13 @@
 
 import logging
 import time
-from collections.abc import Iterable
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from impactcell.alarms import RULES
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Alarm, Capture, ModuleStatus, Snapshot
+from impactcell.records import Alarm, Capture, ModuleStatus, PositioningState, Snapshot
 from impactcell.web.interface import CellNews, Freshness
 
 if TYPE_CHECKING:
@@ -18,23 +19,38 @@ if TYPE_CHECKING:
 class CellPublisher:
     """Shows one cell; without a server, as before it has started, only the log hears of it.
 
+    A snapshot is published some time after its cycle was computed, and what people do goes on meanwhile. So
+    alarms are shown by `publish_alarms` alone, which the worker calls in the order of their changes, and the
+    positioning task as it is at that moment: neither is ever taken out of a snapshot.
+
     Parameters
     ----------
     cell : str
-    alarms : iterable of Alarm
+    alarms : tuple of Alarm
         As they were; one that is active already is not logged again.
+    positioning : callable
+        The positioning task as it is now.
     log : CellLogger
     """
 
-    def __init__(self, cell: str, alarms: Iterable[Alarm], log: CellLogger) -> None:
+    def __init__(
+        self,
+        cell: str,
+        alarms: tuple[Alarm, ...],
+        positioning: Callable[[], PositioningState],
+        log: CellLogger,
+    ) -> None:
         self.server: Server | None = None
         self.feed: LiveFeed | None = None
         self._cell = cell
+        self._alarms = alarms
+        self._positioning = positioning
         self._active = {alarm.name for alarm in alarms if alarm.active}
         self._log = log
 
     def publish(self, snapshot: Snapshot, capture: Capture | None = None) -> None:
         """Show a cycle, and what was measured in it."""
+        snapshot = replace(snapshot, alarms=self._alarms, positioning=self._positioning())
         self._put(snapshot=snapshot, capture=capture, freshness=Freshness.LIVE)
         if self.server is not None:
             self.server.publish(self._cell, snapshot)
@@ -53,17 +69,18 @@ class CellPublisher:
         if self.server is not None:
             self.server.module(self._cell, status, time.time_ns())
 
-    def publish_alarms(self, changed: Iterable[Alarm]) -> None:
-        """Show conditions that have changed, and log them."""
-        alarms = tuple(changed)
-        if alarms:
-            self._put(alarms=alarms)
-        for alarm in alarms:
-            self.log_alarm(alarm)
+    def publish_alarms(self, alarms: tuple[Alarm, ...], *, unchanged: bool = False) -> None:
+        """Show the conditions that have changed since the last call, or all of them, and log them."""
+        before, self._alarms = self._alarms, alarms
+        shown = alarms if unchanged else tuple(a for a in alarms if not any(a is b for b in before))
+        if shown:
+            self._put(alarms=shown)
+        for alarm in shown:
+            self._log_alarm(alarm)
             if self.server is not None:
                 self.server.alarm(self._cell, alarm)
 
-    def log_alarm(self, alarm: Alarm) -> None:
+    def _log_alarm(self, alarm: Alarm) -> None:
         """Log an alarm that comes or goes, but for those that their finder has told of already."""
         if alarm.active != (alarm.name in self._active) and not RULES[alarm.name].logged_by_cause:
             message = "alarm %s is active: %s" if alarm.active else "alarm %s is over: %s"

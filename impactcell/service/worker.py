@@ -79,6 +79,8 @@ class CellWorker:
         self._state = self._fitted(design, restored.cell)
         self._snapshot = restored.snapshot
         self.belief = restored.planner
+        self._told = self.alarms
+        self._tell_alarms: Callable[[tuple[Alarm, ...]], object] | None = None
         self._store_model()
 
     @property
@@ -146,15 +148,14 @@ class CellWorker:
             self._thread.submit(self._maintain, capture.time_ns)  # what is shown need not wait for it
         return processed
 
-    async def apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
-        """Take what a rule beside the cycles says; the alarms that moved."""
-        return await self.run(lambda: self._apply_rule_result(rule_result, time_ns))
+    async def apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> None:
+        """Take what a rule beside the cycles says."""
+        await self.run(lambda: self._apply_rule_result(rule_result, time_ns))
 
-    async def expire_shelving(self, time_ns: int) -> tuple[Alarm, ...]:
-        """End every shelving whose time is over; the alarms that moved."""
-        if all(alarm.shelving is Shelving.UNSHELVED for alarm in self.alarms):
-            return ()
-        return await self.run(lambda: self._expire_shelving(time_ns))
+    async def expire_shelving(self, time_ns: int) -> None:
+        """End every shelving whose time is over."""
+        if any(alarm.shelving is not Shelving.UNSHELVED for alarm in self.alarms):
+            await self.run(lambda: self._expire_shelving(time_ns))
 
     async def apply_event(self, name: str, event: AlarmEvent, audit: AuditEntry) -> Transition:
         """Apply a person's action on a condition, and write down who did it."""
@@ -196,7 +197,24 @@ class CellWorker:
 
     async def run(self, work: Callable[[], T]) -> T:
         """Do some work in the cell's thread, after all that was asked for before."""
-        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+        return await asyncio.get_running_loop().run_in_executor(self._thread, self._told_after, work)
+
+    def tell_alarms(self, tell: Callable[[tuple[Alarm, ...]], object]) -> None:
+        """Have all alarms told to the running loop whenever work has changed one, before the work is over.
+
+        They come in the order in which they changed; nothing else may carry them to where they are shown, or
+        an older state could overwrite a newer one.
+        """
+        loop = asyncio.get_running_loop()
+        self._tell_alarms = lambda alarms: loop.call_soon_threadsafe(tell, alarms)
+
+    def _told_after(self, work: Callable[[], T]) -> T:
+        try:
+            return work()
+        finally:
+            if self.alarms is not self._told and self._tell_alarms is not None:
+                self._told = self.alarms
+                self._tell_alarms(self._told)
 
     def _store_model(self) -> None:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
@@ -254,17 +272,15 @@ class CellWorker:
     def _blob(self) -> bytes:
         return pack_state(StoredState(self._state, self._snapshot, self.belief), self._unknown)
 
-    def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> tuple[Alarm, ...]:
+    def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> None:
         self._state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)
         if changed:
             self._record(changed, None)
-        return changed
 
-    def _expire_shelving(self, time_ns: int) -> tuple[Alarm, ...]:
+    def _expire_shelving(self, time_ns: int) -> None:
         self._state, changed = core.expire_shelving(self._state, time_ns)
         if changed:
             self._record(changed, None)
-        return changed
 
     def _apply_event(self, name: str, event: AlarmEvent, audit: AuditEntry) -> Transition:
         self._state, transition = core.apply_event(self._state, name, event)

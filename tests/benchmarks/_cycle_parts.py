@@ -107,6 +107,8 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
             with timed(spent):
                 cycle_result = running.worker._process(capture, PositioningState(), None, ())
                 server.publish(cell.name, cycle_result.step_result.snapshot)
+                for alarm in running.worker.alarms:
+                    server.alarm(cell.name, alarm)
                 server.module(
                     cell.name,
                     ModuleStatus(connected=True, received=cycle, round_trip_s=1e-3),
