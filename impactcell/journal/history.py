@@ -9,9 +9,8 @@ from typing import Any, Final, Generic, TypeVar
 
 from impactcell.errors import JournalError
 from impactcell.journal.checksums import SqlValue
-from impactcell.journal.stored_forms import load_alarm
 from impactcell.quantities import BY_PATH, HISTORY
-from impactcell.records import Alarm, Quality
+from impactcell.records import Quality
 
 T = TypeVar("T")
 
@@ -94,41 +93,44 @@ def stored_values(
     )
 
 
-def stored_alarms(database: sqlite3.Connection, query: HistoryQuery, is_whole: IsWhole) -> Page[Alarm]:
-    """Read the states that each transition of an alarm led to.
-
-    Those of conditions that are not known, and damaged rows, are left out.
+def stored_alarms(database: sqlite3.Connection, query: HistoryQuery, is_whole: IsWhole) -> Page[str]:
+    """Read the states that each transition of an alarm led to, as stored; damaged rows are left out.
 
     Raises
     ------
     JournalError
-        The token is not one of ours, or a record is of another version.
+        The token is not one of ours.
     """
     columns, rows, resume = _page(database, query, "alarms", "id")
     at_record = columns.index("record")
-    try:
-        alarms = [load_alarm(row[at_record]) for row in rows if is_whole("alarms", row)]
-    except ValueError as error:
-        raise JournalError(f"the journal's alarms cannot be shown: {error}") from error
-    return Page(tuple(alarm for alarm in alarms if alarm is not None), resume)
+    return Page(tuple(str(row[at_record]) for row in rows if is_whole("alarms", row)), resume)
 
 
 def _page(
     database: sqlite3.Connection, query: HistoryQuery, table: str, key: str
 ) -> tuple[list[str], list[tuple[Any, ...]], bytes | None]:
     direction, beyond = ("DESC", "<") if query.newest_first else ("ASC", ">")
-    after = None
+    # Only what is asked stands in the statement, so that SQLite goes to the first row by its index: a page
+    # deep in the past costs what the first one does.
+    start_ns, end_ns = query.start_ns, query.end_ns
+    conditions, bounds = ["TRUE"], list[int]()
     if query.resume is not None:
+        conditions.append(f"(time_ns, {key}) {beyond} (?, ?)")
         try:
-            after = _TOKEN.unpack(query.resume)
+            bounds += _TOKEN.unpack(query.resume)
         except struct.error as error:
             raise JournalError("this token continues no page of a history") from error
+        start_ns, end_ns = (start_ns, bounds[0]) if query.newest_first else (bounds[0], end_ns)
+    if start_ns is not None:
+        conditions.append("time_ns >= ?")
+        bounds.append(start_ns)
+    if end_ns is not None:
+        conditions.append("time_ns <= ?")
+        bounds.append(end_ns)
     cursor = database.execute(
-        f"SELECT * FROM {table} "  # noqa: S608 - names from this module only
-        "WHERE (?1 IS NULL OR time_ns >= ?1) AND (?2 IS NULL OR time_ns <= ?2) "
-        f"AND (?3 IS NULL OR (time_ns, {key}) {beyond} (?3, ?4)) "
-        f"ORDER BY time_ns {direction}, {key} {direction} LIMIT ?5",
-        (query.start_ns, query.end_ns, *(after or (None, None)), query.limit + 1),
+        f"SELECT * FROM {table} WHERE {' AND '.join(conditions)} "  # noqa: S608 - names from this module only
+        f"ORDER BY time_ns {direction}, {key} {direction} LIMIT ?",
+        (*bounds, query.limit + 1),
     )
     columns, rows = [str(name) for name, *_ in cursor.description], cursor.fetchall()
     more, rows = len(rows) > query.limit, rows[: query.limit]

@@ -25,7 +25,7 @@ from impactcell.journal.presence import FilePresence
 from impactcell.journal.retention import Retention, prune
 from impactcell.journal.salvage import stored_captures
 from impactcell.journal.schema import cycle_row
-from impactcell.journal.stored_forms import ALARM
+from impactcell.journal.stored_forms import ALARM, load_alarms
 from impactcell.records import Alarm, Capture, CycleId, Snapshot
 
 
@@ -245,7 +245,8 @@ class Journal:
     def alarms(self, query: HistoryQuery) -> Page[Alarm]:
         """Return the states that each transition of an alarm led to."""
         with errors(self.path):
-            return stored_alarms(self._db, query, self._tables.is_whole)
+            page = stored_alarms(self._db, query, self._tables.is_whole)
+        return Page(load_alarms(page.entries), page.resume)
 
     def checkpoint(self) -> None:
         """Move what has been committed from the log into the file; it is as durable before as after."""

@@ -3,12 +3,14 @@
 Each says its format and is read by every later version; see `impactcell.serialization`.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
 from impactcell import alarms
 from impactcell.cell import CellState
+from impactcell.errors import JournalError
 from impactcell.journal.migrations import ALARM_MIGRATIONS, ALARM_NAMES_1, MODEL_MIGRATIONS, STATE_MIGRATIONS
 from impactcell.positioning import PlannerPosterior
 from impactcell.prediction import Model
@@ -53,6 +55,21 @@ def load_alarm(record: str) -> Alarm | None:
     if isinstance(named, str) and named not in _KNOWN_ALARMS:
         return None
     return ALARM.loads(record)
+
+
+def load_alarms(records: Iterable[str]) -> tuple[Alarm, ...]:
+    """Read stored alarms; those of conditions that this version does not know are left out.
+
+    Raises
+    ------
+    JournalError
+        One is of a later format.
+    """
+    try:
+        read = [load_alarm(record) for record in records]
+    except ValueError as error:
+        raise JournalError(f"the journal's alarms cannot be shown: {error}") from error
+    return tuple(alarm for alarm in read if alarm is not None)
 
 
 def pack_state(stored: StoredState, unknown: Unknown | None = None) -> bytes:

@@ -39,7 +39,8 @@ Who uses the server gives it an address space, methods and the answers of `host_
 `history_service`            HistoryRead: raw values, aggregates, events
 `historical_variable`        spans of time, read page by page
 `history_aggregates`         Average, Minimum, Maximum, Count by their definition; `history_processed` reads
-                             what they need
+                             once through what they need, `history_encoding` puts answers together
+`read_budget`                what one HistoryRead may take; `loop_share`: what any request may, at a time
 `type_instances`             objects made from types, with NodeIds that stay the same
 `service_host`               listener, services and clock put together
 ===========================  ==============================================================================

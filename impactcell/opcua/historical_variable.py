@@ -9,7 +9,8 @@ from asyncua import ua
 
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import HistoricalValue, HistoricalValues, HistoryProvider, HistoryRequest
-from impactcell.opcua.variable_store import moment, nanoseconds
+from impactcell.opcua.read_budget import ReadBudget
+from impactcell.opcua.variable_store import nanoseconds
 
 VALUES_PER_PAGE: Final = 1_000
 """Values, events or aggregates in one answer; more come by continuation point."""
@@ -98,9 +99,11 @@ class HistoricalVariable:
         self._history = history
         self._node = node
 
-    async def read(self, current: ReadRange) -> tuple[list[HistoricalValue], ReadRange | None]:
+    async def read(
+        self, current: ReadRange, budget: ReadBudget
+    ) -> tuple[list[HistoricalValue], ReadRange | None]:
         """Read what one answer holds, bounds included, and say what is left."""
-        limit, values = current.limit, list[HistoricalValue]()
+        limit, values = budget.room(current.limit), list[HistoricalValue]()
         first_ns = current.first_bound_ns
         if first_ns is not None:
             current = replace(current, first_bound_ns=None)
@@ -109,11 +112,15 @@ class HistoricalVariable:
                 values.append(bound)
             if len(values) == limit:
                 return values, current
-        if not current.is_read:
+        while not current.is_read:
             page = await self._history.read_values(self._node, current.request(limit - len(values)))
             left = current.after(len(page.values), page.resume)
             values += page.values
-            if left is not None or current.last_bound_ns is None:
+            await budget.spend(len(page.values))
+            if left is None and current.last_bound_ns is None:
+                return values, None
+            current = replace(current, is_read=True) if left is None else left
+            if left is not None and (len(values) == limit or budget.is_spent):
                 return values, left
         last_ns = current.last_bound_ns
         if last_ns is not None and len(values) == limit:
@@ -144,9 +151,3 @@ class HistoricalVariable:
         start_ns, end_ns = (time_ns, None) if later else (None, time_ns)
         request = HistoryRequest(start_ns, end_ns, limit=1, newest_first=not later)
         return await self._history.read_values(self._node, request)
-
-
-def data_value(value: HistoricalValue) -> ua.DataValue:
-    """Make the DataValue of a stored value."""
-    variant = None if value.value is None else ua.Variant(value.value, ua.VariantType.Double)
-    return ua.DataValue(variant, ua.StatusCode(value.status), moment(value.time_ns), moment(value.time_ns))

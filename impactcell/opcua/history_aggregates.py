@@ -14,7 +14,8 @@ brackets:
 """
 
 import enum
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -108,69 +109,81 @@ def processing_intervals(start_ns: int, end_ns: int, step_ns: int) -> Iterator[P
         lower_ns = upper_ns
 
 
-def aggregate_interval(
-    aggregate: AggregateFunction,
-    interval: ProcessingInterval,
-    values: Sequence[HistoricalValue],
-    configuration: AggregateConfiguration,
-    *,
-    within: bool,
-) -> AggregateValue:
-    """Aggregate the values of one interval.
+class IntervalAggregate:
+    """The aggregate of one interval, from its values one after the other, in any order.
 
-    Parameters
-    ----------
-    values : sequence of HistoricalValue
-        All that lie in the interval, in any order.
-    within : bool
-        Whether the interval touches the span of what is stored at all.
+    It holds no values: its size, and the cost of one more, do not depend on how many there are.
     """
-    if aggregate is AggregateFunction.COUNT:
-        return _count(interval, values, configuration, within=within)
-    good = [value for value in values if _is_good(value, configuration)]
-    if not good:
-        return AggregateValue(interval.start_ns, None, NO_DATA if not values else BAD)
-    status = _status(len(good), len(values), configuration)
-    if aggregate is AggregateFunction.AVERAGE:
-        mean = sum(value.value or 0.0 for value in good) / len(good)
-        return AggregateValue(interval.start_ns, mean, status | CALCULATED)
-    pick = min if aggregate is AggregateFunction.MINIMUM else max
-    return _extreme(pick, interval, values, good, status)
 
+    def __init__(
+        self,
+        aggregate: AggregateFunction,
+        interval: ProcessingInterval,
+        configuration: AggregateConfiguration,
+    ) -> None:
+        self.interval = interval
+        self.count = 0
+        self._aggregate = aggregate
+        self._configuration = configuration
+        self._pick = min if aggregate is AggregateFunction.MINIMUM else max
+        self._good = 0
+        self._sum = 0.0
+        self._extreme = self._extreme_not_good = math.nan
+        self._occurrences = 0
+        self._occurs_at_start = False
+        self._has_missing = False
 
-def _count(
-    interval: ProcessingInterval,
-    values: Sequence[HistoricalValue],
-    configuration: AggregateConfiguration,
-    *,
-    within: bool,
-) -> AggregateValue:
-    bits = CALCULATED | (PARTIAL if interval.partial else 0)
-    if not values:
-        return (
-            AggregateValue(interval.start_ns, 0, bits)
-            if within
-            else AggregateValue(interval.start_ns, None, NO_DATA)
+    def add(self, value: HistoricalValue) -> None:
+        """Take in a value that lies in the interval."""
+        self.count += 1
+        if _is_good(value, self._configuration):
+            self._good += 1
+            self._sum += value.value or 0.0
+            self._add_good(value.value or 0.0, value.time_ns)
+        elif value.value is None or math.isnan(value.value):
+            self._has_missing = True
+        else:
+            self._extreme_not_good = self._more_extreme(value.value, self._extreme_not_good)
+
+    def _add_good(self, value: float, time_ns: int) -> None:
+        if value != self._extreme:
+            if self._more_extreme(value, self._extreme) != value:
+                return
+            self._extreme, self._occurrences, self._occurs_at_start = value, 0, False
+        self._occurrences += 1
+        self._occurs_at_start |= time_ns == self.interval.start_ns
+
+    def _more_extreme(self, value: float, other: float) -> float:
+        return value if math.isnan(other) else self._pick(value, other)
+
+    def result(self, *, within: bool) -> AggregateValue:
+        """Give the aggregate.
+
+        Parameters
+        ----------
+        within : bool
+            Whether the interval touches the span of what is stored at all.
+        """
+        start_ns, partial = self.interval.start_ns, PARTIAL if self.interval.partial else 0
+        if self._aggregate is AggregateFunction.COUNT:
+            if not self.count and not within:
+                return AggregateValue(start_ns, None, NO_DATA)
+            return AggregateValue(start_ns, self._good, self._status() | CALCULATED | partial)
+        if not self._good:
+            return AggregateValue(start_ns, None, BAD if self.count else NO_DATA)
+        if self._aggregate is AggregateFunction.AVERAGE:
+            return AggregateValue(start_ns, self._sum / self._good, self._status() | CALCULATED)
+        status = self._status()
+        if self._has_missing or self._more_extreme(self._extreme, self._extreme_not_good) != self._extreme:
+            # Part 13, 5.4.3.10: a more extreme value exists that is not Good.
+            status = max(status, SUB_NORMAL)
+        bits = RAW if self._occurs_at_start else CALCULATED
+        return AggregateValue(
+            start_ns, self._extreme, status | bits | partial | (MULTIPLE if self._occurrences > 1 else 0)
         )
-    good = sum(1 for value in values if _is_good(value, configuration))
-    return AggregateValue(interval.start_ns, good, _status(good, len(values), configuration) | bits)
 
-
-def _extreme(
-    pick: Callable[..., float],
-    interval: ProcessingInterval,
-    values: Sequence[HistoricalValue],
-    good: Sequence[HistoricalValue],
-    status: int,
-) -> AggregateValue:
-    extreme = pick(value.value for value in good)
-    times_ns = [value.time_ns for value in good if value.value == extreme]
-    if any(pick(value.value, extreme) != extreme for value in values if value not in good):
-        # Part 13, 5.4.3.10: a more extreme value exists that is not Good.
-        status = max(status, SUB_NORMAL)
-    bits = RAW if interval.start_ns in times_ns else CALCULATED
-    bits |= (MULTIPLE if len(times_ns) > 1 else 0) | (PARTIAL if interval.partial else 0)
-    return AggregateValue(interval.start_ns, extreme, status | bits)
+    def _status(self) -> int:
+        return _status(self._good, self.count, self._configuration) if self.count else GOOD
 
 
 def _is_good(value: HistoricalValue, configuration: AggregateConfiguration) -> bool:

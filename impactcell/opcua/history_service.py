@@ -4,6 +4,7 @@ Mended: asyncua keeps history in memory or in a table of its own, mistakes the e
 continuation points that survive values with equal times, and no aggregates.
 """
 
+from dataclasses import dataclass
 from typing import Any, Final
 
 from asyncua import ua
@@ -11,20 +12,32 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.event_filter import EventFilter
-from impactcell.opcua.historical_variable import (
-    HistoricalVariable,
-    ReadRange,
-    data_value,
-    read_range,
-)
-from impactcell.opcua.history_processed import read_processed
+from impactcell.opcua.historical_variable import HistoricalVariable, ReadRange, read_range
+from impactcell.opcua.history_encoding import DataValueEncoder, history_data
+from impactcell.opcua.history_processed import ProcessedReading
 from impactcell.opcua.host_interface import AccessPolicy, HistoryProvider, Permission, RefusedError
 from impactcell.opcua.method_service import status_of
+from impactcell.opcua.read_budget import ReadBudget
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
-from impactcell.opcua.variable_store import with_timestamps
 
 MAX_NODES_PER_READ: Final = 100
 """Nodes in one HistoryRead; shown as MaxNodesPerHistoryReadData."""
+EVENTS_AT_ONCE: Final = 10
+"""Events that are made again and filtered between two turns of others: some 3 ms."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Unfinished:
+    """What a continuation point stands for: it goes on with the same node and the same kind of question."""
+
+    node: ua.NodeId
+    details: type
+    state: ReadRange | ProcessedReading
+
+    def read_on(self, node: ua.HistoryReadValueId, details: object) -> ReadRange | ProcessedReading:
+        if (self.node, self.details) != (node.NodeId, type(details)):
+            raise StatusCodeError(ua.StatusCodes.BadContinuationPointInvalid)
+        return self.state
 
 
 class HistoryService:
@@ -60,9 +73,9 @@ class HistoryService:
             raise StatusCodeError(ua.StatusCodes.BadTimestampsToReturnInvalid)
         if isinstance(details, ua.ReadProcessedDetails) and len(details.AggregateType or []) != len(nodes):
             raise StatusCodeError(ua.StatusCodes.BadAggregateListMismatch)
-        response = ua.HistoryReadResponse()
+        response, budget = ua.HistoryReadResponse(), ReadBudget(context.header.TimeoutHint)
         response.Results = [
-            await self._read_node(context, parameters, index, node) for index, node in enumerate(nodes)
+            await self._read_node(context, parameters, index, budget) for index in range(len(nodes))
         ]
         return response
 
@@ -71,46 +84,34 @@ class HistoryService:
         context: RequestContext,
         parameters: ua.HistoryReadParameters,
         index: int,
-        node: ua.HistoryReadValueId,
+        budget: ReadBudget,
     ) -> ua.HistoryReadResult:
-        result = ua.HistoryReadResult()
+        result, node = ua.HistoryReadResult(), parameters.NodesToRead[index]
+        points, details = context.session.history, parameters.HistoryReadDetails
         try:
-            continuation_points = context.session.history
-            state = continuation_points.take(node.ContinuationPoint) if node.ContinuationPoint else None
+            kept = points.take(node.ContinuationPoint) if node.ContinuationPoint else None
             if parameters.ReleaseContinuationPoints:
                 return result
-            details = parameters.HistoryReadDetails
             self._check_node(node, context, events=isinstance(details, ua.ReadEventDetails))
-            data, remaining = await self._read_details(node.NodeId, details, index, state)
+            state = self._begin(node.NodeId, details, index) if kept is None else kept.read_on(node, details)
+            if not budget.is_spent:
+                result.HistoryData, is_empty, state = await self._go_on(
+                    node.NodeId, parameters, state, budget
+                )
+                if is_empty and state is None:
+                    result.StatusCode = ua.StatusCode(ua.StatusCodes.GoodNoData)
         except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
-            return result
         except RefusedError as refused:
             result.StatusCode = status_of(refused)
-            return result
-        if isinstance(data, ua.HistoryData):
-            data.DataValues = [
-                with_timestamps(value, parameters.TimestampsToReturn) for value in data.DataValues
-            ]
-            empty = not data.DataValues
         else:
-            empty = not data.Events
-        result.HistoryData = data
-        result.ContinuationPoint = continuation_points.keep(remaining) if remaining is not None else None
-        if empty and remaining is None:
-            result.StatusCode = ua.StatusCode(ua.StatusCodes.GoodNoData)
+            if state is not None:
+                result.ContinuationPoint = points.keep(_Unfinished(node.NodeId, type(details), state))
         return result
 
-    async def _read_details(self, node: ua.NodeId, details: Any, index: int, state: Any) -> tuple[Any, Any]:
-        if isinstance(details, ua.ReadRawModifiedDetails) and not details.IsReadModified:
-            return await self._read_raw(node, details, state)
-        if isinstance(details, ua.ReadProcessedDetails):
-            return await self._read_processed(node, details, details.AggregateType[index], state)
-        if isinstance(details, ua.ReadEventDetails):
-            return await self._read_events(node, details, state)
-        raise StatusCodeError(ua.StatusCodes.BadHistoryOperationUnsupported)
-
     def _check_node(self, node: ua.HistoryReadValueId, context: RequestContext, *, events: bool) -> None:
+        if context.session.closed:  # while a node before was read
+            raise StatusCodeError(ua.StatusCodes.BadSessionClosed)
         if node.NodeId not in self._space:
             raise StatusCodeError(ua.StatusCodes.BadNodeIdUnknown)
         if not self._access.permits(context.actor.role, Permission.READ_HISTORY, node.NodeId):
@@ -120,40 +121,45 @@ class HistoryService:
         if node.IndexRange:
             raise StatusCodeError(ua.StatusCodes.BadIndexRangeInvalid)
 
-    async def _read_raw(
-        self, node: ua.NodeId, details: ua.ReadRawModifiedDetails, state: ReadRange | None
-    ) -> tuple[ua.HistoryData, ReadRange | None]:
-        series = HistoricalVariable(self._history, node)
-        current = state or read_range(
-            details.StartTime, details.EndTime, details.NumValuesPerNode, bounds=details.ReturnBounds
-        )
-        values, remaining = await series.read(current)
-        data = ua.HistoryData()
-        data.DataValues = [data_value(value) for value in values]
-        return data, remaining
+    def _begin(self, node: ua.NodeId, details: Any, index: int) -> ReadRange | ProcessedReading:
+        """Check what is asked of one node; nothing is read yet."""
+        if isinstance(details, ua.ReadRawModifiedDetails) and not details.IsReadModified:
+            return read_range(
+                details.StartTime, details.EndTime, details.NumValuesPerNode, bounds=details.ReturnBounds
+            )
+        if isinstance(details, ua.ReadProcessedDetails):
+            series = HistoricalVariable(self._history, node)
+            return ProcessedReading(series, details, details.AggregateType[index])
+        if isinstance(details, ua.ReadEventDetails):
+            return read_range(details.StartTime, details.EndTime, details.NumValuesPerNode)
+        raise StatusCodeError(ua.StatusCodes.BadHistoryOperationUnsupported)
 
-    async def _read_processed(
-        self, node: ua.NodeId, details: ua.ReadProcessedDetails, kind: ua.NodeId, state: int | None
-    ) -> tuple[ua.HistoryData, int | None]:
-        data = ua.HistoryData()
-        data.DataValues, remaining = await read_processed(
-            HistoricalVariable(self._history, node), details, kind, state
-        )
-        return data, remaining
+    async def _go_on(
+        self, node: ua.NodeId, parameters: ua.HistoryReadParameters, state: Any, budget: ReadBudget
+    ) -> tuple[Any, bool, ReadRange | ProcessedReading | None]:
+        """Read on; what goes into the answer, whether that is nothing, and what is left."""
+        details, timestamps = parameters.HistoryReadDetails, parameters.TimestampsToReturn
+        if isinstance(state, ProcessedReading):
+            aggregates = await state.read(budget)
+            encoder = DataValueEncoder(timestamps, is_count=state.is_count)
+            data = history_data(map(encoder.encode, aggregates))
+            return data, not aggregates, None if state.is_finished else state
+        if isinstance(details, ua.ReadEventDetails):
+            return await self._read_events(node, details, state, budget)
+        values, left = await HistoricalVariable(self._history, node).read(state, budget)
+        return history_data(map(DataValueEncoder(timestamps).encode, values)), not values, left
 
     async def _read_events(
-        self, node: ua.NodeId, details: ua.ReadEventDetails, state: ReadRange | None
-    ) -> tuple[ua.HistoryEvent, ReadRange | None]:
+        self, node: ua.NodeId, details: ua.ReadEventDetails, current: ReadRange, budget: ReadBudget
+    ) -> tuple[ua.HistoryEvent, bool, ReadRange | None]:
         event_filter = EventFilter(self._space, details.Filter)
-        current = state or read_range(details.StartTime, details.EndTime, details.NumValuesPerNode)
-        events: list[ua.HistoryEventFieldList] = []
+        limit, events = budget.room(current.limit), list[ua.HistoryEventFieldList]()
         remaining: ReadRange | None = current
-        while remaining is not None and len(events) < current.limit:
-            request = remaining.request(current.limit - len(events))
+        while remaining is not None and len(events) < limit and not budget.is_spent:
+            request = remaining.request(min(limit - len(events), EVENTS_AT_ONCE))
             page = await self._history.read_events(node, request)
             passed = [event_filter.select(event) for event in page.events if event_filter.passes(event)]
             events += [ua.HistoryEventFieldList(fields.EventFields) for fields in passed]
             remaining = remaining.after(len(passed), page.resume)
-        data = ua.HistoryEvent()
-        data.Events = events
-        return data, remaining
+            await budget.spend(len(passed))
+        return ua.HistoryEvent(events), not events, remaining

@@ -25,7 +25,7 @@ from impactcell.opcua.monitored_item_service import MonitoredItemService
 from impactcell.opcua.request_dispatch import MAX_OPERATIONS, RequestDispatcher, Service
 from impactcell.opcua.secure_channel import ChannelSecurity
 from impactcell.opcua.session_service import SessionService
-from impactcell.opcua.session_table import MAX_CONTINUATION_POINTS, SessionTable
+from impactcell.opcua.session_table import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS, SessionTable
 from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.opcua.tcp_connection import TcpConnection
 from impactcell.opcua.trust_list import TrustList
@@ -245,12 +245,12 @@ class ServiceHost:
             (ids.Server_ServerStatus_BuildInfo_BuildDate, now, kinds.DateTime),
             (
                 ids.Server_ServerCapabilities_MaxBrowseContinuationPoints,
-                MAX_CONTINUATION_POINTS,
+                MAX_BROWSE_POINTS,
                 kinds.UInt16,
             ),
             (
                 ids.Server_ServerCapabilities_MaxHistoryContinuationPoints,
-                MAX_CONTINUATION_POINTS,
+                MAX_HISTORY_POINTS,
                 kinds.UInt16,
             ),
             (ids.Server_ServerCapabilities_MaxQueryContinuationPoints, 0, kinds.UInt16),

@@ -23,8 +23,10 @@ _log = logging.getLogger(__name__)
 
 MIN_TIMEOUT_S: Final = 10.0
 """Shortest timeout of a session, seconds."""
-MAX_CONTINUATION_POINTS: Final = 20
-"""Continuation points of each kind kept for one session; shown among the capabilities."""
+MAX_BROWSE_POINTS: Final = 20
+"""Continuation points of Browse kept for one session; shown among the capabilities."""
+MAX_HISTORY_POINTS: Final = 100
+"""Continuation points of HistoryRead kept for one session: one for each node of the largest request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +42,13 @@ class PublishRequest:
 class ContinuationPoints:
     """Continuation points of one session; the oldest gives way when there are too many."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int) -> None:
+        self._most = most
         self._states: OrderedDict[bytes, Any] = OrderedDict()
 
     def keep(self, state: object) -> bytes:
         """Keep what is needed to read on, and name it."""
-        while len(self._states) >= MAX_CONTINUATION_POINTS:
+        while len(self._states) >= self._most:
             self._states.popitem(last=False)
         point = os.urandom(16)
         self._states[point] = state
@@ -80,8 +83,8 @@ class Session:
     actor: Actor | None = None
     last_seen: float = field(default_factory=time.monotonic)
     publish_requests: deque[PublishRequest] = field(default_factory=deque)
-    browse: ContinuationPoints = field(default_factory=ContinuationPoints)
-    history: ContinuationPoints = field(default_factory=ContinuationPoints)
+    browse: ContinuationPoints = field(default_factory=lambda: ContinuationPoints(MAX_BROWSE_POINTS))
+    history: ContinuationPoints = field(default_factory=lambda: ContinuationPoints(MAX_HISTORY_POINTS))
     closed: bool = False
 
     @property

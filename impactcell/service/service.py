@@ -77,9 +77,11 @@ class Service:
         self._create_tasks()
         async with contextlib.AsyncExitStack() as stack:
             await stack.enter_async_context(self._monitoring())
+            history = JournalHistory(self.running)
+            stack.push_async_callback(history.close)
             servers = {}
             for endpoint in dict.fromkeys(cell.settings.opcua.endpoint for cell in self._cells):
-                servers[endpoint] = await stack.enter_async_context(self._server(endpoint))
+                servers[endpoint] = await stack.enter_async_context(self._server(endpoint, history))
             for cell in self._cells:
                 self.endpoints[cell.name] = servers[cell.settings.opcua.endpoint].endpoint
             await stack.enter_async_context(self._pages(servers))
@@ -124,13 +126,13 @@ class Service:
             await running.reload()
         systemd.notify("READY=1")
 
-    def _server(self, endpoint: str) -> Server:
+    def _server(self, endpoint: str, history: JournalHistory) -> Server:
         cells = [cell for cell in self._cells if cell.settings.opcua.endpoint == endpoint]
         return Server(
             server_settings(cells[0]),
             cells[0].settings.opcua.users_file,
             [cell_description(cell) for cell in cells],
-            JournalHistory(self.running),
+            history,
             OperatorCommands(self.running),
         )
 

@@ -147,6 +147,7 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
             assert (
                 await history.values("press-1", "Friction/StaticFriction", HistoryRequest(None, None, 1))
             ).values
+            await history.close()
     with Journal(tmp_path / "press-1.sqlite", "press-1") as journal:
         assert journal.count() >= 3
     for said in ("cell=press-1 waits until its journal can be opened", "opened now; the cell runs"):

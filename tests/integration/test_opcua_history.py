@@ -1,13 +1,22 @@
 """HistoryRead as Part 11, 6.5.3 has it: which values come in which answer, and when more are to come."""
 
+import asyncio
+import itertools
+import math
 from collections.abc import AsyncIterator
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from asyncua import Client, ua
 
+from impactcell.opcua.historical_variable import VALUES_PER_PAGE
+from impactcell.opcua.loop_share import SLICE_S
+from impactcell.opcua.read_budget import VALUES_PER_ANSWER
+from impactcell.quantities import HISTORY
 from impactcell.records import Alarm
-from impactcell.scada import HistoryValue
-from tests.opcua_server import CELL, START_NS, Site, site
+from impactcell.scada import HistoryRequest, HistoryValue, ValuePage
+from tests.opcua_server import CELL, START_NS, MemoryHistory, Site, site
 
 SECOND_NS = 10**9
 COUNT = 25
@@ -135,5 +144,122 @@ async def test_a_continuation_point_holds_once(here: Site) -> None:
         point = (await client.uaclient.history_read(parameters))[0].ContinuationPoint
         node.ContinuationPoint = point
         assert (await client.uaclient.history_read(parameters))[0].StatusCode.is_good()
+        again = (await client.uaclient.history_read(parameters))[0]
+        assert again.StatusCode.value == ua.StatusCodes.BadContinuationPointInvalid
+
+
+NODES = 98
+INTERVALS = 1_000
+PIECES = 100
+
+
+@pytest.fixture
+async def plant() -> AsyncIterator[Site]:
+    """A cell with a value a second of each variable that has a past."""
+    async with site() as running:
+        for path in HISTORY:
+            running.history.stored[CELL, path] = [
+                HistoryValue(START_NS + i * SECOND_NS, float(i)) for i in range(2 * INTERVALS)
+            ]
+        yield running
+
+
+async def test_aggregates_of_many_nodes_come_page_by_page_while_others_are_answered(
+    plant: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """98 nodes of 1000 intervals: each value is read once, and another client has its turn in between."""
+    # By this clock a turn is over after so many pieces, however quick the machine is.
+    clock = SimpleNamespace(perf_counter=itertools.count(0.0, SLICE_S / PIECES).__next__)
+    monkeypatch.setattr("impactcell.opcua.loop_share.time", clock)
+    monkeypatch.setattr("impactcell.opcua.read_budget.LONGEST_S", math.inf)
+    read, longest = 0, 0
+
+    async def values(cell: str, variable: str, request: HistoryRequest) -> ValuePage:
+        nonlocal read, longest
+        page = await MemoryHistory.values(plant.history, cell, variable, replace(request, limit=250))
+        read += len(page.values)
+        longest = max(longest, request.limit)
+        return page
+
+    monkeypatch.setattr(plant.history, "values", values)
+    async with await plant.client() as client, await plant.client() as other:
+        index = await client.get_namespace_index("urn:impactcell:cells")
+        nodes = [
+            ua.HistoryReadValueId(NodeId=ua.NodeId(f"{CELL}/{path}", index))
+            for path in itertools.islice(itertools.cycle(HISTORY), NODES)
+        ]
+        asked, answered = asyncio.create_task(all_of(client, nodes)), 0
+        value = await plant.node(other, "Wear/Level")
+        while not asked.done():
+            await value.read_data_value(raise_on_bad_status=False)
+            answered += 1
+        results, requests = await asked
+    expected = [2.0 * i + 0.5 for i in range(INTERVALS)]
+    assert all(means == expected for means in results)
+    # Each value once, and those once more that came with a page which the answer had no room for.
+    assert read <= NODES * 2 * INTERVALS + 250 * requests
+    assert longest <= VALUES_PER_PAGE
+    assert requests == NODES * INTERVALS // VALUES_PER_ANSWER + 1
+    turns = NODES * INTERVALS / PIECES
+    assert answered > turns / 20  # a read takes several turns, of both ends, which share this loop
+
+
+async def all_of(client: Client, nodes: list[ua.HistoryReadValueId]) -> tuple[list[list[float]], int]:
+    """Means of two seconds each, of all nodes; and how many requests it took."""
+    details = ua.ReadProcessedDetails(
+        StartTime=moment(0), EndTime=moment(2 * INTERVALS), ProcessingInterval=2e3,
+        AggregateType=[ua.NodeId(ua.ObjectIds.AggregateFunction_Average)],
+        AggregateConfiguration=ua.AggregateConfiguration(UseServerCapabilitiesDefaults=True),
+    )  # fmt: skip
+    results: dict[int, list[float]] = {id(node): [] for node in nodes}
+    requests, unread = 0, nodes
+    while unread:
+        requests += 1
+        details.AggregateType = details.AggregateType[:1] * len(unread)
+        parameters = ua.HistoryReadParameters(
+            HistoryReadDetails=details, TimestampsToReturn=ua.TimestampsToReturn.Source,
+            ReleaseContinuationPoints=False, NodesToRead=unread,
+        )  # fmt: skip
+        answers = await client.uaclient.history_read(parameters)
+        for node, answer in zip(unread, answers, strict=True):
+            answer.StatusCode.check()
+            if isinstance(answer.HistoryData, ua.HistoryData):
+                results[id(node)] += [v.Value.Value for v in answer.HistoryData.DataValues]
+            node.ContinuationPoint = answer.ContinuationPoint
+        unread = [node for node in unread if node.ContinuationPoint]
+    return list(results.values()), requests
+
+
+async def test_an_answer_ends_when_its_time_is_over(here: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("impactcell.opcua.read_budget.LONGEST_S", 0.0)
+    monkeypatch.setattr(here.history, "values", one_by_one(here))
+    async with await here.client() as client:
+        assert await answers(here, client, VARIABLE, raw(3, 6, 0)) == [[3], [4], [5]]
+
+
+def one_by_one(here: Site) -> object:
+    async def values(cell: str, variable: str, request: HistoryRequest) -> ValuePage:
+        return await MemoryHistory.values(here.history, cell, variable, replace(request, limit=1))
+
+    return values
+
+
+@pytest.mark.parametrize("other", ["another node", "another kind of question"])
+async def test_a_continuation_point_goes_on_with_its_own_question(here: Site, other: str) -> None:
+    here.history.stored[CELL, "Wear/Level"] = [HistoryValue(START_NS, 1.0)]
+    async with await here.client() as client:
+        node = ua.HistoryReadValueId(NodeId=(await here.node(client, VARIABLE)).nodeid)
+        parameters = ua.HistoryReadParameters(
+            HistoryReadDetails=raw(0, 20, 5), TimestampsToReturn=ua.TimestampsToReturn.Source,
+            ReleaseContinuationPoints=False, NodesToRead=[node],
+        )  # fmt: skip
+        node.ContinuationPoint = (await client.uaclient.history_read(parameters))[0].ContinuationPoint
+        if other == "another node":
+            node.NodeId = (await here.node(client, "Wear/Level")).nodeid
+        else:
+            parameters.HistoryReadDetails = ua.ReadProcessedDetails(
+                StartTime=moment(0), EndTime=moment(9), ProcessingInterval=1e3,
+                AggregateType=[ua.NodeId(ua.ObjectIds.AggregateFunction_Count)],
+            )  # fmt: skip
         again = (await client.uaclient.history_read(parameters))[0]
         assert again.StatusCode.value == ua.StatusCodes.BadContinuationPointInvalid

@@ -15,8 +15,9 @@ from impactcell.opcua.history_aggregates import (
     RAW,
     SUB_NORMAL,
     AggregateConfiguration,
+    AggregateValue,
+    IntervalAggregate,
     ProcessingInterval,
-    aggregate_interval,
     processing_intervals,
 )
 from impactcell.opcua.history_aggregates import AggregateFunction as Function
@@ -25,6 +26,20 @@ from impactcell.opcua.host_interface import HistoricalValue
 G, U, B = 0x0000_0000, 0x4000_0000, 0x8000_0000  # Good, Uncertain, Bad (Part 4, 7.39)
 WHOLE = ProcessingInterval(0, 100)
 DEFAULT = AggregateConfiguration()
+
+
+def aggregate_interval(
+    function: Function,
+    interval: ProcessingInterval,
+    values: list[HistoricalValue],
+    configuration: AggregateConfiguration,
+    *,
+    within: bool,
+) -> AggregateValue:
+    aggregate = IntervalAggregate(function, interval, configuration)
+    for value in values:
+        aggregate.add(value)
+    return aggregate.result(within=within)
 
 
 def series(*entries: tuple[int, float, int]) -> list[HistoricalValue]:

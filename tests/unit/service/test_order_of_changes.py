@@ -1,4 +1,4 @@
-"""What people do and what cycles bring is shown in the order in which it happened, whatever the interleaving."""
+"""What people do and what cycles bring is shown in the order in which it happened, however they meet."""
 
 import asyncio
 import itertools
