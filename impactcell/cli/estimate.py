@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TextIO
 
 from impactcell.api.friction import calibrated, with_masses
-from impactcell.campaign import Campaign, Excitation, read
+from impactcell.campaign import Campaign, Excitation, from_contact, read
 from impactcell.cli.paths import check_output
+from impactcell.discrepancy.data import check_campaign_units
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
@@ -47,9 +48,12 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
     """
     if output is not None:
         check_output(output, CampaignError)
-    campaign_data = read(campaign)
+    campaign_data, notes = from_contact(read(campaign))
+    for note in notes:
+        print_note(note)
     if campaign_data.excitation is Excitation.DRIVEN:
         raise CampaignError(f"{campaign}: estimate needs taps or free slides, this campaign is driven")
+    check_campaign_units(campaign_data)
     if campaign_data.excitation is Excitation.FREE_SLIDE:
         rows = [
             (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots

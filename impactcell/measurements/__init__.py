@@ -6,16 +6,16 @@ from impactcell.measurements.limits import Limits
 from impactcell.measurements.mapping import Assignment, Given, Mapping, guess
 from impactcell.measurements.reading import read_tables
 from impactcell.measurements.recognition import Quantity
-from impactcell.measurements.table import Column, Table
+from impactcell.measurements.table import MeasuredColumn, Table
 
 __all__ = [
     "Assignment",
-    "Column",
     "Dialect",
     "Given",
     "Imported",
     "Limits",
     "Mapping",
+    "MeasuredColumn",
     "Quantity",
     "Table",
     "guess",

@@ -20,8 +20,8 @@ from impactcell.measurements.recognition import (
     name_score,
     normalised,
 )
-from impactcell.measurements.table import Column, Table
-from impactcell.measurements.units import Dimension, Unit, parse_unit
+from impactcell.measurements.table import MeasuredColumn, Table
+from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
 
 SURE = 0.5
 """Confidence from which on a guess is used without being confirmed."""
@@ -45,9 +45,9 @@ class Given:
     Attributes
     ----------
     columns : mapping
-        Column of a quantity, as `force`: `Kraft 1`.
+        MeasuredColumn of a quantity, as `force`: `Kraft 1`.
     units : mapping
-        Unit of a column by its name.
+        MeasuredUnit of a column by its name.
     signs : mapping
         +1 or -1 for a channel, as `force`: -1.
     excitation : Excitation or None
@@ -73,7 +73,7 @@ class Assignment:
     ----------
     column : str
     quantity : Quantity
-    unit : Unit or None
+    unit : MeasuredUnit or None
         None where the file says none and none was given: such a column cannot be used where one is needed.
     confidence : float
         0 to 1; 1 where it was given.
@@ -82,7 +82,7 @@ class Assignment:
 
     column: str
     quantity: Quantity
-    unit: Unit | None
+    unit: MeasuredUnit | None
     confidence: float
     why: str
 
@@ -120,7 +120,7 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
         A column or unit that was given is not there.
     """
     given = given or Given()
-    columns: dict[str, Column] = {}
+    columns: dict[str, MeasuredColumn] = {}
     for table in tables:
         for column in table.columns:
             columns.setdefault(column.name, column)
@@ -149,7 +149,7 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
     return replace(mapping, faults=tuple(_faults(mapping, tables)))
 
 
-def _check_given(columns: AbstractMapping[str, Column], given: Given) -> None:
+def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) -> None:
     known = ", ".join(repr(name) for name in columns)
     faults = [
         f"there is no column {name!r}; the columns are {known}"
@@ -165,12 +165,12 @@ def _check_given(columns: AbstractMapping[str, Column], given: Given) -> None:
         raise MeasurementError("\n".join(faults))
 
 
-def _unit_of(column: Column, given: Given) -> Unit | None:
+def _unit_of(column: MeasuredColumn, given: Given) -> MeasuredUnit | None:
     text = given.units.get(column.name) or column.unit
     return None if text is None else parse_unit(text)
 
 
-def _candidates(column: Column, given: Given, columns: Sequence[Column]) -> list[Assignment]:
+def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[MeasuredColumn]) -> list[Assignment]:
     """Whatever a column could be, with how sure it is."""
     unit = _unit_of(column, given)
     named = [quantity for quantity, name in given.columns.items() if name == column.name]
@@ -187,7 +187,11 @@ def _candidates(column: Column, given: Given, columns: Sequence[Column]) -> list
 
 
 def _score(
-    column: Column, quantity: Quantity, unit: Unit | None, columns: Sequence[Column], given: Given
+    column: MeasuredColumn,
+    quantity: Quantity,
+    unit: MeasuredUnit | None,
+    columns: Sequence[MeasuredColumn],
+    given: Given,
 ) -> tuple[float, str]:
     is_text = column.text is not None
     if is_text != (quantity is Quantity.BATCH) and not (quantity is Quantity.BATCH and not is_text):
@@ -212,7 +216,7 @@ def _score(
     return 0.0, ""
 
 
-def _further(column: Column, given: Given) -> Assignment:
+def _further(column: MeasuredColumn, given: Given) -> Assignment:
     """Take a column that is none of the quantities for a covariate: it may still explain friction."""
     unit = _unit_of(column, given)
     return Assignment(column.name, Quantity.COVARIATE, unit, SURE, "none of the known quantities")

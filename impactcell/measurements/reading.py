@@ -1,23 +1,38 @@
-"""Reads a measurement file of any kind into tables."""
+"""Reads a measurement file of any kind into tables; the kind is told from its first bytes."""
 
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from impactcell.errors import MeasurementError
+from impactcell.measurements.archive import ARCHIVES, unpacked
 from impactcell.measurements.dialect import Dialect
+from impactcell.measurements.hdf5 import read_hdf5
 from impactcell.measurements.limits import Limits
+from impactcell.measurements.matlab import read_matlab
+from impactcell.measurements.mdf4 import read_mdf4
+from impactcell.measurements.parquet import read_parquet
 from impactcell.measurements.table import Table
+from impactcell.measurements.tdms import read_tdms
 from impactcell.measurements.text_file import read_text
 
 Reader = Callable[[Path, Limits], tuple[Table, ...]]
-TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".log", "")
-"""Endings of files that are read as text."""
+KINDS: tuple[tuple[bytes, Reader], ...] = (
+    (b"PAR1", read_parquet),
+    (b"\x89HDF\r\n\x1a\n", read_hdf5),
+    (b"MATLAB 7.3", read_hdf5),
+    (b"MATLAB", read_matlab),
+    (b"TDSm", read_tdms),
+    (b"MDF ", read_mdf4),
+)
+"""First bytes of a file, and what reads it."""
 
 
 def read_tables(
     path: Path, limits: Limits | None = None, dialect: Dialect | None = None
 ) -> tuple[Table, ...]:
-    """Read the tables of a measurement file: text in any dialect.
+    """Read the tables of a measurement file: text, Parquet, HDF5, MDF, TDMS, MATLAB, or a zip of them.
 
     Parameters
     ----------
@@ -40,6 +55,49 @@ def read_tables(
     limits = limits or Limits()
     limits.check_file(path)
     try:
+        with path.open("rb") as file:
+            head = file.read(16)
+        if head.startswith(ARCHIVES):
+            return _packed(path, limits, dialect)
+        for begin, reader in KINDS:
+            if head.startswith(begin):
+                return reader(path, limits)
+        if path.suffix.lower() == ".mat":
+            return read_matlab(path, limits)
         return read_text(path, limits, dialect or Dialect())
     except OSError as error:
         raise MeasurementError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _packed(path: Path, limits: Limits, dialect: Dialect | None) -> tuple[Table, ...]:
+    """Read the tables of all files of an archive, which has no archive within."""
+    tables: list[Table] = []
+    with unpacked(path, limits) as directory:
+        for file in sorted(directory.rglob("*"), key=lambda file: natural_key(str(file))):
+            if not file.is_file():
+                continue
+            with file.open("rb") as opened:
+                if opened.read(4).startswith(ARCHIVES):
+                    raise MeasurementError(f"{path}: holds an archive, {file.name!r}; unpack it first")
+            source = f"{path}/{file.relative_to(directory)}"
+            try:
+                tables += (replace(table, source=source) for table in read_tables(file, limits, dialect))
+            except MeasurementError as error:
+                raise MeasurementError(str(error).replace(str(file), source)) from error
+    if not tables:
+        raise MeasurementError(f"{path}: holds no files")
+    return tuple(tables)
+
+
+def natural_key(name: str) -> list[tuple[int, int, str]]:
+    """Key under which `shot10` comes after `shot9`.
+
+    Examples
+    --------
+    >>> sorted(["shot10", "shot9"], key=natural_key)
+    ['shot9', 'shot10']
+    """
+    return [
+        (0, int(part), "") if part.isdigit() and part.isascii() else (1, 0, part)
+        for part in re.split(r"(\d+)", name)
+    ]

@@ -13,7 +13,7 @@ Lines = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Column:
+class MeasuredColumn:
     """One column of a table.
 
     Attributes
@@ -42,7 +42,7 @@ class Table:
     ----------
     source : str
         The file, as faults name it.
-    columns : tuple of Column
+    columns : tuple of MeasuredColumn
     name : str
         Of the sheet, group or channel group; empty where the file is one table.
     attributes : mapping
@@ -54,7 +54,7 @@ class Table:
     """
 
     source: str
-    columns: tuple[Column, ...]
+    columns: tuple[MeasuredColumn, ...]
     name: str = ""
     attributes: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -68,7 +68,7 @@ class Table:
     def __len__(self) -> int:
         return len(self.columns[0].values) if self.columns else 0
 
-    def column(self, name: str) -> Column | None:
+    def column(self, name: str) -> MeasuredColumn | None:
         """Give the column of this name, None where there is none."""
         return next((column for column in self.columns if column.name == name), None)
 

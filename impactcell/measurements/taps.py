@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.campaign import contacts
 from impactcell.errors import MeasurementError
-from impactcell.measurements import contacts
 from impactcell.measurements.captures import channel_of, described, scalar
 from impactcell.measurements.mapping import Given
 from impactcell.measurements.recognition import CHANNELS, Quantity
@@ -22,7 +22,7 @@ NO_TRIGGER = "none"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Tap:
+class _TapRecord:
     """One tap of a record.
 
     `onset` is the index of the first force sample in contact, None where the record has no sample before it.
@@ -44,7 +44,7 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
     notes: list[str] = []
     faults: list[str] = []
     signed = _signed(records, given, notes)
-    taps: list[_Tap] = []
+    taps: list[_TapRecord] = []
     for record in signed:
         taps += _taps(record, given, faults)
     if faults:
@@ -74,7 +74,7 @@ def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[R
     return turned
 
 
-def _taps(record: Record, given: Given, faults: list[str]) -> list[_Tap]:
+def _taps(record: Record, given: Given, faults: list[str]) -> list[_TapRecord]:
     time, force = record.times[Quantity.FORCE], record.values[Quantity.FORCE]
     if given.trigger == NO_TRIGGER:
         return _with_velocity([(record, None)], given, faults)
@@ -126,7 +126,9 @@ def _part(record: Record, onset: int, end_s: float) -> tuple[Record, int]:
     return part, int(onset - np.count_nonzero(time[:onset] < begin_s))
 
 
-def _with_velocity(parts: Sequence[tuple[Record, int | None]], given: Given, faults: list[str]) -> list[_Tap]:
+def _with_velocity(
+    parts: Sequence[tuple[Record, int | None]], given: Given, faults: list[str]
+) -> list[_TapRecord]:
     taps = []
     for record, onset in parts:
         velocity = given.constants.get("velocity", record.scalars.get("velocity"))
@@ -138,7 +140,7 @@ def _with_velocity(parts: Sequence[tuple[Record, int | None]], given: Given, fau
                 f"velocity=NAME, or give --set 'velocity=3000 mm/min'"
             )
             continue
-        taps.append(_Tap(record, onset, abs(velocity)))
+        taps.append(_TapRecord(record, onset, abs(velocity)))
     return taps
 
 
@@ -152,7 +154,7 @@ def _slope(record: Record, onset: int | None) -> float:
     return float(np.polyfit(time[near] - t0, position[near], 1)[0])
 
 
-def _contact_times(taps: Sequence[_Tap], notes: list[str]) -> list[float]:
+def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:
     """Time of first contact of each tap in its record [s]."""
     triggered = [tap for tap in taps if tap.onset is not None]
     if triggered:
@@ -185,7 +187,7 @@ def _rest_force(force: Samples, onset: int | None) -> float:
     return float(np.median(before)) if len(before) >= 3 else 0.0
 
 
-def _capture(number: int, tap: _Tap, t0: float, given: Given) -> Capture:
+def _capture(number: int, tap: _TapRecord, t0: float, given: Given) -> Capture:
     record = tap.record
     channels: dict[str, Channel | None] = {str(q): channel_of(record, q, t0) for q in CHANNELS}
     force = channels["force"]

@@ -11,7 +11,7 @@ from impactcell.errors import MeasurementError
 from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.numbers import parse_number
-from impactcell.measurements.table import Column, Lines, Table, unique_names
+from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
 from impactcell.measurements.text_layout import Layout, find_layout, is_comment
 from impactcell.records import Samples
 
@@ -191,20 +191,20 @@ def _plain_numbers(cells: list[str], decimal: str) -> Samples | None:
         return None
 
 
-def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[Column, ...]:
+def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[MeasuredColumn, ...]:
     """Columns of the table; those without name and content, as a delimiter at line ends makes them, go."""
     kept = []
     names = unique_names(list(layout.names))
     for place, content in enumerate(columns):
         unit = layout.units[place]
         if isinstance(content, np.ndarray):
-            kept.append(Column(names[place], unit, content))
+            kept.append(MeasuredColumn(names[place], unit, content))
         elif any(content) or layout.names[place]:
             moments = _moments(content)
             if moments is None:
-                kept.append(Column(names[place], unit, np.full(len(content), np.nan), tuple(content)))
+                kept.append(MeasuredColumn(names[place], unit, np.full(len(content), np.nan), tuple(content)))
             else:
-                kept.append(Column(names[place], "s", moments))
+                kept.append(MeasuredColumn(names[place], "s", moments))
     return tuple(kept)
 
 

@@ -29,7 +29,7 @@ class Dimension(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
+class MeasuredUnit:
     """A unit.
 
     Attributes
@@ -113,17 +113,17 @@ _SUFFIX_WORDS = {"n": "N", "nm": "nm", "v": "V", "a": "A", "k": "K", "hz": "Hz",
 
 
 @cache
-def _symbols() -> dict[str, Unit]:
+def _symbols() -> dict[str, MeasuredUnit]:
     table = {}
     for symbol, dimension, factor, prefixes in _SI:
         for prefix in ("", *prefixes):
-            table[prefix + symbol] = Unit(prefix + symbol, dimension, _PREFIXES[prefix] * factor)
+            table[prefix + symbol] = MeasuredUnit(prefix + symbol, dimension, _PREFIXES[prefix] * factor)
     for symbol, dimension, factor in _FURTHER:
-        table[symbol] = Unit(symbol, dimension, factor)
+        table[symbol] = MeasuredUnit(symbol, dimension, factor)
     return table
 
 
-def parse_unit(text: str) -> Unit | None:
+def parse_unit(text: str) -> MeasuredUnit | None:
     """Give the unit that `text` writes, None where it is none that is known.
 
     Examples
@@ -140,15 +140,15 @@ def parse_unit(text: str) -> Unit | None:
     if not plain:
         return None
     unit = _single(plain) or _rate(plain)
-    return None if unit is None else Unit(shown, unit.dimension, unit.factor)
+    return None if unit is None else MeasuredUnit(shown, unit.dimension, unit.factor)
 
 
-def _single(plain: str) -> Unit | None:
+def _single(plain: str) -> MeasuredUnit | None:
     symbols = _symbols()
     return symbols.get(plain) or symbols.get(_WORDS.get(plain.lower(), ""))
 
 
-def _rate(plain: str) -> Unit | None:
+def _rate(plain: str) -> MeasuredUnit | None:
     """Something by time, as mm/min, m/s2 or deg/s."""
     above, slash, below = plain.partition("/")
     if not slash:
@@ -158,7 +158,7 @@ def _rate(plain: str) -> Unit | None:
     if upper is None or lower is None or lower.dimension is not Dimension.TIME:
         return None
     dimension = _RATES.get((upper.dimension, power))
-    return None if dimension is None else Unit(plain, dimension, upper.factor / lower.factor**power)
+    return None if dimension is None else MeasuredUnit(plain, dimension, upper.factor / lower.factor**power)
 
 
 def split_unit(header: str) -> tuple[str, str | None]:

@@ -233,6 +233,8 @@ class _CampaignProblem:
         eliminated = []
         for tap in start.taps:
             h, cross, g = float(tap.normal[MU_K, MU_K]), tap.normal[SHARED, MU_K], float(tap.slope[MU_K])
+            if not h > 0.0:
+                raise NotConvergedError("the friction of a tap does not show in its samples")
             curvature += tap.normal[SHARED, SHARED] - np.outer(cross, cross) / h
             gradient += tap.slope[SHARED] - cross * (g / h)
             eliminated.append((h, cross, g))

@@ -9,7 +9,13 @@ from impactcell.discrepancy.data.noise_floor import (
     sensor_noise,
 )
 from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES, Trajectory
-from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign, prepare, shot_set, split_held_out
+from impactcell.discrepancy.data.prepared_campaign import (
+    PreparedCampaign,
+    check_campaign_units,
+    prepare,
+    shot_set,
+    split_held_out,
+)
 from impactcell.discrepancy.data.shots import (
     CHANNELS,
     FORCE,
@@ -38,6 +44,7 @@ __all__ = [
     "ReplicateSpread",
     "ShotSet",
     "Trajectory",
+    "check_campaign_units",
     "concatenate_shots",
     "decimate",
     "prepare",

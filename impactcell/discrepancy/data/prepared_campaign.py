@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.campaign import Campaign, Excitation
+from impactcell.campaign import Campaign, Excitation, from_contact
 from impactcell.discrepancy.data.driven import Driven
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
@@ -70,7 +70,8 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         Too few shots for any test, or a unit that is wrong by a large factor.
     """
     strategy = STRATEGIES[campaign.excitation]
-    notes: list[str] = []
+    campaign, pretrigger = from_contact(campaign)
+    notes = list(pretrigger)
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
         message = (
@@ -103,6 +104,19 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         ),
         tuple(notes),
     )
+
+
+def check_campaign_units(campaign: Campaign) -> None:
+    """Notice a unit that is wrong by a large factor, as `prepare` does, however few the shots.
+
+    Raises
+    ------
+    CampaignError
+        With the columns whose unit to check.
+    """
+    strategy = STRATEGIES[campaign.excitation]
+    shots = [_prepared_shot(strategy, shot, (1, 1), 0, 0) for shot in campaign.shots]
+    check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
 
 
 def split_held_out(prepared: PreparedCampaign, seed: int) -> tuple[IndexArray, IndexArray]:

@@ -145,3 +145,60 @@ def test_the_sample_campaigns(name: str, most: float, shared_data: Path, tmp_pat
     ]
     assert len(errors) == 60
     assert np.mean(errors) < most
+
+
+def recorded_from(shift_s: float, pretrigger: int = 300) -> list[Capture]:
+    """Give the captures with samples before contact, and times that count from `shift_s` before it."""
+    rng = np.random.default_rng(8)
+
+    def earlier(channel: Channel | None, noise: float, at: float) -> Channel:
+        assert channel is not None
+        before = channel.time_s[0] - np.arange(pretrigger, 1, -1) * 1e-4
+        return Channel(
+            np.concatenate([before, channel.time_s]) + shift_s,
+            np.concatenate([at + rng.normal(0.0, noise, before.size), channel.values]),
+        )
+
+    return [
+        replace(
+            shot, force=earlier(shot.force, 0.4, 0.0), position=earlier(shot.position, 1.5e-6, shot.start_m)
+        )
+        for shot in captures(taps())
+    ]
+
+
+@pytest.mark.parametrize("shift_s", [0.0, 0.03])
+def test_samples_before_contact_are_expected(
+    tmp_path: Path, shift_s: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shots = tuple(recorded_from(shift_s))
+    write(
+        Campaign(Excitation.TAP, shots, stroke_m=1.5e-3, sensors=SENSORS, columns=COVARIATES), tmp_path / "c"
+    )
+    estimate(tmp_path / "c", output=tmp_path / "out.csv")
+    told = capsys.readouterr().err
+    assert "pretrigger" in told
+    assert ("First contact came 30" in told) == (shift_s > 0.0)
+    with (tmp_path / "out.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(shots)
+    for row, tap in zip(rows, taps(), strict=True):
+        assert float(row["mu_k"]) == pytest.approx(tap.mu_k, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("channel", "told"),
+    [("position", r"unit of position_m, time_s or velocity_mm_per_min"), ("force", "unit of force_n")],
+)
+def test_a_unit_that_is_wrong_is_told(tmp_path: Path, channel: str, told: str) -> None:
+    shots = tuple(
+        replace(
+            shot, **{channel: replace(getattr(shot, channel), values=1e3 * getattr(shot, channel).values)}
+        )
+        for shot in captures(taps())
+    )
+    write(
+        Campaign(Excitation.TAP, shots, stroke_m=1.5e-3, sensors=SENSORS, columns=COVARIATES), tmp_path / "c"
+    )
+    with pytest.raises(CampaignError, match=told):
+        estimate(tmp_path / "c")

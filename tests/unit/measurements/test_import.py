@@ -13,8 +13,8 @@ from impactcell.cli.app import run_verb
 from impactcell.errors import MeasurementError
 from impactcell.features import extract
 from impactcell.measurements import (
-    Column,
     Given,
+    MeasuredColumn,
     Quantity,
     Table,
     guess,
@@ -42,7 +42,9 @@ def read(paths: list[Path]) -> tuple[Table, ...]:
 
 
 def table(**columns: tuple[str | None, np.ndarray]) -> Table:
-    return Table("a.csv", tuple(Column(name, unit, values) for name, (unit, values) in columns.items()))
+    return Table(
+        "a.csv", tuple(MeasuredColumn(name, unit, values) for name, (unit, values) in columns.items())
+    )
 
 
 def test_a_loggers_files_become_taps_with_the_right_friction(files: list[Path], tmp_path: Path) -> None:
@@ -95,7 +97,7 @@ def test_a_column_numbers_the_shots_and_a_word_is_the_batch() -> None:
         "Versuch": (None, numbers),
         "Druck": ("bar", numbers),
     }
-    batch = Column("Charge", None, np.full(len(numbers), np.nan), tuple(f"B{n:g}" for n in numbers))
+    batch = MeasuredColumn("Charge", None, np.full(len(numbers), np.nan), tuple(f"B{n:g}" for n in numbers))
     made = table(**columns)
     tables = [Table("a.csv", (*made.columns, batch))]
     given = Given(constants={"mass": 18.9, "velocity": 0.05}, units={}, columns={})

@@ -1,0 +1,106 @@
+"""Counts the times of taps from first contact, where a record began before it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell.campaign import contacts
+from impactcell.campaign.contents import Campaign, Excitation
+from impactcell.records import Capture, Channel
+
+MIN_LATE_STEPS = 3.0
+"""Sampling steps by which a contact has to come late before a record is taken to have begun earlier."""
+MIN_LATE_S = 1e-3
+"""Time by which it has to come late: longer than a sensor lags or a channel is skewed."""
+STATED_LATE_S = 5e-3
+"""The same where samples before t = 0 say that t = 0 was meant to be the contact."""
+CONTACT_S = 1e-9
+"""Time [s] up to which a sample is taken at first contact itself, where the force jumps and has no one
+value."""
+
+
+def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
+    """Give a campaign whose taps begin at first contact, and what was done to them.
+
+    The model of a tap begins at first contact: samples before it are left out. Where the force of most shots
+    begins later than t = 0, contact is put where it begins.
+
+    Returns
+    -------
+    campaign : Campaign
+    notes : tuple of str
+        Empty where nothing was to be done.
+    """
+    if campaign.excitation is not Excitation.TAP:
+        return campaign, ()
+    notes: list[str] = []
+    shots = _from_onset(campaign.shots, notes)
+    kept = tuple(_without_pretrigger(shot) for shot in shots)
+    changed = sum(before is not after for before, after in zip(shots, kept, strict=True))
+    if changed:
+        notes.append(f"Samples before contact (pretrigger) of {changed} shots are left out of the fits.")
+    return replace(campaign, shots=kept), tuple(notes)
+
+
+def _from_onset(shots: Sequence[Capture], notes: list[str]) -> tuple[Capture, ...]:
+    onsets: list[int | None] = []
+    for shot in shots:
+        force = shot.force
+        if force is None or len(force.values) < 10 or np.ptp(force.values) == 0.0:
+            onsets.append(None)
+            continue
+        found = contacts.contact_onsets(force.time_s, force.values, contacts.baseline_of(force.values))
+        onsets.append(found[0] if found and found[0] > 0 else None)
+    late = [
+        (shot, shot.force, onset)
+        for shot, onset in zip(shots, onsets, strict=True)
+        if onset is not None and shot.force
+    ]
+    if not late or 2 * len(late) < len(shots):
+        return tuple(shots)
+    step = float(np.median([np.median(np.diff(force.time_s)) for _, force, _ in late]))
+    lateness = float(np.median([force.time_s[onset] for _, force, onset in late]))
+    is_stated = any(force.time_s[0] < 0.0 for _, force, _ in late)
+    if abs(lateness) < max(MIN_LATE_STEPS * step, STATED_LATE_S if is_stated else MIN_LATE_S):
+        return tuple(shots)
+    starts = contacts.onset_within_sample(
+        [force.time_s for _, force, _ in late],
+        [force.values - float(np.median(force.values[: max(onset - 1, 1)])) for _, force, onset in late],
+        [onset for _, _, onset in late],
+        [shot.velocity_m_s for shot, _, _ in late],
+    )
+    notes.append(
+        f"First contact came {1e3 * lateness:.3g} ms after t = 0: times of {len(late)} shots are counted "
+        f"from where their "
+        f"force begins, good to a part of the sampling step of {1e3 * step:.3g} ms."
+    )
+    moved = {shot.cycle: start for (shot, _, _), start in zip(late, starts, strict=True)}
+    return tuple(_counted_from(shot, moved[shot.cycle]) if shot.cycle in moved else shot for shot in shots)
+
+
+def _counted_from(shot: Capture, start_s: float) -> Capture:
+    def moved(channel: Channel | None) -> Channel | None:
+        return None if channel is None else replace(channel, time_s=channel.time_s - start_s)
+
+    return replace(
+        shot, force=moved(shot.force), position=moved(shot.position), actuator=moved(shot.actuator)
+    )
+
+
+def _without_pretrigger(shot: Capture) -> Capture:
+    channels = (shot.force, shot.position, shot.actuator)
+    if not any(
+        channel is not None and len(channel.time_s) and channel.time_s[0] < 0.0 for channel in channels
+    ):
+        return shot
+
+    def kept(channel: Channel | None) -> Channel | None:
+        if channel is None:
+            return None
+        since = channel.time_s > CONTACT_S
+        values = channel.values[since]
+        return replace(channel, time_s=channel.time_s[since], values=values) if len(values) else channel
+
+    force, position, actuator = map(kept, channels)
+    return replace(shot, force=force, position=position, actuator=actuator)

@@ -1,0 +1,108 @@
+"""Reads HDF5 files, and MATLAB files of version 7.3, which are such, with h5py."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements.arrays import tables_of
+from impactcell.measurements.limits import Limits
+from impactcell.measurements.optional import reader_library
+from impactcell.measurements.table import Table
+
+MAX_DEPTH = 8
+"""Groups within groups that are looked into."""
+UNIT_KEYS = ("unit", "units", "Unit", "Units", "Einheit", "unit_string")
+"""Attributes that hold the unit of a data set."""
+
+
+def read_hdf5(path: Path, limits: Limits) -> tuple[Table, ...]:
+    """Read a table of each group: its vectors, the columns of its matrices and of its records.
+
+    Raises
+    ------
+    MeasurementError
+        It is too large, damaged, without data, or h5py is not installed.
+    """
+    h5py = reader_library("h5py", "HDF5", path)
+    tables: list[Table] = []
+    try:
+        with h5py.File(path, "r") as file:
+            _read_group(h5py, file, path, limits, (0, 0), tables)
+    except MeasurementError:
+        raise
+    except Exception as error:
+        raise MeasurementError(f"{path}: is a damaged HDF5 file: {error}") from error
+    if not tables:
+        raise MeasurementError(f"{path}: holds no column of numbers")
+    return tuple(tables)
+
+
+def _read_group(
+    h5py: Any,
+    group: Any,
+    path: Path,
+    limits: Limits,
+    spent: tuple[int, int],
+    tables: list[Table],
+) -> int:
+    """Read the tables of a group and of those within; the cells read so far."""
+    depth, cells = spent
+    columns: list[tuple[str, str | None, Any]] = []
+    for name in group:
+        link = group.get(name, getlink=True)
+        if not isinstance(link, h5py.HardLink) or name.startswith("#"):
+            continue  # links may lead out of the file, or round in a circle; # is MATLAB's own
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            if depth < MAX_DEPTH:
+                cells = _read_group(h5py, item, path, limits, (depth + 1, cells), tables)
+            continue
+        cells = _count(item, path, limits, cells)
+        columns += _columns(name, item)
+    limits.check_shape(f"{path}: {group.name}", 0, len(columns))
+    attributes = {key: _plain(value) for key, value in group.attrs.items()}
+    note = "HDF5" if group.name == "/" else f"HDF5 group {group.name}"
+    tables += tables_of(str(path), columns, group.name.strip("/"), attributes, note)
+    return cells
+
+
+def _count(item: Any, path: Path, limits: Limits, cells: int) -> int:
+    """Refuse a data set by its shape, before it is unpacked."""
+    if item.ndim not in (1, 2) or not item.size:
+        return cells
+    width = len(item.dtype.names) if item.dtype.names else min(item.shape) if item.ndim == 2 else 1
+    return limits.check_shape(
+        f"{path}: {item.name}", item.size // max(width, 1) if item.ndim == 2 else item.size, width, cells
+    )
+
+
+def _columns(name: str, item: Any) -> list[tuple[str, str | None, Any]]:
+    unit = next((str(_plain(item.attrs[key])) for key in UNIT_KEYS if key in item.attrs), None)
+    if not item.size or item.ndim not in (1, 2) or (item.dtype.hasobject and item.dtype.kind != "O"):
+        return []
+    if item.dtype.names:
+        records = item[()]
+        return [(field, unit, records[field]) for field in item.dtype.names if records[field].ndim == 1]
+    values = item.asstr()[()] if item.dtype.kind == "O" else item[()]
+    if values.ndim == 1:
+        return [(name, unit, values)]
+    if values.shape[0] < values.shape[1]:
+        values = values.T  # MATLAB writes columns as rows
+    if values.shape[1] == 1:
+        return [(name, unit, values[:, 0])]
+    names = _plain(item.attrs.get("columns", item.attrs.get("names")))
+    titles = names if isinstance(names, list) and len(names) == values.shape[1] else None
+    return [
+        (titles[i] if titles else f"{name} {i + 1}", unit, np.ascontiguousarray(values[:, i]))
+        for i in range(values.shape[1])
+    ]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, np.ndarray):
+        return [_plain(item) for item in value.ravel()[:1000].tolist()]
+    return value
