@@ -2,11 +2,14 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Final
 
 from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality
 
 PERIOD_GAIN = 0.05
 """Share of the latest time between cycles in their mean."""
+_COEFFICIENTS: Final = ("mu_s", "mu_k", "by_force", "by_distance", "combined")
+"""Those of an estimate, by whatever predictor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,30 +57,39 @@ class CycleBatch:
     expected: bool
 
 
-def fill_defaults(known: CaptureDefaults, capture: Capture) -> Capture:
+def fill_defaults(defaults: CaptureDefaults, capture: Capture) -> Capture:
     """Fill in what the module does not report: mass, stroke and the noise of its sensors."""
     mass_kg, stroke_m = capture.mass_kg, capture.stroke_m
-    if math.isnan(mass_kg) and known.mass_kg is not None:
-        mass_kg = known.mass_kg
-    if math.isinf(stroke_m) and known.stroke_m is not None:
-        stroke_m = known.stroke_m
+    if math.isnan(mass_kg) and defaults.mass_kg is not None:
+        mass_kg = defaults.mass_kg
+    if math.isinf(stroke_m) and defaults.stroke_m is not None:
+        stroke_m = defaults.stroke_m
     return replace(
         capture,
         mass_kg=mass_kg,
         stroke_m=stroke_m,
-        force=_with_noise(capture.force, known.force_noise_std_n),
-        position=_with_noise(capture.position, known.position_noise_std_m),
+        force=_with_noise(capture.force, defaults.force_noise_std_n),
+        position=_with_noise(capture.position, defaults.position_noise_std_m),
     )
 
 
 def degrade_quality(friction: FrictionEstimate, faults: tuple[str, ...]) -> FrictionEstimate:
-    """Make an estimate from a capture with faults uncertain at best, and say why."""
-    if not faults or friction.mu_s.quality is not Quality.GOOD:
+    """Make each coefficient of a capture with faults uncertain at best, and say why.
+
+    One that is uncertain or bad already keeps its own reason.
+    """
+    if not faults:
         return friction
-    reason = "; ".join(faults)
-    mu_s = replace(friction.mu_s, quality=Quality.UNCERTAIN, reason=reason)
-    mu_k = replace(friction.mu_k, quality=max(friction.mu_k.quality, Quality.UNCERTAIN), reason=reason)
-    return replace(friction, mu_s=mu_s, mu_k=mu_k)
+    doubt = {"quality": Quality.UNCERTAIN, "reason": "; ".join(faults)}
+    coefficients = {name: getattr(friction, name) for name in _COEFFICIENTS}
+    return replace(
+        friction,
+        **{
+            name: replace(coefficient, **doubt)
+            for name, coefficient in coefficients.items()
+            if coefficient.quality is Quality.GOOD
+        },
+    )
 
 
 def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:

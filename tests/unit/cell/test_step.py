@@ -1,0 +1,202 @@
+"""One cycle as a whole: what goes into the snapshot, what is kept, and what people and faults do to it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from impactcell import cell as core
+from impactcell.alarms import AlarmEvent, EventKind, Notification
+from impactcell.alarms.rules import module_connection
+from impactcell.cell import CellDesign, CellState
+from impactcell.records import BatchAnnouncement, Capture, PositioningState, Quality, Shelving
+from impactcell.service.factory import cell_design
+from impactcell.settings import read_cell
+from tests.integration.processes import CONFIG
+from tests.taps import Tap
+
+SECOND = 10**9
+LEARNED = 12
+
+
+@pytest.fixture(scope="module")
+def design() -> CellDesign:
+    return cell_design(read_cell(CONFIG / "cells" / "prototype.yaml"))
+
+
+def capture(cycle: int, mu_s: float = 0.2, batch_id: str | None = "A") -> Capture:
+    draw = np.random.default_rng([cycle, 9])
+    tap = Tap(0.06, mu_s * (1.0 + 0.012 * draw.standard_normal()), stroke_m=1.5e-3)
+    return replace(tap.capture(draw, cycle=cycle), time_ns=(cycle + 5) * SECOND, batch_id=batch_id, session=3)
+
+
+@pytest.fixture(scope="module")
+def learned(design: CellDesign) -> CellState:
+    state = core.initial_state(design)
+    for cycle in range(1, LEARNED + 1):
+        state = core.step(design, state, capture(cycle), PositioningState()).state
+    return state
+
+
+def test_the_snapshot_says_all_of_its_cycle(design: CellDesign, learned: CellState) -> None:
+    task, given = PositioningState(target_m=0.01, running=True, taps=3), capture(LEARNED + 1)
+    done = core.step(design, learned, given, task)
+    snapshot, state = done.snapshot, done.state
+    assert (snapshot.cycle, snapshot.time_ns) == (given.cycle, given.time_ns)
+    assert (snapshot.velocity_m_s, snapshot.mass_kg) == (given.velocity_m_s, given.mass_kg)
+    assert snapshot.positioning is task
+    assert snapshot.model_name == design.model.name
+    assert snapshot.alarms is state.alarms.alarms
+    assert snapshot.friction.mu_s.value == pytest.approx(0.2, abs=0.015)
+    assert snapshot.friction.mu_s.quality is Quality.GOOD
+    assert snapshot.gap == snapshot.friction.gap == pytest.approx(1.0, abs=0.3)
+    assert snapshot.gap_quality is Quality.GOOD
+    assert snapshot.wear.limit == design.tracker.wear_limit
+    assert snapshot.wear.level == pytest.approx(0.2, abs=0.01)
+    assert snapshot.batch.batch_id == "A"
+    assert snapshot.signature.position_m[-1] == design.signature.length_m
+    assert (state.cycle, state.time_ns, state.period_s) == (given.cycle, given.time_ns, pytest.approx(1.0))
+    assert state.batch.by_module == "A"
+    assert state.tracker.clock.last == given.cycle
+    assert state.tracker.clock.session == 3
+    assert state.gap.count == LEARNED + 1
+    assert done.changed == ()
+
+
+def test_the_usual_residual_is_uncertain_before_it_is_learned(design: CellDesign) -> None:
+    first = core.step(design, core.initial_state(design), capture(1), PositioningState()).snapshot
+    assert first.gap_quality is Quality.UNCERTAIN
+    blind = replace(capture(1), force=None, position=None)
+    nothing = core.step(design, core.initial_state(design), blind, PositioningState())
+    assert nothing.snapshot.gap_quality is Quality.BAD
+    assert nothing.snapshot.friction.mu_s.quality is Quality.BAD
+    assert nothing.notes
+    assert nothing.notes[0] == nothing.snapshot.friction.mu_s.reason
+    assert len(set(nothing.notes)) == len(nothing.notes)
+
+
+def test_faults_of_the_fieldbus_are_in_the_estimate_and_the_notes(
+    design: CellDesign, learned: CellState
+) -> None:
+    good = core.step(design, learned, capture(LEARNED + 1), PositioningState())
+    assert good.notes == ()
+    done = core.step(
+        design, learned, capture(LEARNED + 1), PositioningState(), None, ("capture cut short", "late")
+    )
+    assert done.snapshot.friction.mu_s.quality is Quality.UNCERTAIN
+    assert done.notes == ("capture cut short; late",)
+
+
+def test_defaults_are_filled_in_before_anything_is_estimated(design: CellDesign, learned: CellState) -> None:
+    defaults = replace(design.defaults, mass_kg=18.9, stroke_m=1.5e-3)
+    bare = replace(capture(LEARNED + 1), mass_kg=math.nan, stroke_m=math.inf)
+    done = core.step(replace(design, defaults=defaults), learned, bare, PositioningState())
+    whole = core.step(design, learned, capture(LEARNED + 1), PositioningState())
+    assert done.snapshot.mass_kg == 18.9
+    assert done.snapshot.friction == whole.snapshot.friction
+
+
+@pytest.mark.parametrize("told", ["by the PLC", "by a person", "by nobody"])
+def test_an_announced_batch_is_a_new_baseline_and_no_alarm(
+    design: CellDesign, learned: CellState, told: str
+) -> None:
+    state, announcement = learned, None
+    if told == "by the PLC":
+        announcement = BatchAnnouncement(1, LEARNED + 1)
+    elif told == "by a person":
+        state = core.start_batch(learned, "B", expected=True)
+        assert state.batch.by_operator is not None
+        assert state.batch.by_operator.module_batch_id == "A"
+    suppressed = []
+    for cycle in range(LEARNED + 1, LEARNED + 4):
+        done = core.step(design, state, capture(cycle), PositioningState(), announcement)
+        state = done.state
+        suppressed.append(state.alarms.alarm("BatchShift").suppressed)
+        assert done.snapshot.batch.batch_id == ("B" if told == "by a person" else "A")
+    assert suppressed == [told != "by nobody"] * 3
+    # the reference of the signature begins anew with another material
+    assert state.signature.batch_id == ("B" if told == "by a person" else "A")
+
+
+def test_a_module_that_restarts_is_followed_from_its_first_cycle_on(
+    design: CellDesign, learned: CellState
+) -> None:
+    state, notes = learned, []
+    for cycle in (1, 2, 3):
+        again = replace(capture(cycle), session=4, time_ns=(LEARNED + 6 + cycle) * SECOND)
+        done = core.step(design, state, again, PositioningState())
+        state = done.state
+        notes.append(done.notes)
+    assert notes == [("cycle numbers restarted at 1",), (), ()]
+    assert state.tracker.noise.weight == learned.tracker.noise.weight + 3
+    assert state.cycle == 3
+
+
+def test_a_reset_of_wear_begins_at_the_next_cycle(design: CellDesign, learned: CellState) -> None:
+    fresh = core.reset_wear_level(learned)
+    assert len(fresh.tracker.bank) == 0
+    assert (fresh.cycle, fresh.period_s) == (learned.cycle, learned.period_s)
+    assert fresh.alarms is learned.alarms
+    assert fresh.tracker.noise is learned.tracker.noise
+    done = core.step(design, fresh, capture(LEARNED + 1, 0.15), PositioningState())
+    assert done.snapshot.wear.level == pytest.approx(done.snapshot.friction.mu_s.value)
+
+
+def test_what_happens_beside_the_cycles_carries_the_cycle_and_its_own_time(
+    design: CellDesign, learned: CellState
+) -> None:
+    lost = module_connection.result("refused", connected=False)
+    state, (alarm,) = core.apply_rule_result(design, learned, lost, 99 * SECOND)
+    assert (alarm.name, alarm.active) == ("ModuleConnection", True)
+    assert (alarm.cycle, alarm.time_ns) == (LEARNED, 99 * SECOND)
+    assert state.alarms.alarm("ModuleConnection") is alarm
+    same, moved = core.apply_rule_result(design, state, lost, 100 * SECOND)
+    assert moved == ()
+    assert same.alarms.alarms == state.alarms.alarms
+    acted, done = core.apply_event(
+        state, "ModuleConnection", AlarmEvent(EventKind.SHELVE_TIMED, 0, 100 * SECOND, shelve_ns=SECOND)
+    )
+    assert done.notifications == (Notification.EVENT,)
+    assert (done.alarm.cycle, done.alarm.shelving) == (LEARNED, Shelving.TIMED)
+    assert acted.alarms.alarm("ModuleConnection") is done.alarm
+    early, moved = core.expire_shelving(acted, 100 * SECOND)
+    assert moved == ()
+    assert early.alarms == acted.alarms
+    late, (over,) = core.expire_shelving(acted, 101 * SECOND)
+    assert (over.shelving, over.cycle) == (Shelving.UNSHELVED, LEARNED)
+    assert late.alarms.alarm("ModuleConnection") is over
+    refused, done = core.apply_event(late, "ModuleConnection", AlarmEvent(EventKind.UNSHELVE))
+    assert done.refusal is not None
+    assert refused.alarms == late.alarms
+
+
+def test_a_state_of_another_grid_learns_its_signature_anew(design: CellDesign, learned: CellState) -> None:
+    wider = replace(design, signature=replace(design.signature, points=40))
+    fitted = core.migrate_state(wider, learned)
+    assert len(fitted.signature.reference.mean) != len(learned.signature.reference.mean) or not np.any(
+        fitted.signature.reference.mean
+    )
+    assert fitted.tracker is learned.tracker
+    assert fitted.gap is learned.gap
+    assert not fitted.model_changed
+    assert core.migrate_state(wider, fitted) is fitted
+    done = core.step(wider, fitted, capture(LEARNED + 1), PositioningState())
+    assert len(done.snapshot.signature.friction) == 40
+
+
+def test_another_model_is_an_expected_change_of_one_cycle(design: CellDesign, learned: CellState) -> None:
+    plant = replace(design.model.plant, stiffness_n_per_m=6.6e5)
+    other = replace(design, model=replace(design.model, plant=plant))
+    changed = core.migrate_state(other, learned)
+    assert changed.model_changed
+    assert changed.gap.count == 0
+    assert changed.tracker is learned.tracker
+    done = core.step(other, changed, capture(LEARNED + 1), PositioningState())
+    assert not done.state.model_changed
+    assert done.state.alarms.alarm("BatchShift").suppressed
+    assert core.migrate_state(other, done.state) is done.state
+    # two changes between two cycles are one
+    assert core.migrate_state(design, changed).model_changed
+    # a state that does not know by what model it was learned is not taken for another's
+    assert not core.migrate_state(other, replace(learned, model_digest="")).model_changed
