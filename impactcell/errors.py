@@ -28,7 +28,8 @@
     │   ├── ForeignJournalError   not our file, or of another version; never overwritten
     │   ├── JournalDamagedError   what is stored is not what was written (retry: in a journal begun anew)
     │   ├── JournalGoneError      the file was removed or replaced while it was in use (retry)
-    │   └── JournalFullError      the disk is full, or the file cannot be used now    (retry)
+    │   └── JournalUnavailableError  the file cannot be opened or written now         (retry)
+    │       └── JournalFullError     ... for the disk, or a quota, is full            (retry)
     └── AccessError               users, certificates and rights of the OPC UA server
 
 `retry` says whether doing the same again can help. A message names the cell, the thing and the way out.
@@ -174,10 +175,14 @@ class JournalGoneError(JournalError):
     retry: ClassVar[bool] = True
 
 
-class JournalFullError(JournalError):
-    """The disk or its quota is full, or the file cannot be opened or written now."""
+class JournalUnavailableError(JournalError):
+    """The file cannot be opened or written now: its disk, directory, owner, or another program is why."""
 
     retry: ClassVar[bool] = True
+
+
+class JournalFullError(JournalUnavailableError):
+    """The disk or its quota is full."""
 
 
 class AccessError(ImpactCellError):

@@ -210,7 +210,7 @@ MODULE: Final[tuple[Quantity[ModuleStatus], ...]] = (
     _Q("Module/CyclesReceived", 6083, "Cycles received since the service started.",
        ("Cycles received", "Zyklen empfangen"),
        lambda m: m.received, data_type=DataType.UINT32),
-    _Q("Module/CyclesMissed", 6084, "Cycles the module counted but the service never saw.",
+    _Q("Module/CyclesMissed", 6084, "Cycles the module counted but the service never saw or stored.",
        ("Cycles missed", "Zyklen verpasst"),
        lambda m: m.missed, data_type=DataType.UINT32),
     _Q("Module/RoundTripTime", 6085, "Time between a request to the module and its answer.",

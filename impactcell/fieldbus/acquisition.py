@@ -12,13 +12,13 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
-from impactcell.errors import FieldbusError, ModbusExceptionError, WrongDeviceError
+from impactcell.errors import FieldbusError
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_consistent, next_capture
 from impactcell.fieldbus.decoding import StatusBlock
+from impactcell.fieldbus.identity import IdentityCheck
 from impactcell.fieldbus.modbus_client import ModbusClient
-from impactcell.fieldbus.plausibility import wrong_word_order
 from impactcell.fieldbus.poll_schedule import PollSchedule
 from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
@@ -32,8 +32,6 @@ __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
 
 _DISAGREEMENTS: Final = 5
 """So often status block and window may disagree about the oldest cycle; then the next one is tried."""
-_NOT_THIS_DEVICE: Final = (1, 2, 3, 10, 11)
-"""Exceptions that say that there are no such registers, or nobody with this device id behind a gateway."""
 
 
 class ModuleAcquisition:
@@ -77,7 +75,7 @@ class ModuleAcquisition:
         self._durable: CycleId | None = None
         self._acknowledged: CycleId | None = None
         self._connections = 0
-        self._order_proved = False
+        self._identity = IdentityCheck(cell, self.register_client, self._status_reader)
 
     @property
     def status(self) -> ModuleStatus:
@@ -156,6 +154,7 @@ class ModuleAcquisition:
                 if target is None:
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
+                await self._identity.check_for(target.cycle_id)
                 fetched = await self._reader.fetch(target, taken)
             except FieldbusError as error:
                 await self._disconnect(error)
@@ -198,56 +197,22 @@ class ModuleAcquisition:
         """Connect, check who answers, and read the status block; raises FieldbusError where that fails."""
         await self._connect()
         status = await self.read_status()
-        await self._prove_word_order(status)
+        await self._identity.check_word_order(status)
         return status
 
     async def _connect(self) -> None:
         """Connect and check who answers."""
         self._ready.clear()
         await self._client.connect()
-        await self._identify()
-        self._acknowledged, self._order_proved = None, False
-
-    async def _identify(self) -> None:
-        """Raise WrongDeviceError unless every register that the map pins shows what it should."""
-        pinned = tuple(
-            name for name, register in self.registers.registers.items() if register.expect is not None
-        )
-        try:
-            values = (await self.register_client.read_image(pinned)).values
-        except ModbusExceptionError as error:
-            if error.code not in _NOT_THIS_DEVICE:
-                raise
-            raise WrongDeviceError(
-                f"{self.cell}: {error}; this is not a module of map {self.registers.name}, "
-                f"or device_id {self.link.device_id} is wrong"
-            ) from error
-        for name in pinned:
-            register = self.registers[name]
-            if values[name] != register.expect:
-                raise WrongDeviceError(
-                    f"{self.cell}: {self.link}: register {name} ({register.address}) shows {values[name]!r}, "
-                    f"map {self.registers.name} expects {register.expect!r}"
-                )
-
-    async def _prove_word_order(self, status: StatusBlock) -> None:
-        """Raise WrongDeviceError where the module has the other word order: else it would count by 65536."""
-        if self._status_reader.proves_word_order:
-            self._order_proved = True
-        elif status.cycle_counter and status.cycle_counter in status.ring:
-            header = await self.register_client.read_header(status.ring.index(status.cycle_counter))
-            image = self._status_reader.image
-            wrong = None if image is None else wrong_word_order(self.registers, image, header)
-            if wrong is not None:
-                raise WrongDeviceError(f"{self.cell}: {self.link}: {wrong}")
-            self._order_proved = True
+        self._identity.forget()
+        await self._identity.check()
+        self._acknowledged = None
 
     async def _poll(self) -> StatusBlock:
         if not self._client.connected:
             await self._connect()
         status = await self.read_status()
-        if not self._order_proved:
-            await self._prove_word_order(status)
+        await self._identity.check_word_order(status)
         if self._durable != self._acknowledged:
             await self._send_acknowledgement()
         if not self._ready.is_set():

@@ -14,7 +14,7 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
-from impactcell.fieldbus.capture_ring import NextCapture, is_after
+from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import Value, Words, registers_crc32
@@ -22,12 +22,16 @@ from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.records import Capture, CycleId
 
-_MOST_ATTEMPTS: Final = 5
-"""Readings of one cycle that may be discarded before it is given up."""
+_AT_ONCE: Final = 5
+"""Readings of one cycle that may be discarded one after the other; then the status block is looked at."""
+_MOST_ATTEMPTS: Final = 16
+"""Readings of one cycle that may be discarded before it is given up though the ring has it: some 2.5 s, for
+which all later ones wait."""
 _MOST_LINK_FAILURES: Final = 30
 """Times that the link may fail on one cycle, without getting further, before it is given up."""
-_PAUSE_S: Final = 0.001
-"""Rest after the first discarded reading, doubled with each: the module may be writing the slot."""
+_PAUSE_S, _LONGEST_PAUSE_S = 0.001, 0.25
+"""Rest after the first discarded reading, doubled with each up to the second: the module may be writing the
+slot, or another client be selecting others."""
 _REQUEST_FAULTS: Final = (1, 2, 3)
 """Exceptions that the request earns; all others tell of a module, or a gateway, that cannot answer now."""
 _ARRAYS: Final = ("force", "position", "actuator")
@@ -39,6 +43,7 @@ class NotFetched(enum.Enum):
     OVERWRITTEN = "the module has put a newer cycle in its place"
     NOT_SHOWN = "its slot shows another cycle: the status block is wrong, or the window"
     TAKEN = "it has been taken before: the status block is old, or wrong"
+    NOT_YET = "no reading of it was of use yet; the ring still holds it"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +103,8 @@ class CaptureReader:
     async def fetch(self, target: NextCapture, taken: TakenCycles) -> FetchedCapture | NotFetched:
         """Read the cycle `target`, if that is what its slot shows and it has not been taken before.
 
-        A cycle that cannot be read however often it is tried comes back without content, and `faults` says
-        why.
+        A cycle that cannot be read however often it is tried, or not before others behind it would be lost,
+        comes back without content, and `faults` says why.
 
         Raises
         ------
@@ -110,7 +115,7 @@ class CaptureReader:
         if self._target is None or self._target.cycle_id != target.cycle_id:
             self._target, self._attempts, self._link_failures, self._partial = target, 0, 0, None
         reason = "it kept changing while it was read; does another client select slots?"
-        while self._attempts < _MOST_ATTEMPTS:
+        while True:
             try:
                 partial = await self._read_header(target, taken)
                 if isinstance(partial, NotFetched):
@@ -137,13 +142,21 @@ class CaptureReader:
             self._partial = None
             self._attempts += 1
             self.discarded += 1
-            await asyncio.sleep(_PAUSE_S * 2**self._attempts)
+            await asyncio.sleep(min(_PAUSE_S * 2**self._attempts, _LONGEST_PAUSE_S))
+            if self._attempts >= _MOST_ATTEMPTS or (self._attempts >= _AT_ONCE and self._is_urgent(target)):
+                break
+            if self._attempts >= _AT_ONCE:
+                return NotFetched.NOT_YET
         self._target = self._partial = None
         if taken.is_behind(target.cycle_id):  # no header has proved that there is such a cycle at all
             return NotFetched.NOT_SHOWN
         cycle = target.cycle_id.cycle
         fault = f"{self._cell}: cycle {cycle} could not be read: {reason}"
         return FetchedCapture(decoding.empty_capture(cycle), b"", readable=False, faults=(fault,))
+
+    def _is_urgent(self, target: NextCapture) -> bool:
+        """Whether so many newer ones wait in the ring that they would be lost for this one."""
+        return cycles_after(target.cycle_id.cycle, target.counter) >= self._registers.slots // 2
 
     def _progressed(self) -> bool:
         """Whether the interrupted reading got further than the one before."""

@@ -24,7 +24,8 @@ class NextCapture:
     counter : int
         The module's last complete cycle, as the status block has it.
     missed : int
-        Cycles between the last one taken and this one, which the ring no longer has.
+        Cycles between the last one taken and this one, which the ring no longer has. After a restart it is
+        what the module's counter says of those since, as far as that can be known: see `_made_before`.
     restarted : bool
         Whether the module was started anew since the last one taken. How many cycles it made between that one
         and the restart nobody knows; `missed` counts those of the new session.
@@ -83,7 +84,7 @@ def next_capture(
         last.session != session or cycles_after(last.cycle, counter) > CYCLE_PERIOD // 2
     )
     if last is None or restarted:
-        behind = counter if restarted else CYCLE_PERIOD
+        behind = CYCLE_PERIOD
         ages_to_read = sorted((age for age in ages if age <= CYCLE_PERIOD // 2), reverse=True)
     else:
         behind = cycles_after(last.cycle, counter)
@@ -92,7 +93,36 @@ def next_capture(
         return None
     age = ages_to_read[min(skip, len(ages_to_read) - 1)]
     slot = ages[age]
-    missed = 0 if last is None else max(0, behind - age - 1)
-    if restarted and missed > CYCLE_PERIOD // 2:
-        missed = 0  # no module makes so many cycles between two polls: its counter was set
+    if last is None:
+        missed = 0
+    elif restarted:
+        complete = len(ages_to_read) == len(ring)
+        missed = max(0, _made_before(last.cycle, counter, len(ages_to_read), complete=complete) - age)
+    else:
+        missed = max(0, behind - age - 1)
     return NextCapture(CycleId(session, ring[slot]), slot, counter, missed, restarted)
+
+
+def _made_before(last: int, counter: int, held: int, *, complete: bool) -> int:
+    """Return how many cycles before the newest were made since `last`, before which the module was restarted.
+
+    A module counts from 1 again, goes on counting where it was, or begins where somebody set its counter. A
+    ring that is not full tells which: it holds all that was made since the restart. Where it is full, the
+    counter is taken to have gone on if that means less than half as many cycles since.
+
+    Parameters
+    ----------
+    last, counter : int
+        Cycle taken last, and the newest.
+    held : int
+        How many the ring holds.
+    complete : bool
+        Whether it is full.
+    """
+    if held == counter:  # from 1 again, and all are there
+        return counter - 1
+    since = cycles_after(last, counter)
+    went_on = since <= CYCLE_PERIOD // 2
+    if complete and not (went_on and 2 * since < counter):
+        return counter - 1 if counter <= CYCLE_PERIOD // 2 else 0
+    return since - 1 if went_on else 0

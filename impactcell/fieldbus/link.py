@@ -60,7 +60,8 @@ class ModuleLink:
     pause_s : float
         Rest between a reply and the next request.
     timeout_s : float
-        An answer later than this closes the connection, as does a connection that takes longer to be made.
+        Without an answer for so long the connection is closed, as is one that takes longer to be made. Of
+        several requests in flight each may take so long after the reply before it.
     tls : TlsFiles or None
         Encrypted link.
     """

@@ -10,12 +10,18 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from impactcell.errors import ForeignJournalError, JournalDamagedError, JournalError, JournalFullError
+from impactcell.errors import (
+    ForeignJournalError,
+    JournalDamagedError,
+    JournalError,
+    JournalFullError,
+    JournalUnavailableError,
+)
 from impactcell.journal.checksums import row_crc
 from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, OLDEST, TABLES, UPGRADES
 
 WAY_OUT: Final = "run the version that wrote it, or name another file to begin anew"
-_NO_ROOM: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+_NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT)
 _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _MAGIC: Final = b"SQLite format 3\0"
 _APPLICATION_ID_AT: Final = 68
@@ -30,14 +36,14 @@ def errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise _temporary_error(
-            path, error.strerror, full=error.errno in (errno.ENOSPC, errno.EDQUOT)
-        ) from error
+        raise _temporary_error(path, error.strerror, full=error.errno in _NO_ROOM) from error
     except sqlite3.OperationalError as error:
         code = error.sqlite_errorcode & 0xFF
         if code == sqlite3.SQLITE_ERROR:  # a table is missing
             raise JournalError(f"{path}: cannot be used ({error}); name another file") from error
-        raise _temporary_error(path, error, full=code in _NO_ROOM) from error
+        if code == sqlite3.SQLITE_IOERR:
+            raise _io_error(path, error) from error
+        raise _temporary_error(path, error, full=code == sqlite3.SQLITE_FULL) from error
     except sqlite3.DatabaseError as error:
         if getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED:
             raise JournalDamagedError(f"{path}: is damaged and cannot be used ({error})") from error
@@ -46,11 +52,24 @@ def errors(path: Path) -> Iterator[None]:
         raise JournalError(f"{path}: cannot be used ({error})") from error
 
 
-def _temporary_error(path: Path, reason: object, *, full: bool) -> JournalFullError:
+def _temporary_error(path: Path, reason: object, *, full: bool) -> JournalUnavailableError:
     """Make the error after which trying again can help."""
     if full:
         return JournalFullError(f"{path}: the disk or its quota is full ({reason}); make room")
-    return JournalFullError(f"{path}: cannot be used now ({reason}); check its disk, directory and owner")
+    return JournalUnavailableError(
+        f"{path}: cannot be used now ({reason}); check its disk, directory and owner"
+    )
+
+
+def _io_error(path: Path, error: sqlite3.OperationalError) -> JournalUnavailableError:
+    """Say what SQLite's "disk I/O error" may be: it does not hand on what the system said."""
+    with contextlib.suppress(OSError):
+        if not os.statvfs(path.parent).f_bavail:
+            return _temporary_error(path, error, full=True)
+    return JournalUnavailableError(
+        f"{path}: the disk failed ({error}, {error.sqlite_errorname}) though it is not full: its quota "
+        "may be, or it is broken or gone; see the system's log"
+    )
 
 
 def open_database(
@@ -71,7 +90,7 @@ def open_database(
     ------
     ForeignJournalError
         The file is not a journal, of another format, or of another cell; it is left as it is.
-    JournalFullError
+    JournalUnavailableError
         It cannot be opened now.
     JournalError
         It is damaged.

@@ -59,10 +59,10 @@ class Journal:
     ------
     ForeignJournalError
         If the file is not a journal, of another format, or of another cell; it is left as it is.
-    JournalFullError
+    JournalUnavailableError
         If the file cannot be opened now.
     JournalError
-        If it never can: another service writes it, or it is damaged.
+        If it never can: another service writes it, it has two names, or it is damaged.
     """
 
     def __init__(
@@ -149,8 +149,9 @@ class Journal:
 
         Raises
         ------
-        JournalFullError
-            If the disk or a quota is full; nothing of the cycle is stored.
+        JournalUnavailableError
+            If it cannot be written now, JournalFullError if that is for lack of room; nothing of the cycle is
+            stored.
         JournalGoneError
             If the file is no longer there; nothing counts as stored.
         JournalError

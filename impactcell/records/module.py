@@ -33,8 +33,8 @@ class ModuleStatus:
     round_trip_s : float
         Of the last request; nan before the first.
     received, missed, unreadable : int
-        Cycles received (unreadable ones among them), gone from the ring before they could be read, and
-        received without content.
+        Cycles received (unreadable ones among them), gone from the ring before they could be read (or never
+        stored, as the service counts them), and received without content.
     discarded : int
         Readings thrown away because the capture changed meanwhile or its CRC did not fit.
     restarts, reconnects : int

@@ -99,13 +99,13 @@ class CellTask:
 
     @property
     def status(self) -> ModuleStatus:
-        """State of the link and counts."""
-        return self._module.status
+        """State of the link and counts; a cycle that the journal lost counts as missed, for nobody has it."""
+        return self._with_losses(self._module.status)
 
     @property
     def health(self) -> CellHealth:
         """What monitoring shows of the cell."""
-        status, snapshot = self._module.status, self.worker.snapshot
+        status, snapshot = self.status, self.worker.snapshot
         return CellHealth(
             cell=self.cell.name,
             connected=status.connected,
@@ -230,7 +230,7 @@ class CellTask:
         self._notes = notes
         self._last_cycle_s, self._stale = time.monotonic(), False
         self._publisher.publish(snapshot, capture)
-        self._publisher.publish_module(self._module.status)
+        self._publisher.publish_module(self.status)
         mu_s, late_s = snapshot.friction.mu_s, time.time() - 1e-9 * capture.time_ns
         self.log.debug(
             "mu_s %.4f ± %.4f (%s), gap %.2f, published %s after its end",
@@ -267,13 +267,16 @@ class CellTask:
             return None
         return status_block.batch
 
+    def _with_losses(self, status: ModuleStatus) -> ModuleStatus:
+        return replace(status, missed=status.missed + self.worker.lost)
+
     def _link_changed(self, status: ModuleStatus) -> None:
         self._link_changes.put_nowait(status)
 
     async def _publish_link(self) -> None:
         while True:
             status = await self._link_changes.get()
-            self._publisher.publish_link(status)
+            self._publisher.publish_link(self._with_losses(status))
             await self._apply_rule_result(module_connection.result(status.reason, connected=status.connected))
 
     async def _check_journal(self) -> None:
@@ -312,7 +315,7 @@ class CellTask:
 
     def _publish_restored(self) -> None:
         self._publisher.publish_alarms(self.worker.alarms, unchanged=True)
-        self._publisher.publish_module(self._module.status)
+        self._publisher.publish_module(self.status)
         if self.worker.snapshot is not None:
             self._publisher.publish(self.worker.snapshot)
             self._publisher.mark_stale(self.worker.snapshot.time_ns)

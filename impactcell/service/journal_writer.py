@@ -37,7 +37,7 @@ def open_journal(path: Path, cell: str) -> tuple[Journal, str]:
 
     Raises
     ------
-    ForeignJournalError, JournalFullError, JournalError
+    ForeignJournalError, JournalUnavailableError, JournalError
         As `Journal` does.
     """
     try:
@@ -74,6 +74,8 @@ class JournalWriter:
         self.fault = ""
         self.durable: CycleId | None = None
         """The last cycle that is safely stored; None where there is none."""
+        self.lost = 0
+        """Cycles that were never stored; an acknowledgement of a later one covers them."""
         self._events: list[str] = []
         self._keep = keep
         self._log = CellLogger(logging.getLogger(__name__), cell)
@@ -149,9 +151,17 @@ class JournalWriter:
             return
         self._waiting.append((cycle_id, entry))
         if len(self._waiting) > BACKLOG:
-            self._waiting.popleft()
-            self._log.error("the journal cannot be written; its oldest waiting entry is lost")
+            self._drop("the journal cannot be written, and no more can wait for it")
         self.retry()
+
+    def _drop(self, why: str) -> None:
+        """Give up the entry that has waited longest."""
+        cycle_id, _ = self._waiting.popleft()
+        if cycle_id is None:
+            self._log.error("an entry of the journal is lost: %s", why)
+        else:
+            self.lost += 1
+            self._log.error("not stored, and lost: %s", why, cycle=cycle_id.cycle)
 
     def retry(self) -> None:
         """Write what waits, as far as the journal takes it."""
@@ -174,8 +184,9 @@ class JournalWriter:
                     return
                 # What can never be stored must not keep what can from being stored.
                 fault = str(error)
-                self._log.error("an entry of the journal is lost: %s", error)
-            self._waiting.popleft()
+                self._drop(fault)
+            else:
+                self._waiting.popleft()
         self.fault = fault
 
     def _begin_anew(self, journal: Journal, *, damaged: bool) -> None:

@@ -67,7 +67,12 @@ PATIENCE_S = 5.0
 _METRICS: tuple[tuple[str, str, str, Callable[[CellHealth], float]], ...] = (
     ("gauge", "connected", "1 while the module answers", lambda h: float(h.connected)),
     ("counter", "cycles", "Cycles processed since the start", lambda h: h.cycles),
-    ("counter", "cycles_missed", "Cycles the module had overwritten", lambda h: h.missed),
+    (
+        "counter",
+        "cycles_missed",
+        "Cycles the module had overwritten, or the journal lost",
+        lambda h: h.missed,
+    ),
     ("gauge", "last_cycle", "Number of the last cycle", lambda h: h.last_cycle),
     ("gauge", "round_trip_milliseconds", "Of the last Modbus request", lambda h: h.round_trip_ms),
     ("gauge", "static_friction", "mu_s of the last cycle", lambda h: h.mu_s),

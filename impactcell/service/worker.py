@@ -104,6 +104,11 @@ class CellWorker:
         return self._journal_writer.durable
 
     @property
+    def lost(self) -> int:
+        """Cycles that were taken in and could not be stored; they never will be."""
+        return self._journal_writer.lost
+
+    @property
     def journal_fault(self) -> str:
         """Why something was not stored, or is not yet; empty while all is."""
         return self._journal_writer.fault

@@ -6,6 +6,7 @@ taken for an answer. A disconnect fails all that is pending at once.
 """
 
 import asyncio
+import math
 import socket
 from collections import deque
 from collections.abc import Sequence
@@ -52,6 +53,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         self._requests_in_flight = 0
         self._busy: dict[asyncio.TimerHandle, RequestBatch] = {}
         self._unconfirmed: list[Exchange] = []
+        self._answered_s = -math.inf
         self._timeout_timer: asyncio.TimerHandle | None = None
         self._pause_timer: asyncio.TimerHandle | None = None
 
@@ -172,16 +174,22 @@ class TcpConnection(asyncio.BufferedProtocol):
         return drawn
 
     def _check_timeout(self) -> None:
-        """Give up if the oldest request has waited too long; else look again when it will have."""
+        """Give up if the oldest request has waited too long since the last reply; else look again.
+
+        A device, or a gateway before a serial line, answers one after the other: what is behind in a window
+        waits for all before it.
+        """
         self._timeout_timer = None
         if not self._in_flight:
             return
         oldest = self._in_flight[0]  # they stay in the order of sending
-        left_s = oldest.sent_s + self.link.timeout_s - self._loop.time()
+        left_s = max(oldest.sent_s, self._answered_s) + self.link.timeout_s - self._loop.time()
         if left_s > 0.0:
             self._timeout_timer = self._loop.call_later(left_s, self._check_timeout)
             return
         timeout = f"within {self.link.timeout_s:g} s"
+        if self._requests_in_flight > 1:
+            timeout += f", of {self._requests_in_flight} in flight (window {self.link.window})"
         self.fail(LinkError(f"{self.link}: no answer to {oldest.batch.requests[0].description} {timeout}"))
 
     def _consume_good_replies(self, stream: bytes) -> bytes:
@@ -216,6 +224,7 @@ class TcpConnection(asyncio.BufferedProtocol):
     def _take_from_flight(self, flight: BatchInFlight, first: int, count: int) -> BatchInFlight:
         """Take `count` requests of `flight`, from `first` on, out of what is in flight."""
         self._requests_in_flight -= count
+        self._answered_s = self._loop.time()
         at = self._in_flight.index(flight)
         if first:
             self._in_flight.insert(at, flight.split(first))

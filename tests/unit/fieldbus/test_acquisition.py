@@ -284,7 +284,7 @@ async def test_a_capture_that_never_fits_its_crc_is_passed_on_empty_and_the_next
 ) -> None:
     device = ScriptedDevice(fpga)
     make(device, capture_crc32=12345)
-    make(device)
+    make(device, fpga.slots // 2)
     async with running(fpga, device) as (_, module, receptions):
         bad, good = await take(receptions, 2)
         assert bad.capture.force is None
@@ -327,7 +327,7 @@ async def test_bad_content_is_named_with_cell_cycle_and_register(
 ) -> None:
     device = ScriptedDevice(fpga)
     device.complete(samples_of(1) | samples, **(HEADER | header))
-    make(device)
+    make(device, fpga.slots // 2)
     async with running(fpga, device) as (_, _, receptions):
         bad, good = await take(receptions, 2)
         begins = ("cell-1: cycle 1: ", "cell-1: cycle 1 could not be read: ")

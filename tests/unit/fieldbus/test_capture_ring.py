@@ -85,6 +85,40 @@ def test_a_restart_longer_ago_than_the_ring_counts_what_is_gone() -> None:
     assert (want.cycle_id, want.missed, want.restarted) == (CycleId(2, 23), 22, True)
 
 
+def test_a_counter_that_is_kept_over_a_restart_goes_on() -> None:
+    """The ring is empty after a start of the module, its counter may not be."""
+    want = next_capture(CycleId(1, 65_530), 2, 65_532, ring_of(65_532, 65_531))
+    assert want is not None
+    assert (want.cycle_id, want.missed, want.restarted) == (CycleId(2, 65_531), 0, True)
+    # three of the cycles before the restart had not been read
+    want = next_capture(CycleId(1, 65_527), 2, 65_531, ring_of(65_531, 65_531))
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, 65_531), 3)
+
+
+def test_a_counter_that_is_kept_is_told_from_one_that_began_anew_by_the_smaller_loss() -> None:
+    """With a full ring: from 65 530 on to 65 600, or from 1 on to 65 600 within one outage."""
+    want = next_capture(CycleId(1, 65_530), 2, 65_600, ring_of(65_600, 65_531))
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, 65_593), 62)
+    want = next_capture(CycleId(1, 5), 2, 40, ring_of(40, 1))
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, 33), 32)
+
+
+def test_a_counter_kept_over_a_restart_and_its_wrap() -> None:
+    newest = CYCLE_PERIOD + 2
+    want = next_capture(CycleId(1, CYCLE_PERIOD - 1), 2, 2, ring_of(newest, newest - 2))
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, CYCLE_PERIOD), 0)
+
+
+def test_skipping_after_a_restart_counts_what_is_skipped() -> None:
+    want = next_capture(CycleId(1, 100), 2, 5, ring_of(5, 1), skip=2)
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, 3), 2)
+
+
 def test_a_counter_that_goes_back_is_a_restart_even_in_the_same_session() -> None:
     want = next_capture(CycleId(1, 5000), 1, 2, ring_of(2, 1))
     assert want is not None

@@ -132,6 +132,28 @@ async def test_what_cannot_be_stored_now_is_stored_later_in_order(
     assert cycles(tmp_path / "j") == [1, 2, 3]
 
 
+async def test_cycles_that_are_lost_for_a_full_disk_are_counted(
+    tmp_path: Path, design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A later cycle will be acknowledged, and that tells the module that the lost ones are stored too."""
+    monkeypatch.setattr("impactcell.service.journal_writer.BACKLOG", 4)
+    journal = Journal(tmp_path / "j", "c")
+    worker = CellWorker(design, journal, Retention())
+
+    def full(*_: object) -> None:
+        raise JournalFullError("the disk is full")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(journal, "append", full)
+        for cycle in range(1, 8):
+            assert await process(worker, make_capture(cycle)) is None
+            assert worker.lost == max(0, cycle - 4)
+    await worker.retry()
+    assert (worker.durable, worker.lost) == (CycleId(1, 7), 3)
+    await worker.close()
+    assert cycles(tmp_path / "j") == [4, 5, 6, 7]
+
+
 async def test_a_capture_that_cannot_be_computed_counts_as_unreadable(
     design: core.CellDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:

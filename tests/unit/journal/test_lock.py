@@ -1,0 +1,79 @@
+"""One writer a journal, under whatever name; and what an error of the file system is called."""
+
+import os
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from impactcell.errors import JournalError, JournalFullError, JournalUnavailableError
+from impactcell.journal.database import errors
+from impactcell.journal.store import Journal
+
+
+def test_a_second_writer_is_refused(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", "c"), pytest.raises(JournalError, match="another service writes"):
+        Journal(tmp_path / "j", "c")
+
+
+def test_a_second_writer_by_a_symbolic_link_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    link = tmp_path / "elsewhere" / "link"
+    link.symlink_to(tmp_path / "j")
+    with Journal(tmp_path / "j", "c"), pytest.raises(JournalError, match="another service writes"):
+        Journal(link, "c")
+    with Journal(link, "c"), pytest.raises(JournalError, match="another service writes"):
+        Journal(tmp_path / "j", "c")
+
+
+def test_a_file_with_a_second_name_is_refused_under_both(tmp_path: Path) -> None:
+    path, other = tmp_path / "j", tmp_path / "other"
+    with Journal(path, "c"):
+        os.link(path, other)
+        with pytest.raises(JournalError, match=r"has another name as well \(a hard link\)") as told:
+            Journal(other, "c")
+        assert not told.value.retry
+    with pytest.raises(JournalError, match="hard link"):
+        Journal(path, "c")
+    with Journal(other, "c", read_only=True) as journal:
+        assert journal.cell == "c"
+    other.unlink()
+    Journal(path, "c").close()
+
+
+def sqlite_error(code: int, name: str, text: str) -> sqlite3.OperationalError:
+    error = sqlite3.OperationalError(text)
+    error.sqlite_errorcode, error.sqlite_errorname = code, name
+    return error
+
+
+def test_a_disk_that_fails_is_not_called_full(tmp_path: Path) -> None:
+    failed = sqlite_error(sqlite3.SQLITE_IOERR_FSYNC, "SQLITE_IOERR_FSYNC", "disk I/O error")
+    with pytest.raises(JournalUnavailableError, match="SQLITE_IOERR_FSYNC") as told, errors(tmp_path / "j"):
+        raise failed
+    assert not isinstance(told.value, JournalFullError)
+    assert told.value.retry
+    assert "though it is not full" in str(told.value)
+
+
+def test_a_disk_that_fails_and_is_full_is_called_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = os.statvfs_result((4096, 4096, 1000, 0, 0, 10, 10, 10, 0, 255))
+    monkeypatch.setattr(os, "statvfs", lambda _: full)
+    failed = sqlite_error(sqlite3.SQLITE_IOERR_WRITE, "SQLITE_IOERR_WRITE", "disk I/O error")
+    with pytest.raises(JournalFullError, match="make room"), errors(tmp_path / "j"):
+        raise failed
+
+
+@pytest.mark.parametrize("code", [sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY])
+def test_what_cannot_be_used_now_is_not_called_full(tmp_path: Path, code: int) -> None:
+    with pytest.raises(JournalUnavailableError, match="cannot be used now") as told, errors(tmp_path / "j"):
+        raise sqlite_error(code, "", "no")
+    assert not isinstance(told.value, JournalFullError)
+
+
+def test_a_directory_that_is_not_there_is_not_called_a_full_disk(tmp_path: Path) -> None:
+    with pytest.raises(JournalUnavailableError) as told:
+        Journal(tmp_path / "nowhere" / "j", "c")
+    assert not isinstance(told.value, JournalFullError)
