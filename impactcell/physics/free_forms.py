@@ -22,19 +22,19 @@ from impactcell.records import Samples
 
 SPANS = 7
 """Polynomial pieces of a spline: an S with a fold is followed, a single sample is not. Own choice."""
-COEFFICIENTS = SPANS + 3
-"""Of a cubic spline on that many pieces."""
+SPANS_OF_TABLE = 24
+"""The same over the position on the table, where a surface may have waves and spots: a wave takes three."""
 LOWER, UPPER = "lower", "upper"
 """Names of the parameters that say where the knots lie."""
 
 
 @compiled
-def spline(u: float, p: FloatPointer) -> float:
+def spline(u: float, p: FloatPointer, spans: int) -> float:
     """Cubic B-spline at u; knots from p[0] to p[1], coefficients from p[2] on; straight beyond."""
-    width = (p[1] - p[0]) / SPANS
+    width = (p[1] - p[0]) / spans
     w = (u - p[0]) / width
-    inside = min(max(w, 0.0), float(SPANS))
-    i = min(int(inside), SPANS - 1)
+    inside = min(max(w, 0.0), float(spans))
+    i = min(int(inside), spans - 1)
     t = inside - i
     a, b, c, d = p[2 + i], p[3 + i], p[4 + i], p[5 + i]
     s = 1.0 - t
@@ -48,42 +48,42 @@ def spline(u: float, p: FloatPointer) -> float:
 
 def _friction_over_speed(speed: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """s(|x'|), added to mu_k."""
-    return spline(speed, p)
+    return spline(speed, p, SPANS)
 
 
 def _friction_over_position(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """1 + s(x), factor of mu_s and mu_k."""
-    return 1.0 + spline(x, p)
+    return 1.0 + spline(x, p, SPANS_OF_TABLE)
 
 
 def _force_over_position(x: float, _v: float, _m: float, _g: float, p: FloatPointer) -> float:
     """s(x) on the part."""
-    return spline(x, p)
+    return spline(x, p, SPANS_OF_TABLE)
 
 
 def _drag_over_speed(_x: float, v: float, _m: float, _g: float, p: FloatPointer) -> float:
     """-x' s(|x'|) on the part: odd, and nothing at rest."""
-    return -v * spline(abs(v), p)
+    return -v * spline(abs(v), p, SPANS)
 
 
 def _stiffness_over_indentation(d: float, _rate: float, _k: float, _b: float, p: FloatPointer) -> float:
     """D s(d): nothing where contact is lost."""
-    return d * spline(d, p)
+    return d * spline(d, p, SPANS)
 
 
 def _damping_over_indentation(d: float, rate: float, _k: float, _b: float, p: FloatPointer) -> float:
     """D' s(d)."""
-    return rate * spline(d, p)
+    return rate * spline(d, p, SPANS)
 
 
 def _damping_over_rate(_d: float, rate: float, _k: float, _b: float, p: FloatPointer) -> float:
     """D' s(d')."""
-    return rate * spline(rate, p)
+    return rate * spline(rate, p, SPANS)
 
 
 def _pull_over_gap(gap: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """(1 - gap/upper) s(gap) while the gap is below `upper`."""
-    return (1.0 - gap / p[1]) * spline(gap, p)
+    return (1.0 - gap / p[1]) * spline(gap, p, SPANS)
 
 
 def _reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -93,12 +93,12 @@ def _reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float
 
 def _speed_over_time(t: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """1 + s(t), factor of the actuator's speed."""
-    return 1.0 + spline(t, p)
+    return 1.0 + spline(t, p, SPANS)
 
 
 def _reading_over_force(force: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """F (1 + s(F)) is shown."""
-    return force * (1.0 + spline(force, p))
+    return force * (1.0 + spline(force, p, SPANS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,6 +118,12 @@ class FreeForm:
         e.g. `-b * s`.
     argument : str
         Python of the covariate in the same four numbers.
+    constant_is : str
+        Parameter of the nominal plant that does what a constant function would; empty where none does, so
+        that a constant is a law of its own.
+    dissipates : str
+        Parameter of the plant to which the function is added where the sum must not be negative, lest it give
+        energy; `0` where it is the function alone, empty where either sign is possible.
     """
 
     effect: Effect
@@ -126,11 +132,18 @@ class FreeForm:
     law_kind: LawKind
     around: str
     argument: str
+    constant_is: str = ""
+    dissipates: str = ""
 
     @property
     def coefficients(self) -> tuple[str, ...]:
         """Names of the parameters that a fit moves."""
         return tuple(parameter.name for parameter in self.effect.parameters[2:])
+
+    @property
+    def spans(self) -> int:
+        """Polynomial pieces of its spline."""
+        return len(self.coefficients) - 3
 
     @property
     def unit(self) -> str:
@@ -150,6 +163,8 @@ def _form(
     equation: str,
     *,
     extra: Mapping[LawKind, Law] = MappingProxyType({}),
+    constant_is: str = "",
+    dissipates: str = "",
 ) -> FreeForm:
     """Declare a place: its covariate (name, unit, argument), and how its function enters.
 
@@ -163,7 +178,7 @@ def _form(
     )
     coefficients = tuple(
         Parameter(f"c{i}", unit, null=0.0, lower=-1e3 * typical, upper=1e3 * typical, typical=typical)
-        for i in range(COEFFICIENTS)
+        for i in range((SPANS_OF_TABLE if name == "position" else SPANS) + 3)
     )
     effect = Effect(
         identifier=identifier,
@@ -175,7 +190,7 @@ def _form(
         laws={kind: law, **extra},
     )
     add_effect(effect)
-    return FreeForm(effect, name, covariate_unit, kind, around, argument)
+    return FreeForm(effect, name, covariate_unit, kind, around, argument, constant_is, dissipates)
 
 
 _KINDS = {
@@ -196,6 +211,8 @@ _DECLARED = (
         ("speed", "m/s", "a"),
         (LawKind.KINETIC, "s", "1", 0.03),
         "mu_k + s(|x'|)",
+        constant_is="mu_k",
+        dissipates="mu_k",
     ),
     _form(
         "free_friction_over_position",
@@ -203,6 +220,7 @@ _DECLARED = (
         ("position", "m", "a"),
         (LawKind.SCALE, "1.0 + s", "1", 0.1),
         "mu (1 + s(x))",
+        constant_is="mu_k",
     ),
     _form(
         "free_force_over_position",
@@ -217,6 +235,7 @@ _DECLARED = (
         ("speed", "m/s", "abs(b)"),
         (LawKind.BODY, "-b * s", "N s/m", 50.0),
         "-x' s(|x'|)",
+        dissipates="0",
     ),
     _form(
         "free_stiffness_over_indentation",
@@ -224,6 +243,7 @@ _DECLARED = (
         ("indentation", "m", "a"),
         (LawKind.CONTACT, "a * s", "N/m", 1e5),
         "d s(d)",
+        constant_is="stiffness_n_per_m",
     ),
     _form(
         "free_damping_over_indentation",
@@ -231,6 +251,8 @@ _DECLARED = (
         ("indentation", "m", "a"),
         (LawKind.CONTACT, "b * s", "N s/m", 100.0),
         "d' s(d)",
+        constant_is="damping_n_s_per_m",
+        dissipates="damping_n_s_per_m",
     ),
     _form(
         "free_damping_over_rate",
@@ -238,12 +260,14 @@ _DECLARED = (
         ("indentation_rate", "m/s", "b"),
         (LawKind.CONTACT, "b * s", "N s/m", 100.0),
         "d' s(d')",
+        constant_is="damping_n_s_per_m",
+        dissipates="damping_n_s_per_m",
     ),
     _form(
         "free_pull_over_gap",
         _pull_over_gap,
         ("gap", "m", "a"),
-        (LawKind.PULL, "s", "N", 3.0),
+        (LawKind.PULL, "(1.0 - a / reach) * s", "N", 3.0),
         "pull (1 - gap/l) s(gap), gap < l",
         extra={LawKind.REACH: _reach},
     ),
@@ -267,17 +291,17 @@ FREE_FORMS: Mapping[str, FreeForm] = MappingProxyType({form.effect.identifier: f
 """Every place by the identifier of its effect."""
 
 
-def spline_basis(u: ArrayLike, lower: float, upper: float) -> Samples:
-    """Values of the B-splines, shape (n, COEFFICIENTS), at u of shape (n,); straight beyond the knots."""
+def spline_basis(u: ArrayLike, lower: float, upper: float, spans: int = SPANS) -> Samples:
+    """Values of the B-splines, shape (n, spans + 3), at u of shape (n,); straight beyond the knots."""
     points = np.atleast_1d(np.asarray(u, dtype=np.float64))
-    w = (points - lower) * (SPANS / (upper - lower))
-    inside = np.clip(w, 0.0, float(SPANS))
-    i = np.minimum(inside.astype(np.int64), SPANS - 1)
+    w = (points - lower) * (spans / (upper - lower))
+    inside = np.clip(w, 0.0, float(spans))
+    i = np.minimum(inside.astype(np.int64), spans - 1)
     t = inside - i
     beyond = w - inside
     value = np.stack([(1.0 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, 1 + 3 * t + 3 * t**2 - 3 * t**3, t**3]) / 6.0
     slope = np.stack([-((1.0 - t) ** 2), 3 * t**2 - 4 * t, 1 + 2 * t - 3 * t**2, t**2]) / 2.0
-    basis = np.zeros((len(points), COEFFICIENTS))
+    basis = np.zeros((len(points), spans + 3))
     for k in range(4):
         basis[np.arange(len(points)), i + k] += value[k] + slope[k] * beyond
     return basis

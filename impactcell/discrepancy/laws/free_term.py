@@ -18,7 +18,7 @@ from impactcell.discrepancy.model import (
     refit_shot_parameters,
 )
 from impactcell.errors import DiscrepancyError
-from impactcell.physics.free_forms import COEFFICIENTS, FREE_FORMS, LOWER, UPPER, FreeForm
+from impactcell.physics.free_forms import FREE_FORMS, LOWER, UPPER, FreeForm
 from impactcell.records import Samples
 
 SMOOTHNESS = (1e-6, 1e-4, 1e-2, 1.0)
@@ -31,6 +31,8 @@ PLACES = 4
 """Places that are fitted, of those that promise most to first order."""
 FIRST_TRY = 1e-4
 """Weight of the roughness at which places are compared."""
+WORTH_MORE = 4.0
+"""Times the least mean squared residual: places within it are fitted at the other weights too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,8 +48,8 @@ class FreeTerm:
     fit : Fit
     smoothness : float
         Weight of the roughness that was chosen.
-    check : float
-        Mean squared residual of the training shots on which it was chosen, over the noise floor.
+    check_per_shot : ndarray, shape (n,)
+        Mean squared residual, 1 at the noise floor, of each training shot on which it was chosen.
     """
 
     form: FreeForm
@@ -55,7 +57,12 @@ class FreeTerm:
     problem: Problem
     fit: Fit
     smoothness: float
-    check: float
+    check_per_shot: Samples
+
+    @property
+    def check(self) -> float:
+        """Mean over those shots."""
+        return float(np.mean(self.check_per_shot))
 
     @property
     def columns(self) -> IndexArray:
@@ -67,7 +74,7 @@ class FreeTerm:
 
     @property
     def coefficients(self) -> Samples:
-        """Coefficients of the spline in the form's unit, shape (COEFFICIENTS,)."""
+        """Coefficients of the spline in the form's unit, shape (K,)."""
         items = self.fit.coordinates
         return np.array([items[i].value(float(self.fit.theta[i])) for i in self.columns.tolist()])
 
@@ -84,7 +91,7 @@ def candidate_terms(problem: Problem, base: Fit, places: Sequence[str] = tuple(F
         if span is None or not _may_act(problem, base, form):
             continue
         extended, state = _start(problem, base, form, span, FIRST_TRY)
-        H, g = _equations(extended, state)
+        H, g = equations(extended, state)
         if np.isfinite(H).all() and np.isfinite(g).all():
             promise[place] = float(g @ np.linalg.lstsq(H + extended.penalty_matrix, g, rcond=1e-12)[0])
     return sorted(promise, key=lambda place: -promise[place])
@@ -95,26 +102,36 @@ def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
     inner, check = problem.shots.excitation.split(problem.shots.items, seed)
     parts = problem.select(inner), problem.select(check)
     inner_base = _of_shots(base, inner, parts[0])
-    terms = []
+    first: list[tuple[FreeForm, Visited, dict[float, Samples]]] = []
     for place in candidate_terms(problem, base)[:PLACES]:
         form = FREE_FORMS[place]
         span = visited(problem, base, form)
-        if span is None:
+        if span is not None:
+            first.append((form, span, {FIRST_TRY: _check(parts, inner_base, form, span, FIRST_TRY)}))
+    nearest = min((float(np.mean(errors[FIRST_TRY])) for _, _, errors in first), default=np.inf)
+    terms = []
+    for form, span, errors in first:
+        if float(np.mean(errors[FIRST_TRY])) < WORTH_MORE * nearest:
+            for smoothness in set(SMOOTHNESS) - {FIRST_TRY}:
+                errors[smoothness] = _check(parts, inner_base, form, span, smoothness)
+        smoothness = min(errors, key=lambda weight: float(np.mean(errors[weight])))
+        if not np.isfinite(errors[smoothness]).all():
             continue
-        tried: list[tuple[float, float]] = []
-        for smoothness in SMOOTHNESS:
-            try:
-                fitted = _fit(parts[0], inner_base, form, span, smoothness)
-            except DiscrepancyError:
-                continue
-            held = refit_shot_parameters(parts[1].constrained(*_model(fitted)), fitted[1])
-            tried.append((float(np.mean(held.residual**2)), smoothness))
-        if not tried:
-            continue
-        error, smoothness = min(tried)
         extended, whole = _fit(problem, base, form, span, smoothness)
-        terms.append(FreeTerm(form, span, extended, whole, smoothness, error))
+        terms.append(FreeTerm(form, span, extended, whole, smoothness, errors[smoothness]))
     return sorted(terms, key=lambda term: term.check)
+
+
+def _check(
+    parts: tuple[Problem, Problem], base: Fit, form: FreeForm, span: Visited, smoothness: float
+) -> Samples:
+    """Mean squared residual of each shot of the second part, a term fitted to the first; inf without."""
+    try:
+        extended, fitted = _fit(parts[0], base, form, span, smoothness)
+    except DiscrepancyError:
+        return np.full(parts[1].count, np.inf)
+    held = refit_shot_parameters(parts[1].constrained(extended.effects, extended.constraints), fitted)
+    return held.misfit(parts[1].shots) / parts[1].sizes
 
 
 def _may_act(problem: Problem, base: Fit, form: FreeForm) -> bool:
@@ -133,15 +150,11 @@ def _of_shots(base: Fit, indices: IndexArray, part: Problem) -> Fit:
     return Fit(base.effects, base.coordinates, base.theta, shot_parameters, base.spread, residual)
 
 
-def _model(fitted: tuple[Problem, Fit]) -> tuple[tuple[str, ...], Constraints]:
-    return fitted[0].effects, fitted[0].constraints
-
-
 def _start(
     problem: Problem, base: Fit, form: FreeForm, span: Visited, smoothness: float
 ) -> tuple[Problem, FitState]:
     """Model with the term still at zero, its roughness weighed by what the data know of its coefficients."""
-    identifier = form.effect.identifier
+    identifier, count = form.effect.identifier, len(form.coefficients)
     held = {
         **problem.constraints.held,
         f"{identifier}.{LOWER}": span.lower,
@@ -149,21 +162,19 @@ def _start(
     }
     effects = (*base.effects, identifier)
     bare = problem.constrained(effects, Constraints(held))
-    theta = np.concatenate([base.theta, np.zeros(COEFFICIENTS)])
+    theta = np.concatenate([base.theta, np.zeros(count)])
     state = bare.evaluate(theta, base.shot_parameters, base.spread)
     if not np.isfinite(state.cost):
         return bare, state
-    H, _ = _equations(bare, state)
-    scale = float(np.trace(H[-COEFFICIENTS:, -COEFFICIENTS:])) / COEFFICIENTS
-    differences = np.diff(np.eye(COEFFICIENTS), n=2, axis=0)
-    rows = np.vstack(
-        [np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(COEFFICIENTS)]
-    )
+    H, _ = equations(bare, state)
+    scale = float(np.trace(H[-count:, -count:])) / count
+    differences = np.diff(np.eye(count), n=2, axis=0)
+    rows = np.vstack([np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(count)])
     weighed = Constraints(held, (Roughness(identifier, form.coefficients, rows),))
     return problem.constrained(effects, weighed), state
 
 
-def _equations(problem: Problem, state: FitState) -> tuple[Samples, Samples]:
+def equations(problem: Problem, state: FitState) -> tuple[Samples, Samples]:
     """Information and gradient of the shared coordinates, each shot's own eliminated."""
     J, Jl = problem.linearise(state)
     H, g, _ = normal_equations(problem, J, Jl, state)

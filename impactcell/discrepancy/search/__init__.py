@@ -21,7 +21,14 @@ from impactcell.discrepancy.search.model_selection import nested_models, only_te
 from impactcell.discrepancy.search.open_loop import Simulation, SimulationError, simulate_held_out
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
-from impactcell.discrepancy.search.validation import MAX_P_VALUE, Gap, GapChange, Part, Validation
+from impactcell.discrepancy.search.validation import (
+    MAX_P_VALUE,
+    Gap,
+    GapChange,
+    GapMeasure,
+    Part,
+    Validation,
+)
 
 __all__ = [
     "ALL",
@@ -35,6 +42,7 @@ __all__ = [
     "Conclusion",
     "Gap",
     "GapChange",
+    "GapMeasure",
     "HeldOutOutcome",
     "Mapper",
     "ModelEvidence",

@@ -11,12 +11,15 @@ from scipy.interpolate import BSpline
 from impactcell.errors import PhysicsError
 from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.physics.effects import LIBRARY, add_effect, find_effect
-from impactcell.physics.free_forms import COEFFICIENTS, FREE_FORMS, SPANS, spline, spline_basis
+from impactcell.physics.free_forms import FREE_FORMS, SPANS, SPANS_OF_TABLE, spline, spline_basis
 
 TAP = TapInput(velocity_m_s=0.075, mass_kg=12.0, stroke_m=0.004, start_m=0.01)
 LOWER, UPPER = 0.0, 0.2
+COEFFICIENTS = SPANS + 3
 GREVILLE = LOWER + (UPPER - LOWER) / SPANS * (np.arange(COEFFICIENTS) - 1.0)
 """Coefficients at which a cubic spline on uniform knots is the straight line u."""
+GREVILLE_OF_TABLE = LOWER + (UPPER - LOWER) / SPANS_OF_TABLE * (np.arange(SPANS_OF_TABLE + 3) - 1.0)
+"""The same for a function of the position."""
 
 
 def _plant(effects: dict[str, dict[str, float]]) -> Plant:
@@ -41,10 +44,10 @@ def test_spline_is_scipys_inside_and_its_tangent_beyond(
     reference = BSpline(knots, np.array(coefficients), 3)
     p = np.array([lower, upper, *coefficients])
     u = lower + share * (upper - lower)
-    assert spline(u, p) == pytest.approx(float(reference(u)), abs=1e-12)
+    assert spline(u, p, SPANS) == pytest.approx(float(reference(u)), abs=1e-12)
     assert float((spline_basis(u, lower, upper) @ p[2:])[0]) == pytest.approx(float(reference(u)), abs=1e-12)
     tangent = float(reference(upper) + beyond * reference.derivative()(upper))
-    assert spline(upper + beyond, p) == pytest.approx(tangent, abs=1e-9)
+    assert spline(upper + beyond, p, SPANS) == pytest.approx(tangent, abs=1e-9)
     assert float((spline_basis(upper + beyond, lower, upper) @ p[2:])[0]) == pytest.approx(tangent, abs=1e-9)
 
 
@@ -61,10 +64,14 @@ def test_spline_is_scipys_inside_and_its_tangent_beyond(
             900.0 * GREVILLE,
             {"quadratic_drag": {"drag_coefficient_n_s2_per_m2": 900.0}},
         ),
-        ("free_force_over_position", -800.0 * GREVILLE, {"restoring_force": {"stiffness_n_per_m": 800.0}}),
+        (
+            "free_force_over_position",
+            -800.0 * GREVILLE_OF_TABLE,
+            {"restoring_force": {"stiffness_n_per_m": 800.0}},
+        ),
         (
             "free_friction_over_position",
-            12.0 * GREVILLE,
+            12.0 * GREVILLE_OF_TABLE,
             {"position_dependent_friction": {"gradient_per_m": 12.0}},
         ),
         (

@@ -1,0 +1,242 @@
+"""From a fitted spline to functional forms, ranked by what they keep of its gain; no simulation is needed.
+
+Near the fitted spline the log-likelihood is a quadratic function of its coefficients c, h'c - c'S c / 2, with
+the information S after plant, other effects and every shot's own numbers have been eliminated. A form is
+projected on the spline; its amplitudes follow in closed form, its shapes by a search from a grid. Directions
+that the plant would take up by itself have no information and cost a form nothing.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import fmin
+
+from impactcell.discrepancy.laws.free_term import FreeTerm, equations
+from impactcell.discrepancy.laws.grammar import WAVES, Form, Shaped, name, shaped_terms
+from impactcell.physics.free_forms import spline_basis
+from impactcell.records import Samples
+
+GRID = 80
+"""Points of the range on which a form is projected on the spline."""
+PAIRS = 400
+"""Single-atom terms that are paired into sums, the best first."""
+REFINED = 60
+"""Forms whose shapes are refined."""
+SINGULAR = 1e-9
+"""Relative determinant below which two terms are one."""
+WIDEST_STEP, FARTHEST = 0.25, 2.0
+"""First step of a shape's search, and how far it may go, in its logarithm or as a share of the range."""
+EVALUATIONS, SETTLED_SHAPE, SETTLED_GAIN = 80, 1e-3, 0.05
+"""Evaluations for each shape, and where its search ends, in the same units and in log-likelihood."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tangent:
+    """Quadratic log-likelihood of the coefficients.
+
+    Attributes
+    ----------
+    information : ndarray, shape (K, K)
+    pull : ndarray, shape (K,)
+    lower, upper : float
+        Range of the covariate.
+    samples : int
+        How many were fitted.
+    constant : bool
+        A constant function is a law of its own.
+    others, response : ndarray, shape (p,) and (p, K)
+        All other coordinates at zero coefficients, and how they move with the coefficients.
+    """
+
+    information: Samples
+    pull: Samples
+    lower: float
+    upper: float
+    samples: int
+    constant: bool
+    others: Samples
+    response: Samples
+
+    @property
+    def reference(self) -> float:
+        """Largest magnitude of the covariate."""
+        return max(abs(self.lower), abs(self.upper))
+
+    @property
+    def most(self) -> float:
+        """Gain of the spline itself: no form has more."""
+        return 0.5 * float(
+            self.pull @ np.linalg.pinv(self.information, rcond=1e-10, hermitian=True) @ self.pull
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RankedForm:
+    """A functional form with the numbers at which it comes nearest to the spline.
+
+    Attributes
+    ----------
+    gain : float
+        Of log-likelihood over the model without any term, to second order.
+    score : float
+        Gain less half the logarithm of the samples for each number (Schwarz 1978).
+    others : ndarray, shape (p,)
+        Where all other coordinates go with it.
+    """
+
+    terms: tuple[Shaped, ...]
+    amplitudes: tuple[float, ...]
+    gain: float
+    score: float
+    others: Samples
+
+    @property
+    def form(self) -> Form:
+        """Functional form alone."""
+        return tuple(item.term for item in self.terms)
+
+
+def tangent(term: FreeTerm) -> Tangent:
+    """Quadratic log-likelihood of a fitted term's coefficients, in the unit of its place."""
+    H, g = equations(term.problem, term.fit.state)
+    inside = term.columns
+    rest = np.setdiff1d(np.arange(len(g)), inside)
+    inverse = np.linalg.pinv(H[np.ix_(rest, rest)], rcond=1e-13, hermitian=True)
+    scale = np.array([term.fit.coordinates[i].scale for i in inside.tolist()])
+    cross = H[np.ix_(rest, inside)] / scale
+    S = H[np.ix_(inside, inside)] / np.outer(scale, scale) - cross.T @ inverse @ cross
+    pull = g[inside] / scale - cross.T @ inverse @ g[rest] + S @ term.coefficients
+    response = -inverse @ cross
+    others = term.fit.theta[rest] + inverse @ g[rest] - response @ term.coefficients
+    span, form = term.visited, term.form
+    samples = term.fit.residual.size
+    return Tangent(S, pull, span.lower, span.upper, samples, not form.constant_is, others, response)
+
+
+def rank_forms(quadratic: Tangent) -> list[RankedForm]:
+    """Functional forms, the best first; one entry a form."""
+    projector = _Projector(quadratic)
+    singles = list(shaped_terms(quadratic.lower, quadratic.upper, constant=quadratic.constant))
+    columns = np.array([projector.coefficients(item) for item in singles])
+    h, gram = projector.against(columns)
+    best: dict[str, tuple[float, tuple[Shaped, ...]]] = {}
+
+    def offer(score: float, terms: tuple[Shaped, ...]) -> None:
+        key = name(tuple(item.term for item in terms))
+        if score > best.get(key, (-math.inf, ()))[0]:
+            best[key] = (score, terms)
+
+    diagonal = np.maximum(np.diag(gram), 1e-300)
+    gains = 0.5 * h**2 / diagonal
+    cost = 0.5 * math.log(quadratic.samples)
+    numbers = np.array([1 + item.shape_count for item in singles])
+    for i in np.argsort(-(gains - cost * numbers)).tolist():
+        offer(float(gains[i] - cost * numbers[i]), (singles[i],))
+    plain = [i for i, item in enumerate(singles) if len(item.term) == 1]
+    chosen = sorted(plain, key=lambda i: -(gains[i] - cost * numbers[i]))[:PAIRS]
+    chosen += [i for i in plain if i not in set(chosen) and singles[i].shape_count == 0]
+    a, b = np.triu_indices(len(chosen), 1)
+    i, j = np.array(chosen)[a], np.array(chosen)[b]
+    determinant = diagonal[i] * diagonal[j] - gram[i, j] ** 2
+    usable = determinant > SINGULAR * diagonal[i] * diagonal[j]
+    i, j, determinant = i[usable], j[usable], determinant[usable]
+    pair = 0.5 * (diagonal[j] * h[i] ** 2 - 2.0 * gram[i, j] * h[i] * h[j] + diagonal[i] * h[j] ** 2)
+    pair = pair / determinant - cost * (numbers[i] + numbers[j])
+    for place in np.argsort(-pair)[: 50 * REFINED].tolist():
+        one, other = singles[int(i[place])], singles[int(j[place])]
+        if _is_wave(one, other) and one.shapes != other.shapes:
+            continue
+        offer(float(pair[place]), (one, other))
+    order = sorted(best.values(), key=lambda entry: -entry[0])
+    order = order[:REFINED] + [entry for entry in order[REFINED:] if list(map(_atoms, entry[1])) == [1]]
+    refined = [projector.refine(terms, cost) for _, terms in order]
+    return sorted(refined, key=lambda item: -item.score)
+
+
+def _atoms(item: Shaped) -> int:
+    return len(item.term)
+
+
+def _is_wave(one: Shaped, other: Shaped) -> bool:
+    return {one.term[0].name, other.term[0].name} == set(WAVES)
+
+
+class _Projector:
+    """Projects functions on the spline, in the sense of what the data know of it."""
+
+    def __init__(self, quadratic: Tangent) -> None:
+        self.quadratic = quadratic
+        self.points = np.linspace(quadratic.lower, quadratic.upper, GRID)
+        self.inverse = np.linalg.pinv(
+            spline_basis(self.points, quadratic.lower, quadratic.upper, len(quadratic.pull) - 3)
+        )
+
+    def coefficients(self, item: Shaped) -> Samples:
+        """Coefficients of the spline that is nearest to a term of amplitude one."""
+        out: Samples = self.inverse @ item.values(self.points, self.quadratic.reference)
+        return out
+
+    def against(self, columns: Samples) -> tuple[Samples, Samples]:
+        """Give the pulls on amplitudes, and their information."""
+        return columns @ self.quadratic.pull, columns @ self.quadratic.information @ columns.T
+
+    def amplitudes(self, terms: tuple[Shaped, ...]) -> tuple[Samples, float]:
+        """Best amplitudes of terms, and their gain."""
+        h, gram = self.against(np.array([self.coefficients(item) for item in terms]))
+        values = np.asarray(np.linalg.lstsq(gram, h, rcond=1e-12)[0], dtype=np.float64)
+        return values, 0.5 * float(values @ h)
+
+    def _inside(self, item: Shaped) -> bool:
+        """Whether every centre lies in the range gone through."""
+        lower, upper = self.quadratic.lower, self.quadratic.upper
+        return all(
+            lower < value < upper
+            for atom, values in zip(item.term, item.shapes, strict=True)
+            for shape, value in zip(atom.shapes, values, strict=True)
+            if shape.name == "centre"
+        )
+
+    def refine(self, terms: tuple[Shaped, ...], cost: float) -> RankedForm:
+        """Move the shapes to where the gain is largest."""
+        wave = len(terms) == 2 and _is_wave(*terms)
+        free = terms[:1] if wave else terms
+        start = np.array([value for item in free for atom in item.shapes for value in atom])
+        kinds = [shape for item in free for atom in item.term for shape in atom.shapes]
+        width = self.quadratic.upper - self.quadratic.lower
+
+        def placed(x: Samples) -> tuple[Shaped, ...]:
+            moved = [
+                float(origin + width * step) if kind.name == "centre" else float(origin * math.exp(step))
+                for origin, step, kind in zip(start, x, kinds, strict=True)
+            ]
+            numbers = iter(moved)
+            out = tuple(
+                Shaped(item.term, tuple(tuple(next(numbers) for _ in atom) for atom in item.shapes))
+                for item in free
+            )
+            return (out[0], Shaped(terms[1].term, out[0].shapes)) if wave else out
+
+        def lost(x: Samples) -> float:
+            """Gain with its sign changed; 0 where a shape has left the range."""
+            if float(np.abs(x).max()) > FARTHEST or not all(map(self._inside, placed(x))):
+                return 0.0
+            return -self.amplitudes(placed(x))[1]
+
+        best = terms
+        if len(start):
+            found = fmin(
+                lost,
+                np.zeros(len(start)),
+                initial_simplex=np.vstack([np.zeros(len(start)), WIDEST_STEP * np.eye(len(start))]),
+                maxfun=EVALUATIONS * len(start),
+                xtol=SETTLED_SHAPE,
+                ftol=SETTLED_GAIN,
+                disp=False,
+            )
+            best = placed(np.asarray(found, dtype=np.float64))
+        values, gain = self.amplitudes(best)
+        numbers = len(best) + len(start)
+        coefficients = values @ np.array([self.coefficients(item) for item in best])
+        others = self.quadratic.others + self.quadratic.response @ coefficients
+        return RankedForm(best, tuple(values.tolist()), gain, gain - cost * numbers, others)

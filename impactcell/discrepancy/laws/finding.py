@@ -1,0 +1,213 @@
+"""A law that nobody had listed, from what remains to what is proposed, proved on shots that were held out."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.discrepancy.laws.condense import rank_forms, tangent
+from impactcell.discrepancy.laws.free_term import SMOOTHNESS, FreeTerm, equations, fit_free_terms
+from impactcell.discrepancy.laws.refit import FittedLaw, refit_forms, tied_with
+from impactcell.discrepancy.model import Fit, Problem, fit, parameter_name, refit_shot_parameters
+from impactcell.discrepancy.search import GapChange, GapMeasure, Part
+from impactcell.errors import DiscrepancyError
+from impactcell.physics.free_forms import spline_basis
+from impactcell.records import Samples
+
+DRAWN = 60
+"""Points of the range at which a term is drawn and looked at."""
+BAND = 1.96
+"""Standard deviations of a 95 % band."""
+STRAIGHT = frozenset({"1", "u", "1 + u"})
+"""Forms that a spline at its smoothest bound can still tell."""
+TIED_PLACES = 2.2
+"""Standard deviations over shots within which two places predict alike, as for named effects."""
+MOST_LEFT = 1.2
+"""Gap of the held-out traces, in noise floors, up to which a term is the law that was missing."""
+MOST_STEPS = 9
+"""Gauss-Newton steps with all samples, from where few came to rest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A fitted function with its 95 % band, each of shape (n,)."""
+
+    covariate: Samples
+    function: Samples
+    low: Samples
+    high: Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LawFinding:
+    """What was found where something remained.
+
+    Attributes
+    ----------
+    term : FreeTerm
+        Free-form term at the place that predicts best.
+    curve : Curve
+    law : FittedLaw or None
+        Functional form that does as well; None where only the spline does.
+    equivalents : tuple of FittedLaw
+        Other forms that the data cannot tell from it.
+    rival_places : tuple of str
+        Effects of other places at which a term predicts as well.
+    change : GapChange
+        Of the held-out gap, without and with it: the law where there is one, else the spline.
+    training, held_out : Fit
+        The same model.
+    refused : str
+        Why nothing is proposed; empty where something is.
+    """
+
+    term: FreeTerm
+    curve: Curve
+    law: FittedLaw | None
+    equivalents: tuple[FittedLaw, ...]
+    rival_places: tuple[str, ...]
+    change: GapChange
+    training: Fit
+    held_out: Fit
+    refused: str
+
+
+def find_law(
+    training: tuple[Problem, Problem, Fit],
+    measure: GapMeasure,
+    held_base: Fit,
+    seed: int,
+) -> LawFinding | None:
+    """Look for the law that a model lacks; None where no covariate was gone through far enough to say.
+
+    Parameters
+    ----------
+    training : tuple of Problem, Problem and Fit
+        Shots with all samples and with fewer, and the model that leaves something.
+    measure : GapMeasure
+        Of the shots that were never used.
+    held_base : Fit
+        The same model with their own factors.
+    seed : int
+        Of the inner split, by which smoothness and place are chosen, and of the resampling of the proof.
+    """
+    problem, coarse, base = training
+    rough = base if coarse is problem else refit_shot_parameters(coarse, base)
+    terms = fit_free_terms(coarse, rough, seed)
+    if not terms:
+        return None
+    best = terms[0]
+    laws = refit_forms(rough, best, rank_forms(tangent(best)))
+    law = laws[0] if laws and not _spline_is_better(best, laws[0]) else None
+    source = best if law is None else law
+    model, fitted = _with_all_samples(problem, source.problem, source.fit)
+    held = refit_shot_parameters(measure.problem.constrained(fitted.effects, model.constraints), fitted)
+    change = measure.change(held_base, held, (Part.TRACES,))
+    return LawFinding(
+        best,
+        _curve(best),
+        law,
+        () if law is None else _equivalents(laws),
+        tuple(term.form.effect.identifier for term in terms[1:] if _predict_alike(best, term)),
+        change,
+        fitted,
+        held,
+        _refusal(best, law, change),
+    )
+
+
+def _with_all_samples(problem: Problem, coarse: Problem, fitted: Fit) -> tuple[Problem, Fit]:
+    """Fit the same model to all samples."""
+    model = problem.constrained(coarse.effects, coarse.constraints)
+    if coarse.shots is problem.shots:
+        return model, fitted
+    start = refit_shot_parameters(model, fitted)
+    try:
+        again = fit(
+            model, start.theta, start.shot_parameters, spread=max(fitted.spread, 1e-6), most_steps=MOST_STEPS
+        )
+    except DiscrepancyError:
+        return model, start
+    return model, again
+
+
+def _spline_is_better(term: FreeTerm, law: FittedLaw) -> bool:
+    """Whether the spline says more than the best form, its own numbers paid for."""
+    spline = term.fit.log_likelihood(term.problem.shots)
+    numbers = effective_numbers(term)
+    cost = 0.5 * math.log(term.fit.residual.size)
+    better = float(spline.sum()) - cost * numbers - law.score
+    scatter = float(np.std(spline - law.per_shot)) * math.sqrt(len(spline))
+    return better > max(cost, TIED_PLACES * scatter)
+
+
+def effective_numbers(term: FreeTerm) -> float:
+    """Effective number of coefficients of a penalised spline, tr((H + P)⁻¹ H) over them (Wood 2017)."""
+    H, _ = equations(term.problem, term.fit.state)
+    share = np.linalg.pinv(H + term.problem.penalty_matrix, rcond=1e-13, hermitian=True) @ H
+    return float(np.diag(share)[term.columns].sum())
+
+
+def _equivalents(laws: list[FittedLaw]) -> tuple[FittedLaw, ...]:
+    """Forms that are tied with the first; one that merely contains it says nothing else."""
+    best = laws[0]
+    parts = set(best.law.functional_form.split(" + "))
+    return tuple(
+        law
+        for law in laws[1:]
+        if tied_with(best, law) and not parts < set(law.law.functional_form.split(" + "))
+    )
+
+
+def _predict_alike(best: FreeTerm, other: FreeTerm) -> bool:
+    """Whether two places predict shots that they were not fitted to equally well."""
+    difference = np.log(other.check_per_shot / best.check_per_shot)
+    scatter = float(np.std(difference)) / math.sqrt(max(len(difference), 1))
+    return float(np.mean(difference)) < TIED_PLACES * scatter
+
+
+def _curve(term: FreeTerm) -> Curve:
+    lower, upper = term.visited.lower, term.visited.upper
+    u = np.linspace(lower, upper, DRAWN)
+    basis = spline_basis(u, lower, upper, term.form.spans)
+    H, _ = equations(term.problem, term.fit.state)
+    covariance = np.linalg.pinv(H + term.problem.penalty_matrix, rcond=1e-13, hermitian=True)
+    scale = np.array([term.fit.coordinates[i].scale for i in term.columns.tolist()])
+    inside = covariance[np.ix_(term.columns, term.columns)] * np.outer(scale, scale)
+    std = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", basis, inside, basis), 0.0))
+    value = basis @ term.coefficients
+    return Curve(u, value, value - BAND * std, value + BAND * std)
+
+
+def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange) -> str:
+    """Why nothing is proposed, if so."""
+    if not change.is_real():
+        return "on held-out shots the gap does not fall by more than chance"
+    if change.after.trace > MOST_LEFT:
+        return (
+            f"the best term, {term.form.effect.equation}, leaves {change.after.trace:.3g} noise floors: what is "
+            f"missing is no function of the {term.form.covariate.replace('_', ' ')} alone"
+        )
+    if gives_energy(term):
+        return (
+            f"the term would give energy: {term.form.effect.equation} becomes negative in the range that was "
+            "gone through, so that something else is missing"
+        )
+    straight = law is not None and law.law.functional_form in STRAIGHT
+    if term.smoothness == SMOOTHNESS[-1] and not straight:
+        return (
+            "the smoothest spline predicts best, so that the data tell nothing of how the term bends; "
+            f"shots over a wider range of {term.form.covariate} would"
+        )
+    return ""
+
+
+def gives_energy(term: FreeTerm) -> bool:
+    """Whether a dissipative term, with the plant's own beside it, is negative beyond its band somewhere."""
+    if not term.form.dissipates:
+        return False
+    own = 0.0
+    for place, coordinate in enumerate(term.fit.coordinates):
+        if parameter_name(coordinate) == term.form.dissipates:
+            own = coordinate.value(float(term.fit.theta[place]))
+    return bool((own + _curve(term).high < 0.0).any())

@@ -1,0 +1,161 @@
+"""The laws a free-form term may be: functions of one covariate, of right dimension by how they are made.
+
+A law is a sum of at most two terms; a term is an amplitude, in the unit of its place, times one or two atoms;
+an atom is a dimensionless function of the covariate over something of its own unit. Every atom is written
+once, as the Python that also stands in an effect file.
+"""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.records import Samples
+
+SCALES = tuple(float(x) for x in np.geomspace(0.04, 4.0, 12))
+"""Scales to start from, over the largest covariate: what is sharper than a twenty-fifth of the range, or
+wider than four times, no campaign shows."""
+EXPONENTS = (0.25, 0.5, 1.5, 2.5, 4.0)
+"""Exponents to start from."""
+CENTRES = tuple(float(x) for x in np.linspace(0.1, 0.9, 9))
+"""Centres to start from, as shares of the range gone through."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A number inside an atom: where a search starts, and how a fit moves it.
+
+    Attributes
+    ----------
+    name : str
+    grid : tuple of float
+        Starts: over the reference of the covariate, as a share of its range for a centre, else as they are.
+    has_unit : bool
+        It is measured in the covariate's unit.
+    """
+
+    name: str
+    grid: tuple[float, ...]
+    has_unit: bool = True
+
+
+SCALE = Shape("scale", SCALES)
+PERIOD = Shape("period", SCALES)
+CENTRE = Shape("centre", CENTRES)
+EXPONENT = Shape("exponent", EXPONENTS, has_unit=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Atom:
+    """A dimensionless function of the covariate.
+
+    Attributes
+    ----------
+    name : str
+        As one would print it, of u.
+    source : str
+        Python of u, of the reference of the covariate, and of the shapes by name.
+    shapes : tuple of Shape
+    signed : bool
+        It means something for negative u too.
+    """
+
+    name: str
+    source: str
+    shapes: tuple[Shape, ...] = ()
+    signed: bool = True
+
+    def values(self, u: Samples, reference: float, shapes: tuple[float, ...]) -> Samples:
+        """Values at u, shape (n,)."""
+        known = {"u": u, "reference": reference, "math": _ArrayMath, "max": np.maximum, "abs": np.abs}
+        known |= {shape.name: value for shape, value in zip(self.shapes, shapes, strict=True)}
+        out = eval(self.source, {"__builtins__": {}}, known)  # noqa: S307  # sources of this file only
+        return np.broadcast_to(np.asarray(out, dtype=np.float64), u.shape)
+
+
+class _ArrayMath:
+    """What atoms use of `math`, for arrays."""
+
+    exp, tanh, log1p, sin, cos, pow = np.exp, np.tanh, np.log1p, np.sin, np.cos, np.power
+
+
+ATOMS = (
+    Atom("1", "1.0"),
+    Atom("u", "(u / reference)"),
+    Atom("u^2", "(u / reference) ** 2"),
+    Atom("u^3", "(u / reference) ** 3"),
+    Atom("u^n", "math.pow(max(u, 0.0) / reference, exponent)", (EXPONENT,), signed=False),
+    Atom("exp(-u/l)", "math.exp(-u / scale)", (SCALE,), signed=False),
+    Atom("exp(-(u/l)^2)", "math.exp(-((u / scale) ** 2))", (SCALE,)),
+    Atom("1/(1+u/l)", "(1.0 / (1.0 + max(u, 0.0) / scale))", (SCALE,), signed=False),
+    Atom("1/(1+(u/l)^2)", "(1.0 / (1.0 + (u / scale) ** 2))", (SCALE,)),
+    Atom("log(1+u/l)", "math.log1p(max(u, 0.0) / scale)", (SCALE,), signed=False),
+    Atom("tanh(u/l)", "math.tanh(u / scale)", (SCALE,)),
+    Atom("sin(2pi u/p)", "math.sin(6.283185307179586 * u / period)", (PERIOD,)),
+    Atom("cos(2pi u/p)", "math.cos(6.283185307179586 * u / period)", (PERIOD,)),
+    Atom("exp(-(u-c)^2/2l^2)", "math.exp(-0.5 * ((u - centre) / scale) ** 2)", (CENTRE, SCALE)),
+    Atom("1/(1+exp(-(u-c)/l))", "(0.5 + 0.5 * math.tanh(0.5 * (u - centre) / scale))", (CENTRE, SCALE)),
+    Atom("max(u-c,0)", "(max(u - centre, 0.0) / reference)", (CENTRE,)),
+    Atom("max(1-u/l,0)", "max(1.0 - u / scale, 0.0)", (SCALE,), signed=False),
+    Atom("max(1-c/u,0)", "(max(u - centre, 0.0) / max(u, centre))", (CENTRE,), signed=False),
+)
+"""Powers, saturations, decays, waves, bumps, steps, and folds as slope and as secant."""
+WAVES = ("sin(2pi u/p)", "cos(2pi u/p)")
+"""Atoms that make one wave of any phase together: they share their period."""
+
+Term = tuple[Atom, ...]
+Form = tuple[Term, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Shaped:
+    """A term with numbers for its shapes, atom by atom."""
+
+    term: Term
+    shapes: tuple[tuple[float, ...], ...]
+
+    def values(self, u: Samples, reference: float) -> Samples:
+        """Values at u without the amplitude, shape (n,)."""
+        out = np.ones_like(u)
+        for atom, shapes in zip(self.term, self.shapes, strict=True):
+            out = out * atom.values(u, reference, shapes)
+        return out
+
+    @property
+    def shape_count(self) -> int:
+        """How many numbers the term has beside its amplitude."""
+        return sum(map(len, self.shapes))
+
+
+def name(form: Form) -> str:
+    """Name of a functional form: its terms in a fixed order."""
+    return " + ".join(sorted(" ".join(sorted(atom.name for atom in term)) for term in form))
+
+
+def shaped_terms(lower: float, upper: float, *, constant: bool) -> Iterator[Shaped]:
+    """Every single-atom term at every start of its shapes, then every product of two at fewer starts.
+
+    `constant` says whether a constant is one of them; without it only those of its products are.
+    """
+    reference = max(abs(lower), abs(upper))
+    atoms = [atom for atom in ATOMS if (atom.signed or lower >= 0.0) and (constant or atom.name != "1")]
+    for atom in atoms:
+        for shapes in itertools.product(*(_starts(shape, lower, upper, reference) for shape in atom.shapes)):
+            yield Shaped((atom,), (shapes,))
+    factors = [atom for atom in atoms if atom.name != "1" and len(atom.shapes) <= 1]
+    for one, other in itertools.combinations(factors, 2):
+        if not one.shapes and not other.shapes:
+            continue
+        grids = [
+            list(itertools.product(*(_starts(shape, lower, upper, reference)[::3] for shape in atom.shapes)))
+            for atom in (one, other)
+        ]
+        for pair in itertools.product(*grids):
+            yield Shaped((one, other), pair)
+
+
+def _starts(shape: Shape, lower: float, upper: float, reference: float) -> tuple[float, ...]:
+    if shape is CENTRE:
+        return tuple(lower + share * (upper - lower) for share in shape.grid)
+    return tuple(value * reference if shape.has_unit else value for value in shape.grid)

@@ -1,0 +1,239 @@
+"""A law as a physical effect: the text of its effect file, which is also what the fit runs."""
+
+import hashlib
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from impactcell.discrepancy.laws.condense import RankedForm
+from impactcell.discrepancy.laws.grammar import WAVES, Shape, name
+from impactcell.physics import Effect, LawKind
+from impactcell.physics.effects import add_effect
+from impactcell.physics.free_forms import FreeForm
+
+SUFFIX = {
+    "1": "", "m": "_m", "m/s": "_m_s", "s": "_s", "N": "_n", "N s/m": "_n_s_per_m", "N/m": "_n_per_m",
+}  # fmt: skip
+"""How a parameter's name ends for each unit."""
+MANY = 1e3
+"""Times its first value: how far an amplitude or scale may be looked for."""
+
+_SIGNATURES = {
+    LawKind.KINETIC: "a: float, _b: float, _c: float, _d: float",
+    LawKind.SCALE: "a: float, _b: float, _c: float, _d: float",
+    LawKind.PULL: "a: float, _b: float, _c: float, _d: float",
+    LawKind.SPEED: "a: float, _b: float, _c: float, _d: float",
+    LawKind.READING: "a: float, _b: float, _c: float, _d: float",
+    LawKind.BODY: "a: float, b: float, _c: float, _d: float",
+    LawKind.CONTACT: "a: float, b: float, _c: float, _d: float",
+}
+"""Arguments of a law of each kind, those that no free form reads with a line before them."""
+
+
+@dataclass(frozen=True, slots=True)
+class LawParameter:
+    """A number of a law, as its effect file declares it.
+
+    Attributes
+    ----------
+    null : float
+        0 for an amplitude, nan for a shape.
+    first : float
+        Value at which a fit begins.
+    """
+
+    name: str
+    unit: str
+    null: float
+    lower: float
+    upper: float
+    first: float
+    kind: str = "VALUE"
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A functional form at a place, with names for its numbers.
+
+    Attributes
+    ----------
+    identifier : str
+        Of its effect: place, and what it is made of.
+    functional_form : str
+        Name of the form, of u.
+    expression : str
+        Python of the function of u, its parameters by name.
+    """
+
+    identifier: str
+    place: FreeForm
+    functional_form: str
+    expression: str
+    parameters: tuple[LawParameter, ...]
+
+    @property
+    def is_wave(self) -> bool:
+        """Whether two terms are one wave of any phase."""
+        return self.functional_form == " + ".join(sorted(WAVES))
+
+    @property
+    def equation(self) -> str:
+        """The law as one would print it."""
+        function = (
+            self.expression.replace("math.", "").replace("**", "^").replace("6.283185307179586", "2 pi")
+        )
+        for parameter in self.parameters:
+            function = re.sub(rf"\b{re.escape(parameter.name)}\b", _short(parameter.name), function)
+        return f"{self.place.effect.equation} with s(u) = {function}, u the {_WORDS[self.place.covariate]}"
+
+    def text(self) -> str:
+        """Text of the effect file."""
+        kind, reach = self.place.law_kind, self.place.law_kind is LawKind.PULL
+        lines = [f"    {item.name} = p[{i}]" for i, item in enumerate(self.parameters)]
+        declared = [
+            f'        Parameter("{item.name}", "{item.unit}", null={_python(item.null)}, '
+            f"lower={_python(item.lower)}, upper={_python(item.upper)}, typical={_python(abs(item.first))}"
+            + (f", kind=ParameterKind.{item.kind}" if item.kind != "VALUE" else "")
+            + "),"
+            for item in self.parameters
+        ]
+        around = self.place.around.replace("reach", "range_m") if reach else self.place.around
+        laws = f"LawKind.{kind.name}: law" + (", LawKind.REACH: reach" if reach else "")
+        end = (
+            "\n\ndef reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:\n"
+            f'    """Gap at which the pull ends."""\n    return p[{len(self.parameters) - 1}]\n'
+            if reach
+            else ""
+        )
+        imports = "Effect, Kind, LawKind, Parameter, Phase"
+        if any(item.kind != "VALUE" for item in self.parameters):
+            imports = "Effect, Kind, LawKind, Parameter, ParameterKind, Phase"
+        phases = ", ".join(f"Phase.{phase.name}" for phase in self.place.effect.phases)
+        return "\n".join(
+            [
+                f'"""Found in data: {self.functional_form} over {_WORDS[self.place.covariate]}."""',
+                "",
+                "import math",
+                "",
+                "from impactcell.numerics.jit import FloatPointer",
+                f"from impactcell.physics.effect import {imports}",
+                "",
+                "",
+                f"def law({_SIGNATURES[kind]}, p: FloatPointer) -> float:",
+                f'    """{self.place.effect.equation}."""',
+                *lines,
+                f"    u = {self.place.argument}",
+                f"    s = {self.expression}",
+                f"    return {around}",
+                end,
+                "",
+                "EFFECT = Effect(",
+                f'    identifier="{self.identifier}",',
+                f"    kind=Kind.{self.place.effect.kind.name},",
+                f'    equation="{self.equation}",',
+                '    reference="Found by the discrepancy workflow",',
+                f"    phases=({phases},),",
+                "    parameters=(",
+                *declared,
+                "    ),",
+                f"    laws={{{laws}}},",
+                ")",
+                '"""Where it was tested, and with which values, says `result.json` beside it."""',
+                "",
+            ]
+        )
+
+    def effect(self) -> Effect:
+        """Effect that the text defines, ready to enter a plant."""
+        space: dict[str, object] = {"__name__": self.identifier}
+        exec(compile(self.text(), f"<{self.identifier}>", "exec"), space)  # noqa: S102  # our own text
+        effect = space["EFFECT"]
+        if not isinstance(effect, Effect):
+            raise TypeError(self.identifier)
+        add_effect(effect)
+        return effect
+
+
+_WORDS = {
+    "speed": "speed of sliding",
+    "position": "position on the table",
+    "indentation": "indentation",
+    "indentation_rate": "rate of indentation",
+    "gap": "gap",
+    "time": "time since first contact",
+    "force": "contact force",
+}
+"""What a covariate is called in a sentence."""
+
+
+def _short(parameter: str) -> str:
+    for suffix in sorted(SUFFIX.values(), key=len, reverse=True):
+        if suffix and parameter.endswith(suffix):
+            return parameter.removesuffix(suffix)
+    return parameter
+
+
+def _python(value: float) -> str:
+    return "math.nan" if math.isnan(value) else repr(float(value))
+
+
+def write_law(place: FreeForm, ranked: RankedForm, reference: float) -> Law:
+    """Give a ranked form's numbers names, units and ranges."""
+    form_name = name(ranked.form)
+    parameters: list[LawParameter] = []
+    pieces: list[str] = []
+    wave = {term[0].name for term in ranked.form} == set(WAVES) and len(ranked.form) == 2
+    shared: dict[str, str] = {}
+    for number, (item, amplitude) in enumerate(zip(ranked.terms, ranked.amplitudes, strict=True), 1):
+        several = len(ranked.terms) > 1
+        label = f"amplitude{f'_{number}' if several else ''}{SUFFIX[place.unit]}"
+        size = max(abs(amplitude), 1e-12)
+        parameters.append(LawParameter(label, place.unit, 0.0, -MANY * size, MANY * size, amplitude))
+        factors = [label]
+        for atom, values in zip(item.term, item.shapes, strict=True):
+            source = atom.source.replace("reference", repr(reference))
+            for shape, value in zip(atom.shapes, values, strict=True):
+                key = shape.name
+                if wave and key in shared:
+                    written = shared[key]
+                else:
+                    written = _shape_name(shape, place, {entry.name for entry in parameters})
+                    parameters.append(_shape_parameter(written, shape, place, value, reference))
+                    shared[key] = written
+                source = re.sub(rf"\b{key}\b", written, source)
+            if source != "1.0":
+                factors.append(source)
+        pieces.append(" * ".join(factors))
+    if place.law_kind is LawKind.PULL:
+        parameters.append(
+            LawParameter("range_m", "m", math.nan, 1e-3 * reference, MANY * reference, reference)
+        )
+    digest = hashlib.sha256(f"{form_name} {parameters}".encode()).hexdigest()[:8]
+    identifier = f"{place.effect.identifier.replace('free_', 'law_of_', 1)}_{digest}"
+    return Law(identifier, place, form_name, " + ".join(pieces), tuple(parameters))
+
+
+def _shape_name(shape: Shape, place: FreeForm, taken: set[str]) -> str:
+    suffix = SUFFIX[place.covariate_unit] if shape.has_unit else ""
+    return next(candidate for candidate in _numbered(shape.name, suffix) if candidate not in taken)
+
+
+def _numbered(stem: str, suffix: str) -> Iterator[str]:
+    yield stem + suffix
+    for number in range(2, 9):
+        yield f"{stem}_{number}{suffix}"
+
+
+def _shape_parameter(
+    written: str, shape: Shape, place: FreeForm, value: float, reference: float
+) -> LawParameter:
+    if shape.name == "centre":
+        lower = -reference if value < 0.0 or place.covariate == "position" else 1e-3 * reference
+        return LawParameter(written, place.covariate_unit, math.nan, lower, reference, value, "POSITION")
+    if shape.name == "exponent":
+        return LawParameter(written, "1", math.nan, 0.05, 12.0, value)
+    kind = "PERIOD" if shape.name == "period" and place.covariate_unit == "m" else "VALUE"
+    return LawParameter(
+        written, place.covariate_unit, math.nan, 1e-3 * reference, 1e2 * reference, value, kind
+    )

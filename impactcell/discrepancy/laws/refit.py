@@ -1,0 +1,165 @@
+"""Functional forms refitted through the simulation: which the data prefer, and which they cannot tell."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.discrepancy.laws.condense import RankedForm
+from impactcell.discrepancy.laws.free_term import FreeTerm
+from impactcell.discrepancy.laws.grammar import Shaped, name
+from impactcell.discrepancy.laws.law import Law, write_law
+from impactcell.discrepancy.model import Constraints, Fit, Problem, fit
+from impactcell.errors import DiscrepancyError
+from impactcell.physics import LawKind
+from impactcell.records import Samples
+
+REFITTED = 20
+"""Forms that are fitted through the simulation, beside every single atom: near a fold or far from the spline
+the ranking may err."""
+RANGES = (0.03, 0.1, 0.3, 1.0)
+"""Ranges of a pull that are tried, over the largest gap."""
+SIMPLIFIED = 5
+"""Sums of two terms, the best first, of which each term is then tried alone."""
+MOST_STEPS = 9
+"""Gauss-Newton steps of each."""
+TIED_SCORE = 6.0
+"""Difference of score up to which forms are tied: e^6 to one, 1 in 400, after Kass and Raftery (1995)."""
+TIED_DEVIATIONS = 2.2
+"""The same in standard deviations of its sum over shots, as for named effects."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedLaw:
+    """A law fitted to the training shots.
+
+    Attributes
+    ----------
+    score : float
+        Log-likelihood less half the logarithm of the samples for each number of the law (Schwarz 1978).
+    per_shot : ndarray, shape (n,)
+        Log-likelihood of every shot.
+    """
+
+    law: Law
+    ranked: RankedForm
+    problem: Problem
+    fit: Fit
+    score: float
+    per_shot: Samples
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters of the law by name."""
+        return {
+            item.parameter: item.value(float(self.fit.theta[i]))
+            for i, item in enumerate(self.fit.coordinates)
+            if item.effect == self.law.identifier
+        }
+
+
+def refit_forms(base: Fit, term: FreeTerm, ranked: Sequence[RankedForm]) -> list[FittedLaw]:
+    """Fit the best of the ranked forms through the simulation; the best first."""
+    simple = [entry for entry in ranked[REFITTED:] if list(map(len, entry.form)) == [1]]
+    fitted = _fitted(base, term, [*ranked[:REFITTED], *simple])
+    known = {item.law.functional_form for item in fitted}
+    simpler = {
+        name(entry.form): entry
+        for item in fitted[:SIMPLIFIED]
+        for entry in _single_terms(term, item)
+        if name(entry.form) not in known
+    }
+    return sorted(fitted + _fitted(base, term, list(simpler.values())), key=lambda item: -item.score)
+
+
+def _fitted(base: Fit, term: FreeTerm, forms: Sequence[RankedForm]) -> list[FittedLaw]:
+    fitted = []
+    for entry in forms:
+        try:
+            fitted.append(_refit(base, term, entry))
+        except DiscrepancyError:
+            continue
+    return sorted(fitted, key=lambda item: -item.score)
+
+
+def _single_terms(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
+    """Take each term of a sum alone, from where the sum came to rest: the plant may take up the other one."""
+    if len(fitted.ranked.terms) < 2 or fitted.law.is_wave:
+        return []
+    of_law = len(fitted.law.parameters)
+    pairs = zip(fitted.fit.coordinates[-of_law:], fitted.fit.theta[-of_law:].tolist(), strict=True)
+    values = iter([coordinate.value(number) for coordinate, number in pairs])
+    shaped = []
+    for item in fitted.ranked.terms:
+        amplitude = next(values)
+        shaped.append(
+            (amplitude, Shaped(item.term, tuple(tuple(next(values) for _ in atom) for atom in item.shapes)))
+        )
+    reference = max(abs(term.visited.lower), abs(term.visited.upper))
+    singles = []
+    for (amplitude, kept), (other, dropped) in (shaped, shaped[::-1]):
+        constant = other * float(np.mean(dropped.values(term.visited.values, reference)))
+        others = _taken_up(term, fitted, constant)[:-of_law]
+        singles.append(RankedForm((kept,), (amplitude,), -math.inf, -math.inf, others))
+    return singles
+
+
+def _taken_up(term: FreeTerm, fitted: FittedLaw, constant: float) -> Samples:
+    """Coordinates after the plant has taken up a constant function."""
+    theta = fitted.fit.theta.copy()
+    for place, coordinate in enumerate(fitted.fit.coordinates):
+        if not coordinate.effect and coordinate.parameter == term.form.constant_is:
+            value = coordinate.value(float(theta[place]))
+            is_factor = term.form.law_kind is LawKind.SCALE
+            moved = value * (1.0 + constant) if is_factor else value + constant
+            ends = coordinate.value(coordinate.lower), coordinate.value(coordinate.upper)
+            theta[place] = coordinate.coordinate(min(max(moved, ends[0]), ends[1]))
+    return theta
+
+
+def _refit(base: Fit, term: FreeTerm, entry: RankedForm) -> FittedLaw:
+    law = write_law(term.form, entry, max(abs(term.visited.lower), abs(term.visited.upper)))
+    law.effect()
+    held = {name: value for name, value in term.problem.constraints.held.items() if not _of(term, name)}
+    problem = term.problem.constrained((*base.effects, law.identifier), Constraints(held))
+    theta = np.concatenate(
+        [
+            entry.others,
+            [
+                coordinate.coordinate(parameter.first)
+                for coordinate, parameter in zip(
+                    problem.coordinates[len(base.coordinates) :], law.parameters, strict=True
+                )
+            ],
+        ]
+    )
+    if law.place.law_kind is LawKind.PULL:
+        theta = _with_best_range(problem, theta, term)
+    fitted = fit(problem, theta, term.fit.shot_parameters, spread=term.fit.spread, most_steps=MOST_STEPS)
+    per_shot = fitted.log_likelihood(problem.shots)
+    cost = 0.5 * len(law.parameters) * math.log(fitted.residual.size)
+    return FittedLaw(law, entry, problem, fitted, float(per_shot.sum()) - cost, per_shot)
+
+
+def _with_best_range(problem: Problem, theta: Samples, term: FreeTerm) -> Samples:
+    """Start with the range of a pull that suits the shots best."""
+    starts = []
+    for share in RANGES:
+        start = theta.copy()
+        start[-1] = problem.coordinates[-1].coordinate(share * term.visited.upper)
+        starts.append(start)
+    costs = [problem.evaluate(start, term.fit.shot_parameters, term.fit.spread).cost for start in starts]
+    return starts[int(np.argmin(costs))]
+
+
+def _of(term: FreeTerm, parameter: str) -> bool:
+    """Whether a held parameter is the free-form term's."""
+    return parameter.startswith(f"{term.form.effect.identifier}.")
+
+
+def tied_with(best: FittedLaw, other: FittedLaw) -> bool:
+    """Whether the data cannot tell two laws apart: by score, or by the scatter of what lies between."""
+    difference = best.score - other.score
+    scatter = float(np.std(best.per_shot - other.per_shot)) * math.sqrt(len(best.per_shot))
+    return difference < max(TIED_SCORE, TIED_DEVIATIONS * scatter)
