@@ -4,7 +4,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -14,14 +14,17 @@ from typing import Any
 from impactcell.api.friction import calibrated
 from impactcell.campaign import Campaign, Excitation, read
 from impactcell.discrepancy.report import headline, json_text, result_document, write_report
-from impactcell.discrepancy.workflow import DiscrepancyResult, extended_plant, investigate
+from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
+from impactcell.physics import Plant
 from impactcell.prediction import Model
 from impactcell.prediction.model import Prior
 from impactcell.settings.model_file import read_model, write_model
 
 FILES = ("result.json", "model.extended.yaml", "report.html")
 """What a run leaves in its directory."""
+LAW_FILES = "law_of_*.py"
+"""And where it proposes a law that nobody had listed, its effect file."""
 SMALLEST_SHARE = 1e-4
 """Smallest standard deviation of a prior, relative to its value: a prior of none would stop any fit."""
 
@@ -143,7 +146,7 @@ def discrepancy(
 def write_findings(
     result: DiscrepancyResult, data: Campaign, output: Path, source: str, nominal: str
 ) -> None:
-    """Write all three files beside the directory and move them in together at the end."""
+    """Write all files beside the directory and move them in together at the end."""
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         beside = Path(tempfile.mkdtemp(prefix=f".{output.name}.", dir=output.parent))
@@ -153,7 +156,14 @@ def write_findings(
         (beside / "result.json").write_text(json_text(result_document(result)), encoding="utf-8")
         write_model(extended_model(result, data, source, nominal), beside / "model.extended.yaml")
         write_report(result, source, beside / "report.html")
+        law = result.law.proposed if result.law else None
+        if law is not None:
+            (beside / f"{law.identifier}.py").write_text(law.text(), encoding="utf-8")
         output.mkdir(exist_ok=True)
+        for stale in output.glob(LAW_FILES):
+            stale.unlink()
+        if law is not None:
+            (beside / f"{law.identifier}.py").replace(output / f"{law.identifier}.py")
         for name in FILES:
             (beside / name).replace(output / name)
     except OSError as error:
@@ -164,7 +174,7 @@ def write_findings(
 
 def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nominal: str) -> Model:
     """Make the extended model as a model file holds it, calibrated so that a service can run with it."""
-    plant = extended_plant(result)
+    plant = _extended_plant(result)
     half = {one.parameter: (one.high - one.low) / 4.0 for one in result.parameters if not one.effect}
     ratio = plant.mu_k / plant.mu_s
     intervals: dict[str, dict[str, tuple[float, float]]] = {}
@@ -199,6 +209,39 @@ def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nomin
     except (PredictionError, PhysicsError) as error:
         note = {**model.provenance, "not calibrated": str(error)}
         return replace(model, provenance=note)
+
+
+def _extended_plant(result: DiscrepancyResult) -> Plant:
+    """Plant of the final model."""
+    values = {
+        ("", estimate.parameter): estimate.value for estimate in result.parameters if not estimate.effect
+    }
+    effects: dict[str, dict[str, float | Sequence[float]]] = {}
+    for estimate in result.parameters:
+        if not estimate.effect:
+            continue
+        values_of_effect = effects.setdefault(estimate.effect, {})
+        if estimate.batch:
+            values_of_effect[estimate.parameter] = (
+                *_batch_values(values_of_effect.get(estimate.parameter)),
+                estimate.value,
+            )
+        else:
+            values_of_effect[estimate.parameter] = estimate.value
+    mu_k = values["", "mu_k"]
+    ratio = values.get(("", "ratio"), 1.0)
+    return Plant(
+        stiffness_n_per_m=values.get(("", "stiffness_n_per_m"), 6e5),
+        damping_n_s_per_m=values.get(("", "damping_n_s_per_m"), 0.0),
+        mu_s=mu_k * ratio,
+        mu_k=mu_k,
+        gravity_m_s2=result.prepared.gravity_m_s2,
+        effects=effects,
+    )
+
+
+def _batch_values(value: float | Sequence[float] | None) -> Sequence[float]:
+    return value if isinstance(value, Sequence) else ()
 
 
 def _positive(value: float, magnitude: float) -> float:

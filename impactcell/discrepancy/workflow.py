@@ -15,6 +15,7 @@ from impactcell.discrepancy.data import (
     shot_set,
     split_held_out,
 )
+from impactcell.discrepancy.laws import LawFinding, find_law
 from impactcell.discrepancy.model import (
     Fit,
     ParameterEstimate,
@@ -30,6 +31,7 @@ from impactcell.discrepancy.search import (
     MAX_P_VALUE,
     UNKNOWN,
     Conclusion,
+    GapMeasure,
     HeldOutOutcome,
     Mapper,
     ModelEvidence,
@@ -74,6 +76,8 @@ class DiscrepancyResult:
         The same with the held-out shots' own factors.
     parameters : tuple of ParameterEstimate
         Of the final model.
+    law : LawFinding or None
+        Where something remains, the law that may be missing; None where nothing does, or nothing can be said.
     """
 
     conclusion: Conclusion
@@ -94,6 +98,7 @@ class DiscrepancyResult:
     simulation: Simulation
     unexplained: UnexplainedGap | None
     experiments: tuple[Proposal, ...]
+    law: LawFinding | None
     seed: int
 
     @property
@@ -181,6 +186,11 @@ def investigate(
         selection, outcome = _confirmed_rival(context, selection, opened, outcome)
     final = outcome.final
     conclusion = conclude(selection, _evidence(context, search_evidence, final), outcome.validation, missing)
+    law: LawFinding | None = None
+    if not conclusion.remaining.explained and not missing:
+        report_step("looking for a law that nobody has listed")
+        measure = GapMeasure(held_problem, floor, outcome.replicates, seed)
+        law = find_law((problem, context.coarse, final), measure, outcome.held_final, seed)
     report_step("planning the next experiment")
     return DiscrepancyResult(
         conclusion=conclusion,
@@ -201,6 +211,7 @@ def investigate(
         simulation=simulate_held_out(held_problem, nominal, final),
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,
         experiments=propose_experiments(problem, final, _tied_models(selection, conclusion.established)),
+        law=law,
         seed=seed,
     )
 
@@ -263,36 +274,3 @@ def _tied_models(selection: SelectionResult, established: tuple[str, ...]) -> li
         if effect in established and variant.accepted is not None:
             models.append((effect, rival, variant.accepted))
     return models
-
-
-def extended_plant(result: DiscrepancyResult) -> Plant:
-    """Plant of the final model."""
-    values = {
-        ("", estimate.parameter): estimate.value for estimate in result.parameters if not estimate.effect
-    }
-    effects: dict[str, dict[str, float | Sequence[float]]] = {}
-    for estimate in result.parameters:
-        if not estimate.effect:
-            continue
-        values_of_effect = effects.setdefault(estimate.effect, {})
-        if estimate.batch:
-            values_of_effect[estimate.parameter] = (
-                *_batch_values(values_of_effect.get(estimate.parameter)),
-                estimate.value,
-            )
-        else:
-            values_of_effect[estimate.parameter] = estimate.value
-    mu_k = values["", "mu_k"]
-    ratio = values.get(("", "ratio"), 1.0)
-    return Plant(
-        stiffness_n_per_m=values.get(("", "stiffness_n_per_m"), 6e5),
-        damping_n_s_per_m=values.get(("", "damping_n_s_per_m"), 0.0),
-        mu_s=mu_k * ratio,
-        mu_k=mu_k,
-        gravity_m_s2=result.prepared.gravity_m_s2,
-        effects=effects,
-    )
-
-
-def _batch_values(value: float | Sequence[float] | None) -> Sequence[float]:
-    return value if isinstance(value, Sequence) else ()

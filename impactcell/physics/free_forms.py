@@ -159,7 +159,7 @@ def _form(
     identifier: str,
     law: Law,
     covariate: tuple[str, str, str],
-    function: tuple[LawKind, str, str, float],
+    function: tuple[LawKind, Kind, str, str, float],
     equation: str,
     *,
     extra: Mapping[LawKind, Law] = MappingProxyType({}),
@@ -168,10 +168,10 @@ def _form(
 ) -> FreeForm:
     """Declare a place: its covariate (name, unit, argument), and how its function enters.
 
-    `function` holds the kind of law, how s enters, its unit, and the size at which it is clearly visible.
+    `function` holds the kind of law, what it acts on, how s enters, its unit, and a size that shows clearly.
     """
     name, covariate_unit, argument = covariate
-    kind, around, unit, typical = function
+    law_kind, kind, around, unit, typical = function
     knots = tuple(
         Parameter(end, covariate_unit, null=math.nan, lower=-math.inf, upper=math.inf, typical=1.0)
         for end in (LOWER, UPPER)
@@ -182,34 +182,23 @@ def _form(
     )
     effect = Effect(
         identifier=identifier,
-        kind=_KINDS[kind],
+        kind=kind,
         equation=equation,
         reference="Free-form term: cubic B-spline, de Boor (1978)",
-        phases=_CONTACT if kind in {LawKind.CONTACT, LawKind.READING, LawKind.SPEED} else _SLIP,
+        phases=_CONTACT if law_kind in {LawKind.CONTACT, LawKind.READING, LawKind.SPEED} else _SLIP,
         parameters=(*knots, *coefficients),
-        laws={kind: law, **extra},
+        laws={law_kind: law, **extra},
     )
     add_effect(effect)
-    return FreeForm(effect, name, covariate_unit, kind, around, argument, constant_is, dissipates)
+    return FreeForm(effect, name, covariate_unit, law_kind, around, argument, constant_is, dissipates)
 
-
-_KINDS = {
-    LawKind.KINETIC: Kind.FRICTION,
-    LawKind.SCALE: Kind.FRICTION,
-    LawKind.BODY: Kind.BODY,
-    LawKind.CONTACT: Kind.CONTACT,
-    LawKind.PULL: Kind.CONTACT,
-    LawKind.SPEED: Kind.ACTUATOR,
-    LawKind.READING: Kind.SENSOR,
-}
-"""What a law of each kind acts on."""
 
 _DECLARED = (
     _form(
         "free_friction_over_speed",
         _friction_over_speed,
         ("speed", "m/s", "a"),
-        (LawKind.KINETIC, "s", "1", 0.03),
+        (LawKind.KINETIC, Kind.FRICTION, "s", "1", 0.03),
         "mu_k + s(|x'|)",
         constant_is="mu_k",
         dissipates="mu_k",
@@ -218,7 +207,7 @@ _DECLARED = (
         "free_friction_over_position",
         _friction_over_position,
         ("position", "m", "a"),
-        (LawKind.SCALE, "1.0 + s", "1", 0.1),
+        (LawKind.SCALE, Kind.FRICTION, "1.0 + s", "1", 0.1),
         "mu (1 + s(x))",
         constant_is="mu_k",
     ),
@@ -226,14 +215,14 @@ _DECLARED = (
         "free_force_over_position",
         _force_over_position,
         ("position", "m", "a"),
-        (LawKind.BODY, "s", "N", 3.0),
+        (LawKind.BODY, Kind.BODY, "s", "N", 3.0),
         "s(x) on the part",
     ),
     _form(
         "free_drag_over_speed",
         _drag_over_speed,
         ("speed", "m/s", "abs(b)"),
-        (LawKind.BODY, "-b * s", "N s/m", 50.0),
+        (LawKind.BODY, Kind.BODY, "-b * s", "N s/m", 50.0),
         "-x' s(|x'|)",
         dissipates="0",
     ),
@@ -241,7 +230,7 @@ _DECLARED = (
         "free_stiffness_over_indentation",
         _stiffness_over_indentation,
         ("indentation", "m", "a"),
-        (LawKind.CONTACT, "a * s", "N/m", 1e5),
+        (LawKind.CONTACT, Kind.CONTACT, "a * s", "N/m", 1e5),
         "d s(d)",
         constant_is="stiffness_n_per_m",
     ),
@@ -249,7 +238,7 @@ _DECLARED = (
         "free_damping_over_indentation",
         _damping_over_indentation,
         ("indentation", "m", "a"),
-        (LawKind.CONTACT, "b * s", "N s/m", 100.0),
+        (LawKind.CONTACT, Kind.CONTACT, "b * s", "N s/m", 100.0),
         "d' s(d)",
         constant_is="damping_n_s_per_m",
         dissipates="damping_n_s_per_m",
@@ -258,7 +247,7 @@ _DECLARED = (
         "free_damping_over_rate",
         _damping_over_rate,
         ("indentation_rate", "m/s", "b"),
-        (LawKind.CONTACT, "b * s", "N s/m", 100.0),
+        (LawKind.CONTACT, Kind.CONTACT, "b * s", "N s/m", 100.0),
         "d' s(d')",
         constant_is="damping_n_s_per_m",
         dissipates="damping_n_s_per_m",
@@ -267,7 +256,7 @@ _DECLARED = (
         "free_pull_over_gap",
         _pull_over_gap,
         ("gap", "m", "a"),
-        (LawKind.PULL, "(1.0 - a / reach) * s", "N", 3.0),
+        (LawKind.PULL, Kind.CONTACT, "(1.0 - a / reach) * s", "N", 3.0),
         "pull (1 - gap/l) s(gap), gap < l",
         extra={LawKind.REACH: _reach},
     ),
@@ -275,14 +264,14 @@ _DECLARED = (
         "free_speed_over_time",
         _speed_over_time,
         ("time", "s", "a"),
-        (LawKind.SPEED, "1.0 + s", "1", 0.05),
+        (LawKind.SPEED, Kind.ACTUATOR, "1.0 + s", "1", 0.05),
         "y' = v (1 + s(t))",
     ),
     _form(
         "free_reading_over_force",
         _reading_over_force,
         ("force", "N", "a"),
-        (LawKind.READING, "a * (1.0 + s)", "1", 0.03),
+        (LawKind.READING, Kind.SENSOR, "a * (1.0 + s)", "1", 0.03),
         "F (1 + s(F)) is shown",
     ),
 )

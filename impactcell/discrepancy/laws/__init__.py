@@ -2,6 +2,7 @@
 
 from impactcell.discrepancy.laws.finding import Curve, LawFinding, find_law
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
+from impactcell.discrepancy.laws.law import Law
 from impactcell.discrepancy.laws.refit import FittedLaw
 
-__all__ = ["Curve", "FittedLaw", "FreeTerm", "LawFinding", "find_law", "fit_free_terms"]
+__all__ = ["Curve", "FittedLaw", "FreeTerm", "Law", "LawFinding", "find_law", "fit_free_terms"]

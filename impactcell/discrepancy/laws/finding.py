@@ -1,12 +1,13 @@
 """A law that nobody had listed, from what remains to what is proposed, proved on shots that were held out."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from impactcell.discrepancy.laws.condense import rank_forms, tangent
 from impactcell.discrepancy.laws.free_term import SMOOTHNESS, FreeTerm, equations, fit_free_terms
+from impactcell.discrepancy.laws.law import Law
 from impactcell.discrepancy.laws.refit import FittedLaw, refit_forms, tied_with
 from impactcell.discrepancy.model import Fit, Problem, fit, parameter_name, refit_shot_parameters
 from impactcell.discrepancy.search import GapChange, GapMeasure, Part
@@ -55,8 +56,10 @@ class LawFinding:
         Effects of other places at which a term predicts as well.
     change : GapChange
         Of the held-out gap, without and with it: the law where there is one, else the spline.
+    model : Problem
+        Training shots with that term in the model.
     training, held_out : Fit
-        The same model.
+        The same, fitted.
     refused : str
         Why nothing is proposed; empty where something is.
     """
@@ -67,9 +70,25 @@ class LawFinding:
     equivalents: tuple[FittedLaw, ...]
     rival_places: tuple[str, ...]
     change: GapChange
+    model: Problem
     training: Fit
     held_out: Fit
     refused: str
+
+    @property
+    def proposed(self) -> Law | None:
+        """The law with the numbers that all training shots gave; None where there is none to propose."""
+        if self.law is None or self.refused:
+            return None
+        values = {
+            item.parameter: item.value(float(self.training.theta[place]))
+            for place, item in enumerate(self.training.coordinates)
+            if item.effect == self.law.law.identifier
+        }
+        law = self.law.law
+        return replace(
+            law, parameters=tuple(replace(item, first=values[item.name]) for item in law.parameters)
+        )
 
 
 def find_law(
@@ -110,6 +129,7 @@ def find_law(
         () if law is None else _equivalents(laws),
         tuple(term.form.effect.identifier for term in terms[1:] if _predict_alike(best, term)),
         change,
+        model,
         fitted,
         held,
         _refusal(best, law, change),
@@ -185,8 +205,8 @@ def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange) -> str:
         return "on held-out shots the gap does not fall by more than chance"
     if change.after.trace > MOST_LEFT:
         return (
-            f"the best term, {term.form.effect.equation}, leaves {change.after.trace:.3g} noise floors: what is "
-            f"missing is no function of the {term.form.covariate.replace('_', ' ')} alone"
+            f"the best term, {term.form.effect.equation}, leaves {change.after.trace:.3g} noise floors: what "
+            f"is missing is no function of {term.form.covariate.replace('_', ' ')} alone"
         )
     if gives_energy(term):
         return (

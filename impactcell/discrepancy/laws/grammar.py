@@ -6,7 +6,7 @@ once, as the Python that also stands in an effect file.
 """
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,10 +68,15 @@ class Atom:
 
     def values(self, u: Samples, reference: float, shapes: tuple[float, ...]) -> Samples:
         """Values at u, shape (n,)."""
-        known = {"u": u, "reference": reference, "math": _ArrayMath, "max": np.maximum, "abs": np.abs}
-        known |= {shape.name: value for shape, value in zip(self.shapes, shapes, strict=True)}
-        out = eval(self.source, {"__builtins__": {}}, known)  # noqa: S307  # sources of this file only
-        return np.broadcast_to(np.asarray(out, dtype=np.float64), u.shape)
+        names = (shape.name for shape in self.shapes)
+        return evaluate(self.source, u, {"reference": reference, **dict(zip(names, shapes, strict=True))})
+
+
+def evaluate(source: str, u: Samples, parameters: Mapping[str, float]) -> Samples:
+    """Values of a function of u that is made of atoms, its parameters by name, at u of shape (n,)."""
+    known = {"u": u, "math": _ArrayMath, "max": np.maximum, **parameters}
+    out = eval(source, {"__builtins__": {}}, known)  # noqa: S307  # made of this file's atoms and nothing else
+    return np.broadcast_to(np.asarray(out, dtype=np.float64), u.shape)
 
 
 class _ArrayMath:

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from impactcell.discrepancy.laws.condense import RankedForm
-from impactcell.discrepancy.laws.grammar import WAVES, Shape, name
+from impactcell.discrepancy.laws.grammar import WAVES, Shape, evaluate, name
 from impactcell.physics import Effect, LawKind
 from impactcell.physics.effects import add_effect
 from impactcell.physics.free_forms import FreeForm
+from impactcell.records import Samples
 
 SUFFIX = {
     "1": "", "m": "_m", "m/s": "_m_s", "s": "_s", "N": "_n", "N s/m": "_n_s_per_m", "N/m": "_n_per_m",
@@ -143,6 +144,11 @@ class Law:
                 "",
             ]
         )
+
+    def values(self, u: Samples) -> Samples:
+        """Values of the function at u, shape (n,), its parameters as they stand."""
+        known = {item.name: item.first for item in self.parameters}
+        return evaluate(self.expression, u, known)
 
     def effect(self) -> Effect:
         """Effect that the text defines, ready to enter a plant."""

@@ -26,8 +26,9 @@ MOST_STEPS = 9
 """Gauss-Newton steps of each."""
 TIED_SCORE = 6.0
 """Difference of score up to which forms are tied: e^6 to one, 1 in 400, after Kass and Raftery (1995)."""
-TIED_DEVIATIONS = 2.2
-"""The same in standard deviations of its sum over shots, as for named effects."""
+TIED_DEVIATIONS, LARGEST_TIE = 2.2, 30.0
+"""The same in standard deviations of its sum over shots, as for named effects, and the largest that is none:
+a law that fails in a few shots is not in doubt because most do not show it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +61,7 @@ class FittedLaw:
 
 
 def refit_forms(base: Fit, term: FreeTerm, ranked: Sequence[RankedForm]) -> list[FittedLaw]:
-    """Fit the best of the ranked forms through the simulation; the best first."""
+    """Fit forms through the simulation, the best first: of those that are tied the simplest."""
     simple = [entry for entry in ranked[REFITTED:] if list(map(len, entry.form)) == [1]]
     fitted = _fitted(base, term, [*ranked[:REFITTED], *simple])
     known = {item.law.functional_form for item in fitted}
@@ -70,7 +71,10 @@ def refit_forms(base: Fit, term: FreeTerm, ranked: Sequence[RankedForm]) -> list
         for entry in _single_terms(term, item)
         if name(entry.form) not in known
     }
-    return sorted(fitted + _fitted(base, term, list(simpler.values())), key=lambda item: -item.score)
+    laws = sorted(fitted + _fitted(base, term, list(simpler.values())), key=lambda item: -item.score)
+    tied = [item for item in laws if tied_with(laws[0], item)]
+    simplest = min(tied, key=lambda item: (len(item.law.parameters), -item.score), default=None)
+    return laws if simplest is None else [simplest, *(item for item in laws if item is not simplest)]
 
 
 def _fitted(base: Fit, term: FreeTerm, forms: Sequence[RankedForm]) -> list[FittedLaw]:
@@ -162,4 +166,4 @@ def tied_with(best: FittedLaw, other: FittedLaw) -> bool:
     """Whether the data cannot tell two laws apart: by score, or by the scatter of what lies between."""
     difference = best.score - other.score
     scatter = float(np.std(best.per_shot - other.per_shot)) * math.sqrt(len(best.per_shot))
-    return difference < max(TIED_SCORE, TIED_DEVIATIONS * scatter)
+    return difference < max(TIED_SCORE, min(TIED_DEVIATIONS * scatter, LARGEST_TIE))

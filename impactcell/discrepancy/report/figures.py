@@ -211,3 +211,28 @@ def shape_figure(result: DiscrepancyResult) -> str | None:
                 f"residual, times {shape.times} [noise std]" if shape.times else "mean residual [noise std]"
             )
         return _svg(figure)
+
+
+def law_figure(result: DiscrepancyResult) -> str | None:
+    """Free-form term with its band, the law beside it, and where the covariate was met."""
+    finding = result.law
+    if finding is None or finding.refused:
+        return None
+    form, curve = finding.term.form, finding.curve
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 3.4))
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
+        above.axhline(0.0, color="#8a97a3", linewidth=0.8)
+        above.fill_between(curve.covariate, curve.low, curve.high, color=MEASURED, alpha=0.5, linewidth=0)
+        above.plot(curve.covariate, curve.function, color=BEFORE, label="spline, 95 % band")
+        if finding.proposed is not None:
+            function = finding.proposed.values(curve.covariate)
+            above.plot(curve.covariate, function, "--", color=AFTER, label=finding.proposed.functional_form)
+        above.set_ylabel("s(u)" if form.unit == "1" else f"s(u) [{form.unit}]")
+        above.legend(frameon=False, fontsize=8)
+        below.hist(finding.term.visited.values, bins=60, color=MEASURED)
+        below.set_yticks([])
+        below.set_xlabel(
+            f"{form.covariate.replace('_', ' ')} [{form.covariate_unit}]; below: where samples lie"
+        )
+        return _svg(figure)

@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report import figures
 from impactcell.discrepancy.report.result import locate_effect
-from impactcell.discrepancy.report.sentences import headline, phrase
+from impactcell.discrepancy.report.sentences import headline, law_sentences, phrase
 from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import LIBRARY
@@ -78,6 +78,8 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
         "factors": figures.factor_figure(result),
         "shape": figures.shape_figure(result),
         "unexplained": result.unexplained,
+        "law": law_sentences(result),
+        "law_figure": figures.law_figure(result),
         "apart": split_sentence(result),
         "candidates": _candidates(result),
         "alternatives": [

@@ -5,15 +5,17 @@ import math
 from typing import Any
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS
-from impactcell.discrepancy.model import ParameterEstimate
+from impactcell.discrepancy.model import ParameterEstimate, estimate_parameters, linearise
 from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search import Gap, GapChange, ModelEvidence, Remaining, Simulation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics import Kind
-from impactcell.physics.effects import LIBRARY
+from impactcell.physics.effects import LIBRARY, find_effect
 
 FORMAT = 2
 """Version of `result.json`."""
+SPLINE_ONLY = "spline only"
+"""Form of a term that no functional form does as well as."""
 DIGITS = 6
 """Significant digits written: more would change with the machine's rounding."""
 MAX_P_DEPENDS_ON = 0.05
@@ -64,7 +66,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
             },
         },
         "simulation": _simulation(result.simulation),
-        "law": None,
+        **_law(result),
         "next_experiment": [
             {
                 "separates": list(proposal.effects),
@@ -120,6 +122,35 @@ def _simulation(simulation: Simulation) -> dict[str, Any]:
         "fit_percent": {when: round_digits(error.fit_percent) for when, error in errors.items()},
         "relative_force_error": {when: round_digits(error.relative_force) for when, error in errors.items()},
     }
+
+
+def _law(result: DiscrepancyResult) -> dict[str, Any]:
+    """Write what is proposed where something remains; null, with the reason, where nothing is."""
+    finding = result.law
+    if finding is None or finding.refused:
+        return {"law": None, "law_refused": finding.refused if finding else None}
+    form, law = finding.term.form, finding.proposed
+    effect = form.effect.identifier if law is None else law.identifier
+    estimates = estimate_parameters(finding.training, linearise(finding.model, finding.training))
+    document = {
+        "place": form.effect.equation,
+        "covariates": [form.covariate],
+        "form": SPLINE_ONLY if law is None else law.functional_form,
+        "equation": form.effect.equation if law is None else law.equation,
+        "parameters": {} if law is None else _parameters([one for one in estimates if one.effect == effect]),
+        "equivalents": [item.law.functional_form for item in finding.equivalents],
+        "rival_places": [find_effect(place).equation for place in finding.rival_places],
+        "tested_range": {
+            form.covariate: {
+                "low": round_digits(finding.term.visited.lower),
+                "high": round_digits(finding.term.visited.upper),
+                "unit": form.covariate_unit,
+            }
+        },
+        "held_out": {**_change(finding.change), "p_value": round_digits(finding.change.p_value)},
+        "file": None if law is None else f"{law.identifier}.py",
+    }
+    return {"law": document, "law_refused": None}
 
 
 def _effect(result: DiscrepancyResult, effect: str) -> dict[str, Any]:

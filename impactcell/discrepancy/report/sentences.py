@@ -1,9 +1,11 @@
 """The outcome in two sentences: what is established, and what remains."""
 
 import math
+from typing import Any
 
 from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.physics.effects import find_effect
 
 
 def phrase(identifier: str) -> str:
@@ -12,7 +14,40 @@ def phrase(identifier: str) -> str:
 
 
 def headline(result: DiscrepancyResult) -> str:
-    """Say what is established, and what remains."""
+    """Say what is established, what remains, and which law would explain it, if one was found."""
+    finding = result.law
+    if finding is None or finding.refused:
+        return _conclusion(result)
+    fall = f"from {finding.change.before.trace:.2f} to {finding.change.after.trace:.2f} noise floors"
+    what = finding.term.form.effect.equation if finding.proposed is None else finding.proposed.equation
+    kind = "A free-form term" if finding.proposed is None else "A law that is in no library"
+    return f"{_conclusion(result)} {kind} closes what is left in the traces {fall}: {what}."
+
+
+def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
+    """Say what the page tells of a law that nobody had listed; None where none was looked for."""
+    finding = result.law
+    if finding is None:
+        return None
+    form, law = finding.term.form, finding.proposed
+    u, low, high = form.covariate.replace("_", " "), finding.term.visited.lower, finding.term.visited.upper
+    unit = form.covariate_unit
+    return {
+        "refused": finding.refused,
+        "equation": form.effect.equation if law is None else law.equation,
+        "spline_only": law is None,
+        "before": finding.change.before.trace,
+        "after": finding.change.after.trace,
+        "p": finding.change.p_value,
+        "equivalents": [item.law.functional_form for item in finding.equivalents],
+        "rivals": [find_effect(place).equation for place in finding.rival_places],
+        "tested": f"{u} from {low:.3g} to {high:.3g} {unit}",
+        "file": None if law is None else f"{law.identifier}.py",
+        "parameters": [] if law is None else [(item.name, item.first, item.unit) for item in law.parameters],
+    }
+
+
+def _conclusion(result: DiscrepancyResult) -> str:
     proof, conclusion = result.validation, result.conclusion
     if conclusion.verdict == UNTESTED:
         unit = result.prepared.excitation.unit
