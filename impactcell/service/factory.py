@@ -133,6 +133,7 @@ def cell_facts(cell: CellConfig, endpoint: str) -> CellFacts:
         endpoint,
         None if journal is None else journal.file,
         cell.path.resolve(),
+        None if cell.settings.actuator.stroke_mm is None else cell.settings.actuator.stroke_mm * MM,
     )
 
 

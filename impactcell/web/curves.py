@@ -36,7 +36,6 @@ def decimate(channel: Channel, columns: int = COLUMNS) -> Curve:
         No peak is lost, however narrow, unlike with every n-th sample.
 
         >>> import numpy as np
-    from numpy.typing import NDArray
         >>> spike = np.zeros(1000)
         >>> spike[77] = 5.0
         >>> float(decimate(Channel(np.arange(1000.0), spike), 10).high.max())

@@ -49,6 +49,8 @@ class CellFacts:
         Its journal file.
     file : Path or None
         Its cell file, which says which model it runs with.
+    stroke_m : float or None
+        Stroke of its actuator from first contact on, where it is the same for every tap.
     """
 
     name: str
@@ -56,6 +58,7 @@ class CellFacts:
     endpoint: str
     journal: Path | None = None
     file: Path | None = None
+    stroke_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,9 @@ from impactcell.alarms import RULES, Message
 from impactcell.records import Alarm
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 
+LARGE = 1e9
+"""From here on a number is written with an exponent, in any unit."""
+
 
 def preferred_language(asked: str | None, remembered: str | None, accepted: str) -> str:
     """Choose a language: the one asked for, the remembered one, the browser's first that is spoken.
@@ -50,12 +53,14 @@ class Messages:
         return Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
 
     def number(self, value: float, digits: int) -> str:
-        """Write a number with so many significant digits.
+        """Write a number with so many significant digits, and an exponent only where it is large or small.
 
-        >>> Messages("de").number(0.1234, 2)
-        '0,12'
+        >>> Messages("de").number(0.1234, 2), Messages("en").number(649980.0, 5)
+        ('0,12', '649980')
         """
         text = f"{value:.{digits}g}"
+        if "e+" in text and abs(value) < LARGE:
+            text = f"{float(text):.0f}"
         return text.replace(".", ",") if self.language == "de" else text
 
     def for_script(self) -> dict[str, str]:

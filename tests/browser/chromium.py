@@ -95,26 +95,31 @@ class Browser:
 
     def show_as(self, theme: str, size: tuple[int, int]) -> None:
         """Choose colours and the size of the window."""
-        width, height = size
+        self._set_size(*size)
+        self.driver.execute_cdp_cmd(
+            "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
+        )
+
+    def _set_size(self, width: int, height: int) -> None:
         self.driver.execute_cdp_cmd(
             "Emulation.setDeviceMetricsOverride",
             {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500},
         )
-        self.driver.execute_cdp_cmd(
-            "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
-        )
+        self.driver.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
 
     def screenshot(self, file: Path, *, whole: bool = True) -> None:
         """Take a picture, of the whole page or of the window."""
         import base64
 
         height = self.run("return document.documentElement.scrollHeight")
-        width = self.run("return innerWidth")
-        parameters: dict[str, Any] = {"format": "png", "captureBeyondViewport": whole}
-        if whole:
-            parameters["clip"] = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
+        width, shown = self.run("return [innerWidth, innerHeight]")
+        parameters: dict[str, Any] = {"format": "png"}
+        if whole:  # what lies outside the window is not drawn: make it large enough
+            self._set_size(width, max(height, shown))
         data = self.driver.execute_cdp_cmd("Page.captureScreenshot", parameters)["data"]
         file.write_bytes(base64.b64decode(data))
+        if whole:
+            self._set_size(width, shown)
 
     def faults(self) -> list[str]:
         """Read what the browser complained of since it was asked last."""

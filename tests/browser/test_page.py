@@ -1,68 +1,41 @@
 """The live page in a real browser: a running service, a simulated module, an OPC UA client beside it."""
 
-import asyncio
 import json
 import os
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import TypeVar
 
 import pytest
 import pytest_asyncio
 from asyncua import Client, ua
 
-from impactcell.records import Snapshot
 from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, with_password, write_users
-from tests.browser.chromium import DESK, PHONE, Browser, chromium, need_chromium
+from tests.browser.chromium import DESK, PHONE, Browser, need_chromium
+from tests.browser.shop import CELL, PASSWORDS, Shop, enter, judge, write_shop_users
 from tests.integration.processes import simulator, write_cell
-from tests.integration.watched import Watched, serving
+from tests.integration.watched import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300), pytest.mark.asyncio(loop_scope="module")]
 
-T = TypeVar("T")
-CELL = "press-1"
+PAGES = {
+    "cells": "/",
+    "cell": f"/cells/{CELL}",
+    "alarms": "/alarms",
+    "studies": "/studies",
+    "system": "/system",
+}
 SCRIPT = "<script>document.title='owned'</script>"
-PASSWORDS = {"eva": "engineer-1", "otto": "operator-1", "olga": "observer-1"}
-ROLES = {"eva": Role.ENGINEER, "otto": Role.OPERATOR, "olga": Role.OBSERVER}
-PAGES = {"cells": "/", "cell": f"/cells/{CELL}", "alarms": "/alarms", "system": "/system"}
-AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
 MOST_BYTES = 200_000
 """What is asked of a page with all that belongs to it."""
-
-
-@dataclass
-class Shop:
-    """A cell that runs, with its page."""
-
-    watched: Watched
-    directory: Path
-
-    @property
-    def page(self) -> str:
-        return self.watched.service.pages[CELL]
-
-    @property
-    def endpoint(self) -> str:
-        return self.watched.service.endpoints[CELL]
-
-    @property
-    def last(self) -> Snapshot:
-        return self.watched.snapshots[CELL][-1]
-
-    async def beside(self, work: Callable[[], T]) -> T:
-        """Let a person do something in a thread, while the service runs on."""
-        return await asyncio.to_thread(work)
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
     need_chromium()
     directory = tmp_path_factory.mktemp("shop")
-    users = {name: with_password(User(name, role), PASSWORDS[name]) for name, role in ROLES.items()}
-    write_users(directory / "users.yaml", users)
+    write_shop_users(directory)
     scenario = {
         "strikes": {"period_s": 0.5, "velocities_mm_per_min": [4000]},
         "wear": {"mu_s_per_1000_cycles": 4.0},
@@ -80,19 +53,6 @@ async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
         async with serving(cell) as watched:
             await watched.until(CELL, 20)
             yield Shop(watched, directory)
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    need_chromium()
-    with chromium(tmp_path / "profile") as started:
-        yield started
-
-
-def enter(browser: Browser, shop: Shop, user: str) -> None:
-    browser.open(shop.page)
-    browser.log_in(user, PASSWORDS[user])
-    browser.until(lambda: browser.path == "/", "the cells")
 
 
 async def test_a_cycle_is_seen_within_a_second_of_its_end(shop: Shop, browser: Browser) -> None:
@@ -249,21 +209,3 @@ async def test_every_page(
         assert not faults, json.dumps(faults, indent=1)
 
     await shop.beside(look)
-
-
-def judge(browser: Browser, name: str, picture: Path, width: int) -> list[str]:
-    """Take a picture; say what is too wide, what the browser complains of, what axe-core finds serious."""
-    browser.screenshot(picture)
-    faults = [f"{name}: {fault}" for fault in browser.faults()]
-    if browser.run("return Math.max(document.documentElement.scrollWidth, innerWidth)") > width:
-        faults.append(f"{name}: is too wide")
-    if not AXE.is_file():
-        if os.environ.get("IMPACTCELL_CI"):
-            pytest.fail("CI installs axe-core; it is missing")
-        return faults
-    # The policy of the page lets no script in; this one comes in as a debugger's.
-    browser.driver.execute_cdp_cmd("Runtime.evaluate", {"expression": AXE.read_text()})
-    run = "const done = arguments[arguments.length - 1]; axe.run().then((found) => done(found.violations));"
-    violations = browser.driver.execute_async_script(run)
-    serious = [v for v in violations if v["impact"] in ("serious", "critical")]
-    return faults + [f"{name}: {v['id']}: {[node['html'][:160] for node in v['nodes']]}" for v in serious]

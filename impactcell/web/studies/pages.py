@@ -36,7 +36,8 @@ async def studies(context: PageContext, request: Request, session: BrowserSessio
 async def begin(context: PageContext, _: Request, session: BrowserSession, form: dict[str, str]) -> Response:
     """Begin a study; its files come next."""
     cell = form.get("cell", "")
-    if cell and context.content.find(cell) is None:
+    facts = context.content.find(cell)
+    if cell and facts is None:
         raise RequestRefusedError(404, "error_not_found")
     if context.studies.is_full:
         raise RequestRefusedError(503, "error_queue_full")
@@ -47,6 +48,8 @@ async def begin(context: PageContext, _: Request, session: BrowserSession, form:
         )
     except OSError as error:
         raise RequestRefusedError(507, "error_no_room") from error
+    if facts is not None and facts.stroke_m is not None:
+        study.choices = {"set.stroke": f"{1e3 * facts.stroke_m:.6g} mm"}  # no file says it
     return JSONResponse({"id": study.id}, 201)
 
 
@@ -81,7 +84,9 @@ async def read(context: PageContext, request: Request, _: BrowserSession, form: 
     study = _study(context, request)
     if study.is_working or not study.files:
         raise RequestRefusedError(409, "error_study_stage")
-    study.choices = {name: value.strip() for name, value in form.items() if name != "csrf" and value.strip()}
+    chosen = {name: value.strip() for name, value in form.items() if name != "csrf"}
+    if chosen:  # nothing is chosen yet where it is read for the first time
+        study.choices = {name: value for name, value in chosen.items() if value}
     _enqueue_allowed(context)
     context.studies.read(study)
     return _to(study)

@@ -142,6 +142,7 @@ class StudyQueue:
     async def _study(self, study: Study) -> None:
         results = self.store.results(study)
         results.mkdir(exist_ok=True)
+        study.result, study.changes = {}, {}
         campaign = str(self.store.campaign(study))
         cell = self._cell_files.get(study.cell)
         against = [] if cell is None else ["--cell", str(cell)]
@@ -152,12 +153,12 @@ class StudyQueue:
             study.result = overview | {"messages": list(outcome.messages)}
         else:
             arguments = ["discrepancy", campaign, "-o", str(results), "--json", *against]
-            outcome = await self._verb(study, arguments)
-            study.result = _json(outcome.output)
-            if cell is not None and study.result.get("effects"):
-                extended = str(results / study.result["model"])
+            result = _json((await self._verb(study, arguments)).output)
+            if cell is not None and result.get("effects"):
+                extended = str(results / result["model"])
                 arguments = ["model", "accept", str(cell), extended, "--dry-run", "--json"]
                 study.changes = _json((await self._verb(study, arguments)).output)
+            study.result = result
         study.stage = Stage.DONE
 
     async def _verb(

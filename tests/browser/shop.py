@@ -1,0 +1,76 @@
+"""A cell that runs with its page, people who log in to it, and what every page is held to."""
+
+import asyncio
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+from impactcell.records import Snapshot
+from impactcell.scada import Role
+from impactcell.scada.users import User, with_password, write_users
+from tests.browser.chromium import Browser
+from tests.integration.watched import Watched
+
+T = TypeVar("T")
+CELL = "press-1"
+PASSWORDS = {"eva": "engineer-1", "otto": "operator-1", "olga": "observer-1"}
+ROLES = {"eva": Role.ENGINEER, "otto": Role.OPERATOR, "olga": Role.OBSERVER}
+AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
+
+
+@dataclass
+class Shop:
+    """A cell that runs, with its page."""
+
+    watched: Watched
+    directory: Path
+
+    @property
+    def page(self) -> str:
+        return self.watched.service.pages[CELL]
+
+    @property
+    def endpoint(self) -> str:
+        return self.watched.service.endpoints[CELL]
+
+    @property
+    def last(self) -> Snapshot:
+        return self.watched.snapshots[CELL][-1]
+
+    async def beside(self, work: Callable[[], T]) -> T:
+        """Let a person do something in a thread, while the service runs on."""
+        return await asyncio.to_thread(work)
+
+
+def write_shop_users(directory: Path) -> None:
+    """Write the users file: one of each role."""
+    users = {name: with_password(User(name, role), PASSWORDS[name]) for name, role in ROLES.items()}
+    write_users(directory / "users.yaml", users)
+
+
+def enter(browser: Browser, shop: Shop, user: str) -> None:
+    browser.open(shop.page)
+    browser.log_in(user, PASSWORDS[user])
+    browser.until(lambda: browser.path == "/", "the cells")
+
+
+def judge(browser: Browser, name: str, picture: Path, width: int) -> list[str]:
+    """Take a picture; say what is too wide, what the browser complains of, what axe-core finds serious."""
+    browser.screenshot(picture)
+    faults = [f"{name}: {fault}" for fault in browser.faults()]
+    if browser.run("return Math.max(document.documentElement.scrollWidth, innerWidth)") > width:
+        faults.append(f"{name}: is too wide")
+    if not AXE.is_file():
+        if os.environ.get("IMPACTCELL_CI"):
+            pytest.fail("CI installs axe-core; it is missing")
+        return faults
+    # The policy of the page lets no script in; this one comes in as a debugger's.
+    browser.driver.execute_cdp_cmd("Runtime.evaluate", {"expression": AXE.read_text()})
+    run = "const done = arguments[arguments.length - 1]; axe.run().then((found) => done(found.violations));"
+    violations = browser.driver.execute_async_script(run)
+    serious = [v for v in violations if v["impact"] in ("serious", "critical")]
+    return faults + [f"{name}: {v['id']}: {[node['html'][:160] for node in v['nodes']]}" for v in serious]

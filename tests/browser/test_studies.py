@@ -1,0 +1,176 @@
+"""The whole way in a real browser: drop a CSV, read what is missing, accept it, see the gap close."""
+
+import csv
+import os
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+import yaml
+
+from simulator.campaign import write
+from simulator.campaign_scenario import CampaignScenario
+from tests.browser.chromium import DESK, PHONE, Browser, need_chromium
+from tests.browser.shop import CELL, Shop, enter, judge, write_shop_users
+from tests.integration.processes import CONFIG, simulator, write_cell
+from tests.integration.watched import serving
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(400), pytest.mark.asyncio(loop_scope="module")]
+
+MISSING = {"stribeck_friction": {"friction_increase": 0.03, "stribeck_velocity_m_s": 0.04}}
+KNOWN = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 85}}
+"""What the cell's model has already."""
+HEADER = "Schuss;Zeit [ms];Kraft [N];Weg [mm];Geschwindigkeit [mm/min];Masse [kg];Richtung\n"
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
+    """A cell in which an effect acts that its model does not know."""
+    need_chromium()
+    directory = tmp_path_factory.mktemp("shop")
+    write_shop_users(directory)
+    (directory / "model.yaml").write_bytes((CONFIG / "models" / "prototype.yaml").read_bytes())
+    scenario = {
+        "strikes": {"period_s": 0.5, "velocities_mm_per_min": [2000, 4000, 6000]},
+        "appearances": [{"from_cycle": 1, "effects": MISSING}],
+    }
+    async with simulator(directory, **scenario) as module:
+        changes = {"model": "model.yaml", "web": {"endpoint": "http://127.0.0.1:0"}}
+        async with serving(write_cell(directory, module["port"], CELL, **changes)) as watched:
+            await watched.until(CELL, 3)
+            yield Shop(watched, directory)
+
+
+def write_measurement(directory: Path) -> Path:
+    """Strike 60 shots on the same plant, and write them as a logger would: one file, in German, ms and mm."""
+    scenario = {
+        "format": 1, "excitation": "tap", "seed": 5, "plant": {"spread": 0}, "hide": [*KNOWN, *MISSING],
+        "strengths": {**KNOWN, **MISSING}, "masses_kg": [18.9], "replicates": 6,
+        "sensors": {
+            "force": {"rate_hz": 10000, "noise_std": 0.4},
+            "position": {"rate_hz": 10000, "noise_std": 1.5e-6},
+        },
+    }  # fmt: skip
+    write(CampaignScenario.model_validate(scenario), directory / "shots")
+    table = directory / "versuch <b>3.csv"
+    with table.open("w", encoding="utf-8") as file, (directory / "shots" / "shots.csv").open() as shots:
+        file.write(HEADER)
+        for shot in csv.DictReader(shots):
+            constant = (shot["velocity_mm_per_min"], shot["mass_kg"], shot["direction"])
+            with (directory / "shots" / "traces" / f"{shot['shot']}.csv").open() as trace:
+                for row in csv.DictReader(trace):
+                    ms, force = 1e3 * float(row["time_s"]), row["force_n"]
+                    mm = f"{1e3 * float(row['position_m']):.6f}" if row["position_m"] else ""
+                    cells = (shot["shot"], f"{ms:.4f}", force, mm, *constant)
+                    file.write(";".join(cells).replace(".", ",") + "\n")
+    return table
+
+
+def gap(browser: Browser) -> float:
+    """Read the gap off the cell's page."""
+    text = " ".join(place.text for place in browser.all('[data-quantity="Model/Gap"]')) or "–"
+    return float("nan") if text == "–" else float(text.split()[0])
+
+
+async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Browser, tmp_path: Path) -> None:
+    table = write_measurement(tmp_path)
+    pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
+
+    def before() -> float:
+        enter(browser, shop, "eva")
+        browser.open(f"{shop.page}/cells/{CELL}")
+        browser.until(lambda: gap(browser) > 0.0, "a gap")
+        return gap(browser)
+
+    def drop() -> None:
+        browser.open(f"{shop.page}/studies")
+        browser.find("#drop-form input[type=file]").send_keys(str(table))
+        browser.find("#drop-form button").click()
+        browser.find('[data-stage="confirming"]')
+
+    def run() -> float:
+        begun = time.monotonic()
+        browser.find('button[value="discrepancy"]').click()
+        browser.find('[data-effect="stribeck_friction"]')
+        browser.driver.switch_to.frame(browser.find("iframe.report"))
+        assert "Missing: stribeck friction" in browser.text
+        browser.driver.switch_to.default_content()
+        return time.monotonic() - begun
+
+    def accept() -> None:
+        browser.find('form[action$="/accept"] button').click()
+        browser.find('[data-acceptance="accept"]')
+
+    def closed() -> float:
+        browser.open(f"{shop.page}/cells/{CELL}")
+        browser.until(lambda: 0.0 < gap(browser) < 1.5, "the gap closed")
+        return gap(browser)
+
+    open_gap = await shop.beside(before)
+    assert open_gap > 1.5
+    begun = time.monotonic()
+    await shop.beside(drop)
+    shown = await shop.beside(lambda: browser.text)
+    assert "60 shots, 18.9 kg, 2000–6000 mm/min" in shown
+    assert "Geschwindigkeit" in shown
+    assert "versuch_b_3.csv" in shown
+    study_s = await shop.beside(run)
+    print(f"dropped to named: {time.monotonic() - begun:.1f} s, of that the study {study_s:.1f} s")
+    faults = []
+    for theme, size in (("light", DESK), ("dark", DESK), ("light", PHONE)):
+        suffix = "phone" if size == PHONE else theme
+
+        def look(theme: str = theme, size: tuple[int, int] = size, suffix: str = suffix) -> list[str]:
+            browser.show_as(theme, size)
+            return judge(browser, "study", pictures / f"page-study-{suffix}.png", size[0])
+
+        faults += await shop.beside(look)
+    assert not faults
+    await shop.beside(lambda: browser.show_as("light", DESK))
+    await shop.beside(accept)
+    print(f"gap {open_gap:.2f}, then {await shop.beside(closed):.2f}")
+    assert shop.last.model_name == "prototype + stribeck_friction"
+    audit = await shop.watched.service.running[CELL].worker.query_journal(lambda journal: journal.audit())
+    assert audit is not None
+    assert [(entry.action, entry.user.split()[0]) for entry in audit] == [("model accept", "eva")]
+
+    def undo() -> None:
+        browser.driver.back()
+        browser.find('form[action$="/restore"] button').click()
+        browser.find('[data-acceptance="restore"]')
+
+    await shop.beside(undo)
+    model = shop.directory / "model.yaml"
+    assert yaml.safe_load(model.read_text())["name"] == "prototype"
+
+
+async def test_what_cannot_be_read_is_said_and_a_script_in_a_name_is_text(
+    shop: Shop, browser: Browser, tmp_path: Path
+) -> None:
+    name = "<img src=x onerror=document.title='owned'>.csv"
+    (tmp_path / name).write_text("<script>document.title='owned'</script>;b\n1;zwei\n")
+    (tmp_path / "wide.csv").write_text(";".join(f"c{i}" for i in range(10_000)) + "\n" + "1;" * 9999 + "1\n")
+
+    def drop(path: Path) -> str:
+        browser.open(f"{shop.page}/studies")
+        browser.find("#drop-form input[type=file]").send_keys(str(path))
+        browser.find("#drop-form button").click()
+        browser.find(".faults li")
+        assert browser.driver.title != "owned"
+        return browser.all(".faults")[0].text
+
+    await shop.beside(lambda: enter(browser, shop, "otto"))
+    assert await shop.beside(lambda: drop(tmp_path / name))
+    assert "10000 columns" in await shop.beside(lambda: drop(tmp_path / "wide.csv"))
+
+
+async def test_an_observer_looks_and_drops_nothing(shop: Shop, browser: Browser) -> None:
+    def look() -> str:
+        enter(browser, shop, "olga")
+        browser.open(f"{shop.page}/studies")
+        assert not browser.all("#drop-form")
+        return browser.text
+
+    assert "Operators and engineers can drop measurements here." in await shop.beside(look)
