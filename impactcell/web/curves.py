@@ -33,13 +33,13 @@ class Curve:
 def decimate(channel: Channel, columns: int = COLUMNS) -> Curve:
     """Give the smallest and largest value in each of at most `columns` columns of equally many samples.
 
-        No peak is lost, however narrow, unlike with every n-th sample.
+    No peak is lost, however narrow, unlike with every n-th sample.
 
-        >>> import numpy as np
-        >>> spike = np.zeros(1000)
-        >>> spike[77] = 5.0
-        >>> float(decimate(Channel(np.arange(1000.0), spike), 10).high.max())
-        5.0
+    >>> import numpy as np
+    >>> spike = np.zeros(1000)
+    >>> spike[77] = 5.0
+    >>> float(decimate(Channel(np.arange(1000.0), spike), 10).high.max())
+    5.0
     """
     count = len(channel.values)
     if count <= columns:
