@@ -188,8 +188,9 @@ def _check_header(path: Path) -> None:
 
 
 def _create(database: sqlite3.Connection, cell: str) -> None:
+    """Write an empty journal in one transaction: what is cut off is empty, not a foreign database."""
+    database.execute("BEGIN")  # not IMMEDIATE: that makes the first page, and fixes what the next line sets
     database.execute("PRAGMA auto_vacuum = INCREMENTAL")
-    database.execute("BEGIN IMMEDIATE")
     for statement in TABLES.split(";"):
         database.execute(statement)
     database.execute("INSERT INTO meta VALUES ('cell', ?, ?)", (cell, row_crc(["cell", cell])))
