@@ -6,6 +6,7 @@
     ├── SettingsError             a cell, map, model or scenario file: file:line:column and the way out
     ├── CampaignError             a campaign directory: file, line and the way out
     ├── MeasurementError          a measurement file that cannot be imported: file, line or column
+    ├── EffectError               an effect of the user's own that cannot be used: file and the way out
     ├── SeriesError               a series for `impactcell track`: file, line and the way out
     ├── PhysicsError              the plant model cannot answer
     │   ├── NoBreakawayError      the part never moved
@@ -55,6 +56,10 @@ class CampaignError(ImpactCellError):
 
 class MeasurementError(ImpactCellError):
     """A measurement file that cannot be imported; the message names file, line or column and the way out."""
+
+
+class EffectError(ImpactCellError):
+    """An effect of the user's own that cannot be used; the message names file and what it breaks."""
 
 
 class SeriesError(ImpactCellError):

@@ -22,7 +22,9 @@ app = typer.Typer(
 model = typer.Typer(no_args_is_help=True, help="The model a cell runs with.")
 app.add_typer(users, name="users")
 app.add_typer(certs, name="certs")
+effect = typer.Typer(no_args_is_help=True, help="Effects of your own.")
 app.add_typer(model, name="model")
+app.add_typer(effect, name="effect")
 
 
 @verb(app)
@@ -170,11 +172,16 @@ def discrepancy(
     journal: Annotated[Path | None, typer.Option(metavar="DB", help="Recorded captures instead.")] = None,
     seed: Annotated[int, typer.Option(help="Of the resampling.")] = 0,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler.")] = None,
+    effects: Annotated[
+        list[Path] | None, typer.Option(metavar="PATH", help="A file or folder of effects of your own.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Find where model and measurement disagree, name the missing effect, prove it."""
     from impactcell.cli.discrepancy import discrepancy as run_discrepancy
+    from impactcell.cli.effects import offer
 
+    offer(effects or (), scheduler)
     run_discrepancy(
         campaign, output, cell=cell, journal=journal, seed=seed, scheduler=scheduler, as_json=as_json
     )
@@ -202,6 +209,18 @@ def figures(output: Directory) -> None:
 
     for path in draw(output):
         print_result(str(path))
+
+
+@verb(effect, "check")
+def effect_check(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Files of effects, or folders of them.")
+    ],
+) -> None:
+    """Hold effects of your own to what every effect owes; the files are run."""
+    from impactcell.cli.effects import check_effects
+
+    check_effects(files)
 
 
 @verb(model, "accept")

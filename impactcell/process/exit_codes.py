@@ -7,6 +7,7 @@ from collections.abc import Callable
 from impactcell.errors import (
     AccessError,
     CampaignError,
+    EffectError,
     ForeignJournalError,
     ImpactCellError,
     MapError,
@@ -18,6 +19,7 @@ from impactcell.errors import (
 _BAD_INPUT = (
     AccessError,
     CampaignError,
+    EffectError,
     ForeignJournalError,
     MapError,
     MeasurementError,

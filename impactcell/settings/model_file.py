@@ -9,9 +9,10 @@ from typing import Annotated, Literal, Self
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.errors import ImpactCellError, PhysicsError, SettingsError
 from impactcell.physics import Plant
 from impactcell.physics.effects import LIBRARY
+from impactcell.physics.outside_effects import offer_effects, offer_installed, source_of
 from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predictor, Prior, Sensitivity
 from impactcell.process import yaml_loader
 
@@ -108,6 +109,7 @@ class ModelFile(_Part):
     stroke_m: Positive | None = None
     predictors: list[PredictorFile] = []
     provenance: dict[str, str] = {}
+    effect_files: list[str] = []
 
     @model_validator(mode="after")
     def _one_predictor_a_tap(self) -> Self:
@@ -128,6 +130,12 @@ def read_model(path: Path) -> Model:
     """
     file, positions = yaml_loader.read(path, ModelFile)
     faults = []
+    try:
+        offer_effects([path.parent / name for name in file.effect_files])
+        offer_installed()
+    except PhysicsError as fault:
+        where = positions.value(("effect_files",)) if file.effect_files else positions.value(())
+        raise SettingsError(yaml_loader.format_error(path, where, str(fault))) from fault
     for identifier, parameters in file.plant.effects.items():
         location = ("plant", "effects", identifier)
         if identifier not in LIBRARY:
@@ -262,6 +270,9 @@ def _to_mapping(model: Model) -> dict[str, object]:
         ],
         "provenance": dict(model.provenance),
     }
+    sources = [str(source) for effect in plant.effects if (source := source_of(effect)) is not None]
+    if sources:
+        mapping["effect_files"] = sources
     return mapping
 
 

@@ -1,7 +1,8 @@
 """The library of physical effects: one file is one named effect.
 
 A file of this package defines one `EFFECT`, of the same name; that file is all it takes for the effect to be
-simulated, fitted and offered everywhere.
+simulated, fitted and offered everywhere. Effects from outside of the package join by `offer_effect`
+(`impactcell.physics.outside_effects` loads them), and by entry points of the group "impactcell.effects".
 """
 
 import importlib
@@ -13,21 +14,44 @@ from impactcell.errors import PhysicsError
 from impactcell.physics.effect import Effect
 
 
-def _discover() -> Mapping[str, Effect]:
+def _discover() -> dict[str, Effect]:
     library: dict[str, Effect] = {}
     for module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name):
         effect = importlib.import_module(f"{__name__}.{module.name}").EFFECT
         if effect.identifier != module.name:
             raise PhysicsError(f"effects/{module.name}.py calls its effect {effect.identifier!r}")
         library[effect.identifier] = effect
-    return MappingProxyType(library)
+    return library
 
 
-LIBRARY: Mapping[str, Effect] = _discover()
-"""Every effect of the product by its identifier."""
+_OFFERED: dict[str, Effect] = _discover()
+"""What `LIBRARY` shows."""
+LIBRARY: Mapping[str, Effect] = MappingProxyType(_OFFERED)
+"""Every effect that is offered, by its identifier: those of the product, and what joined them from
+outside."""
 
 _ADDED: dict[str, Effect] = {}
 """Effects that joined while running: free-form terms and laws that nobody had listed."""
+
+
+def offer_effect(effect: Effect) -> None:
+    """Let an effect from outside be simulated, fitted and named like those of the product.
+
+    Raises
+    ------
+    PhysicsError
+        Another effect has this identifier.
+    """
+    if effect.identifier in _OFFERED or effect.identifier in _ADDED:
+        raise PhysicsError(
+            f"an effect called {effect.identifier!r} is there already; give yours another name"
+        )
+    _OFFERED[effect.identifier] = effect
+
+
+def withdraw_effect(identifier: str) -> None:
+    """Take back what `offer_effect` has offered."""
+    _OFFERED.pop(identifier, None)
 
 
 def add_effect(effect: Effect) -> None:

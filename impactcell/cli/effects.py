@@ -1,0 +1,58 @@
+"""Effects of the user's own: offered to a study, and checked."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from impactcell.errors import EffectError, PhysicsError
+from impactcell.physics.effect_contract import contract_faults
+from impactcell.physics.outside_effects import effect_files, load_effect, offer_effects, offer_installed
+from impactcell.process.console import print_note, print_result
+
+
+def offer(paths: Sequence[Path], scheduler: str | None = None) -> None:
+    """Offer the effects of files and folders, and of installed plug-ins.
+
+    Raises
+    ------
+    EffectError
+        What cannot be used, a line each.
+    """
+    if paths and scheduler is not None:
+        raise EffectError(
+            "effects of files are known in this process only; without --scheduler, or install them"
+        )
+    try:
+        offered = (*offer_installed(), *offer_effects(paths))
+    except PhysicsError as error:
+        raise EffectError(str(error)) from error
+    if offered:
+        print_note(f"offered beside the library: {', '.join(offered)}")
+
+
+def check_effects(paths: Sequence[Path]) -> None:
+    """Hold the effects of files and folders to the contract.
+
+    Raises
+    ------
+    EffectError
+        What they break, a line each.
+    """
+    faults: list[str] = []
+    files = []
+    for path in paths:
+        try:
+            files += effect_files(path)
+        except PhysicsError as error:
+            faults.append(str(error))
+    for file in files:
+        try:
+            broken = contract_faults(load_effect(file))
+        except PhysicsError as error:
+            faults.append(str(error))
+            continue
+        if broken:
+            faults += [f"{file}: {fault}" for fault in broken]
+        else:
+            print_result(f"{file}: in order")
+    if faults:
+        raise EffectError("\n".join(faults))
