@@ -92,7 +92,7 @@ class _DemoRun:
             if self.cycles is not None and self.seen >= self.cycles:
                 stop.set()
 
-        self.service = Service([self.setup.cell], observe)
+        self.service = Service([self.setup.cell], observe, {self.setup.cell.name: self.setup.stops})
         watch = asyncio.create_task(self._watch(news, stop))
         with stop_on_signals(stop) as signals:
             try:

@@ -15,15 +15,18 @@ from pathlib import Path
 
 import yaml
 
+from impactcell.demo.tour import tour
 from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.process.shipped import ROOT, shipped_config
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
 from impactcell.service.factory import cell_design
 from impactcell.service.warmup import warm_up
 from impactcell.settings import CellConfig, read_cell
+from impactcell.web import TourStop
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
-"""Where a checkout keeps its cells and scenarios."""
+CONFIG = shipped_config()
+"""Cells and scenarios that come with the program."""
 SCENARIOS = ("demo", "new-effect", "positioning")
 USER = "demo"
 EVENT_SECTIONS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
@@ -46,12 +49,15 @@ class DemoSetup:
         Of the user `demo`; made anew for each demo.
     last_target_m : float
         Where the last part should go; nan where cycles come without end.
+    stops : tuple of TourStop
+        The same as the page tells it.
     """
 
     cell: CellConfig
     story: tuple[tuple[int, str], ...]
     password: str
     last_target_m: float = math.nan
+    stops: tuple[TourStop, ...] = ()
 
 
 @contextlib.contextmanager
@@ -69,7 +75,9 @@ def set_up_scenario(scenario: str, cycles: int | None) -> Iterator[DemoSetup]:
     if scenario not in SCENARIOS:
         raise SettingsError(f"there is no scenario '{scenario}'; choose one of {', '.join(SCENARIOS)}")
     if not source.is_file():
-        raise SettingsError(f"the demo needs a checkout of the project: there is no {source}")
+        raise SettingsError(
+            f"the demo's scenarios are missing: there is no {source}; install the program anew"
+        )
     directory = Path(tempfile.mkdtemp(prefix="impactcell-demo-"))
     try:
         content = yaml.safe_load(source.read_text(encoding="utf-8"))
@@ -82,7 +90,7 @@ def set_up_scenario(scenario: str, cycles: int | None) -> Iterator[DemoSetup]:
         warm_up(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
         with _simulator(played) as port:
             cell = read_cell(_write_cell_file(scenario, directory, port))
-            yield DemoSetup(cell, story(content), password, last_target_m(content))
+            yield DemoSetup(cell, story(content), password, last_target_m(content), tour(content))
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 
@@ -140,7 +148,7 @@ def _simulator(scenario: Path) -> Iterator[int]:
         stdout=subprocess.PIPE,
         stderr=errors,
         text=True,
-        cwd=CONFIG.parent,
+        cwd=ROOT,
     )
     try:
         assert process.stdout is not None  # noqa: S101 - a pipe was asked for

@@ -118,7 +118,7 @@ def page_settings(cell: CellConfig, section: WebSection) -> PageSettings:
         section.endpoint,
         opcua.users_file,
         opcua.certificates_dir,
-        section.studies_dir,
+        section.studies_dir or cell.path.resolve().parent / "studies",
         section.certificate,
         section.key,
     )

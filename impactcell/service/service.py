@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from dataclasses import replace
 
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
@@ -30,7 +31,7 @@ from impactcell.service.operator_commands import OperatorCommands
 from impactcell.service.page_gateway import PageGateway
 from impactcell.settings import CellConfig
 from impactcell.settings.web_section import WebSection
-from impactcell.web import CellNews, PageServer
+from impactcell.web import CellNews, PageServer, TourStop
 from impactcell.web.live_feed import LiveFeed
 
 log = logging.getLogger("impactcell.service")
@@ -53,6 +54,8 @@ class Service:
     cells : sequence of CellConfig
     on_snapshot : callable, optional
         Called with the cell's name and each snapshot, after it was published.
+    tours : mapping, optional
+        What the page tells of each cell that is a demo.
 
     A cell whose journal cannot be opened is told and waits, without values, until it can; the others run.
 
@@ -62,8 +65,14 @@ class Service:
         No journal can be opened, and trying again cannot help; nothing has been started.
     """
 
-    def __init__(self, cells: Sequence[CellConfig], on_snapshot: SnapshotCallback | None = None) -> None:
+    def __init__(
+        self,
+        cells: Sequence[CellConfig],
+        on_snapshot: SnapshotCallback | None = None,
+        tours: Mapping[str, Sequence[TourStop]] | None = None,
+    ) -> None:
         self._cells = tuple(cells)
+        self._tours = tours or {}
         self._on_snapshot = on_snapshot
         self.running: dict[str, CellTask] = {}
         self.endpoints: dict[str, str] = {}
@@ -156,7 +165,10 @@ class Service:
     ) -> None:
         shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in cells}
         settings = page_settings(cells[0], section)
-        facts = [cell_facts(cell, self.endpoints[cell.name]) for cell in cells]
+        facts = [
+            replace(cell_facts(cell, self.endpoints[cell.name]), tour=self._tours.get(cell.name, ()))
+            for cell in cells
+        ]
         gateway = PageGateway(shown_by, OperatorCommands(self.running), cells, settings.certificates)
         page = PageServer(settings, facts, gateway)
         try:

@@ -229,7 +229,7 @@ class CellSettings(Section):
     """Absent: nothing is kept over a restart."""
     monitoring: MonitoringSection | None = None
     """Absent: no health and metrics over HTTP."""
-    web: WebSection | None = Field(default={}, validate_default=True)
+    web: WebSection | None = WebSection()
     """The live page; null: none."""
 
 

@@ -3,7 +3,7 @@
 from typing import Annotated, Self
 from urllib.parse import urlsplit
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, model_validator
 
 from impactcell.settings.fields import AnyPath, InputFile, Section, page_endpoint
 
@@ -17,8 +17,8 @@ class WebSection(Section):
     """Certificate (PEM) of the page, for https."""
     key: InputFile | None = None
     """Its private key (PEM)."""
-    studies_dir: AnyPath = Field(default="studies", validate_default=True)
-    """Directory for the measurements that people drop on the page, and for what comes out of them."""
+    studies_dir: AnyPath | None = None
+    """Directory for the measurements that people drop on the page; absent: `studies` beside the cell file."""
     allow_without_encryption: bool = False
     """Opens plain http beyond loopback, where anybody can listen; every start then warns."""
 

@@ -35,6 +35,15 @@ class CellNews:
 
 
 @dataclass(frozen=True, slots=True)
+class TourStop:
+    """Something that a demo has in store: from which cycle on, what happens, and where to look."""
+
+    cycle: int
+    what: str
+    where: str
+
+
+@dataclass(frozen=True, slots=True)
 class CellFacts:
     """What does not change of a cell while the service runs.
 
@@ -51,6 +60,8 @@ class CellFacts:
         Its cell file, which says which model it runs with.
     stroke_m : float or None
         Stroke of its actuator from first contact on, where it is the same for every tap.
+    tour : sequence of TourStop
+        What happens in a cell that is a demo; empty in a real one.
     """
 
     name: str
@@ -59,6 +70,7 @@ class CellFacts:
     journal: Path | None = None
     file: Path | None = None
     stroke_m: float | None = None
+    tour: Sequence[TourStop] = ()
 
 
 @dataclass(frozen=True, slots=True)

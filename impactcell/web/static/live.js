@@ -102,6 +102,16 @@ export function showAlarm(place, alarms, emptyText) {
   }));
 }
 
+/** A demo's tour: what has happened is ticked off, what comes is said to come. */
+export function showTour(card) {
+  const cycle = card.values["Friction/CycleNumber"] ?? 0;
+  for (const stop of document.querySelectorAll(`[data-tour="${CSS.escape(card.cell)}"] [data-cycle-from]`)) {
+    const from = Number(stop.dataset.cycleFrom);
+    stop.className = cycle >= from ? "happened" : "";
+    stop.dataset.when = cycle >= from ? `✓ ${texts.since_cycle} ${from}` : `${texts.in_cycles} ${from - cycle}`;
+  }
+}
+
 /** Keeps a stream open; the browser reconnects by itself, the end of a session leads to the login. */
 export function follow(address, handlers) {
   const openAlarms = new Map();
@@ -124,6 +134,9 @@ export function follow(address, handlers) {
     count.setAttribute("aria-label", `${total} ${total === 1 ? texts.open_one : texts.open_many}`);
     handlers.alarms?.(cell);
   });
-  for (const kind of ["recent", "card", "detail"]) listen(kind, (content) => handlers[kind]?.(content));
+  for (const kind of ["recent", "card", "detail"]) listen(kind, (content) => {
+    handlers[kind]?.(content);
+    if (kind === "card") showTour(content);
+  });
   addEventListener("pagehide", () => source.close());
 }

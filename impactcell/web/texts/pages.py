@@ -86,6 +86,11 @@ PAGE_TEXTS: Texts = {
     "remaining": ("Remaining", "Rest"),
     "figures": ("Figures of the last cycle", "Werte des letzten Zyklus"),
     "model_and_gap": ("Model and gap", "Modell und Abweichung"),
+    "tour": ("Tour: what happens in this demo", "Rundgang: was in dieser Vorführung geschieht"),
+    "tour_help": (
+        "A simulated machine behind real Modbus; everything else is as it would run beside yours.",
+        "Eine simulierte Maschine hinter echtem Modbus; alles andere ist so, wie es neben Ihrer liefe.",
+    ),
     # alarms
     "open_alarms": ("Open alarms", "Offene Alarme"),
     "no_open_alarms": ("No alarm needs a look.", "Kein Alarm wartet."),

@@ -28,6 +28,7 @@ SCRIPT_TEXTS: Texts = {
     "live_statistic": ("statistic", "Prüfgröße"),
     "live_threshold": ("threshold", "Schwelle"),
     "live_since_cycle": ("since cycle", "seit Zyklus"),
+    "live_in_cycles": ("cycles to go:", "Zyklen bis dahin:"),
     "live_size": ("size", "Größe"),
     "live_time": ("time", "Zeit"),
     "live_last_alarm": ("Last alarm", "Letzter Alarm"),

@@ -15,7 +15,7 @@ from impactcell.scada import Actor, ConditionAction, RefusedError, Role
 from impactcell.scada.conditions import event_id
 from impactcell.scada.users import User, Users, write_users
 from impactcell.web.app import page_app
-from impactcell.web.interface import CellFacts, CellNews, PageContent, PageSettings
+from impactcell.web.interface import CellFacts, CellNews, PageContent, PageSettings, TourStop
 from impactcell.web.live_feed import LiveFeed
 from impactcell.web.sessions import SessionTable
 from impactcell.web.studies.queue import RunVerb, StudyQueue
@@ -138,14 +138,19 @@ def raised(message: str = "friction is off", **changes: object) -> Alarm:
     )
 
 
-def make_page(directory: Path, journal: Path | None = None, verbs: RunVerb | None = None) -> Page:
+def make_page(
+    directory: Path,
+    journal: Path | None = None,
+    verbs: RunVerb | None = None,
+    tour: tuple[TourStop, ...] = (),
+) -> Page:
     users = directory / "users.yaml"
     write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
     clock, backend = Clock(), Backend(users)
     settings = PageSettings(ADDRESS, users, directory / "pki", directory / "studies")
     feed = LiveFeed([CELL])
     feed.start()
-    facts = CellFacts(CELL, "127.0.0.1:502", "opc.tcp://127.0.0.1:4840", journal)
+    facts = CellFacts(CELL, "127.0.0.1:502", "opc.tcp://127.0.0.1:4840", journal, tour=tour)
     studies = StudyQueue(StudyStore(settings.studies), {CELL: directory / "press-1.yaml"}, verbs or Verbs())
     sessions = SessionTable(Users(users), clock)
     app = page_app(settings, PageContent((facts,)), feed, sessions, backend, studies)

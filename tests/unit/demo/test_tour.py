@@ -1,0 +1,44 @@
+"""The tour tells every event of every scenario that comes with the program, and the page shows it."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+import yaml
+
+from impactcell.demo.scenario_setup import CONFIG, SCENARIOS, story
+from impactcell.demo.tour import tour
+from impactcell.process.shipped import ROOT, shipped_config
+from impactcell.scada import Role
+from impactcell.web.interface import TourStop
+from tests.unit.web.page import CELL, make_page
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_what_happens_is_told_with_where_to_look(scenario: str) -> None:
+    content = yaml.safe_load((CONFIG / "sim" / f"{scenario}.yaml").read_text())
+    stops = tour(content)
+    assert sorted(stop.cycle for stop in stops[:-1]) == sorted(cycle for cycle, _ in story(content))
+    assert [stop.cycle for stop in stops] == sorted(stop.cycle for stop in stops)
+    assert all(stop.what and stop.where for stop in stops)
+
+
+async def test_the_page_gives_the_tour(tmp_path: Path) -> None:
+    stop = TourStop(7, "It <happens>.", "There.")
+    page = make_page(tmp_path, tour=(stop,))
+    async with page.logged_in(Role.OBSERVER) as client:
+        for path in ("/", f"/cells/{CELL}"):
+            text = (await client.get(path)).text
+            assert 'data-cycle-from="7"' in text
+            assert "It &lt;happens&gt;." in text
+    await asyncio.sleep(0)
+
+
+def test_the_wheel_has_what_the_demo_needs(tmp_path: Path) -> None:
+    import tomllib
+
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["data-files"]
+    shipped = {path for patterns in declared.values() for pattern in patterns for path in ROOT.glob(pattern)}
+    assert shipped >= set((ROOT / "config").glob("*/*.yaml"))
+    assert shipped_config() == ROOT / "config"
+    assert shipped_config(tmp_path).parts[-3:] == ("share", "impactcell", "config")
