@@ -24,12 +24,29 @@ def _known(effects: Effects) -> Effects:
 
 
 class Listen(ScenarioModel):
-    """Where the module answers; port 0 lets the system choose."""
+    """Where the module answers; port 0 lets the system choose.
+
+    Transport `rtu` makes a serial line of its own, a pseudo terminal, as slow as `baudrate` says; `tls` needs
+    the module's certificate and key, and the authority that the client's certificate must lead to (PEM).
+    """
+
+    transport: Literal["tcp", "tls", "udp", "rtu_over_tcp", "rtu"] = "tcp"
+    baudrate: Annotated[int, Field(ge=300)] = 115_200
+    certificate: str | None = None
+    key: str | None = None
+    client_authority: str | None = None
 
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 0
     device_id: Annotated[int, Field(ge=0, le=255)] = 1
     control_port: Annotated[int, Field(ge=0, le=65535)] | None = None
+
+    @model_validator(mode="after")
+    def _has_certificates(self) -> Self:
+        if (self.transport == "tls") != (self.certificate is not None and self.key is not None):
+            message = "`certificate` and `key` belong to `transport: tls`, and to no other"
+            raise ValueError(message)
+        return self
 
 
 class CellPlant(ScenarioModel):

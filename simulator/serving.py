@@ -1,4 +1,4 @@
-"""Serves a scenario over Modbus TCP until it is told to stop."""
+"""Serves a scenario over Modbus until it is told to stop."""
 
 import asyncio
 import contextlib
@@ -18,8 +18,9 @@ from simulator.control import Control
 from simulator.device import Device, Truth
 from simulator.fault_schedule import arm
 from simulator.faults import FaultInjector
-from simulator.modbus_server import ModbusServer
+from simulator.listening import server_of
 from simulator.scenario import Scenario
+from simulator.serial_line import SerialServer
 
 LONGEST_NAP_S = 0.5
 """The module is brought up to date at least so often, seconds."""
@@ -87,14 +88,7 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
     loop = asyncio.get_running_loop()
     listen = scenario.listen
     faults = FaultInjector(scenario.seed)
-    server = ModbusServer(
-        device,
-        listen.device_id,
-        host=listen.host,
-        port=listen.port,
-        faults=faults,
-        before=lambda: device.update(loop.time()),
-    )
+    server = server_of(listen, device, faults, before=lambda: device.update(loop.time()))
 
     def restart() -> int:
         server.drop_clients()
@@ -115,6 +109,8 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
             "port": server.port,
             "device_id": listen.device_id,
         }
+        if isinstance(server, SerialServer):
+            started["serial"] = server.device_file
         if listen.control_port is not None:
             control = await stack.enter_async_context(Control(faults, actions, listen.control_port))
             started["control_port"] = control.port

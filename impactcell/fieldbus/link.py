@@ -3,6 +3,7 @@
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from impactcell.errors import LinkError
 
@@ -45,12 +46,63 @@ class TlsFiles:
         return context
 
 
+TRANSPORTS: Final = ("tcp", "tls", "udp", "rtu_over_tcp", "rtu")
+"""What a request travels on: Modbus TCP, the same encrypted, or in datagrams, RTU frames over TCP, a line."""
+_PARITY_BITS: Final = {"N": 0, "E": 1, "O": 1}
+_RTU_SILENCE: Final = 3.5
+"""Characters of silence that end an RTU frame (Modbus over Serial Line V1.02, section 2.5.1.1)."""
+_RTU_SILENCE_FAST_S: Final = 1.75e-3
+"""The same above 19 200 baud, where it does not shrink any more (ibid.)."""
+_FAST_BAUD: Final = 19_200
+
+
+@dataclass(frozen=True, slots=True)
+class SerialLine:
+    """A serial line and how characters are sent on it.
+
+    Attributes
+    ----------
+    device : str
+        The port, as in /dev/ttyUSB0 or COM3.
+    baudrate : int
+        Bits a second.
+    parity : str
+        N, E or O.
+    stop_bits, data_bits : int
+        RTU has eight data bits.
+    """
+
+    device: str
+    baudrate: int = 19_200
+    parity: str = "E"
+    stop_bits: int = 1
+    data_bits: int = 8
+
+    @property
+    def character_s(self) -> float:
+        """Time that one character takes: start bit, data, parity and stop bits."""
+        return (1 + self.data_bits + _PARITY_BITS[self.parity] + self.stop_bits) / self.baudrate
+
+    @property
+    def silence_s(self) -> float:
+        """Silence between frames."""
+        return _RTU_SILENCE_FAST_S if self.baudrate > _FAST_BAUD else _RTU_SILENCE * self.character_s
+
+    def __str__(self) -> str:
+        """Port and settings, for messages."""
+        return f"{self.device} at {self.baudrate} baud {self.data_bits}{self.parity}{self.stop_bits}"
+
+
 @dataclass(frozen=True, slots=True)
 class ModuleLink:
     """Address of a module and what it, or a gateway before it, can stand.
 
     Attributes
     ----------
+    transport : str
+        One of `TRANSPORTS`.
+    serial : SerialLine or None
+        The line of transport `rtu`, in the place of host and port.
     device_id : int
         Modbus unit id; behind a gateway the address on the serial line.
     window : int
@@ -74,7 +126,17 @@ class ModuleLink:
     pause_s: float = 0.0
     timeout_s: float = 0.5
     tls: TlsFiles | None = None
+    transport: str = "tcp"
+    serial: SerialLine | None = None
+
+    @property
+    def endpoint(self) -> tuple[str, int]:
+        """What leads to the same endpoint shares one connection: host and port, or the serial port and 0."""
+        return (self.host, self.port) if self.serial is None else (self.serial.device, 0)
 
     def __str__(self) -> str:
-        """Host, port and device id, for messages."""
-        return f"{self.host}:{self.port} device {self.device_id}"
+        """Where and which device, for messages."""
+        if self.serial is not None:
+            return f"{self.serial} device {self.device_id}"
+        kind = "" if self.transport == "tcp" else f" ({self.transport.replace('_', ' ')})"
+        return f"{self.host}:{self.port}{kind} device {self.device_id}"

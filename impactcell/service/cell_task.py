@@ -13,7 +13,7 @@ from impactcell.alarms.rules import journal_fault, module_connection, positionin
 from impactcell.errors import ImpactCellError, JournalError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.fieldbus.modbus_client import ModbusClient
-from impactcell.fieldbus.transports import transport_for
+from impactcell.fieldbus.transports import Transport, transport_for
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry
 from impactcell.positioning.task_state_machine import TaskOutcome
@@ -66,7 +66,12 @@ class CellTask:
         The journal cannot be opened.
     """
 
-    def __init__(self, cell: CellConfig, on_snapshot: SnapshotCallback | None = None) -> None:
+    def __init__(
+        self,
+        cell: CellConfig,
+        on_snapshot: SnapshotCallback | None = None,
+        transport: Transport | None = None,
+    ) -> None:
         self.cell = cell
         self.log = CellLogger(logging.getLogger(__name__), cell.name)
         settings = cell.settings.journal
@@ -84,7 +89,10 @@ class CellTask:
         self._notes: tuple[str, ...] = ()
         self._on_snapshot = on_snapshot
         self._module = ModuleAcquisition(
-            cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map, self._link_changed
+            cell.name,
+            ModbusClient(transport or transport_for(module_link(cell))),
+            cell.register_map,
+            self._link_changed,
         )
         self._positioning: PositioningTask | None = None
         if cell.settings.positioning is not None:

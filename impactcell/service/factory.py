@@ -7,7 +7,7 @@ from impactcell.alarms import RULES, AlarmSettings
 from impactcell.alarms.rules import wear_limit
 from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
-from impactcell.fieldbus.link import ModuleLink, TlsFiles
+from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
 from impactcell.journal.retention import Retention
 from impactcell.scada import (
     CellDescription,
@@ -81,7 +81,7 @@ def alarm_settings(cell: CellConfig) -> AlarmSettings:
 def module_link(cell: CellConfig) -> ModuleLink:
     """How the module is reached."""
     module = cell.settings.module
-    tls = module.tls
+    tls, serial = module.tls, module.serial
     return ModuleLink(
         host=module.host,
         port=module.port,
@@ -90,7 +90,11 @@ def module_link(cell: CellConfig) -> ModuleLink:
         max_registers=module.max_registers_per_request,
         pause_s=module.pause_between_requests_ms * 1e-3,
         timeout_s=module.timeout_ms * 1e-3,
-        tls=None if tls is None else TlsFiles(tls.ca_certificate, tls.certificate, tls.key),
+        tls=None if tls is None else TlsFiles(tls.ca_certificate, tls.certificate, tls.key, tls.server_name),
+        transport=module.transport,
+        serial=None
+        if serial is None
+        else SerialLine(serial.device, serial.baudrate, serial.parity[0].upper(), serial.stop_bits),
     )
 
 

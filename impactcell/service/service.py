@@ -13,6 +13,7 @@ from dataclasses import replace
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import JournalError, SettingsError
+from impactcell.fieldbus.transports import Transport, Transports
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.signals import stop_on_signals
@@ -22,6 +23,7 @@ from impactcell.service.factory import (
     cell_description,
     cell_design,
     cell_facts,
+    module_link,
     page_settings,
     server_settings,
 )
@@ -80,6 +82,7 @@ class Service:
         self.pages: dict[str, str] = {}
         """Address of the page that each cell is on, if any, once `run` has started."""
         self._feeds: dict[str, LiveFeed] = {}
+        self._transports = Transports(map(module_link, cells))
 
     async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
         """Run until `stop` is set; `started` is called when every endpoint listens."""
@@ -118,11 +121,15 @@ class Service:
         faults: list[JournalError] = []
         for cell in self._cells:
             try:
-                self.running[cell.name] = CellTask(cell, self._on_snapshot)
+                self.running[cell.name] = CellTask(cell, self._on_snapshot, self._transport(cell))
             except JournalError as error:
                 faults.append(error)
         if faults and not self.running and not any(fault.retry for fault in faults):
             raise JournalError("\n".join(map(str, faults)))
+
+    def _transport(self, cell: CellConfig) -> Transport:
+        """Make a cell's transport; cells behind one gateway, or on one line, share its connection."""
+        return self._transports.transport_for(module_link(cell))
 
     def _health(self) -> list[CellHealth]:
         cells = [(cell.name, self.running.get(cell.name)) for cell in self._cells]
@@ -220,7 +227,9 @@ class Service:
         reason, again_s = "", AGAIN_S
         while True:
             # In a thread: a disk may take its time, and the others go on.
-            opening = asyncio.create_task(asyncio.to_thread(CellTask, cell, self._on_snapshot))
+            opening = asyncio.create_task(
+                asyncio.to_thread(CellTask, cell, self._on_snapshot, self._transport(cell))
+            )
             try:
                 self.running[cell.name] = await asyncio.shield(opening)
                 return await self.running[cell.name].reload()  # its files may be others by now

@@ -96,10 +96,33 @@ def _port(cell: CellConfig) -> int | None:
     return urlsplit(cell.settings.opcua.endpoint).port or None
 
 
-def _acknowledgement_target(cell: CellConfig) -> tuple[str, int, int, Path]:
+def _endpoint(cell: CellConfig) -> tuple[str, int]:
+    """Where the module is; cells of one endpoint share its connection."""
+    module = cell.settings.module
+    return (module.host, module.port) if module.serial is None else (module.serial.device, 0)
+
+
+def _acknowledgement_target(cell: CellConfig) -> tuple[tuple[str, int], int, Path]:
     """Say where a cell acknowledges cycles; a device may serve several cells, each by a map of its own."""
     module = cell.settings.module
-    return module.host, module.port, module.device_id, module.register_map
+    return _endpoint(cell), module.device_id, module.register_map
+
+
+def _connection_faults(cell: CellConfig, other: CellConfig) -> list[str]:
+    """Say why two cells cannot share the connection to their gateway, or the line that they are on."""
+    if _endpoint(cell) != _endpoint(other):
+        return []
+    module, shared = cell.settings.module, other.settings.module
+    keys = [
+        key
+        for key in ("transport", "serial", "tls", "timeout_ms")
+        if getattr(module, key) != getattr(shared, key)
+    ]
+    return [
+        f"{cell.path}: {other.path} is behind the same gateway or on the same line, but has another "
+        f"module.{key}; they share one connection"
+        for key in keys
+    ]
 
 
 def _page_faults(cell: CellConfig, other: CellConfig) -> list[str]:
@@ -144,6 +167,7 @@ def read_cells(paths: Sequence[Path]) -> tuple[CellConfig, ...]:
                 faults.append(
                     f"{cell.path}: {other.path} has the same journal file; a journal belongs to one cell"
                 )
+            faults += _connection_faults(cell, other)
             faults += _page_faults(cell, other)
             if cell.settings.opcua != other.settings.opcua and _port(cell) == _port(other):
                 faults.append(f"{cell.path}: {other.path} has the same endpoint, but other opcua settings")

@@ -56,10 +56,30 @@ class TlsSection(Section):
     """Our own certificate (PEM)."""
     key: InputFile | None = None
     """Our own private key (PEM)."""
+    server_name: str | None = None
+    """Name that the module's certificate must carry; absent: its `host`."""
+
+
+class SerialSection(Section):
+    """The serial line that the module is on."""
+
+    device: str
+    """Serial port, as in /dev/ttyUSB0 or COM3."""
+    baudrate: Annotated[int, Field(ge=300, le=4_000_000)] = 19_200
+    """Bits a second."""
+    parity: Literal["none", "even", "odd"] = "even"
+    """Parity bit; without one, Modbus wants two stop bits."""
+    stop_bits: Literal[1, 2] = 1
+    """Stop bits of a character."""
 
 
 class ModuleSection(Section):
-    """The FPGA module on Modbus TCP."""
+    """The measuring module, and how it is reached."""
+
+    transport: Literal["tcp", "tls", "udp", "rtu_over_tcp", "rtu"] = "tcp"
+    """What requests travel on: `tcp`, also encrypted, has many in flight, each of the others one."""
+    serial: SerialSection | None = None
+    """Serial line of transport `rtu`, in the place of host and port."""
 
     host: str = _LINK.host
     """Address of the module, or of the gateway in front of it."""
@@ -81,6 +101,16 @@ class ModuleSection(Section):
     """An answer later than this closes the connection."""
     tls: TlsSection | None = None
     """Encrypted link; absent: plain Modbus TCP."""
+
+    @model_validator(mode="after")
+    def _transport_has_what_it_needs(self) -> Self:
+        if (self.transport == "rtu") != (self.serial is not None):
+            raise ValueError("`serial` belongs to `transport: rtu`, and to no other")
+        if self.transport == "tls" and self.tls is None:
+            raise ValueError("`transport: tls` needs `tls` with its certificates")
+        if self.tls is not None and self.transport not in ("tcp", "tls"):
+            raise ValueError(f"`tls` does not go with `transport: {self.transport}`")
+        return self
 
 
 class PartSection(Section):

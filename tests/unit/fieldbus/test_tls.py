@@ -1,16 +1,10 @@
 """Modbus/TCP Security: both sides show certificates, and nothing is said to a stranger."""
 
-import datetime as dt
-import ipaddress
 import ssl
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.x509.oid import NameOID
 
 from impactcell.errors import LinkError
 from impactcell.fieldbus.link import ModuleLink, TlsFiles
@@ -18,6 +12,7 @@ from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE, Words
 from impactcell.fieldbus.transports import transport_for
 from simulator.modbus_server import ModbusServer
+from tests.certificates import Authority
 
 
 class Image:
@@ -26,60 +21,6 @@ class Image:
 
     def write(self, address: int, words: Words) -> None:
         raise LookupError(address)
-
-
-class Authority:
-    """A certificate authority that lives as long as the test."""
-
-    def __init__(self, directory: Path, name: str) -> None:
-        self.directory = directory
-        self.key = ec.generate_private_key(ec.SECP256R1())
-        self.name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-        self.certificate = self._sign(self.name, self.key, ca=True)
-        self.file = directory / f"{name}.pem"
-        self.file.write_bytes(self.certificate.public_bytes(serialization.Encoding.PEM))
-
-    def _sign(self, subject: x509.Name, key: ec.EllipticCurvePrivateKey, *, ca: bool) -> x509.Certificate:
-        now = dt.datetime.now(dt.UTC)
-        builder = (
-            x509.CertificateBuilder()
-            .subject_name(subject)
-            .issuer_name(self.name)
-            .public_key(key.public_key())
-            .serial_number(x509.random_serial_number())
-            .not_valid_before(now - dt.timedelta(days=1))
-            .not_valid_after(now + dt.timedelta(days=1))
-            .add_extension(x509.BasicConstraints(ca=ca, path_length=None), critical=True)
-            .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
-            .add_extension(
-                x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key()), critical=False
-            )
-        )
-        if ca:
-            usage = {"digital_signature": True, "key_cert_sign": True, "crl_sign": True}
-            others = ("content_commitment", "key_encipherment", "data_encipherment", "key_agreement")
-            builder = builder.add_extension(
-                x509.KeyUsage(**usage, **dict.fromkeys((*others, "encipher_only", "decipher_only"), False)),
-                critical=True,
-            )
-        else:
-            address = x509.IPAddress(ipaddress.ip_address("127.0.0.1"))
-            builder = builder.add_extension(
-                x509.SubjectAlternativeName([address, x509.DNSName("module.test")]), critical=False
-            )
-        return builder.sign(self.key, hashes.SHA256())
-
-    def issue(self, name: str) -> tuple[Path, Path]:
-        key = ec.generate_private_key(ec.SECP256R1())
-        subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-        certificate, private = self.directory / f"{name}-cert.pem", self.directory / f"{name}-key.pem"
-        certificate.write_bytes(self._sign(subject, key, ca=False).public_bytes(serialization.Encoding.PEM))
-        private.write_bytes(
-            key.private_bytes(
-                serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
-            )
-        )
-        return certificate, private
 
 
 def serving(authority: Authority) -> ModbusServer:

@@ -1,0 +1,236 @@
+"""What every transport promises (see `protocol.Transport`), over each of them, against the simulator."""
+
+import asyncio
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
+from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.registers import WIRE
+from impactcell.fieldbus.transports import transport_for
+from simulator.faults import Fault, FaultInjector, FaultKind
+from tests.transports import KINDS, STREAMS, Image, connected, link_to, server_for
+
+every = pytest.mark.parametrize("kind", KINDS)
+LEGAL = (FaultKind.JOINED, FaultKind.SPLIT, FaultKind.JITTER, FaultKind.DELAY)
+"""What has to be understood."""
+
+
+@every
+@pytest.mark.parametrize(("count", "max_registers"), [(1, 125), (126, 125), (1000, 7), (5_000, 125)])
+async def test_blocks_arrive_whole(kind: str, count: int, max_registers: int, tmp_path: Path) -> None:
+    async with connected(kind, Image(), tmp_path, max_registers=max_registers) as (server, client):
+        assert np.array_equal(await client.read(17, count), np.arange(17, 17 + count))
+        assert server.requests == -(-count // max_registers)
+        assert client.round_trip_s > 0.0
+
+
+@every
+async def test_several_blocks_arrive_in_one_exchange(kind: str, tmp_path: Path) -> None:
+    async with connected(kind, Image(), tmp_path) as (server, client):
+        blocks = [client.block(100, 300), client.block(5_000, 7, "input"), client.block(9_000, 126)]
+        await client.complete(*blocks)
+        for block in blocks:
+            assert np.array_equal(block.words(), np.arange(block.address, block.address + block.count))
+        await client.complete(*blocks)  # nothing is missing any more
+        assert server.requests == 3 + 1 + 2
+
+
+@every
+async def test_writes_are_seen(kind: str, tmp_path: Path) -> None:
+    device = Image()
+    async with connected(kind, device, tmp_path) as (_, client):
+        await client.write(5, np.array([9], dtype=WIRE))
+        await client.write(7, np.array([1, 2, 3], dtype=WIRE))
+        assert device.writes == [(5, [9]), (7, [1, 2, 3])]
+        assert (await client.read(5, 5)).tolist() == [9, 6, 1, 2, 3]
+
+
+@every
+async def test_a_refusal_has_a_name_and_leaves_the_link_open(kind: str, tmp_path: Path) -> None:
+    async with connected(kind, Image(), tmp_path) as (_, client):
+        good, refused = client.block(100, 300), client.block(65_100, 10)
+        with pytest.raises(ModbusExceptionError, match="illegal data address") as caught:
+            await client.complete(good, refused)
+        assert caught.value.code == 2
+        assert client.connected
+        assert np.array_equal(await client.read(3, 300), np.arange(3, 303))
+
+
+@every
+async def test_a_busy_device_is_asked_again(kind: str, tmp_path: Path) -> None:
+    device = Image()
+    device.busy = 3
+    async with connected(kind, device, tmp_path) as (server, client):
+        assert np.array_equal(await client.read(0, 500), np.arange(500))
+    assert server.requests == 4 + 3
+
+
+@every
+async def test_a_device_that_stays_busy_is_an_error_by_name(kind: str, tmp_path: Path) -> None:
+    device = Image()
+    device.busy = 10**9
+    async with connected(kind, device, tmp_path, timeout_s=0.3) as (_, client):
+        with pytest.raises(ModbusExceptionError, match="server device busy"):
+            await client.read(0, 10)
+        assert client.connected
+
+
+@every
+@pytest.mark.parametrize("fault", [FaultKind.DROP, FaultKind.HALF_OPEN])
+async def test_silence_closes_the_link_and_the_next_one_works(
+    kind: str, fault: FaultKind, tmp_path: Path
+) -> None:
+    async with connected(kind, Image(), tmp_path, timeout_s=0.2) as (server, client):
+        server.faults.inject(Fault(fault, remaining=1))
+        with pytest.raises(LinkError, match=r"no answer to 10 holding registers from 0 within 0\.2 s"):
+            await client.read(0, 10)
+        assert not client.connected
+        for link in server.links:
+            link._mute = False
+        await client.connect()
+        assert np.array_equal(await client.read(0, 10), np.arange(10))
+
+
+@every
+@pytest.mark.parametrize(
+    "fault",
+    [
+        FaultKind.WRONG_TRANSACTION,
+        FaultKind.WRONG_UNIT,
+        FaultKind.WRONG_FUNCTION,
+        FaultKind.WRONG_PROTOCOL,
+        FaultKind.DUPLICATE,
+    ],
+)
+async def test_a_reply_that_is_not_ours_closes_the_link(kind: str, fault: FaultKind, tmp_path: Path) -> None:
+    if kind in ("rtu", "rtu_over_tcp") and fault is FaultKind.DUPLICATE:
+        pytest.skip("see the next test: a line need not have brought the second reply yet")
+    async with connected(kind, Image(), tmp_path) as (server, client):
+        server.faults.inject(Fault(fault, remaining=1))
+
+        async def ask() -> None:  # what comes too much may be seen with the next request only
+            for address in range(3):
+                assert (await client.read(address, 10)).tolist() == list(range(address, address + 10))
+
+        with pytest.raises(ProtocolError):
+            await ask()
+        assert not client.connected
+        server.faults.clear()
+
+
+@every
+async def test_a_second_reply_is_never_taken_for_the_answer_to_another_request(
+    kind: str, tmp_path: Path
+) -> None:
+    async with connected(kind, Image(), tmp_path, timeout_s=0.2) as (server, client):
+        server.faults.inject(Fault(FaultKind.DUPLICATE))
+        for address in range(5):
+            try:
+                await client.connect()
+                assert (await client.read(address, 10)).tolist() == list(range(address, address + 10))
+            except FieldbusError:
+                continue
+
+
+@pytest.mark.parametrize("kind", STREAMS)
+@pytest.mark.parametrize("fault", [FaultKind.JOINED, FaultKind.SPLIT, FaultKind.JITTER])
+async def test_legal_but_odd_framing_is_understood(kind: str, fault: FaultKind, tmp_path: Path) -> None:
+    async with connected(kind, Image(), tmp_path) as (server, client):
+        server.faults.inject(Fault(fault, probability=0.5, seconds=0.01))
+        assert np.array_equal(await client.read(0, 2_000), np.arange(2_000))
+
+
+@pytest.mark.parametrize("kind", STREAMS)
+async def test_a_disconnect_fails_everything_at_once(kind: str, tmp_path: Path) -> None:
+    """Within the timeout of the test, with a link timeout far beyond it."""
+    async with connected(kind, Image(), tmp_path) as (server, client):
+        server.faults.inject(Fault(FaultKind.DROP))
+        reads = [asyncio.ensure_future(client.read(i, 300)) for i in range(3)]
+        while server.requests < 1:
+            await asyncio.sleep(0)
+        await server.close()
+        for result in await asyncio.gather(*reads, return_exceptions=True):
+            assert isinstance(result, LinkError)
+        assert not client.connected
+        with pytest.raises(LinkError, match="not connected"):
+            await client.read(0, 1)
+
+
+@pytest.mark.parametrize("kind", STREAMS)
+async def test_an_idle_link_that_is_cut_is_known_to_be(kind: str, tmp_path: Path) -> None:
+    async with connected(kind, Image(), tmp_path) as (server, client):
+        assert (await client.read(3, 1)).tolist() == [3]
+        await server.close()
+        while client.connected:
+            await asyncio.sleep(0.001)
+
+
+@every
+async def test_a_cancelled_read_leaves_the_link_usable(kind: str, tmp_path: Path) -> None:
+    async with connected(kind, Image(), tmp_path) as (server, client):
+        server.faults.inject(Fault(FaultKind.DELAY, seconds=0.02))
+        read = asyncio.ensure_future(client.read(0, 10_000))
+        while not server.requests:
+            await asyncio.sleep(0)
+        read.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await read
+        server.faults.clear()
+        assert np.array_equal(await client.read(7, 300), np.arange(7, 307))
+
+
+@every
+async def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(
+    kind: str, tmp_path: Path
+) -> None:
+    """It comes on the next connection, as of a gateway, and after another request of the same shape."""
+    async with connected(kind, Image(), tmp_path, timeout_s=0.15) as (server, client):
+        server.faults.inject(Fault(FaultKind.LATE_REPLY, remaining=1, seconds=0.2))
+        with pytest.raises(LinkError):
+            await client.read(1000, 10)
+        for _ in range(20):
+            try:
+                await client.connect()
+                assert (await client.read(0, 10)).tolist() == list(range(10))
+            except FieldbusError:
+                continue
+            await asyncio.sleep(0.01)
+
+
+@pytest.mark.parametrize("kind", ["tcp", "tls", "rtu_over_tcp", "rtu"])
+async def test_nobody_there_is_a_link_error(kind: str, tmp_path: Path) -> None:
+    server, tls = server_for(kind, Image(), tmp_path)
+    async with server:
+        link = link_to(kind, server, tls, timeout_s=2.0)
+    client = ModbusClient(transport_for(link))
+    with pytest.raises(LinkError, match="no connection"):
+        await client.connect()
+    await client.close()
+
+
+@every
+@pytest.mark.parametrize("seed", range(2))
+async def test_no_fault_gets_a_wrong_value_through(kind: str, seed: int, tmp_path: Path) -> None:
+    """The small version of the study in tests/benchmarks/transports.py."""
+    faults = FaultInjector(seed)
+    accepted = 0
+    async with connected(kind, Image(), tmp_path, faults, timeout_s=0.04, window=4) as (server, client):
+        for fault in FaultKind:
+            faults.inject(Fault(fault, probability=0.02, seconds=0.05))
+        draw = np.random.default_rng(seed)
+        for _ in range(60):
+            address, count = int(draw.integers(0, 60_000)), int(draw.integers(1, 300))
+            try:
+                await client.connect()
+                words = await client.read(address, count)
+            except FieldbusError:
+                for link in server.links:
+                    link._mute = False
+                continue
+            accepted += 1
+            assert np.array_equal(words, np.arange(address, address + count))
+    assert accepted > 10
+    assert sum(faults.happened.values()) > 15
