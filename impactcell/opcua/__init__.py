@@ -36,6 +36,9 @@ Who uses the server gives it an address space, methods and the answers of `host_
 `data_change_filter`         deadbands, NaN, index ranges
 `event_filter`               OfType with subtypes, three-valued where clauses, for `event_notification`
 `notification_encoding`      publish responses put together from parts encoded once
+`connection_table`           which connections there are, and what they may hold together
+`fan_out`                    what many listen to is told in slices; `retransmission_queue`: sent, not yet
+                             acknowledged; `item_room`: how many monitored items a user may have
 `history_service`            HistoryRead: raw values, aggregates, events
 `historical_variable`        spans of time, read page by page
 `history_aggregates`         Average, Minimum, Maximum, Count by their definition; `history_processed` reads

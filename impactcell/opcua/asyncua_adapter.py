@@ -9,12 +9,14 @@ of the product imports from inside asyncua.
 `StandardServer`           loads the standard address space and imports NodeSet2 files; never listens
 `SecureConnection` ...     chunks, sequence numbers and keys of a secure channel
 `SECURITY_POLICIES` ...    the algorithms of each security policy
-`StrictBuffer` ...         the binary codec, behind checks that it lacks
+`StrictBuffer` ...         the binary codec, behind checks that it lacks, and piece by piece
 =========================  ================================================================================
 """
 
-from collections.abc import Callable
-from typing import Final
+import functools
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any, Final
 
 from asyncua import Server as StandardServer
 from asyncua import ua
@@ -56,6 +58,8 @@ __all__ = [
     "bound_null_arrays",
     "compute_attribute",
     "datetime_to_win_epoch",
+    "encoded_pieces",
+    "field_decoders",
     "new_standard_server",
     "nodeid_from_binary",
     "struct_from_binary",
@@ -88,6 +92,12 @@ MAX_NULLS: Final = 10_000
 As many as the operations of one request."""
 
 
+MAX_READS: Final = 4_000
+"""Reads from the buffer for one piece of a message, some 8 ms; the largest event filter takes 3 500."""
+
+Decoder = Callable[[Buffer], Any]
+
+
 async def new_standard_server(application_uri: str) -> StandardServer:
     """Make asyncua's server for its standard address space alone: none of its services runs."""
     server = StandardServer()
@@ -98,23 +108,37 @@ async def new_standard_server(application_uri: str) -> StandardServer:
 
 
 class StrictBuffer(Buffer):  # type: ignore[misc]
-    """A buffer that cannot be read backwards.
+    """A buffer that cannot be read backwards, nor for long.
 
-    In asyncua a string of length -2 moves the cursor two bytes back; an array of such strings never ends.
+    In asyncua a string of length -2 moves the cursor two bytes back; an array of such strings never ends. And
+    an array of a million empty strings takes a second: each piece of a message may be read `MAX_READS` times.
     """
+
+    def __init__(self, data: bytes, start: int = 0, size: int = -1) -> None:
+        super().__init__(data, start, size)
+        self._reads = [0]
+
+    def begin_piece(self) -> None:
+        """Begin another piece of the message."""
+        self._reads[0] = 0
 
     def read(self, size: int) -> bytes:
         """Read and take `size` bytes."""
         if size < 0:
             raise NotEnoughData(f"a length of {size}")
+        self._reads[0] += 1
+        if self._reads[0] > MAX_READS:
+            raise NotEnoughData(f"more than {MAX_READS} values in one piece")
         data: bytes = super().read(size)
         return data
 
     def copy(self, size: int = -1) -> "StrictBuffer":
-        """Return a view of the next `size` bytes, of all that is left by default."""
+        """Return a view of the next `size` bytes, of all that is left by default; it is the same piece."""
         if size == -1 or size > len(self):
             size = len(self)
-        return StrictBuffer(self._data, self._cur_pos, size)
+        view = StrictBuffer(self._data, self._cur_pos, size)
+        view._reads = self._reads
+        return view
 
 
 class _BoundedNull:
@@ -143,6 +167,67 @@ class _BoundedNull:
 def bound_null_arrays() -> None:
     """Put the bounded decoder of null arrays in place of asyncua's."""
     ua_binary.Primitives1.Null = ua_binary.Primitives.Null = _BoundedNull()
+
+
+@functools.cache
+def field_decoders(kind: type) -> tuple[tuple[str, Decoder, bool], ...]:
+    """Find the decoders of the fields of a structure without optional ones, in order.
+
+    Returns
+    -------
+    tuple of (name, decoder, is_array)
+        Of an array of structures it is the decoder of one element.
+    """
+    hints = ua_binary.get_safe_type_hints(kind, {"ua": ua})
+    decoders = list[tuple[str, Decoder, bool]]()
+    for field in fields(kind):
+        hint = hints[field.name]
+        if _is_array_of_structures(hint):
+            element = ua_binary._create_type_deserializer(ua_binary.type_from_list(hint), kind)  # noqa: SLF001
+            decoders.append((field.name, element, True))
+        elif ua_binary.type_allow_subclass(hint):
+            decoders.append((field.name, ua_binary.extensionobject_from_binary, False))
+        else:
+            decoders.append((field.name, ua_binary._create_type_deserializer(hint, kind), False))  # noqa: SLF001
+    return tuple(decoders)
+
+
+def encoded_pieces(value: Any) -> Iterator[bytes]:
+    """Encode a response field by field, and its arrays of structures element by element."""
+    for name, encoder, is_array in _field_encoders(value.__class__):
+        part = getattr(value, name)
+        if name == "Parameters":
+            yield from encoded_pieces(part)
+        elif is_array and part:
+            yield ua_binary.Primitives.Int32.pack(len(part))
+            for element in part:
+                if isinstance(element, ua.BrowseResult):
+                    yield from encoded_pieces(element)
+                else:
+                    yield struct_to_binary(element)
+        else:
+            yield encoder(part)
+
+
+@functools.cache
+def _field_encoders(kind: type) -> tuple[tuple[str, Callable[[Any], bytes], bool], ...]:
+    hints = ua_binary.get_safe_type_hints(kind, {"ua": ua})
+    return tuple(
+        (
+            field.name,
+            ua_binary.field_serializer(*ua_binary.resolve_uatype(hints[field.name]), kind),
+            _is_array_of_structures(hints[field.name]),
+        )
+        for field in fields(kind)
+    )
+
+
+def _is_array_of_structures(hint: Any) -> bool:
+    if not ua_binary.type_is_list(hint):
+        return False
+    element = ua_binary.type_from_list(hint)
+    is_builtin = hasattr(ua.VariantType, element.__name__) and element is not ua.DataValue
+    return is_dataclass(element) and not is_builtin and not ua_binary.type_allow_subclass(element)
 
 
 def address_space(server: StandardServer) -> AddressSpace:

@@ -43,9 +43,9 @@ class AttributeService:
             raise StatusCodeError(ua.StatusCodes.BadTimestampsToReturnInvalid)
         role = context.actor.role
         response = ua.ReadResponse()
-        response.Results = [
-            self._read_result(read_value, parameters.TimestampsToReturn, role) for read_value in read_values
-        ]
+        response.Results = await context.share.each(
+            read_values, lambda value: self._read_result(value, parameters.TimestampsToReturn, role)
+        )
         return response
 
     def _read_result(
@@ -94,10 +94,10 @@ class AttributeService:
     async def write(self, context: RequestContext, parameters: ua.WriteParameters) -> ua.WriteResponse:
         """Refuse to write: what a client changes, it changes through methods."""
         response = ua.WriteResponse()
-        response.Results = [
-            ua.StatusCode(self._refusal(write_value, context.actor.role))
-            for write_value in check_operations(parameters.NodesToWrite)
-        ]
+        role = context.actor.role
+        response.Results = await context.share.each(
+            check_operations(parameters.NodesToWrite), lambda value: ua.StatusCode(self._refusal(value, role))
+        )
         return response
 
     def _refusal(self, write_value: ua.WriteValue, role: Role) -> int:

@@ -1,15 +1,33 @@
 """Binary requests in, binary responses out: asyncua's codec behind checks it lacks."""
 
-from typing import Any
+from typing import Any, Final
 
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import (
     Buffer,
+    StrictBuffer,
+    encoded_pieces,
+    field_decoders,
     nodeid_from_binary,
     struct_from_binary,
     struct_to_binary,
 )
+from impactcell.opcua.loop_share import LoopShare
+
+MAX_OPERATIONS: Final = 10_000
+"""Operations in one request where a service sets no other limit."""
+NOT_DECODED: Final = (
+    ua.UaError,
+    ValueError,
+    TypeError,
+    OverflowError,
+    RecursionError,
+    KeyError,
+    IndexError,
+    MemoryError,
+)
+"""What asyncua raises at bytes that are no message."""
 
 
 class StatusCodeError(Exception):
@@ -34,16 +52,37 @@ def decode(kind: type, body: Buffer) -> Any:
     """
     try:
         return struct_from_binary(kind, body)
-    except (
-        ua.UaError,
-        ValueError,
-        TypeError,
-        OverflowError,
-        RecursionError,
-        KeyError,
-        IndexError,
-        MemoryError,
-    ) as error:
+    except NOT_DECODED as error:
+        raise DecodingError(f"{kind.__name__}: {error}") from error
+
+
+async def decode_parameters(kind: type, body: StrictBuffer, share: LoopShare) -> Any:
+    """Decode the parameters of a service, one operation after the other.
+
+    Raises
+    ------
+    DecodingError
+        As `decode`; or one operation has more values than is taken.
+    StatusCodeError
+        BadTooManyOperations.
+    """
+    values: dict[str, Any] = {}
+    try:
+        for name, decoder, is_array in field_decoders(kind):
+            body.begin_piece()
+            if not is_array:
+                values[name] = decoder(body)
+                continue
+            values[name] = elements = []
+            length = int.from_bytes(body.read(4), "little", signed=True)
+            if length > MAX_OPERATIONS:
+                raise StatusCodeError(ua.StatusCodes.BadTooManyOperations)
+            for _ in range(length):
+                body.begin_piece()
+                elements.append(decoder(body))
+                await share.give_way()
+        return kind(**values)
+    except NOT_DECODED as error:
         raise DecodingError(f"{kind.__name__}: {error}") from error
 
 
@@ -53,6 +92,15 @@ def decode_type(body: Buffer) -> ua.NodeId:
         return nodeid_from_binary(body)
     except (ua.UaError, ValueError, TypeError) as error:
         raise DecodingError(f"type of the message: {error}") from error
+
+
+async def encode_response(response: object, share: LoopShare) -> bytes:
+    """Encode a response, one result after the other."""
+    pieces = list[bytes]()
+    for piece in encoded_pieces(response):
+        pieces.append(piece)
+        await share.give_way()
+    return b"".join(pieces)
 
 
 def encode(value: object) -> bytes:

@@ -73,7 +73,8 @@ class HistoryService:
             raise StatusCodeError(ua.StatusCodes.BadTimestampsToReturnInvalid)
         if isinstance(details, ua.ReadProcessedDetails) and len(details.AggregateType or []) != len(nodes):
             raise StatusCodeError(ua.StatusCodes.BadAggregateListMismatch)
-        response, budget = ua.HistoryReadResponse(), ReadBudget(context.header.TimeoutHint)
+        budget = ReadBudget(context.share.turns, context.header.TimeoutHint)
+        response = ua.HistoryReadResponse()
         response.Results = [
             await self._read_node(context, parameters, index, budget) for index in range(len(nodes))
         ]

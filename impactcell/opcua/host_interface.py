@@ -51,7 +51,11 @@ class ServerLimits:
     ----------
     connections, sessions, subscriptions : int
         In all.
+    connections_per_address, sessions_per_user : int
+        Of these, for one client's address and for one user: nobody can hold all of them alone.
     subscriptions_per_session, items_per_subscription : int
+    items_per_user, event_items_per_user : int
+        Monitored items of all sessions of one user, and those of them that report events.
     queue_per_item, events_per_item : int
         Longest queue of a data item, and of an event item.
     message_bytes : int
@@ -62,20 +66,27 @@ class ServerLimits:
         Shortest publishing interval.
     hello_s, activation_s : float
         Time a new connection has for its Hello, and then for a session.
+    undisturbed_s : float
+        Time that it has before it may have to give way to a newcomer.
     """
 
     connections: int = 250
+    connections_per_address: int = 150
     sessions: int = 100
+    sessions_per_user: int = 60
     subscriptions: int = 500
     subscriptions_per_session: int = 20
     items_per_subscription: int = 2_000
+    items_per_user: int = 10_000
+    event_items_per_user: int = 100
     queue_per_item: int = 10_000
     events_per_item: int = 1_000
-    message_bytes: int = 4 * 1024 * 1024
+    message_bytes: int = 1024 * 1024
     session_timeout_s: float = 600.0
     publishing_interval_s: float = 0.01
     hello_s: float = 5.0
     activation_s: float = 15.0
+    undisturbed_s: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

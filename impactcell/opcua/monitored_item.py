@@ -23,6 +23,8 @@ OVERFLOW: Final = 0x0480
 """Bits of a status code: it describes a DataValue, and values before it were lost."""
 MIN_EVENT_QUEUE: Final = 100
 """Shortest queue of an event item: a refresh of a few cells fits."""
+MAX_EVENT_BYTES: Final = 256 * 1024
+"""Longest queue of an event item, bytes."""
 OVERFLOW_EVENT: Final = ua.NodeId(ua.ObjectIds.EventQueueOverflowEventType)
 
 ReadyCallback = Callable[["DataMonitoredItem | EventMonitoredItem"], None]
@@ -68,19 +70,24 @@ class DataMonitoredItem:
         )
         self.handle: int = parameters.ClientHandle
         self._timestamps = timestamps
-        self._size = min(max(parameters.QueueSize, 1), self._limits.queue_per_item)
+        self.size = min(max(parameters.QueueSize, 1), self._limits.queue_per_item)
         self._discard_oldest: bool = parameters.DiscardOldest
 
     def modify(self, parameters: ua.MonitoringParameters, timestamps: ua.TimestampsToReturn) -> None:
         """Change filter, queue and handle; values that wait stay, as far as the queue holds them."""
         self._configure(parameters, timestamps)
-        while len(self._queue) > self._size:
+        self.shorten(self.size)
+
+    def shorten(self, size: int) -> None:
+        """Have a queue of no more than this length."""
+        self.size = min(self.size, size)
+        while len(self._queue) > self.size:
             self._queue.popleft()
 
     @property
     def revised(self) -> tuple[int, Any]:
         """Size of the queue and result of the filter, as the client is told."""
-        return self._size, None
+        return self.size, None
 
     def offer_present(self) -> None:
         """Report the present value, whatever was reported before."""
@@ -96,11 +103,11 @@ class DataMonitoredItem:
         if not self._filter.passes(value.data):
             return
         queue = self._queue
-        if len(queue) >= self._size:
-            if self._discard_oldest or self._size == 1:
+        if len(queue) >= self.size:
+            if self._discard_oldest or self.size == 1:
                 queue.popleft()
                 queue.append(value)
-                if self._size > 1:
+                if self.size > 1:
                     queue[0] = SharedValue(with_overflow(queue[0].data))
             else:
                 queue[-1] = SharedValue(with_overflow(value.data))
@@ -132,7 +139,8 @@ class DataMonitoredItem:
             self._ready(self)
 
     def close(self) -> None:
-        """Watch no longer."""
+        """Watch no longer; what is still on its way does not arrive."""
+        self.mode = ua.MonitoringMode.Disabled
         self._values.remove_observer(self._node, self.offer)
         self._queue.clear()
 
@@ -155,6 +163,7 @@ class EventMonitoredItem:
         if notifies is None or not notifies & ua.EventNotifier.SubscribeToEvents.mask:
             raise StatusCodeError(ua.StatusCodes.BadAttributeIdInvalid)
         self._queue: deque[bytes] = deque()
+        self._bytes = 0
         self._overflowed = False
         self.mode = request.MonitoringMode
         self._configure(request.RequestedParameters)
@@ -178,17 +187,28 @@ class EventMonitoredItem:
         """Take in an event."""
         if self.mode == ua.MonitoringMode.Disabled or not self._filter.passes(event):
             return
-        if len(self._queue) >= self._size:
-            self._queue.popleft()
-            if not self._overflowed:
-                # One event that tells of the loss stands where the first lost one stood.
-                self._overflowed = True
-                self._queue.popleft()
-                self._queue.appendleft(
-                    self._encode(EventNotification(OVERFLOW_EVENT, overflow_event_fields(), frozenset()))
-                )
-        self._queue.append(self._encode(event))
+        encoded = self._encode(event)
+        if self._is_full(len(encoded)):
+            self._lose_oldest()
+            while len(self._queue) > 1 and self._is_full(len(encoded)):
+                self._bytes -= len(self._queue[1])
+                del self._queue[1]
+        self._queue.append(encoded)
+        self._bytes += len(encoded)
         self._ready(self)
+
+    def _is_full(self, more_bytes: int) -> bool:
+        return len(self._queue) >= self._size or self._bytes + more_bytes > MAX_EVENT_BYTES
+
+    def _lose_oldest(self) -> None:
+        """Let one event that tells of the loss stand where the first lost one stood."""
+        if self._overflowed or not self._queue:
+            return
+        self._overflowed = True
+        self._bytes -= len(self._queue.popleft())
+        overflow = self._encode(EventNotification(OVERFLOW_EVENT, overflow_event_fields(), frozenset()))
+        self._queue.appendleft(overflow)
+        self._bytes += len(overflow)
 
     def _encode(self, event: EventNotification) -> bytes:
         fields = self._filter.select(event)
@@ -203,6 +223,7 @@ class EventMonitoredItem:
     def take(self, max_count: int) -> list[bytes]:
         """Take up to `most` events, encoded."""
         notifications = [self._queue.popleft() for _ in range(min(max_count, len(self._queue)))]
+        self._bytes -= sum(map(len, notifications))
         self._overflowed = self._overflowed and bool(self._queue)
         return notifications
 
@@ -211,11 +232,13 @@ class EventMonitoredItem:
         self.mode = mode
         if mode == ua.MonitoringMode.Disabled:
             self._queue.clear()
+            self._bytes = 0
         if self.waiting:
             self._ready(self)
 
     def close(self) -> None:
-        """Forget what waits."""
+        """Forget what waits; what is still on its way does not arrive."""
+        self.mode = ua.MonitoringMode.Disabled
         self._queue.clear()
 
 

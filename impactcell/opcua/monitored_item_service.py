@@ -7,10 +7,11 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import AccessPolicy, Permission, Role, ServerLimits
+from impactcell.opcua.item_room import ItemRoom
 from impactcell.opcua.monitored_item import DataMonitoredItem, EventMonitoredItem
-from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
+from impactcell.opcua.request_dispatch import RequestContext, Service, apply_to_each, check_operations
 from impactcell.opcua.subscription import MonitoredItem, Subscription
-from impactcell.opcua.subscription_service import SubscriptionService, apply_to_each
+from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.opcua.variable_store import VariableStore
 
 
@@ -47,10 +48,11 @@ class MonitoredItemService:
         subscription = self._subscriptions.find(parameters.SubscriptionId, context.session)
         _check_timestamps(parameters.TimestampsToReturn)
         response = ua.CreateMonitoredItemsResponse()
-        response.Results = [
-            self._create_result(subscription, item, parameters.TimestampsToReturn, context.actor.role)
-            for item in check_operations(parameters.ItemsToCreate)
-        ]
+        role, left = context.actor.role, self._subscriptions.room_for_items(subscription.owner)
+        response.Results = await context.share.each(
+            check_operations(parameters.ItemsToCreate),
+            lambda item: self._create_result(subscription, item, parameters.TimestampsToReturn, role, left),
+        )
         return response
 
     def _create_result(
@@ -59,14 +61,18 @@ class MonitoredItemService:
         request: ua.MonitoredItemCreateRequest,
         timestamps: ua.TimestampsToReturn,
         role: Role,
+        room: ItemRoom,
     ) -> ua.MonitoredItemCreateResult:
         result = ua.MonitoredItemCreateResult()
         try:
+            subscription.check_open()
+            room.take(events=request.ItemToMonitor.AttributeId == ua.AttributeIds.EventNotifier)
             item = self._make_item(subscription, request, timestamps, role)
         except StatusCodeError as fault:
             result.StatusCode = ua.StatusCode(fault.code)
             return result
         subscription.items[item.id] = item
+        subscription.grant_queue(item)
         if item.waiting:
             subscription.ready(item)
         result.MonitoredItemId = item.id
@@ -111,17 +117,20 @@ class MonitoredItemService:
         subscription = self._subscriptions.find(parameters.SubscriptionId, context.session)
         _check_timestamps(parameters.TimestampsToReturn)
         response = ua.ModifyMonitoredItemsResponse()
-        results = []
-        for change in check_operations(parameters.ItemsToModify):
+
+        def modify(change: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
             result = ua.MonitoredItemModifyResult()
             try:
                 item = subscription.item(change.MonitoredItemId)
+                before = item.revised[0]
                 item.modify(change.RequestedParameters, parameters.TimestampsToReturn)
+                subscription.grant_queue(item, before)
                 _revise_item(item, result)
             except StatusCodeError as fault:
                 result.StatusCode = ua.StatusCode(fault.code)
-            results.append(result)
-        response.Results = results
+            return result
+
+        response.Results = await context.share.each(check_operations(parameters.ItemsToModify), modify)
         return response
 
     async def set_monitoring_mode(
@@ -130,7 +139,8 @@ class MonitoredItemService:
         """Let items report, only sample, or rest."""
         subscription = self._subscriptions.find(parameters.SubscriptionId, context.session)
         response = ua.SetMonitoringModeResponse()
-        response.Parameters.Results = apply_to_each(
+        response.Parameters.Results = await apply_to_each(
+            context.share,
             parameters.MonitoredItemIds,
             lambda number: subscription.item(number).set_mode(parameters.MonitoringMode),
         )
@@ -147,7 +157,7 @@ class MonitoredItemService:
             subscription.remove(number)
 
         response = ua.DeleteMonitoredItemsResponse()
-        response.Results = apply_to_each(parameters.MonitoredItemIds, delete)
+        response.Results = await apply_to_each(context.share, parameters.MonitoredItemIds, delete)
         return response
 
 

@@ -45,6 +45,12 @@ def status_change(code: int) -> bytes:
     return _extension(ua.ObjectIds.StatusChangeNotification_Encoding_DefaultBinary, body)
 
 
+def status_codes(codes: Iterable[int]) -> bytes:
+    """Encode an array of StatusCodes."""
+    values = tuple(codes)
+    return struct.pack(f"<i{len(values)}I", len(values), *values)
+
+
 def notification_message(sequence: int, time: datetime, notifications: list[bytes]) -> bytes:
     """Encode a NotificationMessage; without notifications it keeps the subscription alive."""
     head = _MESSAGE.pack(sequence, datetime_to_win_epoch(time), len(notifications))
@@ -61,7 +67,7 @@ def publish_response(
     subscription: int,
     available: list[int],
     message: bytes,
-    results: list[ua.StatusCode],
+    results: bytes,
     *,
     more: bool,
 ) -> bytes:
@@ -73,7 +79,7 @@ def publish_response(
             struct.pack(f"<i{len(available)}I", len(available), *available),
             b"\x01" if more else b"\x00",
             message,
-            struct.pack(f"<i{len(results)}I", len(results), *(code.value for code in results)),
+            results,
             _NOTHING,
         )
     )

@@ -3,7 +3,7 @@
 import time
 from typing import Final
 
-from impactcell.opcua.loop_share import LoopShare
+from impactcell.opcua.loop_share import LoopShare, Turns
 
 VALUES_PER_ANSWER: Final = 10_000
 """Values, events and aggregates of all nodes in one answer: some 300 kB, and 10 ms of encoding in slices."""
@@ -18,12 +18,13 @@ class ReadBudget(LoopShare):
 
     Parameters
     ----------
+    turns : Turns
     timeout_hint_ms : int
         Time in which the client wants its answer; 0 for any.
     """
 
-    def __init__(self, timeout_hint_ms: int) -> None:
-        super().__init__()
+    def __init__(self, turns: Turns, timeout_hint_ms: int) -> None:
+        super().__init__(turns)
         longest_s = min(LONGEST_S, SHARE_OF_HINT * timeout_hint_ms / 1e3) if timeout_hint_ms else LONGEST_S
         self._until = time.monotonic() + longest_s
         self._has_read = False

@@ -7,27 +7,27 @@ requests on any channel, and looks at no limit of operations.
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import StrictBuffer
 from impactcell.opcua.binary_codec import (
+    MAX_OPERATIONS,
     DecodingError,
     StatusCodeError,
     decode,
+    decode_parameters,
     decode_type,
-    encode,
+    encode_response,
     service_fault,
 )
 from impactcell.opcua.host_interface import Actor
+from impactcell.opcua.loop_share import LoopShare
 from impactcell.opcua.session_table import Session, SessionTable
 from impactcell.opcua.tcp_connection import TcpConnection
 
 _log = logging.getLogger(__name__)
-
-MAX_OPERATIONS: Final = 10_000
-"""Operations in one request where a service sets no other limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,7 @@ class RequestContext:
     connection: TcpConnection
     header: ua.RequestHeader
     request_id: int
+    share: LoopShare
     session_or_none: Session | None = None
 
     @property
@@ -117,7 +118,7 @@ class RequestDispatcher:
             return
         if not isinstance(answer, bytes):
             answer.ResponseHeader.RequestHandle = handle
-            answer = encode(answer)
+            answer = await encode_response(answer, connection.share)
         connection.respond(request_id, handle, answer)
 
     async def _answer(
@@ -134,8 +135,11 @@ class RequestDispatcher:
         session = None
         if service.needs_session:
             session = self._sessions.resolve(header.AuthenticationToken, connection)
-        parameters = decode(service.parameters, body) if service.parameters is not None else body
-        return await service.handler(RequestContext(connection, header, request_id, session), parameters)
+        parameters: Any = body
+        if service.parameters is not None:
+            parameters = await decode_parameters(service.parameters, body, connection.share)
+        context = RequestContext(connection, header, request_id, connection.share, session)
+        return await service.handler(context, parameters)
 
 
 def check_operations(operations: list[Any] | None, limit: int = MAX_OPERATIONS) -> list[Any]:
@@ -151,3 +155,18 @@ def check_operations(operations: list[Any] | None, limit: int = MAX_OPERATIONS) 
     if len(operations) > limit:
         raise StatusCodeError(ua.StatusCodes.BadTooManyOperations)
     return operations
+
+
+async def apply_to_each(
+    share: LoopShare, numbers: list[int], work: Callable[[int], None]
+) -> list[ua.StatusCode]:
+    """Do something to each of a list of ids; the status codes."""
+
+    def apply(number: int) -> ua.StatusCode:
+        try:
+            work(number)
+        except StatusCodeError as fault:
+            return ua.StatusCode(fault.code)
+        return ua.StatusCode()
+
+    return await share.each(check_operations(numbers), apply)

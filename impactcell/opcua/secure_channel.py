@@ -29,6 +29,10 @@ MAX_CHUNK: Final = 65_536
 """Longest chunk taken and sent, bytes."""
 MIN_CHUNK: Final = 8_192
 """Shortest chunk a client may ask for, bytes (Part 6, 7.1.2.3)."""
+MAX_OPEN_BYTES: Final = 10_240
+"""Longest OPN: a chain of certificates, and few blocks to decrypt, of which each takes a millisecond."""
+MAX_ENCRYPTED_BYTES: Final = 4_096
+"""The part of it that is encrypted with the server's key: request and signature take half of it at most."""
 MIN_LIFETIME_MS: Final = 60_000
 """Shortest lifetime of a security token, milliseconds."""
 MAX_LIFETIME_MS: Final = 3_600_000
@@ -64,8 +68,10 @@ class ChannelSecurity:
         return self._last_id
 
     def limits(self) -> TransportLimits:
-        """Limits before Hello has been heard."""
-        return TransportLimits(MAX_CHUNK, MAX_CHUNK, self.message_bytes // MIN_CHUNK + 1, self.message_bytes)
+        """Limits before anybody has logged in: nobody needs a long message for that."""
+        return TransportLimits(
+            MAX_CHUNK, MAX_CHUNK, self.message_bytes // MIN_CHUNK + 1, min(self.message_bytes, MAX_CHUNK)
+        )
 
 
 class SecureChannel:
@@ -79,6 +85,8 @@ class SecureChannel:
         self._max_response = 0
         self._max_response_chunks = 0
         self.expires = float("inf")
+        self.unfinished_bytes = 0
+        """Bytes of the chunks that have come of a message whose last one has not."""
 
     @property
     def is_open(self) -> bool:
@@ -106,6 +114,10 @@ class SecureChannel:
         certificate: bytes | None = getattr(self._secure.security_policy, "peer_certificate", None)
         return certificate or None
 
+    def take_long_messages(self) -> None:
+        """Take messages as long as the server takes them: somebody has logged in."""
+        self._limits.max_message_size = self._security.message_bytes
+
     def acknowledge_hello(self, body: bytes) -> bytes:
         """Answer Hello with Acknowledge."""
         message = decode(ua.Hello, StrictBuffer(body))
@@ -124,7 +136,7 @@ class SecureChannel:
         answer = ua.Acknowledge()
         answer.ReceiveBufferSize = self._limits.max_recv_buffer
         answer.SendBufferSize = self._limits.max_send_buffer
-        answer.MaxMessageSize = self._limits.max_message_size
+        answer.MaxMessageSize = self._security.message_bytes
         answer.MaxChunkCount = self._limits.max_chunk_count
         data: bytes = uatcp_to_binary(ua.MessageType.Acknowledge, answer)
         return data
@@ -138,11 +150,14 @@ class SecureChannel:
             The chunk breaks the protocol or fails its security checks.
         """
         if header.MessageType == ua.MessageType.SecureOpen:
+            if len(body) > MAX_OPEN_BYTES:
+                raise SecureChannelError(ua.StatusCodes.BadTcpMessageTooLarge, f"an OPN of {len(body)} bytes")
             self._check_open(StrictBuffer(body))
         elif not self.is_open or time.monotonic() > self.expires:
             raise SecureChannelError(ua.StatusCodes.BadSecureChannelClosed, "no open channel")
+        self.unfinished_bytes += len(body)
         try:
-            return self._secure.receive_from_header_and_body(header, StrictBuffer(body))
+            message: ua.Message | None = self._secure.receive_from_header_and_body(header, StrictBuffer(body))
         except ua.UaStatusCodeError as error:
             code = error.code
             if code == ua.StatusCodes.BadRequestTooLarge:
@@ -152,6 +167,9 @@ class SecureChannel:
             raise SecureChannelError(
                 ua.StatusCodes.BadSecurityChecksFailed, f"security checks: {error}"
             ) from error
+        if header.ChunkType != ua.ChunkType.Intermediate:
+            self.unfinished_bytes = 0
+        return message
 
     def _check_open(self, body: Buffer) -> None:
         security = decode(ua.AsymmetricAlgorithmHeader, body)
@@ -171,6 +189,10 @@ class SecureChannel:
         certificate = security.SenderCertificate
         if not certificate:
             raise SecureChannelError(ua.StatusCodes.BadSecurityChecksFailed, "no certificate")
+        if len(body) > MAX_ENCRYPTED_BYTES:
+            raise SecureChannelError(
+                ua.StatusCodes.BadTcpMessageTooLarge, f"an OPN of {len(body)} encrypted bytes"
+            )
         server_certificate = self._security.trust.own_certificate
         if (
             security.ReceiverCertificateThumbPrint

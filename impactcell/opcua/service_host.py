@@ -14,7 +14,8 @@ from impactcell.errors import AccessError
 from impactcell.opcua.asyncua_adapter import AddressSpace, SecurityPolicyFactory, bound_null_arrays
 from impactcell.opcua.attribute_service import AttributeService
 from impactcell.opcua.authentication import Authenticator
-from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.binary_codec import MAX_OPERATIONS, StatusCodeError
+from impactcell.opcua.connection_table import ConnectionTable
 from impactcell.opcua.discovery_service import POLICIES, DiscoveryService
 from impactcell.opcua.historical_variable import VALUES_PER_PAGE
 from impactcell.opcua.history_processed import AGGREGATE_FUNCTIONS
@@ -22,7 +23,7 @@ from impactcell.opcua.history_service import MAX_NODES_PER_READ, HistoryService
 from impactcell.opcua.host_interface import Actor, Host, RefusedError, ServerSettings
 from impactcell.opcua.method_service import MethodService
 from impactcell.opcua.monitored_item_service import MonitoredItemService
-from impactcell.opcua.request_dispatch import MAX_OPERATIONS, RequestDispatcher, Service
+from impactcell.opcua.request_dispatch import RequestDispatcher, Service
 from impactcell.opcua.secure_channel import ChannelSecurity
 from impactcell.opcua.session_service import SessionService
 from impactcell.opcua.session_table import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS, SessionTable
@@ -61,7 +62,7 @@ class ServiceHost:
         self._authenticator = Authenticator(host.users, self._trust)
         self._sessions = SessionTable(settings.limits)
         self._discovery = DiscoveryService(settings, host.product, self._trust.own_certificate)
-        self._connections: set[TcpConnection] = set()
+        self._connections = ConnectionTable(settings.limits)
         self._listener: asyncio.Server | None = None
         self._clock: asyncio.Task[None] | None = None
         self._started = datetime.now(UTC)
@@ -162,7 +163,8 @@ class ServiceHost:
             with contextlib.suppress(asyncio.CancelledError):
                 await self._clock
         self.subscription_service.close()
-        for connection in tuple(self._connections):
+        for connection in self._connections.all():
+            assert isinstance(connection, TcpConnection)  # noqa: S101 - nothing else was put in
             connection.abort_with_error(ua.StatusCodes.BadServerHalted, "server stops")
             connection.close()
             await connection.wait_closed()

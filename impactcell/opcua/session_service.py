@@ -122,6 +122,10 @@ class SessionService:
         )
         if session.closed:
             raise StatusCodeError(ua.StatusCodes.BadSessionIdInvalid)
+        given_way = self._sessions.admit(session, actor.user)
+        if given_way is not None:
+            self._subscriptions.end_session(given_way, delete=False)
+            self._sessions.remove(given_way)
         if before is not None and before.user != actor.user:
             # Part 4, 5.7.3.1: another user may take the session, but not what the first one listens to.
             self._subscriptions.end_session(session, delete=True)

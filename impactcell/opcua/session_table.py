@@ -5,7 +5,6 @@ request carries, lets any trusted client take over any session, keeps one sessio
 the rest, and limits sessions only by the thousand.
 """
 
-import asyncio
 import logging
 import os
 import time
@@ -29,13 +28,17 @@ MAX_HISTORY_POINTS: Final = 100
 """Continuation points of HistoryRead kept for one session: one for each node of the largest request."""
 
 
+MAX_SESSION_NAME: Final = 128
+"""Characters kept of the name of a session: it is for the log alone."""
+
+
 @dataclass(frozen=True, slots=True)
 class PublishRequest:
     """A Publish request that waits for something to say."""
 
     request_id: int
     handle: int
-    results: list[ua.StatusCode]
+    results: bytes
     expires: float
 
 
@@ -134,7 +137,7 @@ class SessionTable:
         session = Session(
             session_id=ua.NodeId(os.urandom(16), 1, ua.NodeIdType.ByteString),
             token=ua.NodeId(os.urandom(32), 0, ua.NodeIdType.ByteString),
-            name=name or "",
+            name=(name or "")[:MAX_SESSION_NAME],
             connection=connection,
             policy_uri=connection.channel.policy_uri,
             certificate=certificate,
@@ -155,6 +158,23 @@ class SessionTable:
         if time.monotonic() - oldest.last_seen < 1.0:
             raise StatusCodeError(ua.StatusCodes.BadTooManySessions)
         self.remove(oldest)
+
+    def admit(self, session: Session, user: str) -> Session | None:
+        """See that a user may have this session too; the one of his that has to end for it, if any.
+
+        Raises
+        ------
+        StatusCodeError
+            BadTooManySessions.
+        """
+        of_user = [s for s in self._sessions.values() if s.actor is not None and s.actor.user == user]
+        if session not in of_user and len(of_user) >= self._limits.sessions_per_user:
+            # One whose client is gone, and may never come back, gives way.
+            gone = [s for s in of_user if s.connection is None]
+            if not gone:
+                raise StatusCodeError(ua.StatusCodes.BadTooManySessions)
+            return min(gone, key=lambda s: s.last_seen)
+        return None
 
     def find(self, token: ua.NodeId) -> Session:
         """Find a session by its authentication token.
@@ -206,10 +226,3 @@ class SessionTable:
         """Sessions that have not been heard of for longer than their timeout."""
         now = time.monotonic()
         return [s for s in self._sessions.values() if now - s.last_seen > s.timeout_s]
-
-
-async def every(period_s: float, work: Any) -> None:
-    """Call `work` for ever, once a period."""
-    while True:
-        await asyncio.sleep(period_s)
-        work()

@@ -18,13 +18,14 @@ from impactcell.opcua import notification_encoding
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.monitored_item import DataMonitoredItem, EventMonitoredItem
+from impactcell.opcua.retransmission_queue import RetransmissionQueue
 from impactcell.opcua.session_table import PublishRequest, Session
 from impactcell.opcua.tcp_connection import TcpConnection
 
 MonitoredItem = DataMonitoredItem | EventMonitoredItem
 
-MAX_RETRANSMISSIONS: Final = 256
-"""Messages kept until they are acknowledged."""
+QUEUED_VALUES: Final = 100_000
+"""Room in the queues of all data items of one subscription; beyond it a queue holds one value."""
 MAX_NOTIFICATIONS: Final = 10_000
 """Notifications in one message, where the client sets no limit."""
 MAX_LIFETIME_S: Final = 3_600.0
@@ -54,7 +55,9 @@ class Subscription:
         self._expired = expired
         self._ready_items: OrderedDict[int, MonitoredItem] = OrderedDict()
         self._status_changes: list[int] = []
-        self._retransmission_queue: OrderedDict[int, bytes] = OrderedDict()
+        self._unacknowledged = RetransmissionQueue()
+        self._granted = 0
+        self._is_closed = False
         self._next_sequence_number = 1
         self._keep_alive_counter = 0
         self._lifetime_counter = 0
@@ -126,12 +129,10 @@ class Subscription:
         notifications = self._take_notifications()
         message = notification_encoding.notification_message(self._next_sequence_number, now, notifications)
         if notifications:
-            self._retransmission_queue[self._next_sequence_number] = message
+            self._unacknowledged.keep(self._next_sequence_number, message)
             self._next_sequence_number = (
                 1 if self._next_sequence_number == MAX_SEQUENCE_NUMBER else self._next_sequence_number + 1
             )
-            while len(self._retransmission_queue) > MAX_RETRANSMISSIONS:
-                self._retransmission_queue.popitem(last=False)
         self.late = self._has_news()
         self._first = False
         self._keep_alive_counter = self._lifetime_counter = 0
@@ -139,7 +140,7 @@ class Subscription:
             request.handle,
             now,
             self.id,
-            list(self._retransmission_queue),
+            self._unacknowledged.sequence_numbers(),
             message,
             request.results,
             more=self.late,
@@ -191,6 +192,24 @@ class Subscription:
         self._last_item += 1
         return self._last_item
 
+    def check_open(self) -> None:
+        """See that the subscription has not ended while a request to it was carried out.
+
+        Raises
+        ------
+        StatusCodeError
+            BadSubscriptionIdInvalid.
+        """
+        if self._is_closed:
+            raise StatusCodeError(ua.StatusCodes.BadSubscriptionIdInvalid)
+
+    def grant_queue(self, item: MonitoredItem, before: int = 0) -> None:
+        """Shorten the queue of a data item that is new, or had another length, to the room there is."""
+        if isinstance(item, DataMonitoredItem):
+            self._granted -= before
+            item.shorten(max(QUEUED_VALUES - self._granted, 1))
+            self._granted += item.size
+
     def item(self, number: int) -> MonitoredItem:
         """Find a monitored item.
 
@@ -207,15 +226,16 @@ class Subscription:
     def remove(self, number: int) -> None:
         """Take an item out."""
         item = self.item(number)
+        if isinstance(item, DataMonitoredItem):
+            self._granted -= item.size
         item.close()
         self._ready_items.pop(number, None)
         del self.items[number]
 
     def acknowledge(self, sequence: int) -> int:
         """Forget a message the client has; the status code of the acknowledgement."""
-        if self._retransmission_queue.pop(sequence, None) is None:
-            return int(ua.StatusCodes.BadSequenceNumberUnknown)
-        return int(ua.StatusCodes.Good)
+        known = self._unacknowledged.acknowledge(sequence)
+        return int(ua.StatusCodes.Good if known else ua.StatusCodes.BadSequenceNumberUnknown)
 
     def message(self, sequence: int) -> bytes:
         """Find a message that was sent and not acknowledged.
@@ -225,7 +245,7 @@ class Subscription:
         StatusCodeError
             BadMessageNotAvailable.
         """
-        message = self._retransmission_queue.get(sequence)
+        message = self._unacknowledged.message(sequence)
         if message is None:
             raise StatusCodeError(ua.StatusCodes.BadMessageNotAvailable)
         self._lifetime_counter = 0
@@ -233,7 +253,7 @@ class Subscription:
 
     def available_sequence_numbers(self) -> list[int]:
         """Sequence numbers that can be sent again."""
-        return list(self._retransmission_queue)
+        return self._unacknowledged.sequence_numbers()
 
     def move(self, session: Session, *, initial: bool) -> None:
         """Belong to another session; with `initial` every data item reports its present value again."""
@@ -260,10 +280,11 @@ class Subscription:
 
     def close(self) -> None:
         """End: no further cycle, no item."""
+        self._is_closed = True
         if self._timer is not None:
             self._timer.cancel()
         for item in self.items.values():
             item.close()
         self.items.clear()
         self._ready_items.clear()
-        self._retransmission_queue.clear()
+        self._unacknowledged = RetransmissionQueue()

@@ -5,7 +5,7 @@ subscriptions of others.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, Final
 
@@ -14,14 +14,21 @@ from asyncua import ua
 from impactcell.opcua import notification_encoding
 from impactcell.opcua.binary_codec import StatusCodeError, service_fault
 from impactcell.opcua.event_notification import EventNotification
+from impactcell.opcua.fan_out import FanOut
 from impactcell.opcua.host_interface import ServerLimits
+from impactcell.opcua.item_room import ItemRoom
 from impactcell.opcua.monitored_item import EventMonitoredItem
-from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
+from impactcell.opcua.request_dispatch import RequestContext, Service, apply_to_each, check_operations
 from impactcell.opcua.session_table import PublishRequest, Session
 from impactcell.opcua.subscription import MonitoredItem, Subscription
 
 MAX_PUBLISH_REQUESTS: Final = 100
 """Publish requests of one session that wait; beyond, the oldest is answered with a fault."""
+
+MAX_ACKNOWLEDGEMENTS: Final = 1_000
+"""Acknowledgements in one Publish request."""
+EVENTS_AT_ONCE: Final = 10
+"""Listeners to an event that are told at once; each has fields of its own: some 3 ms."""
 
 
 class SubscriptionService:
@@ -31,6 +38,7 @@ class SubscriptionService:
         self._limits = limits
         self._subscriptions: dict[int, Subscription] = {}
         self._last_id = 0
+        self._fan_out = FanOut(EVENTS_AT_ONCE)
         self._event_items: dict[ua.NodeId, dict[EventMonitoredItem, Subscription]] = {}
 
     def __len__(self) -> int:
@@ -70,8 +78,7 @@ class SubscriptionService:
     def notify(self, notify: EventNotification) -> None:
         """Tell an event to all who listen to one of its notifiers."""
         for notifier in notify.notifiers:
-            for item in tuple(self._event_items.get(notifier, ())):
-                item.offer(notify)
+            self._fan_out.tell((item.offer for item in self._event_items.get(notifier, ())), notify)
 
     def refresh(
         self, session: Session, number: int, item_id: int | None, events: Sequence[EventNotification]
@@ -88,10 +95,11 @@ class SubscriptionService:
         listening = [item for item in items if isinstance(item, EventMonitoredItem)]
         if item_id is not None and not listening:
             raise StatusCodeError(ua.StatusCodes.BadMonitoredItemIdInvalid)
-        for item in listening:
-            for notify in events:
-                if notify.unfiltered or item.notifier in notify.notifiers:
-                    item.offer(notify)
+        for notify in events:
+            self._fan_out.tell(
+                (item.offer for item in listening if notify.unfiltered or item.notifier in notify.notifiers),
+                notify,
+            )
 
     def end_session(self, session: Session, *, delete: bool) -> None:
         """Delete the subscriptions of a session that ends, or leave them to be transferred."""
@@ -161,7 +169,7 @@ class SubscriptionService:
             self.find(number, context.session).enabled = parameters.PublishingEnabled
 
         response = ua.SetPublishingModeResponse()
-        response.Parameters.Results = apply_to_each(parameters.SubscriptionIds, switch)
+        response.Parameters.Results = await apply_to_each(context.share, parameters.SubscriptionIds, switch)
         return response
 
     async def delete_subscriptions(
@@ -169,8 +177,10 @@ class SubscriptionService:
     ) -> ua.DeleteSubscriptionsResponse:
         """End subscriptions."""
         response = ua.DeleteSubscriptionsResponse()
-        response.Results = apply_to_each(
-            parameters.SubscriptionIds, lambda number: self._remove(self.find(number, context.session))
+        response.Results = await apply_to_each(
+            context.share,
+            parameters.SubscriptionIds,
+            lambda number: self._remove(self.find(number, context.session)),
         )
         if not self.subscriptions_of(context.session):
             self._return_requests(context.session)
@@ -207,10 +217,23 @@ class SubscriptionService:
         response.Parameters.Results = results
         return response
 
+    def room_for_items(self, owner: str) -> ItemRoom:
+        """How many more monitored items a user may have."""
+        items, events = self._limits.items_per_user, self._limits.event_items_per_user
+        for subscription in self._subscriptions.values():
+            if subscription.owner == owner:
+                items -= len(subscription.items)
+        for listening in self._event_items.values():
+            events -= sum(1 for subscription in listening.values() if subscription.owner == owner)
+        return ItemRoom(items, events)
+
     async def publish(self, context: RequestContext, parameters: ua.PublishParameters) -> None:
         """Acknowledge, and wait in line for the next thing to say."""
         session = context.session
-        results = [self._acknowledge(session, a) for a in parameters.SubscriptionAcknowledgements or []]
+        acknowledgements = parameters.SubscriptionAcknowledgements or []
+        if len(acknowledgements) > MAX_ACKNOWLEDGEMENTS:
+            raise StatusCodeError(ua.StatusCodes.BadTooManyOperations)
+        results = notification_encoding.status_codes(self._acknowledge(session, a) for a in acknowledgements)
         subscriptions = self.subscriptions_of(session)
         if not subscriptions:
             raise StatusCodeError(ua.StatusCodes.BadNoSubscription)
@@ -225,12 +248,12 @@ class SubscriptionService:
         for subscription in sorted(subscriptions, key=lambda s: -s.priority):
             subscription.serve()
 
-    def _acknowledge(self, session: Session, parameters: ua.SubscriptionAcknowledgement) -> ua.StatusCode:
+    def _acknowledge(self, session: Session, parameters: ua.SubscriptionAcknowledgement) -> int:
         try:
             subscription = self.find(parameters.SubscriptionId, session)
         except StatusCodeError as fault:
-            return ua.StatusCode(fault.code)
-        return ua.StatusCode(subscription.acknowledge(parameters.SequenceNumber))
+            return fault.code
+        return subscription.acknowledge(parameters.SequenceNumber)
 
     def _drop_expired(self, session: Session) -> None:
         now = time.monotonic()
@@ -251,18 +274,6 @@ class SubscriptionService:
         return notification_encoding.republish_response(
             context.header.RequestHandle, datetime.now(UTC), message
         )
-
-
-def apply_to_each(numbers: list[int], work: Callable[[int], None]) -> list[ua.StatusCode]:
-    """Do something to each of a list of ids; the status codes."""
-    results = []
-    for number in check_operations(numbers):
-        try:
-            work(number)
-            results.append(ua.StatusCode())
-        except StatusCodeError as fault:
-            results.append(ua.StatusCode(fault.code))
-    return results
 
 
 def _revise(subscription: Subscription, result: Any) -> None:

@@ -10,12 +10,15 @@ import contextlib
 import logging
 import socket
 import struct
+import time
 from typing import Final, Protocol, cast
 
 from asyncua import ua
 
 from impactcell.opcua.binary_codec import DecodingError, StatusCodeError, encode, service_fault
+from impactcell.opcua.connection_table import ConnectionTable
 from impactcell.opcua.host_interface import ServerLimits
+from impactcell.opcua.loop_share import LoopShare
 from impactcell.opcua.secure_channel import MAX_CHUNK, ChannelSecurity, SecureChannel, SecureChannelError
 
 _log = logging.getLogger(__name__)
@@ -27,8 +30,10 @@ MAX_QUEUED_CHUNKS: Final = 64
 """Chunks read ahead of the one being answered; beyond, reading pauses."""
 LINGER_S: Final = 1.0
 """Seconds that a peer has to read why its connection ends."""
-MAX_UNSENT_BYTES: Final = 16 * 1024 * 1024
-"""Output a client may leave unread, four of the largest responses."""
+MAX_QUEUED_BYTES: Final = 4 * MAX_CHUNK
+"""Bytes read ahead; beyond, reading pauses."""
+MAX_UNSENT_BYTES: Final = 4 * 1024 * 1024
+"""Output a client may leave unread, bytes."""
 CHUNK_TYPES: Final = (b"F", b"C", b"A")
 SECURE_MESSAGE_TYPES: Final = (b"OPN", b"MSG", b"CLO")
 
@@ -51,11 +56,11 @@ class TcpConnection(asyncio.Protocol):
         handler: RequestHandler,
         channels: ChannelSecurity,
         limits: ServerLimits,
-        open_connections: "set[TcpConnection]",
+        table: ConnectionTable,
     ) -> None:
         self._handler = handler
         self._limits = limits
-        self._open_connections = open_connections
+        self._table = table
         self._buffer = bytearray()
         self._frames: asyncio.Queue[tuple[ua.Header, bytes] | None] = asyncio.Queue()
         self._transport: asyncio.Transport | None = None
@@ -64,6 +69,9 @@ class TcpConnection(asyncio.Protocol):
         self._greeted = False
         self._paused = False
         self._discards = False
+        self._queued_bytes = 0
+        self.share = LoopShare(table.turns)
+        self.since_s = time.monotonic()
         self.channel = SecureChannel(channels)
         self.address = ""
         self.local_address: tuple[str, int] | None = None
@@ -75,9 +83,9 @@ class TcpConnection(asyncio.Protocol):
         name = self._transport.get_extra_info("peername")
         self.address = str(name[0]) if name else ""
         self.local_address = self._transport.get_extra_info("sockname")
-        if len(self._open_connections) >= self._limits.connections:
+        if not self._table.admit(self):
             self.abort_with_error(
-                ua.StatusCodes.BadTcpServerTooBusy, f"{self._limits.connections} connections already"
+                ua.StatusCodes.BadTcpServerTooBusy, f"{len(self._table)} connections already"
             )
             return
         wire = self._transport.get_extra_info("socket")
@@ -87,20 +95,22 @@ class TcpConnection(asyncio.Protocol):
             for option, value in (("TCP_KEEPIDLE", 15), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
                 if hasattr(socket, option):
                     wire.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
-        self._open_connections.add(self)
         loop = asyncio.get_running_loop()
         self._task = loop.create_task(self._serve(), name=f"opcua {self.address}")
         self._timer = loop.call_later(self._limits.hello_s, self._too_slow)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection; sessions and subscriptions live on."""
-        self._open_connections.discard(self)
+        self._table.discard(self)
         if self._timer is not None:
             self._timer.cancel()
         if self._task is not None:
             self._task.cancel()
             self._handler.disconnected(self)
         self._transport = None
+        self._buffer.clear()
+        self._frames = asyncio.Queue()
+        self._queued_bytes = 0
         if exc is not None:
             _log.info("connection from %s lost: %s", self.address, exc)
 
@@ -121,13 +131,40 @@ class TcpConnection(asyncio.Protocol):
                 )
                 header.header_size, header.body_size, header.packet_size = start, size - start, size
                 self._frames.put_nowait((header, bytes(self._buffer[start:size])))
+                self._queued_bytes += size
                 del self._buffer[:size]
         except SecureChannelError as error:
             self.abort_with_error(error.code, str(error))
             return
-        if self._frames.qsize() > MAX_QUEUED_CHUNKS and not self._paused and self._transport is not None:
+        if self._is_ahead(1) and not self._paused and self._transport is not None:
             self._transport.pause_reading()
             self._paused = True
+        if self.unfinished_bytes > MAX_CHUNK and self._table.holds_too_much(self):
+            self.abort_with_error(ua.StatusCodes.BadTcpNotEnoughResources, "too many unfinished messages")
+
+    def _is_ahead(self, share: int) -> bool:
+        """Whether more has come than a share (1 for all of it, 2 for half) of what may wait."""
+        return (
+            self._frames.qsize() > MAX_QUEUED_CHUNKS // share
+            or self._queued_bytes > MAX_QUEUED_BYTES // share
+        )
+
+    @property
+    def unfinished_bytes(self) -> int:
+        """Bytes that have come and are no request yet, or one that waits."""
+        return len(self._buffer) + self._queued_bytes + self.channel.unfinished_bytes
+
+    @property
+    def unsent_bytes(self) -> int:
+        """Bytes that the client has not read yet."""
+        return 0 if self._transport is None else self._transport.get_write_buffer_size()
+
+    def give_way(self) -> None:
+        """End at once: somebody else needs the place."""
+        _log.info("connection from %s gives way: no session in time", self.address)
+        self.channel.close()
+        if self._transport is not None:
+            self._transport.abort()
 
     def _check_header(self, kind: bytes, chunk: bytes, size: int) -> None:
         if not self._greeted:
@@ -150,7 +187,9 @@ class TcpConnection(asyncio.Protocol):
 
     async def _serve(self) -> None:
         while (frame := await self._frames.get()) is not None:
-            if self._paused and self._frames.qsize() < MAX_QUEUED_CHUNKS // 2 and self._transport is not None:
+            self.share.begin()
+            self._queued_bytes -= frame[0].packet_size
+            if self._paused and not self._is_ahead(2) and self._transport is not None:
                 self._paused = False
                 self._transport.resume_reading()
             try:
@@ -162,6 +201,7 @@ class TcpConnection(asyncio.Protocol):
             except Exception:  # noqa: BLE001 - one connection's fault must not end the others
                 _log.exception("request from %s", self.address)
                 self.abort_with_error(ua.StatusCodes.BadInternalError, "internal error")
+            await self.share.give_way()
 
     async def _receive_chunk(self, header: ua.Header, body: bytes) -> None:
         if header.MessageType == b"HEL":
@@ -172,6 +212,7 @@ class TcpConnection(asyncio.Protocol):
         if message is None:
             return
         if header.MessageType == b"OPN":
+            await self.share.give_way()  # after one asymmetric operation, and before the next
             self._send(self.channel.open_secure_channel(message))
         elif header.MessageType == b"CLO":
             self.close()
@@ -181,6 +222,7 @@ class TcpConnection(asyncio.Protocol):
     def activated(self) -> None:
         """Let the connection stay: a session lives on it."""
         self.has_session = True
+        self.channel.take_long_messages()
         if self._timer is not None:
             self._timer.cancel()
 
@@ -206,7 +248,8 @@ class TcpConnection(asyncio.Protocol):
         if transport is None or transport.is_closing():
             return
         transport.write(data)
-        if transport.get_write_buffer_size() > MAX_UNSENT_BYTES:
+        unsent = transport.get_write_buffer_size()
+        if unsent > MAX_UNSENT_BYTES or (unsent > MAX_CHUNK and self._table.reads_too_little(self)):
             _log.warning("%s does not read what it asked for; connection dropped", self.address)
             transport.abort()
 

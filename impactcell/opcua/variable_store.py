@@ -7,6 +7,7 @@ from typing import Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace, AttributeValue, struct_to_binary
+from impactcell.opcua.fan_out import FanOut
 
 GOOD: Final = ua.StatusCode(ua.StatusCodes.Good)
 
@@ -62,11 +63,12 @@ ValueObserver = Callable[[SharedValue], None]
 class StoredVariable:
     """A variable that is written often: its place in the address space need not be looked up each time."""
 
-    __slots__ = ("_attribute", "observers")
+    __slots__ = ("_attribute", "_fan_out", "observers")
 
-    def __init__(self, attribute: AttributeValue) -> None:
+    def __init__(self, attribute: AttributeValue, fan_out: FanOut) -> None:
         self._attribute = attribute
-        self.observers: list[ValueObserver] = []
+        self._fan_out = fan_out
+        self.observers: dict[ValueObserver, None] = {}
 
     @property
     def data(self) -> ua.DataValue:
@@ -77,9 +79,7 @@ class StoredVariable:
         """Replace the value and tell all who watch it."""
         self._attribute.value = data
         if self.observers:
-            sample = SharedValue(data)
-            for observer in tuple(self.observers):
-                observer(sample)
+            self._fan_out.tell(self.observers, SharedValue(data))
 
     def set_status(self, status: ua.StatusCode, time: datetime) -> None:
         """Replace the status and keep the last value; do nothing where the status is the same."""
@@ -97,13 +97,14 @@ class VariableStore:
 
     def __init__(self, space: AddressSpace) -> None:
         self._space = space
+        self._fan_out = FanOut()
         self._variables: dict[ua.NodeId, StoredVariable] = {}
 
     def variable(self, node: ua.NodeId) -> StoredVariable:
         """Find a variable."""
         stored = self._variables.get(node)
         if stored is None:
-            stored = StoredVariable(self._space[node].attributes[ua.AttributeIds.Value])
+            stored = StoredVariable(self._space[node].attributes[ua.AttributeIds.Value], self._fan_out)
             self._variables[node] = stored
         return stored
 
@@ -124,10 +125,8 @@ class VariableStore:
 
     def add_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:
         """Call `watcher` with every value written from now on."""
-        self.variable(node).observers.append(observer)
+        self.variable(node).observers[observer] = None
 
     def remove_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:
         """Undo `watch`."""
-        observers = self.variable(node).observers
-        if observer in observers:
-            observers.remove(observer)
+        self.variable(node).observers.pop(observer, None)

@@ -4,6 +4,7 @@ Mended: asyncua never limits an answer and has no BrowseNext, takes unknown refe
 and fails on an empty path.
 """
 
+from dataclasses import dataclass, replace
 from typing import Final
 
 from asyncua import ua
@@ -11,11 +12,13 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
-from impactcell.opcua.session_table import ContinuationPoints
+from impactcell.opcua.session_table import MAX_BROWSE_POINTS, ContinuationPoints
 from impactcell.opcua.type_instances import HAS_SUBTYPE, targets
 
 MAX_REFERENCES_PER_NODE: Final = 1_000
 """References in one answer for a node; more come by continuation point."""
+MAX_REFERENCES_PER_ANSWER: Final = 10_000
+"""References of all nodes in one answer."""
 MAX_PATH_ELEMENTS: Final = 50
 """Elements of one browse path."""
 NO_REMAINING_PATH: Final = 2**32 - 1
@@ -55,21 +58,18 @@ class ViewService:
             parameters.RequestedMaxReferencesPerNode or MAX_REFERENCES_PER_NODE, MAX_REFERENCES_PER_NODE
         )
         response = ua.BrowseResponse()
-        response.Results = [
-            self._browse(description, max_references, context.session.browse) for description in descriptions
-        ]
+        answer = _Answer(context.session.browse)
+        response.Results = await context.share.each(
+            (_Unfinished(description, max_references) for description in descriptions),
+            lambda unfinished: self._browse(unfinished, answer),
+        )
         return response
 
-    def _browse(
-        self, description: ua.BrowseDescription, max_references: int, continuation_points: ContinuationPoints
-    ) -> ua.BrowseResult:
-        result = ua.BrowseResult()
+    def _browse(self, unfinished: "_Unfinished", answer: "_Answer") -> ua.BrowseResult:
         try:
-            references = self._references(description)
+            return answer.page(self._references(unfinished.description), unfinished)
         except StatusCodeError as fault:
-            result.StatusCode = ua.StatusCode(fault.code)
-            return result
-        return page(references, max_references, continuation_points)
+            return ua.BrowseResult(StatusCode=ua.StatusCode(fault.code))
 
     def _references(self, description: ua.BrowseDescription) -> list[ua.ReferenceDescription]:
         node = self._space.get(description.NodeId)
@@ -113,26 +113,29 @@ class ViewService:
         self, context: RequestContext, parameters: ua.BrowseNextParameters
     ) -> ua.BrowseNextResponse:
         """Go on where an answer was cut, or release what was kept for it."""
-        response = ua.BrowseNextResponse()
-        results = []
-        for point in check_operations(parameters.ContinuationPoints):
-            result = ua.BrowseResult()
+        points, answer = context.session.browse, _Answer(context.session.browse)
+
+        def go_on(point: bytes) -> ua.BrowseResult:
             try:
-                references, max_references = context.session.browse.take(point)
-                if not parameters.ReleaseContinuationPoints:
-                    result = page(references, max_references, context.session.browse)
+                unfinished = points.take(point)
             except StatusCodeError as fault:
-                result.StatusCode = ua.StatusCode(fault.code)
-            results.append(result)
-        response.Parameters.Results = results
+                return ua.BrowseResult(StatusCode=ua.StatusCode(fault.code))
+            if parameters.ReleaseContinuationPoints:
+                return ua.BrowseResult()
+            return self._browse(unfinished, answer)
+
+        response = ua.BrowseNextResponse()
+        response.Parameters.Results = await context.share.each(
+            check_operations(parameters.ContinuationPoints), go_on
+        )
         return response
 
     async def translate_browse_paths(
-        self, _context: RequestContext, parameters: ua.TranslateBrowsePathsToNodeIdsParameters
+        self, context: RequestContext, parameters: ua.TranslateBrowsePathsToNodeIdsParameters
     ) -> ua.TranslateBrowsePathsToNodeIdsResponse:
         """Follow paths of browse names."""
         response = ua.TranslateBrowsePathsToNodeIdsResponse()
-        response.Results = [self._translate(path) for path in check_operations(parameters.BrowsePaths)]
+        response.Results = await context.share.each(check_operations(parameters.BrowsePaths), self._translate)
         return response
 
     def _translate(self, path: ua.BrowsePath) -> ua.BrowsePathResult:
@@ -203,15 +206,43 @@ class ViewService:
         return ua.UnregisterNodesResponse()
 
 
-def page(
-    references: list[ua.ReferenceDescription], max_references: int, continuation_points: ContinuationPoints
-) -> ua.BrowseResult:
-    """Answer with as many references as fit, and keep the rest."""
-    result = ua.BrowseResult()
-    result.References = references[:max_references]
-    if len(references) > max_references:
-        result.ContinuationPoint = continuation_points.keep((references[max_references:], max_references))
-    return result
+@dataclass(frozen=True, slots=True)
+class _Unfinished:
+    """What a continuation point of Browse stands for: the question, and how far it has been answered."""
+
+    description: ua.BrowseDescription
+    max_references: int
+    answered: int = 0
+
+
+class _Answer:
+    """One answer to Browse or BrowseNext: it has room for so many references of all nodes."""
+
+    def __init__(self, points: ContinuationPoints) -> None:
+        self._points = points
+        self._kept = 0
+        self._room = MAX_REFERENCES_PER_ANSWER
+
+    def page(self, references: list[ua.ReferenceDescription], unfinished: _Unfinished) -> ua.BrowseResult:
+        """Answer with as many references as fit, and keep where to go on.
+
+        Raises
+        ------
+        StatusCodeError
+            BadNoContinuationPoints: the answer is full, and so are the points that go on with it.
+        """
+        first = unfinished.answered
+        last = min(len(references), first + min(unfinished.max_references, self._room))
+        result = ua.BrowseResult()
+        if last < len(references):
+            # One that this answer has given already must not give way to the next.
+            if self._kept == MAX_BROWSE_POINTS:
+                raise StatusCodeError(ua.StatusCodes.BadNoContinuationPoints)
+            self._kept += 1
+            result.ContinuationPoint = self._points.keep(replace(unfinished, answered=last))
+        result.References = references[first:last]
+        self._room -= last - first
+        return result
 
 
 def masked(reference: ua.ReferenceDescription, mask: int) -> ua.ReferenceDescription:

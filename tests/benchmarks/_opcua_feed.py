@@ -65,7 +65,11 @@ async def report(here: Site, lag: list[float]) -> None:
 async def main(rate_hz: float) -> None:
     loop = asyncio.get_running_loop()
     lag: list[float] = []
-    async with site(limits=ServerLimits(sessions=1000, connections=1000)) as here:
+    async with site(
+        limits=ServerLimits(
+            sessions=1000, connections=1000, sessions_per_user=1000, connections_per_address=1000
+        )
+    ) as here:
         site_of = {
             "endpoint": here.server.endpoint,
             "certificate": str(here.certificate),

@@ -4,93 +4,14 @@ import asyncio
 import contextlib
 import random
 import struct
-import time
 
 import pytest
-from asyncua import Client, ua
+from asyncua import ua
 from asyncua.ua.ua_binary import struct_to_binary
 
 from impactcell.scada import ServerLimits
-from tests.opcua_server import Site, site
-
-NONE_URI = b"http://opcfoundation.org/UA/SecurityPolicy#None"
-AT_ONCE_S = 1.0
-
-
-def frame(kind: bytes, body: bytes, chunk: bytes = b"F", size: int | None = None) -> bytes:
-    return kind + chunk + struct.pack("<I", size if size is not None else 8 + len(body)) + body
-
-
-def hello(url: bytes = b"opc.tcp://localhost", receive: int = 65536, send: int = 65536) -> bytes:
-    return frame(b"HEL", struct.pack("<IIIIIi", 0, receive, send, 0, 0, len(url)) + url)
-
-
-def open_channel(request_type: int = 0, mode: int = 1, uri: bytes = NONE_URI, sequence: int = 1) -> bytes:
-    request = ua.OpenSecureChannelRequest()
-    request.Parameters.RequestType = ua.SecurityTokenRequestType(request_type)
-    request.Parameters.SecurityMode = ua.MessageSecurityMode(mode)
-    request.Parameters.RequestedLifetime = 60_000
-    security = struct.pack("<i", len(uri)) + uri + struct.pack("<ii", -1, -1)
-    return frame(
-        b"OPN",
-        struct.pack("<I", 0) + security + struct.pack("<II", sequence, sequence) + struct_to_binary(request),
-    )
-
-
-def message(channel: int, token: int, body: bytes, sequence: int = 2, chunk: bytes = b"F") -> bytes:
-    return frame(b"MSG", struct.pack("<IIII", channel, token, sequence, sequence) + body, chunk)
-
-
-class Raw:
-    """A bare TCP connection to the server."""
-
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self.reader, self.writer = reader, writer
-
-    async def send(self, data: bytes) -> None:
-        self.writer.write(data)
-        await self.writer.drain()
-
-    async def receive(self) -> tuple[bytes, bytes]:
-        head = await asyncio.wait_for(self.reader.readexactly(8), 5)
-        size = struct.unpack("<I", head[4:])[0]
-        return head[:3], await self.reader.readexactly(size - 8)
-
-    async def error(self) -> int:
-        kind, body = await self.receive()
-        assert kind == b"ERR", (kind, body)
-        assert await asyncio.wait_for(self.reader.read(), 5) == b"", "the connection was not closed"
-        return struct.unpack("<I", body[:4])[0]
-
-    async def channel(self) -> tuple[int, int]:
-        await self.send(hello())
-        assert (await self.receive())[0] == b"ACK"
-        await self.send(open_channel())
-        kind, body = await self.receive()
-        assert kind == b"OPN"
-        # The token is the last structure but the nonce: version, channel, token, created, lifetime, nonce.
-        channel, token = struct.unpack("<II", body[-28:-20]) if body[-4:] != b"\xff" * 4 else (0, 0)
-        channel, token = struct.unpack("<I", body[:4])[0], token
-        return channel, token
-
-
-@contextlib.asynccontextmanager
-async def raw(here: Site):
-    port = int(here.server.endpoint.split(":")[2].split("/")[0])
-    reader, writer = await asyncio.open_connection("127.0.0.1", port)
-    try:
-        yield Raw(reader, writer)
-    finally:
-        writer.close()
-        with contextlib.suppress(ConnectionError):
-            await writer.wait_closed()
-
-
-async def alive(here: Site) -> None:
-    client = Client(here.server.endpoint, timeout=5)
-    endpoints = await client.connect_and_get_server_endpoints()
-    assert len(endpoints) == 3
-
+from tests.opcua_server import site
+from tests.opcua_wire import alive, frame, hello, message, open_channel, raw
 
 codes = ua.StatusCodes
 BEFORE_HELLO = {
@@ -132,13 +53,11 @@ AFTER_HELLO = {
 
 
 async def test_bad_beginnings() -> None:
-    async with site() as here:
+    async with site(limits=ServerLimits(hello_s=3600.0, activation_s=3600.0)) as here:
         for name, (data, code) in BEFORE_HELLO.items():
             async with raw(here) as wire:
-                begin = time.monotonic()
                 await wire.send(data)
                 assert await wire.error() == code, name
-                assert time.monotonic() - begin < AT_ONCE_S, f"{name}: took too long"
         for name, (data, code) in AFTER_HELLO.items():
             async with raw(here) as wire:
                 await wire.send(hello())
@@ -200,7 +119,7 @@ async def test_noise(seed: int) -> None:
                         data[rng.randrange(8, len(data))] = rng.randrange(256)
                     await wire.send(bytes(data) if rng.random() < 0.8 else rng.randbytes(rng.randrange(200)))
                     wire.writer.write_eof()
-                    await asyncio.wait_for(wire.reader.read(), 5)
+                    await asyncio.wait_for(wire.reader.read(), 30)
         await alive(here)
 
 
@@ -218,7 +137,10 @@ async def test_half_open_connections_are_closed_in_time() -> None:
 
 
 async def test_too_many_connections() -> None:
-    async with site(limits=ServerLimits(connections=5)) as here, contextlib.AsyncExitStack() as stack:
+    async with (
+        site(limits=ServerLimits(connections=5, undisturbed_s=3600.0)) as here,
+        contextlib.AsyncExitStack() as stack,
+    ):
         held = [await stack.enter_async_context(raw(here)) for _ in range(5)]
         for wire in held:
             await wire.send(hello())
@@ -235,7 +157,7 @@ async def test_too_many_connections() -> None:
 
 async def test_a_thousand_connections_at_once() -> None:
     """Those beyond the limit are told so before any cryptography; a client that is in goes on."""
-    async with site(limits=ServerLimits(connections=50)) as here:
+    async with site(limits=ServerLimits(connections=50, undisturbed_s=3600.0)) as here:
         here.publish()
         async with await here.client("observer") as inside:
 

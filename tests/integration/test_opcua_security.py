@@ -204,7 +204,7 @@ async def test_certificate_must_be_made_for_the_application() -> None:
 
 async def test_more_sessions_at_once_than_allowed() -> None:
     """A thousand scaled to forty: ten are let in, the rest is refused with the standard's code."""
-    async with site(limits=ServerLimits(sessions=10, connections=60)) as here:
+    async with site(limits=ServerLimits(sessions=10, connections=60, activation_s=3600.0)) as here:
         here.publish()
         async with await here.client("observer") as inside:
             held: list[Client] = []
