@@ -27,7 +27,7 @@ class FanOut:
         self._at_once = at_once
         self._waiting: deque[tuple[Listener, object]] = deque()
 
-    def tell(self, listeners: Iterable[Listener], news: object) -> None:
+    def deliver(self, listeners: Iterable[Listener], news: object) -> None:
         """Tell something to listeners: at once where they are few, and in later rounds of the loop else."""
         told = tuple(listeners)
         if len(told) <= self._at_once and not self._waiting:

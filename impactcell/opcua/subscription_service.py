@@ -78,7 +78,7 @@ class SubscriptionService:
     def notify(self, notify: EventNotification) -> None:
         """Tell an event to all who listen to one of its notifiers."""
         for notifier in notify.notifiers:
-            self._fan_out.tell((item.offer for item in self._event_items.get(notifier, ())), notify)
+            self._fan_out.deliver((item.offer for item in self._event_items.get(notifier, ())), notify)
 
     def refresh(
         self, session: Session, number: int, item_id: int | None, events: Sequence[EventNotification]
@@ -96,7 +96,7 @@ class SubscriptionService:
         if item_id is not None and not listening:
             raise StatusCodeError(ua.StatusCodes.BadMonitoredItemIdInvalid)
         for notify in events:
-            self._fan_out.tell(
+            self._fan_out.deliver(
                 (item.offer for item in listening if notify.unfiltered or item.notifier in notify.notifiers),
                 notify,
             )

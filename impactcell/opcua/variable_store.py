@@ -79,7 +79,7 @@ class StoredVariable:
         """Replace the value and tell all who watch it."""
         self._attribute.value = data
         if self.observers:
-            self._fan_out.tell(self.observers, SharedValue(data))
+            self._fan_out.deliver(self.observers, SharedValue(data))
 
     def set_status(self, status: ua.StatusCode, time: datetime) -> None:
         """Replace the status and keep the last value; do nothing where the status is the same."""

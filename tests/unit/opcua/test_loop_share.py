@@ -67,9 +67,9 @@ async def test_one_who_leaves_the_line_does_not_stop_it() -> None:
 @pytest.mark.usefixtures("clock")
 async def test_many_listeners_are_told_in_slices_and_in_order() -> None:
     fan_out, told = FanOut(), [list[int]() for _ in range(500)]
-    fan_out.tell([entries.append for entries in told], 1)
+    fan_out.deliver([entries.append for entries in told], 1)
     assert not any(told), "told at once"
-    fan_out.tell([told[0].append], 2)  # few, but after the first
+    fan_out.deliver([told[0].append], 2)  # few, but after the first
     rounds = 0
     while len(told[0]) < 2:
         before = sum(map(len, told))
@@ -83,5 +83,5 @@ async def test_many_listeners_are_told_in_slices_and_in_order() -> None:
 
 async def test_few_listeners_are_told_at_once() -> None:
     told = list[int]()
-    FanOut().tell([told.append], 1)
+    FanOut().deliver([told.append], 1)
     assert told == [1]

@@ -1,0 +1,114 @@
+"""One hostile client of each role against an OPC UA server with 24 cells: cycles, other clients, memory."""
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+from asyncio.subprocess import PIPE, Process
+from typing import Any
+
+from tests.benchmarks.scada import ROOT
+from tests.benchmarks.table import Table
+
+ROLES = ("nobody", "observer", "operator", "engineer")
+SECONDS = 120.0
+SETTLE_S = 20.0
+"""After the hostile client is gone: sessions without a client have ended."""
+COLUMNS = (
+    "hostile client",
+    "requests",
+    "cycles lost",
+    "publishing late",
+    "reads of another client",
+    "memory",
+)
+LONGER_MS, MEMORY = 10.0, 0.05
+"""Bars: how much longer another client's p99 may be, and how far memory may be from before."""
+
+
+async def _process(module: str, *arguments: str) -> Process:
+    return await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", f"tests.benchmarks.{module}", *arguments),
+        stdin=PIPE,
+        stdout=PIPE,
+        stderr=subprocess.DEVNULL,
+        cwd=ROOT,
+    )
+
+
+async def _said(process: Process) -> Any:
+    assert process.stdout is not None
+    return json.loads(await process.stdout.readline())
+
+
+async def _state(feed: Process) -> Any:
+    assert feed.stdin is not None
+    feed.stdin.write(b"\n")
+    await feed.stdin.drain()
+    return await _said(feed)
+
+
+async def _client(site: dict[str, Any], role: str, seconds: float) -> Any:
+    process = await _process("_hostile_clients", json.dumps({"site": site, "role": role, "seconds": seconds}))
+    said = await _said(process)
+    await process.wait()
+    return said
+
+
+async def _rows(seconds: float) -> list[tuple[str, ...]]:
+    feed = await _process("_hostile_feed")
+    site = await _said(feed)
+    quiet_s = min(seconds, 30.0)
+    await _client(site, "measure", quiet_s / 3)  # what is made once is made
+    rows = []
+    for role in ROLES:
+        await _state(feed)
+        alone = await _client(site, "measure", quiet_s)
+        before = await _state(feed)
+        hostile, during = await asyncio.gather(
+            _client(site, role, seconds), _client(site, "measure", seconds)
+        )
+        meanwhile = await _state(feed)
+        await asyncio.sleep(SETTLE_S)
+        after = await _state(feed)
+        rows.append(_row(role, hostile["asked"], before, meanwhile, after, alone, during))
+        sys.stderr.write(" | ".join(rows[-1]) + "\n")
+    feed.kill()
+    await feed.wait()
+    return rows
+
+
+def _row(
+    role: str, asked: int, before: Any, meanwhile: Any, after: Any, alone: Any, during: Any
+) -> tuple[str, ...]:
+    longer = during["p99"] - alone["p99"]
+    grown = after["rss_mb"] / before["rss_mb"] - 1.0
+    lost = f"{meanwhile['lost']} of {meanwhile['due']}"
+    reads = f"p99 {alone['p99']:.1f} to {during['p99']:.1f} ms ({longer:+.1f}; n = {during['n']})"
+    memory = f"{before['rss_mb']:.0f} to {after['rss_mb']:.0f} MB ({grown:+.1%})"
+    return (
+        role,
+        str(asked),
+        lost if meanwhile["lost"] == 0 else f"**{lost}**",
+        f"p99 {before['late_ms'][1]:.0f} to {meanwhile['late_ms'][1]:.0f} ms",
+        reads if longer <= LONGER_MS else f"**{reads}**",
+        memory if grown <= MEMORY else f"**{memory}**",
+    )
+
+
+def tables(quick: bool = False) -> list[Table]:
+    """Measure."""
+    seconds = 20.0 if quick else SECONDS
+    rows = asyncio.run(_rows(seconds))
+    load = os.getloadavg()[2]
+    note = (
+        f"{seconds:.0f} s each, one after the other on one server. Bars: no cycle lost; another client's p99 "
+        f"at most {LONGER_MS:.0f} ms longer; memory within {MEMORY:.0%} of before, {SETTLE_S:.0f} s later. "
+        "24 cells publish two cycles a second each, from a thread each and without module and estimators; a "
+        "cycle counts as lost that is later than the next is due. The other client reads ten values fifty "
+        "times a second, encrypted, from a process of its own; the hostile one has eight sessions in turn "
+        "asking for all that its role may (without a login: 32 connections at a time), from another. Load of "
+        f"the machine over the last 15 minutes: {load:.1f} on {os.cpu_count()} cores, other work included."
+    )
+    return [Table("One hostile client", COLUMNS, rows, note)]
