@@ -3,7 +3,7 @@
 Each is an effect like any other, with the coefficients of a cubic B-spline on uniform knots as its parameters
 (de Boor, A Practical Guide to Splines, 1978): `lower` and `upper` say where the knots lie and are held in a
 fit, `c0`, `c1`, ... are fitted. Beyond the knots the spline goes on along its tangent. What physics asks is
-built into the place: no force without indentation, no drag without speed, no pull at the end of its reach.
+built into the place: no force without indentation, no drag without speed, no pull beyond its reach.
 They are no named effects: nobody accepts one, and no YAML offers them.
 """
 
@@ -82,8 +82,8 @@ def _damping_over_rate(_d: float, rate: float, _k: float, _b: float, p: FloatPoi
 
 
 def _pull_over_gap(gap: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
-    """(1 - gap/upper) s(gap) while the gap is below `upper`."""
-    return (1.0 - gap / p[1]) * spline(gap, p, SPANS)
+    """S(gap) while the gap is below `upper`."""
+    return spline(gap, p, SPANS)
 
 
 def _reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -256,8 +256,8 @@ _DECLARED = (
         "free_pull_over_gap",
         _pull_over_gap,
         ("gap", "m", "a"),
-        (LawKind.PULL, Kind.CONTACT, "(1.0 - a / reach) * s", "N", 3.0),
-        "pull (1 - gap/l) s(gap), gap < l",
+        (LawKind.PULL, Kind.CONTACT, "s", "N", 3.0),
+        "pull s(gap), gap < l",
         extra={LawKind.REACH: _reach},
     ),
     _form(

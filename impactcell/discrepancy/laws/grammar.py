@@ -99,6 +99,7 @@ ATOMS = (
     Atom("tanh(u/l)", "math.tanh(u / scale)", (SCALE,)),
     Atom("sin(2pi u/p)", "math.sin(6.283185307179586 * u / period)", (PERIOD,)),
     Atom("cos(2pi u/p)", "math.cos(6.283185307179586 * u / period)", (PERIOD,)),
+    Atom("1/(1+((u-c)/l)^2)", "(1.0 / (1.0 + ((u - centre) / scale) ** 2))", (CENTRE, SCALE)),
     Atom("exp(-(u-c)^2/2l^2)", "math.exp(-0.5 * ((u - centre) / scale) ** 2)", (CENTRE, SCALE)),
     Atom("1/(1+exp(-(u-c)/l))", "(0.5 + 0.5 * math.tanh(0.5 * (u - centre) / scale))", (CENTRE, SCALE)),
     Atom("max(u-c,0)", "(max(u - centre, 0.0) / reference)", (CENTRE,)),

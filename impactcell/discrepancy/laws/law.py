@@ -99,7 +99,6 @@ class Law:
             + "),"
             for item in self.parameters
         ]
-        around = self.place.around.replace("reach", "range_m") if reach else self.place.around
         laws = f"LawKind.{kind.name}: law" + (", LawKind.REACH: reach" if reach else "")
         end = (
             "\n\ndef reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:\n"
@@ -126,7 +125,7 @@ class Law:
                 *lines,
                 f"    u = {self.place.argument}",
                 f"    s = {self.expression}",
-                f"    return {around}",
+                f"    return {self.place.around}",
                 end,
                 "",
                 "EFFECT = Effect(",

@@ -106,7 +106,7 @@ def test_friction_that_rises_with_speed_is_more_friction() -> None:
 
 
 def test_pull_of_a_straight_line_is_adhesion() -> None:
-    free = _free("free_pull_over_gap", np.full(10, 4.0), 0.0, 5e-4)
+    free = _free("free_pull_over_gap", 4.0 * (1.0 - GREVILLE / UPPER), 0.0, 5e-4)
     named = _plant({"adhesion": {"force_n": 4.0, "range_m": 5e-4}})
     assert simulate_tap(free, TAP).displacement_m == pytest.approx(
         simulate_tap(named, TAP).displacement_m, rel=1e-9

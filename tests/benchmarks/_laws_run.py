@@ -1,0 +1,201 @@
+"""Runs the study of laws that nobody had listed: a row of a file for each campaign, resumable.
+
+`python -m tests.benchmarks._laws_run --turns 2 --budget 300` adds the campaigns that are not there yet,
+balanced over what is hidden, and stops after 300 s of processor time.
+"""
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from impactcell.discrepancy.laws import LawFinding
+from impactcell.discrepancy.workflow import investigate
+from impactcell.physics.effects import LIBRARY
+from impactcell.physics.free_forms import spline_basis
+from impactcell.records import Samples
+from tests.discrepancy.study import Job, campaign, hidden
+
+ROWS = Path("bench-results/laws.jsonl")
+FIRST_SEED = 90_000
+"""Seeds of this study; numbers were chosen on seeds below 9000."""
+SHOTS = 48
+"""Shots of a campaign."""
+STRENGTH = 0.7
+"""Multiple of the default strengths."""
+Truth = Callable[[Samples, Mapping[str, Any]], Samples]
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """What is hidden, and what a right answer is.
+
+    Attributes
+    ----------
+    place, form : str
+        Empty where it is no function of one covariate: then nothing may be proposed.
+    truth : callable or None
+        Function of the covariate, its parameters by name.
+    """
+
+    effect: str
+    place: str = ""
+    form: str = ""
+    truth: Truth | None = None
+
+
+def _constant(name: str) -> Truth:
+    return lambda u, p: np.full_like(u, p[name])
+
+
+def _line(name: str, sign: float = 1.0) -> Truth:
+    return lambda u, p: sign * p[name] * u
+
+
+FUNCTIONS = (
+    Hidden("viscous_friction", "free_drag_over_speed", "1", _constant("viscous_coefficient_n_s_per_m")),
+    Hidden("quadratic_drag", "free_drag_over_speed", "u", _line("drag_coefficient_n_s2_per_m2")),
+    Hidden(
+        "stribeck_friction",
+        "free_friction_over_speed",
+        "exp(-(u/l)^2)",
+        lambda u, p: p["friction_increase"] * np.exp(-((u / p["stribeck_velocity_m_s"]) ** 2)),
+    ),
+    Hidden("position_dependent_friction", "free_friction_over_position", "u", _line("gradient_per_m")),
+    Hidden(
+        "friction_patch",
+        "free_friction_over_position",
+        "exp(-(u-c)^2/2l^2)",
+        lambda u, p: p["amplitude"] * np.exp(-0.5 * ((u - p["position_m"]) / p["width_m"]) ** 2),
+    ),
+    Hidden(
+        "periodic_friction",
+        "free_friction_over_position",
+        "cos(2pi u/p) + sin(2pi u/p)",
+        lambda u, p: p["amplitude"] * np.sin(2.0 * math.pi * u / p["period_m"] + p["phase_rad"]),
+    ),
+    Hidden("restoring_force", "free_force_over_position", "u", _line("stiffness_n_per_m", -1.0)),
+    Hidden("hunt_crossley_damping", "free_damping_over_indentation", "u", _line("damping_n_s_per_m2")),
+    Hidden("hertz_contact", "free_stiffness_over_indentation", "u^n"),
+    Hidden("adhesion", "free_pull_over_gap", "max(1-u/l,0)"),
+    Hidden("actuator_ramp", "free_speed_over_time", "max(1-u/l,0)"),
+    Hidden("force_saturation", "free_reading_over_force", "max(1-c/u,0)"),
+    Hidden("bilinear_contact", "free_stiffness_over_indentation", "max(1-c/u,0)"),
+    Hidden(
+        "magnetic_pull",
+        "free_force_over_position",
+        "1/(1+((u-c)/l)^2)",
+        lambda u, p: p["force_n"] / (1.0 + ((u - p["position_m"]) / p["width_m"]) ** 2),
+    ),
+    Hidden(
+        "gap_suction",
+        "free_pull_over_gap",
+        "1 + cos(2pi u/p)",
+        lambda u, p: np.where(u < p["range_m"], p["force_n"] * np.sin(math.pi * u / p["range_m"]) ** 2, 0.0),
+    ),
+)
+"""Functions of one covariate."""
+OTHERS = tuple(
+    map(
+        Hidden, ("relaxing_contact", "loose_mass", "late_friction", "machine_vibration", "actuator_vibration")
+    )
+)
+"""What no function of one of the covariates is."""
+NONE = Hidden("")
+"""Nothing hidden."""
+
+
+def job_of(item: Hidden, turn: int, number: int) -> Job:
+    """Give the campaign of one turn."""
+    kind = "none" if not item.effect else "removed"
+    effects = (item.effect,) if item.effect else ()
+    return Job(kind, effects, FIRST_SEED + 100 * turn + number, strength=STRENGTH, shots=SHOTS)
+
+
+def run(item: Hidden, job: Job) -> dict[str, Any]:
+    """One row of the study."""
+    data = campaign(job)
+    library = [name for name in LIBRARY if name != item.effect]
+    started = time.process_time()
+    steps: dict[str, float] = {}
+    found = investigate(
+        data,
+        seed=job.seed,
+        library=library,
+        progress=lambda step: steps.setdefault(step, time.process_time()) and None,
+    )
+    names = list(steps)
+    law_step = next((i for i, step in enumerate(names) if "law" in step), None)
+    row: dict[str, Any] = {
+        "key": job.key,
+        "effect": item.effect,
+        "verdict": found.verdict,
+        "added": list(found.added),
+        "seconds": round(time.process_time() - started, 2),
+        "law_seconds": 0.0
+        if law_step is None
+        else round(steps[names[law_step + 1]] - steps[names[law_step]], 2),
+        "law": None,
+    }
+    finding = found.law
+    if finding is None:
+        return row
+    proposed = finding.proposed
+    row["law"] = {
+        "place": finding.term.form.effect.identifier,
+        "rival_places": list(finding.rival_places),
+        "form": None if proposed is None else proposed.functional_form,
+        "equivalents": [law.law.functional_form for law in finding.equivalents],
+        "refused": finding.refused,
+        "before": finding.change.before.trace,
+        "after": finding.change.after.trace,
+        "error": _error(item, job, finding),
+    }
+    return row
+
+
+def _error(item: Hidden, job: Job, finding: LawFinding) -> float | None:
+    """RMS error of the function over the states that were visited, over its RMS; None without a truth.
+
+    A constant that the plant has taken up is no error.
+    """
+    form, seen = finding.term.form, finding.term.visited
+    if item.truth is None or finding.refused or form.effect.identifier != item.place:
+        return None
+    truth = item.truth(seen.values, hidden(job)[item.effect])
+    if finding.proposed is not None:
+        function = finding.proposed.values(seen.values)
+    else:
+        function = spline_basis(seen.values, seen.lower, seen.upper, form.spans) @ finding.term.coefficients
+    difference = function - truth
+    if form.constant_is:
+        difference, truth = difference - difference.mean(), truth - truth.mean()
+    return float(np.sqrt(np.mean(difference**2) / np.mean(truth**2)))
+
+
+def main() -> None:
+    """Add what is not there yet."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--turns", type=int, default=10)
+    parser.add_argument("--budget", type=float, default=math.inf, help="processor time [s]")
+    arguments = parser.parse_args()
+    ROWS.parent.mkdir(exist_ok=True)
+    known = {json.loads(line)["key"] for line in ROWS.read_text().splitlines()} if ROWS.exists() else set()
+    begun = time.process_time()
+    for turn in range(arguments.turns):
+        for number, item in enumerate((*FUNCTIONS, *OTHERS, NONE)):
+            job = job_of(item, turn, number)
+            if job.key in known or time.process_time() - begun > arguments.budget:
+                continue
+            with ROWS.open("a") as rows:
+                rows.write(json.dumps(run(item, job)) + "\n")
+
+
+if __name__ == "__main__":
+    main()
