@@ -218,21 +218,25 @@ def law_figure(result: DiscrepancyResult) -> str | None:
     finding = result.law
     if finding is None or finding.refused:
         return None
-    form, curve = finding.term.form, finding.curve
+    form, curve, law = finding.term.form, finding.curve, finding.proposed
+    # What the plant takes up is no difference: both are drawn about their means then.
+    level = float(np.mean(curve.function)) if form.constant_is else 0.0
+    scale, unit = (1e3, "mm") if form.covariate_unit == "m" else (1.0, form.covariate_unit)
+    u = scale * curve.covariate
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 3.4))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
         above.axhline(0.0, color="#8a97a3", linewidth=0.8)
-        above.fill_between(curve.covariate, curve.low, curve.high, color=MEASURED, alpha=0.5, linewidth=0)
-        above.plot(curve.covariate, curve.function, color=BEFORE, label="spline, 95 % band")
-        if finding.proposed is not None:
-            function = finding.proposed.values(curve.covariate)
-            above.plot(curve.covariate, function, "--", color=AFTER, label=finding.proposed.functional_form)
-        above.set_ylabel("s(u)" if form.unit == "1" else f"s(u) [{form.unit}]")
+        above.fill_between(u, curve.low - level, curve.high - level, color=MEASURED, alpha=0.5, linewidth=0)
+        above.plot(u, curve.function - level, color=BEFORE, label="spline, 95 % band")
+        if law is not None:
+            function = law.values(curve.covariate)
+            shift = float(np.mean(function)) if form.constant_is else 0.0
+            above.plot(u, function - shift, "--", color=AFTER, label=law.functional_form)
+        what = "s(u) less its mean" if form.constant_is else "s(u)"
+        above.set_ylabel(what if form.unit == "1" else f"{what} [{form.unit}]")
         above.legend(frameon=False, fontsize=8)
-        below.hist(finding.term.visited.values, bins=60, color=MEASURED)
+        below.hist(scale * finding.term.visited.values, bins=60, color=MEASURED)
         below.set_yticks([])
-        below.set_xlabel(
-            f"{form.covariate.replace('_', ' ')} [{form.covariate_unit}]; below: where samples lie"
-        )
+        below.set_xlabel(f"u, {form.covariate.replace('_', ' ')} [{unit}]; below: where samples lie")
         return _svg(figure)

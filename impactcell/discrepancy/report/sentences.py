@@ -19,9 +19,12 @@ def headline(result: DiscrepancyResult) -> str:
     if finding is None or finding.refused:
         return _conclusion(result)
     fall = f"from {finding.change.before.trace:.2f} to {finding.change.after.trace:.2f} noise floors"
-    what = finding.term.form.effect.equation if finding.proposed is None else finding.proposed.equation
-    kind = "A free-form term" if finding.proposed is None else "A law that is in no library"
-    return f"{_conclusion(result)} {kind} closes what is left in the traces {fall}: {what}."
+    form = finding.term.form
+    u = form.covariate.replace("_", " ")
+    what = f"a free-form function of u, the {u}"
+    if finding.proposed is not None:
+        what = f"{finding.proposed.functional_form} of u, the {u}, a law that no library has"
+    return f"{_conclusion(result)} With s in {form.effect.equation} as {what}, the traces fall {fall}."
 
 
 def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
