@@ -18,6 +18,7 @@ from impactcell.prediction.free_slide import free_slide_friction
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
+from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
 
 COLUMNS = (
@@ -53,6 +54,10 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
         print_note(note)
     if campaign_data.excitation is Excitation.DRIVEN:
         raise CampaignError(f"{campaign}: estimate needs taps or free slides, this campaign is driven")
+    data_faults = inspect_campaign(campaign_data)
+    for note in notes_of(data_faults):
+        print_note(note)
+    refuse_unusable(campaign_data, data_faults)
     check_campaign_units(campaign_data)
     if campaign_data.excitation is Excitation.FREE_SLIDE:
         rows = [

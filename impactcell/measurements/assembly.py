@@ -9,13 +9,14 @@ import numpy as np
 
 from impactcell.campaign import Campaign, Excitation, Sensor
 from impactcell.campaign import write as write_directory
-from impactcell.errors import MeasurementError
+from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.captures import channel_of, described
 from impactcell.measurements.mapping import Given, Mapping
 from impactcell.measurements.recognition import CHANNELS, Quantity
 from impactcell.measurements.recorded import MAX_FAULTS_TOLD, Record, records_of
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
+from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel, Samples
 
 STANDARD_GRAVITY_M_S2 = 9.81
@@ -75,7 +76,12 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         sensors=_sensors(captures),
         columns=_columns(captures, excitation),
     )
-    return Imported(campaign, tuple(notes))
+    data_faults = inspect_campaign(campaign)
+    try:
+        refuse_unusable(campaign, data_faults)
+    except CampaignError as error:
+        raise MeasurementError(f"{records[0].place}: {error}") from error
+    return Imported(campaign, (*notes, *notes_of(data_faults)))
 
 
 def write_campaign(tables: Sequence[Table], mapping: Mapping, directory: Path) -> Imported:

@@ -18,6 +18,7 @@ from impactcell.discrepancy.data.shots import POSITION, IndexArray, PreparedShot
 from impactcell.discrepancy.data.tap import Tap
 from impactcell.discrepancy.data.unit_checks import check_units
 from impactcell.errors import CampaignError
+from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel, Samples
 
 STRATEGIES: dict[Excitation, ExcitationStrategy] = {
@@ -71,7 +72,9 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     """
     strategy = STRATEGIES[campaign.excitation]
     campaign, pretrigger = from_contact(campaign)
-    notes = list(pretrigger)
+    data_faults = inspect_campaign(campaign)
+    refuse_unusable(campaign, data_faults)
+    notes = [*pretrigger, *notes_of(data_faults)]
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
         message = (

@@ -1,0 +1,129 @@
+"""Looks through a campaign for what is wrong with its data, shot by shot and over all shots."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from impactcell.campaign import Campaign, Excitation
+from impactcell.campaign.contacts import noise_of
+from impactcell.errors import CampaignError
+from impactcell.quality.channels import channel_faults
+from impactcell.quality.data_fault import DataFault, Fault
+from impactcell.quality.motion import LATE_STEPS, lateness_s, slides
+from impactcell.records import Capture, Samples
+
+CHANNELS = ("force", "position", "actuator")
+DRIFT_SHARE = 0.01
+"""Change of the force at rest over a campaign, as a share of its largest force, from which on it is told."""
+DRIFT_STD = 6.0
+"""The same in standard deviations of the scatter about its trend."""
+LOW_SHARE, REST_STD, MIN_REST_SHARE = 0.05, 5.0, 0.2
+"""The force at rest is the median of what is within so many standard deviations of its lowest twentieth, if
+that
+is a fifth of the record at least: else it has hardly been recorded."""
+MIN_SHOTS = 6
+"""Shots over which a drift or a lateness can be told."""
+UNUSABLE = (Fault.NO_MOTION, Fault.PRESLIDING_ONLY, Fault.CONSTANT)
+"""What leaves nothing to be estimated in a shot."""
+
+
+def inspect_campaign(campaign: Campaign) -> tuple[DataFault, ...]:
+    """Say what is wrong with the data of a campaign, before any physics is blamed."""
+    data_faults: list[DataFault] = []
+    for shot in campaign.shots:
+        for name in CHANNELS:
+            channel = getattr(shot, name)
+            if channel is not None:
+                data_faults += channel_faults(name, channel, shot.cycle)
+        motion = slides(shot)
+        if motion is not None:
+            data_faults.append(motion)
+    if campaign.excitation is Excitation.TAP:
+        data_faults += _late(campaign.shots)
+        data_faults += _drift(campaign.shots)
+    return tuple(data_faults)
+
+
+def notes_of(data_faults: Sequence[DataFault]) -> tuple[str, ...]:
+    """Give one sentence for each kind of fault of each channel: the first in full, and how many more."""
+    by_kind = Counter((data_fault.fault, data_fault.channel) for data_fault in data_faults)
+    notes = []
+    for (fault, channel), count in by_kind.items():
+        first = next(
+            data_fault
+            for data_fault in data_faults
+            if (data_fault.fault, data_fault.channel) == (fault, channel)
+        )
+        place = "" if first.shot is None else f"shot {first.shot}: "
+        more = "" if count == 1 else f"; the like in {count - 1} more shots"
+        notes.append(f"Data, {fault}: {place}{first.message}{more}.")
+    return tuple(notes)
+
+
+def refuse_unusable(campaign: Campaign, data_faults: Sequence[DataFault]) -> None:
+    """Refuse a campaign of which no shot shows a part that slides.
+
+    Raises
+    ------
+    CampaignError
+        With what is wrong in the first shot.
+    """
+    unusable = [data_fault for data_fault in data_faults if data_fault.fault in UNUSABLE]
+    if campaign.excitation is Excitation.DRIVEN:  # a spring or weight beside friction looks like presliding
+        unusable = [data_fault for data_fault in unusable if data_fault.fault is not Fault.PRESLIDING_ONLY]
+    faulty = {data_fault.shot for data_fault in unusable}
+    if campaign.shots and all(shot.cycle in faulty for shot in campaign.shots):
+        first = unusable[0]
+        raise CampaignError(f"shot {first.shot}: {first.message} (and so in all {len(campaign.shots)} shots)")
+
+
+def _late(shots: Sequence[Capture]) -> list[DataFault]:
+    lateness = np.array([lateness_s(shot) for shot in shots])
+    known = lateness[np.isfinite(lateness)]
+    if len(known) < MIN_SHOTS:
+        return []
+    middle = float(np.median(known))
+    step = float(np.median([np.median(np.diff(s.force.time_s)) for s in shots if s.force is not None]))
+    if abs(middle) <= LATE_STEPS * step or np.mean(np.abs(known - middle) <= 2.0 * step) < 0.6:
+        return []
+    which, other = ("force", "position") if middle > 0.0 else ("position", "force")
+    told = (
+        f"the {which} is recorded {1e3 * abs(middle):.2g} ms after the {other} ({len(known)} shots): "
+        f"check filters and "
+        f"the clock of that channel before a law is blamed"
+    )
+    return [DataFault(Fault.LATE_CHANNEL, which, told)]
+
+
+def _rest_force(force: Samples) -> float:
+    """Force without contact [N]; nan where the record shows hardly any."""
+    low = float(np.quantile(force, LOW_SHARE))
+    near = force[np.abs(force - low) < REST_STD * max(noise_of(force), 1e-12)]
+    return float(np.median(near)) if len(near) >= MIN_REST_SHARE * len(force) else math.nan
+
+
+def _drift(shots: Sequence[Capture]) -> list[DataFault]:
+    forces = [shot.force for shot in shots if shot.force is not None and np.ptp(shot.force.values) > 0.0]
+    if len(forces) < MIN_SHOTS:
+        return []
+    resting = np.array([_rest_force(force.values) for force in forces])
+    forces = [force for force, rest in zip(forces, resting.tolist(), strict=True) if math.isfinite(rest)]
+    resting = resting[np.isfinite(resting)]
+    if len(forces) < MIN_SHOTS:
+        return []
+    largest = float(np.median([force.values.max() for force in forces]))
+    place = np.arange(len(resting), dtype=np.float64)
+    slope, start = np.polyfit(place, resting, 1)
+    scatter = float(np.std(resting - (start + slope * place)))
+    change = float(slope * (len(resting) - 1))
+    error = scatter * math.sqrt(12.0 / len(resting))
+    if abs(change) < max(DRIFT_SHARE * largest, DRIFT_STD * error):
+        return []
+    told = (
+        f"the force at rest goes from {start:.3g} N to {start + change:.3g} N over {len(resting)} shots: "
+        f"tare the sensor, "
+        f"let it warm up"
+    )
+    return [DataFault(Fault.DRIFT, "force", told)]

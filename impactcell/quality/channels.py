@@ -1,0 +1,128 @@
+"""What a channel shows by itself: spikes, plateaus at its end, samples that are missing or stuck."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from impactcell.campaign.contacts import noise_of
+from impactcell.quality.data_fault import DataFault, Fault
+from impactcell.records import Channel, Samples
+
+SPIKE_STD = 12.0
+"""Distance of a spike from the median of five samples, in standard deviations of the noise: white noise
+gets there
+once in 1e30 samples."""
+SPIKE_SHARE = 2e-3
+"""The same as a share of the range: where there is no noise, a kink is that far from the median of its
+neighbours."""
+RASTER_STEPS = 3.0
+"""The same in steps of a coarse raster, over which noise jumps by one or two."""
+MAX_SPIKE_SAMPLES = 2
+"""Samples in a row that are a spike; more is a motion, or a median of five would not see them."""
+MIN_PLATEAU = 5
+"""Equal samples in a row that noise does not make."""
+PLATEAU_FACTOR = 3.0
+"""Length of a plateau over the longest run of equal samples elsewhere: a coarse raster makes runs
+everywhere."""
+MIN_STUCK = 10
+"""Equal samples in a row, amid ones that differ, that are no measurement."""
+GAP_FACTOR = 5.0
+"""Step of time over the median one from which on samples are missing."""
+MIN_SAMPLES = 16
+"""Samples of a channel from which on any of this can be told."""
+
+
+def channel_faults(name: str, channel: Channel, shot: int) -> list[DataFault]:
+    """Say what is wrong with one channel of one shot."""
+    if len(channel.values) < MIN_SAMPLES:
+        return []
+    if np.ptp(channel.values) == 0.0:
+        told = f"the {name} is constant at {channel.values[0]:.6g}: not connected, or the wrong column"
+        return [DataFault(Fault.CONSTANT, name, told, shot)]
+    return [
+        *_spikes(name, channel, shot),
+        *_plateaus(name, channel, shot),
+        *_gaps(name, channel, shot),
+    ]
+
+
+def _spikes(name: str, channel: Channel, shot: int) -> list[DataFault]:
+    values = channel.values
+    away = np.abs(values - median_filter(values, 5, mode="nearest"))
+    steps = np.abs(np.diff(values))
+    raster = float(steps[steps > 0.0].min())
+    far = away > max(SPIKE_STD * noise_of(values), SPIKE_SHARE * float(np.ptp(values)), RASTER_STEPS * raster)
+    # An edge of the signal stays where it is under a median; what comes and goes within two samples does not.
+    starts, lengths = _runs(far)
+    isolated = starts[lengths <= MAX_SPIKE_SAMPLES]
+    isolated = isolated[(isolated > 1) & (isolated < len(values) - 3)]
+    if not isolated.size:
+        return []
+    first = int(isolated[0])
+    told = (
+        f"{isolated.size} outliers in the {name}, the first at {channel.time_s[first]:.6g} s "
+        f"({values[first]:.4g} amid "
+        f"{float(np.median(values[max(first - 2, 0) : first + 3])):.4g}): check cable and shielding, or "
+        f"leave them out"
+    )
+    return [DataFault(Fault.OUTLIERS, name, told, shot)]
+
+
+def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
+    values = channel.values
+    if name == "actuator" or noise_of(values) == 0.0:
+        return []  # an actuator halts, and without noise rest is a plateau
+    starts, lengths = _equal_runs(values)
+    data_faults = []
+    extreme = np.isin(values[starts], (values.max(), values.min()))
+    elsewhere = int(lengths[~extreme].max(initial=1))
+    for end, word in ((float(values.max()), "upper"), (float(values.min()), "lower")):
+        at_end = values[starts] == end
+        longest = int(lengths[at_end].max(initial=0))
+        if longest >= MIN_PLATEAU and longest > PLATEAU_FACTOR * elsewhere and math.fabs(end) > 0.0:
+            start = int(starts[at_end][lengths[at_end].argmax()])
+            told = (
+                f"the {name} stands at its {word} end, {end:.6g}, for {longest} samples from "
+                f"{channel.time_s[start]:.6g} s "
+                f"({int((values == end).sum())} in all): clipped; choose a wider range"
+            )
+            data_faults.append(DataFault(Fault.CLIPPING, name, told, shot))
+    inner = ~extreme
+    stuck = inner & (lengths >= MIN_STUCK) & (lengths > PLATEAU_FACTOR * np.median(lengths) + MIN_STUCK)
+    if stuck.any() and float(np.quantile(lengths, 0.9)) < 0.5 * MIN_STUCK:
+        start = int(starts[stuck][0])
+        told = (
+            f"the {name} is stuck at {values[start]:.6g} for {int(lengths[stuck][0])} samples from "
+            f"{channel.time_s[start]:.6g} s ({int(stuck.sum())} such stretches): samples were lost"
+        )
+        data_faults.append(DataFault(Fault.DROPOUTS, name, told, shot))
+    return data_faults
+
+
+def _gaps(name: str, channel: Channel, shot: int) -> list[DataFault]:
+    steps = np.diff(channel.time_s)
+    gaps = np.flatnonzero(steps > GAP_FACTOR * np.median(steps))
+    if not gaps.size:
+        return []
+    first = int(gaps[0])
+    told = (
+        f"samples of the {name} are missing in {gaps.size} places, the first for {1e3 * steps[first]:.3g} "
+        f"ms from "
+        f"{channel.time_s[first]:.6g} s: what happened meanwhile is lost"
+    )
+    return [DataFault(Fault.DROPOUTS, name, told, shot)]
+
+
+def _equal_runs(values: Samples) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Begin and length of each run of equal values."""
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
+    return starts, np.diff(np.concatenate([starts, [len(values)]]))
+
+
+def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Begin and length of each run of true."""
+    edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return starts, ends - starts
