@@ -11,20 +11,38 @@ from typing import Annotated
 import typer
 
 from impactcell.cli.access_verbs import certs, users
+from impactcell.cli.model_verbs import model
 from impactcell.cli.options import AsJson, Cell, Cells, Directory, OptionalCell, verb
 
 app = typer.Typer(
-    add_completion=False,
+    add_completion=True,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="Friction from taps: estimated, tracked, alarmed and used, beside a PLC.",
 )
-model = typer.Typer(no_args_is_help=True, help="The model a cell runs with.")
 app.add_typer(users, name="users")
 app.add_typer(certs, name="certs")
 effect = typer.Typer(no_args_is_help=True, help="Effects of your own.")
 app.add_typer(model, name="model")
 app.add_typer(effect, name="effect")
+
+
+def _print_version(asked: bool) -> None:  # noqa: FBT001 - typer's callback signature
+    if asked:
+        from impactcell import __version__
+
+        typer.echo(f"impactcell {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def program(
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Friction from taps: estimated, tracked, alarmed and used, beside a PLC."""
 
 
 @verb(app)
@@ -52,13 +70,35 @@ def run(cells: Cells) -> None:
 
 
 @verb(app)
-def check(cells: Cells) -> None:
-    """Report every fault of the cell files at once as file:line:column: message."""
-    from impactcell.process.console import print_result
-    from impactcell.settings import read_cells
+def check(cells: Cells, *, as_json: AsJson = False) -> None:
+    """Report every fault of the cell files at once, and whether each cell fits together as a whole."""
+    from impactcell.cli.check import check as run_check
 
-    read_cells(cells)
-    print_result(f"{len(cells)} cell file{'s' * (len(cells) > 1)} in order")
+    run_check(cells, as_json=as_json)
+
+
+@verb(app)
+def init(
+    directory: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write.")] = Path(),
+    *,
+    name: Annotated[str | None, typer.Option(help="Name of the cell.")] = None,
+    host: Annotated[str | None, typer.Option(help="Address of its module.")] = None,
+    port: Annotated[int | None, typer.Option(help="Its Modbus TCP port.")] = None,
+    register_map: Annotated[str | None, typer.Option("--map", help="A map file, or fpga-v1.")] = None,
+    mass_kg: Annotated[float | None, typer.Option(help="Mass of the part.")] = None,
+    stroke_mm: Annotated[float | None, typer.Option(help="Stroke from first contact on.")] = None,
+    max_velocity_mm_per_min: Annotated[float | None, typer.Option(help="Fastest tap.")] = None,
+    wear_limit: Annotated[float | None, typer.Option(metavar="MU", help="mu_s that counts as worn.")] = None,
+    campaign: Annotated[
+        Path | None, typer.Option(metavar="CAMPAIGN", help="Taps to fit the first model to.")
+    ] = None,
+) -> None:
+    """Begin a cell: write its cell file, register map and first model; asks for what is not said."""
+    from impactcell.cli.init import QUESTIONS, ask
+    from impactcell.cli.init import init as run_init
+
+    given = locals()
+    run_init(directory, ask({key: given[key] for key in QUESTIONS}), campaign)
 
 
 @verb(app)
@@ -98,11 +138,12 @@ def estimate(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.csv", help="CSV file to write.")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Estimate the friction of every shot of a campaign."""
     from impactcell.cli.estimate import estimate as run_estimate
 
-    run_estimate(campaign, cell, output)
+    run_estimate(campaign, cell, output, as_json=as_json)
 
 
 @verb(app, "import")
@@ -221,33 +262,6 @@ def effect_check(
     from impactcell.cli.effects import check_effects
 
     check_effects(files)
-
-
-@verb(model, "accept")
-def model_accept(
-    cell: Cell,
-    extended: Annotated[
-        Path, typer.Argument(metavar="MODEL.yaml", help="As the discrepancy workflow wrote it.")
-    ],
-    *,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would change.")] = False,
-    as_json: AsJson = False,
-) -> None:
-    """Put an extended model into service; a running cell takes it over without losing its state."""
-    from impactcell.cli.accept_model import accept_model, compare_models
-
-    if dry_run:
-        compare_models(cell, extended, as_json=as_json)
-    else:
-        accept_model(cell, extended, as_json=as_json)
-
-
-@verb(model, "restore")
-def model_restore(cell: Cell, *, as_json: AsJson = False) -> None:
-    """Put the model back into service that the last `model accept` replaced."""
-    from impactcell.cli.accept_model import restore_model
-
-    restore_model(cell, as_json=as_json)
 
 
 def run_verb(arguments: list[str] | None = None) -> None:

@@ -1,6 +1,8 @@
 """`impactcell estimate`: friction of every shot of a campaign, by every predictor."""
 
 import csv
+import io
+import json
 import math
 import sys
 from collections.abc import Iterable, Sequence
@@ -27,8 +29,13 @@ COLUMNS = (
     "peak_force_n", "sliding_distance_m", "gap", "reason",
 )  # fmt: skip
 
+WORDS = ("estimator", "quality", "mu_k_quality", "reason")
+"""Columns that are no numbers."""
 
-def estimate(campaign: Path, cell: Path | None = None, output: Path | None = None) -> None:
+
+def estimate(
+    campaign: Path, cell: Path | None = None, output: Path | None = None, *, as_json: bool = False
+) -> None:
     """Write a row a shot: mu_s by equations (4), (5), (6) and the waveform, and mu_k.
 
     Parameters
@@ -39,6 +46,8 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
         Cell whose model is used; without it the plant is fitted to the campaign, k_v = 0.
     output : Path, optional
         CSV file; without it the rows go to standard output.
+    as_json : bool
+        Print the rows as one JSON list, numbers as numbers and null where there is none.
 
     Raises
     ------
@@ -72,15 +81,19 @@ def estimate(campaign: Path, cell: Path | None = None, output: Path | None = Non
             for tap in taps:
                 rows.append((tap.capture.cycle, estimate_from_features(tap, model, misfit)))
                 advance()
-    if output is None:
+    if as_json:
+        sys.stdout.write(_as_json(rows))
+    elif output is None:
         _write(rows, sys.stdout)
+    if output is None:
         return
     try:
         with output.open("w", encoding="utf-8", newline="") as file:
             _write(rows, file)
     except OSError as fault:
         raise CampaignError(f"{output}: cannot be written: {fault.strerror}") from fault
-    print_result(f"{len(rows)} shots in {output}")
+    if not as_json:
+        print_result(f"{len(rows)} shots in {output}")
 
 
 def _model(campaign: Campaign, taps: Sequence[Features], cell: Path | None) -> tuple[Model, float]:
@@ -112,6 +125,17 @@ def _of_free_slide(shot: Capture, gravity_m_s2: float) -> FrictionEstimate:
         mu_s=nothing, mu_k=mu_k, by_force=nothing, by_distance=nothing, combined=nothing,
         estimator=Estimator.NONE, peak_force_n=math.nan, sliding_distance_m=math.nan,
     )  # fmt: skip
+
+
+def _as_json(rows: Sequence[tuple[int, FrictionEstimate]]) -> str:
+    """Write the rows as they are in CSV; what is empty there is null."""
+    text = io.StringIO()
+    _write(rows, text)
+    shots = []
+    for row in csv.DictReader(io.StringIO(text.getvalue())):
+        numeric = {k: float(v) if v else None for k, v in row.items() if k not in WORDS}
+        shots.append({**row, **numeric, "shot": int(row["shot"])})
+    return json.dumps(shots) + "\n"
 
 
 def _write(rows: Iterable[tuple[int, FrictionEstimate]], file: TextIO) -> None:

@@ -1,0 +1,168 @@
+"""A cell's first model: fitted to a campaign or to the running cell's own first taps, and judged."""
+
+import json
+import math
+import sys
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+from impactcell.api.friction import with_masses
+from impactcell.campaign import Campaign, Excitation, from_contact, read
+from impactcell.campaign.recorded import from_captures
+from impactcell.cli.accept_model import previous_model
+from impactcell.cli.calibrate import calibrated_model
+from impactcell.cli.paths import note_damage, open_journal
+from impactcell.errors import CampaignError, PredictionError, SettingsError
+from impactcell.features import extract
+from impactcell.prediction.joint_plant_fit import PlantFit, fit_plant
+from impactcell.process.console import print_note, print_result
+from impactcell.settings import CellConfig, read_cell
+from impactcell.settings.model_file import write_model
+
+TAPS: Final = 30
+"""Taps of a running cell that its first model is fitted to: k, b and mu_k/mu_s to a per cent or so."""
+FEWEST_TAPS: Final = 10
+"""Below this the spread from tap to tap is hardly seen."""
+LARGEST_STIFFNESS_ERROR: Final = 0.02
+"""Relative standard deviation of k; mu_s from the peak force is off by about half of it."""
+LARGEST_DAMPING_ERROR: Final = 0.2
+"""Relative standard deviation of b, which matters less."""
+LARGEST_RATIO_ERROR: Final = 0.05
+"""Standard deviation of mu_k/mu_s."""
+LARGEST_GAP: Final = 1.5
+"""Residuals in noise floors; above it something is missing in the model."""
+
+
+@dataclass(frozen=True, slots=True)
+class FirstModel:
+    """A fitted plant with what is to be said of it.
+
+    Attributes
+    ----------
+    shortcomings : tuple of str
+        Why it is not good enough yet, each with the way out; empty where it is.
+    """
+
+    fit: PlantFit
+    taps: int
+    shortcomings: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """What was found, with one standard deviation."""
+        plant, prior = self.fit.model.plant, self.fit.model.prior
+        return (
+            f"k {plant.stiffness_n_per_m:.6g} ± {prior.stiffness_std_n_per_m:.2g} N/m, "
+            f"b {plant.damping_n_s_per_m:.5g} ± {prior.damping_std_n_s_per_m:.2g} N s/m, "
+            f"mu_k/mu_s {self.fit.model.ratio:.4f} ± {prior.ratio_std:.2g}, "
+            f"from {len(self.fit.used)} of {self.taps} taps; residuals {self.fit.gap:.3g} noise floors"
+        )
+
+
+def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
+    """Fit a plant to a campaign of taps and judge it.
+
+    Raises
+    ------
+    CampaignError
+        The campaign has no taps.
+    PredictionError
+        No plant could be fitted.
+    """
+    if campaign.excitation is not Excitation.TAP:
+        raise CampaignError(f"{source}: a first model needs taps, this campaign is {campaign.excitation}")
+    struck, notes = from_contact(campaign)
+    for note in notes:
+        print_note(note)
+    taps = with_masses([extract(shot) for shot in struck.shots])
+    fit = fit_plant(taps, struck.gravity_m_s2, name)
+    provenance = {"made by": "impactcell", "fitted to": f"{len(fit.used)} taps of {source}"}
+    fit = replace(fit, model=replace(fit.model, provenance=provenance))
+    return FirstModel(fit, len(taps), tuple(_shortcomings(fit)))
+
+
+def _shortcomings(fit: PlantFit) -> list[str]:
+    plant, prior = fit.model.plant, fit.model.prior
+    found = []
+    if len(fit.used) < FEWEST_TAPS:
+        found.append(f"only {len(fit.used)} taps could be used; strike {TAPS}")
+    if not prior.stiffness_std_n_per_m <= LARGEST_STIFFNESS_ERROR * plant.stiffness_n_per_m:
+        found.append("k is not known well enough; strike more taps, and faster ones")
+    if not prior.damping_std_n_s_per_m <= LARGEST_DAMPING_ERROR * max(plant.damping_n_s_per_m, 1.0):
+        found.append("b is not known well enough; vary the velocity")
+    if not prior.ratio_std <= LARGEST_RATIO_ERROR:
+        found.append("mu_k/mu_s is not known well enough; strike more taps")
+    if not fit.gap <= LARGEST_GAP:
+        found.append(
+            f"the taps are {fit.gap:.2g} noise floors off the model: something is missing in it; "
+            "`impactcell discrepancy` names it"
+        )
+    return found
+
+
+def fit_model(
+    cell: Path, campaign: Path | None, taps: int, *, anyway: bool = False, as_json: bool = False
+) -> None:
+    """Fit a cell's model to a campaign, or to the first taps of its own journal, and put it into service.
+
+    The model that it replaces is kept beside it, as `model accept` does. One that is not good enough is put
+    into service only where that is asked for with `anyway`.
+
+    Raises
+    ------
+    SettingsError, CampaignError, JournalError
+        A file cannot be read or written, or there are no taps.
+    PredictionError
+        No plant could be fitted, or it is not good enough.
+    """
+    config = read_cell(cell)
+    source, data = _taps(config, campaign, taps)
+    first = fit_first_model(data, config.name, source)
+    if first.shortcomings and not anyway:
+        say_first_model(first, None, as_json=as_json)
+        raise PredictionError("not put into service (--anyway would)")
+    model = calibrated_model(replace(config, model=first.fit.model))
+    target = config.settings.model
+    previous_model(target).write_bytes(target.read_bytes())
+    write_model(model, target)
+    say_first_model(first, target, as_json=as_json)
+
+
+def say_first_model(first: FirstModel, target: Path | None, *, as_json: bool = False) -> None:
+    """Say what was fitted, where it was written (None: nowhere), and whether it is good enough."""
+    plant, prior = first.fit.model.plant, first.fit.model.prior
+    if as_json:
+        content = {
+            "model": None if target is None else str(target),
+            "stiffness_n_per_m": {"value": plant.stiffness_n_per_m, "std": prior.stiffness_std_n_per_m},
+            "damping_n_s_per_m": {"value": plant.damping_n_s_per_m, "std": prior.damping_std_n_s_per_m},
+            "ratio": {"value": first.fit.model.ratio, "std": prior.ratio_std},
+            "taps": first.taps,
+            "used": len(first.fit.used),
+            "gap": first.fit.gap,
+            "good_enough": not first.shortcomings,
+            "shortcomings": list(first.shortcomings),
+        }
+        sys.stdout.write(json.dumps(content) + "\n")
+        return
+    print_result(first.sentence if target is None else f"{target}: {first.sentence}")
+    if first.shortcomings:
+        print_result("not good enough yet: " + "; ".join(first.shortcomings))
+    else:
+        print_result("good enough to estimate friction with")
+
+
+def _taps(config: CellConfig, campaign: Path | None, taps: int) -> tuple[str, Campaign]:
+    if campaign is not None:
+        return campaign.name, read(campaign)
+    if config.settings.journal is None:
+        raise SettingsError(f"{config.path}: the cell keeps no journal; name a campaign with --campaign")
+    path = config.settings.journal.file
+    with open_journal(path) as journal:
+        captures = list(islice(journal.captures(damaged=note_damage), taps))
+    mass_kg = config.settings.part.mass_kg
+    if mass_kg is not None:
+        captures = [replace(c, mass_kg=mass_kg) if math.isnan(c.mass_kg) else c for c in captures]
+    return f"journal {path.name}", from_captures(captures, config.model.plant.gravity_m_s2).campaign

@@ -1,0 +1,194 @@
+"""`impactcell init`: the files of an own cell, each with what it needs, from a few answers."""
+
+import math
+import shutil
+import sys
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Final
+
+import typer
+import yaml
+
+from impactcell.campaign import read
+from impactcell.cli.calibrate import calibrated_model
+from impactcell.cli.first_model import fit_first_model, say_first_model
+from impactcell.errors import SettingsError
+from impactcell.physics import Plant
+from impactcell.prediction import Model
+from impactcell.prediction.model import Prior
+from impactcell.process.console import print_note, print_result
+from impactcell.process.shipped import shipped_config
+from impactcell.settings import read_cell
+from impactcell.settings.judgement import judge_cell
+from impactcell.settings.model_file import write_model
+
+PROVISIONAL_STIFFNESS: Final = 6.5e5
+"""k of the paper's prototype, N/m: a beginning where nothing was measured."""
+PROVISIONAL_DAMPING: Final = 465.0
+"""b of the paper's prototype, N s/m."""
+PROVISIONAL_RATIO: Final = 0.76
+"""mu_k/mu_s of the paper's prototype."""
+PROVISIONAL_ERROR: Final = 0.5
+"""Relative standard deviation of what is only a beginning."""
+FRICTION_BELOW_LIMIT: Final = 0.8
+"""Friction of a provisional model, of the wear limit."""
+TOP: Final = """\
+# A cell of impactcell, begun by `impactcell init`; `impactcell schema` tells every key there is.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What a cell is begun with; the help of each is what is asked for.
+
+    Attributes
+    ----------
+    register_map : str
+        A map file, or the name of one that comes with the program.
+    """
+
+    name: str
+    host: str
+    port: int
+    register_map: str
+    mass_kg: float
+    stroke_mm: float
+    max_velocity_mm_per_min: float
+    wear_limit: float
+
+
+QUESTIONS: Final[dict[str, tuple[str, Any]]] = {
+    "name": ("Name of the cell", "press-1"),
+    "host": ("Address of its module", "127.0.0.1"),
+    "port": ("Modbus TCP port", 502),
+    "register_map": ("Register map: a file, or fpga-v1", "fpga-v1"),
+    "mass_kg": ("Mass of the part, kg", None),
+    "stroke_mm": ("Stroke of the actuator from first contact on, mm", None),
+    "max_velocity_mm_per_min": ("Fastest tap, mm/min", 6000.0),
+    "wear_limit": ("mu_s at which the surface counts as worn", None),
+}
+"""What is asked for, and what is taken where nobody can be asked; None has to be said."""
+
+
+def ask(given: dict[str, Any]) -> Answers:
+    """Complete what was given on the command line: asked on a terminal, else by default.
+
+    Raises
+    ------
+    SettingsError
+        Something has to be said and nobody can be asked.
+    """
+    missing = [key for key, (_, default) in QUESTIONS.items() if given.get(key) is None and default is None]
+    if missing and not sys.stdin.isatty():
+        options = ", ".join(f"--{key.replace('_', '-')}" for key in missing)
+        raise SettingsError(f"init needs {options}; on a terminal it asks")
+    values: dict[str, Any] = {}
+    kinds = {field.name: field.type for field in fields(Answers)}
+    for key, (question, default) in QUESTIONS.items():
+        value = given.get(key)
+        if value is None and sys.stdin.isatty():
+            value = typer.prompt(question, default=default, type=kinds[key])
+        values[key] = default if value is None else value
+    return Answers(**values)
+
+
+def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
+    """Write cell, map and model into a directory; nothing that is there is replaced.
+
+    Raises
+    ------
+    SettingsError
+        A file is there already, or cannot be written, or an answer makes no cell.
+    CampaignError, PredictionError
+        No model can be fitted to the campaign.
+    """
+    source = _map_file(answers.register_map)
+    cell, model = directory / f"{answers.name}.yaml", directory / f"{answers.name}.model.yaml"
+    target_map = directory / source.name
+    for path in (cell, model):
+        if path.exists():
+            raise SettingsError(f"{path}: is there already; name another directory or another cell")
+    first = None if campaign is None else fit_first_model(read(campaign), answers.name, campaign.name)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        if not target_map.exists():
+            shutil.copyfile(source, target_map)
+        cell.write_text(TOP + yaml.safe_dump(_cell(answers, target_map), sort_keys=False), encoding="utf-8")
+    except OSError as error:
+        raise SettingsError(f"{error.filename or directory}: cannot be written: {error.strerror}") from error
+    try:
+        write_model(provisional_model(answers) if first is None else first.fit.model, model)
+        config = read_cell(cell)
+        write_model(calibrated_model(config), model)
+        findings = judge_cell(read_cell(cell))
+    except Exception:
+        cell.unlink()  # what was not begun whole is not begun
+        model.unlink(missing_ok=True)
+        raise
+    for finding in findings:
+        print_note(str(finding))
+    print_result(f"{cell}, {target_map.name} and {model.name} are written")
+    if first is not None:
+        say_first_model(first, model)
+    print_result(_next_steps(cell, directory, is_provisional=first is None))
+
+
+def provisional_model(answers: Answers) -> Model:
+    """Give a model that nothing was measured of: enough to record taps with, and told to be no more."""
+    mu_s = FRICTION_BELOW_LIMIT * answers.wear_limit
+    plant = Plant(PROVISIONAL_STIFFNESS, PROVISIONAL_DAMPING, mu_s, PROVISIONAL_RATIO * mu_s)
+    prior = Prior(
+        PROVISIONAL_ERROR * PROVISIONAL_STIFFNESS,
+        PROVISIONAL_ERROR * PROVISIONAL_DAMPING,
+        PROVISIONAL_ERROR * PROVISIONAL_RATIO,
+    )
+    note = "nothing measured: figures of the paper's prototype; run `impactcell model fit` after 30 taps"
+    return Model(
+        f"{answers.name}-provisional",
+        plant,
+        prior,
+        stroke_m=answers.stroke_mm * 1e-3,
+        provenance={"made by": "impactcell init", "provisional": note},
+    )
+
+
+def _map_file(name: str) -> Path:
+    for path in (Path(name), shipped_config() / "maps" / f"{name}.yaml"):
+        if path.is_file():
+            return path
+    known = ", ".join(sorted(path.stem for path in (shipped_config() / "maps").glob("*.yaml")))
+    raise SettingsError(f"there is no register map {name}; name a file, or one of {known}")
+
+
+def _cell(answers: Answers, target_map: Path) -> dict[str, Any]:
+    if not all(
+        math.isfinite(v) and v > 0.0 for v in (answers.mass_kg, answers.stroke_mm, answers.wear_limit)
+    ):
+        raise SettingsError("mass, stroke and wear limit have to be above 0")
+    return {
+        "format": 1,
+        "cell": answers.name,
+        "module": {"host": answers.host, "port": answers.port, "register_map": target_map.name},
+        "model": f"{answers.name}.model.yaml",
+        "part": {"mass_kg": answers.mass_kg},
+        "actuator": {
+            "stroke_mm": answers.stroke_mm,
+            "max_stroke_mm": answers.stroke_mm,
+            "max_velocity_mm_per_min": answers.max_velocity_mm_per_min,
+        },
+        "alarms": {"wear_limit": answers.wear_limit},
+        "opcua": {"users_file": "users.yaml", "certificates_dir": "pki"},
+        "journal": {"file": f"{answers.name}.sqlite"},
+    }
+
+
+def _next_steps(cell: Path, directory: Path, *, is_provisional: bool) -> str:
+    steps = [
+        f"impactcell probe {cell}        # what the module says, read as the map has it",
+        f"impactcell users add {directory / 'users.yaml'}",
+        f"impactcell run {cell}          # then open http://127.0.0.1:8480",
+    ]
+    if is_provisional:
+        steps.append(f"impactcell model fit {cell}    # after 30 taps: the cell's own k, b and mu_k/mu_s")
+    return "next:\n" + "\n".join(f"  {step}" for step in steps)

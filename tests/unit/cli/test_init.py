@@ -1,0 +1,183 @@
+"""An own cell from nothing: init, check, the model of its first taps; cells that do not fit together."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from impactcell.cli.app import run_verb
+from impactcell.errors import ImpactCellError, PredictionError, SettingsError
+from impactcell.journal.store import Journal
+from impactcell.process.shipped import shipped_config
+from impactcell.settings import read_cell
+from simulator.campaign import write
+from simulator.campaign_scenario import CampaignScenario
+from tests.snapshots import make_snapshot
+
+PLANT = {"stiffness_n_per_m": 3e5, "damping_n_s_per_m": 210, "mu_s": 0.31, "ratio": 0.8}
+ANSWERS = ["--name", "own", "--mass-kg", "4.2", "--stroke-mm", "2", "--wear-limit", "0.4", "--port", "5020"]
+
+
+def run(*arguments: object) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run_verb([str(argument) for argument in arguments])
+    assert ended.value.code == 0
+
+
+@pytest.fixture(scope="module")
+def shots(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Thirty taps on another plant, with another mass and stroke, written by the simulator."""
+    scenario = {
+        "format": 1, "excitation": "tap", "seed": 3, "plant": PLANT, "masses_kg": [4.2], "stroke_m": 0.002,
+        "velocities_mm_per_min": [3000, 4500, 6000], "replicates": 5,
+        "sensors": {
+            "force": {"rate_hz": 20000, "noise_std": 0.4},
+            "position": {"rate_hz": 20000, "noise_std": 1.5e-6},
+        },
+    }  # fmt: skip
+    directory = tmp_path_factory.mktemp("taps") / "shots"
+    write(CampaignScenario.model_validate(scenario), directory)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cell begun with nothing measured."""
+    directory = tmp_path_factory.mktemp("own")
+    run("init", directory, *ANSWERS)
+    return directory
+
+
+def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
+    begun: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = read_cell(begun / "own.yaml")
+    assert cell.model.name == "own-provisional"
+    assert cell.model.stroke_m == pytest.approx(2e-3)
+    assert cell.model.predictors[0].mass_kg < 4.2 < cell.model.predictors[-1].mass_kg
+    run("check", begun / "own.yaml", "--json")
+    said = json.loads(capsys.readouterr().out)
+    assert said["faults"] == []
+    assert ["no users file" in note["message"] for note in said["notes"]] == [True]
+    with pytest.raises(SettingsError, match="is there already"):
+        run_verb(["init", str(begun), *ANSWERS])
+
+
+def test_what_has_to_be_said_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
+    with pytest.raises(SettingsError, match="--mass-kg, --stroke-mm, --wear-limit"):
+        run_verb(["init", str(tmp_path)])
+    for option, value in (("--map", "none"), ("--mass-kg", "nan"), ("--wear-limit", "-1"), ("--name", "a b")):
+        with pytest.raises(ImpactCellError):
+            run_verb(["init", str(tmp_path / "d"), *ANSWERS, option, value])
+    assert not list(tmp_path.rglob("*.yaml")) or not (tmp_path / "d" / "own.yaml").exists()
+
+
+def test_the_first_model_is_that_of_the_plant(
+    shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run("init", tmp_path, *ANSWERS, "--campaign", shots)
+    plant = read_cell(tmp_path / "own.yaml").model.plant
+    assert plant.stiffness_n_per_m == pytest.approx(PLANT["stiffness_n_per_m"], rel=0.01)
+    assert plant.damping_n_s_per_m == pytest.approx(PLANT["damping_n_s_per_m"], rel=0.05)
+    assert plant.mu_k / plant.mu_s == pytest.approx(PLANT["ratio"], abs=0.02)
+    assert "good enough to estimate friction with" in capsys.readouterr().out
+
+
+def test_the_first_taps_of_the_journal_make_the_model(
+    begun: Path, shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from impactcell.campaign import read
+
+    shutil.copytree(begun, tmp_path / "own")
+    cell = tmp_path / "own" / "own.yaml"
+    captures = read(shots).shots
+    with Journal(tmp_path / "own" / "own.sqlite", "own") as journal:
+        for capture in captures[:5]:
+            journal.append(capture, make_snapshot(capture), b"", ())
+    with pytest.raises(PredictionError, match="not put into service"):
+        run_verb(["model", "fit", str(cell), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert told["good_enough"] is False
+    assert told["shortcomings"][0].startswith("only 5 taps could be used")
+    assert read_cell(cell).model.name == "own-provisional"
+    with Journal(tmp_path / "own" / "own.sqlite", "own") as journal:
+        for capture in captures[5:]:
+            journal.append(capture, make_snapshot(capture), b"", ())
+    run("model", "fit", cell, "--json")
+    told = json.loads(capsys.readouterr().out)
+    assert told["good_enough"] is True
+    assert abs(told["stiffness_n_per_m"]["value"] - 3e5) < 4 * told["stiffness_n_per_m"]["std"]
+    assert read_cell(cell).model.name == "own"
+    run("model", "restore", cell)
+    assert read_cell(cell).model.name == "own-provisional"
+
+
+def change(content: dict[str, Any], path: str, value: Any) -> None:
+    *sections, key = path.split(".")
+    for section in sections:
+        content = content.setdefault(section, {})
+    content[key] = value
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "place", "said"),
+    [
+        ("part.mass_kg", 4200.0, "part", "4200 kg, model 'prototype' is calibrated for 9.45 to 37.8 kg"),
+        (
+            "actuator.stroke_mm",
+            3.0,
+            "actuator",
+            "the stroke is 3 mm, model 'prototype' was calibrated for 1.5",
+        ),
+        ("actuator.max_velocity_mm_per_min", 900.0, "actuator", "taps are at most 900 mm/min"),
+        ("alarms.wear_limit", 0.2, "alarms", "the wear limit 0.2 is not above the friction of the model"),
+        ("predictors", [], "model", "has no predictors"),
+    ],
+)
+def test_a_cell_that_does_not_fit_together_is_refused(
+    tmp_path: Path, path: str, value: Any, place: str, said: str
+) -> None:
+    content = yaml.safe_load((shipped_config() / "cells" / "prototype.yaml").read_text())
+    model = yaml.safe_load((shipped_config() / "models" / "prototype.yaml").read_text())
+    change(model if path == "predictors" else content, path, value)
+    content["module"]["register_map"] = str(shipped_config() / "maps" / "fpga-v1.yaml")
+    content["model"] = "model.yaml"
+    (tmp_path / "model.yaml").write_text(yaml.safe_dump(model))
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(yaml.safe_dump(content))
+    with pytest.raises(SettingsError) as refused:
+        run_verb(["check", str(cell)])
+    fault = str(refused.value).splitlines()[0]
+    assert said in fault
+    line = int(fault.removeprefix(f"{cell}:").split(":")[0])
+    section = next(
+        text for text in reversed(cell.read_text().splitlines()[:line]) if not text.startswith(" ")
+    )
+    assert section.startswith(place)
+
+
+def test_faults_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "cell.yaml").write_text("format: 1\ncell: a\nnonsense: 1\n")
+    with pytest.raises(SettingsError):
+        run_verb(["check", str(tmp_path / "cell.yaml"), "--json"])
+    faults = json.loads(capsys.readouterr().out)["faults"]
+    assert {fault["line"] for fault in faults} >= {3}
+    assert all(fault["file"] == str(tmp_path / "cell.yaml") for fault in faults)
+
+
+def test_friction_as_json(shots: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run("estimate", shots, "--json")
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["shot"] for row in rows] == list(range(1, len(rows) + 1))
+    assert sum(row["mu_s"] for row in rows) / len(rows) == pytest.approx(PLANT["mu_s"], abs=0.01)
+
+
+def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
+    from impactcell import __version__
+
+    run("--version")
+    assert capsys.readouterr().out == f"impactcell {__version__}\n"
