@@ -276,6 +276,8 @@ _DECLARED = (
     ),
 )
 
+"""Friction, forces on the part, contact, actuator and sensor: wherever a law of one covariate may act."""
+
 FREE_FORMS: Mapping[str, FreeForm] = MappingProxyType({form.effect.identifier: form for form in _DECLARED})
 """Every place by the identifier of its effect."""
 

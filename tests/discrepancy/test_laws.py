@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from impactcell.campaign import Campaign
 from impactcell.discrepancy.laws.grammar import ATOMS, Atom, evaluate, shaped_terms
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics import Effect, Plant, TapInput, simulate_tap
-from impactcell.physics.effects import find_effect
+from impactcell.physics.effect_contract import contract_faults
+from impactcell.physics.effects import find_effect, withdraw_effect
+from impactcell.physics.outside_effects import offer_effects
 from tests.discrepancy.study import Job, campaign
 
 FEW = ("hertz_contact", "friction_drift")
@@ -120,3 +123,20 @@ def test_there_are_ten_thousand_starts_and_each_is_one_function() -> None:
     terms = list(shaped_terms(0.0, 1.0, constant=True))
     assert len(terms) + len(terms) ** 2 // 2 > 10_000
     assert len({(item.term, item.shapes) for item in terms}) == len(terms)
+
+
+def test_the_effect_file_passes_the_contract_that_effects_are_held_to(
+    found: DiscrepancyResult, tmp_path: Path
+) -> None:
+    assert found.law is not None
+    law = found.law.proposed
+    assert law is not None
+    again = replace(law, identifier="law_from_a_file")
+    file = tmp_path / "law_from_a_file.py"
+    file.write_text(again.text())
+    offered = offer_effects([file])
+    try:
+        assert offered == ("law_from_a_file",)
+        assert contract_faults(find_effect("law_from_a_file")) == []
+    finally:
+        withdraw_effect("law_from_a_file")

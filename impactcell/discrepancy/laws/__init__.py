@@ -1,8 +1,8 @@
 """A law that nobody had listed: a free-form term where something remains, then the laws that it may be."""
 
-from impactcell.discrepancy.laws.finding import Curve, LawFinding, find_law
+from impactcell.discrepancy.laws.finding import FittedFunction, LawFinding, find_law
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
 from impactcell.discrepancy.laws.law import Law
 from impactcell.discrepancy.laws.refit import FittedLaw
 
-__all__ = ["Curve", "FittedLaw", "FreeTerm", "Law", "LawFinding", "find_law", "fit_free_terms"]
+__all__ = ["FittedFunction", "FittedLaw", "FreeTerm", "Law", "LawFinding", "find_law", "fit_free_terms"]

@@ -30,7 +30,7 @@ MOST_STEPS = 9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curve:
+class FittedFunction:
     """A fitted function with its 95 % band, each of shape (n,)."""
 
     covariate: Samples
@@ -47,7 +47,7 @@ class LawFinding:
     ----------
     term : FreeTerm
         Free-form term at the place that predicts best.
-    curve : Curve
+    function : FittedFunction
     law : FittedLaw or None
         Functional form that does as well; None where only the spline does.
     equivalents : tuple of FittedLaw
@@ -65,7 +65,7 @@ class LawFinding:
     """
 
     term: FreeTerm
-    curve: Curve
+    function: FittedFunction
     law: FittedLaw | None
     equivalents: tuple[FittedLaw, ...]
     rival_places: tuple[str, ...]
@@ -124,7 +124,7 @@ def find_law(
     change = measure.change(held_base, held, (Part.TRACES,))
     return LawFinding(
         best,
-        _curve(best),
+        _fitted_function(best),
         law,
         () if law is None else _equivalents(laws),
         tuple(term.form.effect.identifier for term in terms[1:] if _predict_alike(best, term)),
@@ -186,7 +186,7 @@ def _predict_alike(best: FreeTerm, other: FreeTerm) -> bool:
     return float(np.mean(difference)) < TIED_PLACES * scatter
 
 
-def _curve(term: FreeTerm) -> Curve:
+def _fitted_function(term: FreeTerm) -> FittedFunction:
     lower, upper = term.visited.lower, term.visited.upper
     u = np.linspace(lower, upper, DRAWN)
     basis = spline_basis(u, lower, upper, term.form.spans)
@@ -196,7 +196,7 @@ def _curve(term: FreeTerm) -> Curve:
     inside = covariance[np.ix_(term.columns, term.columns)] * np.outer(scale, scale)
     std = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", basis, inside, basis), 0.0))
     value = basis @ term.coefficients
-    return Curve(u, value, value - BAND * std, value + BAND * std)
+    return FittedFunction(u, value, value - BAND * std, value + BAND * std)
 
 
 def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange) -> str:
@@ -230,4 +230,4 @@ def gives_energy(term: FreeTerm) -> bool:
     for place, coordinate in enumerate(term.fit.coordinates):
         if parameter_name(coordinate) == term.form.dissipates:
             own = coordinate.value(float(term.fit.theta[place]))
-    return bool((own + _curve(term).high < 0.0).any())
+    return bool((own + _fitted_function(term).high < 0.0).any())

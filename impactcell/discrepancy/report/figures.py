@@ -218,7 +218,7 @@ def law_figure(result: DiscrepancyResult) -> str | None:
     finding = result.law
     if finding is None or finding.refused:
         return None
-    form, curve, law = finding.term.form, finding.curve, finding.proposed
+    form, curve, law = finding.term.form, finding.function, finding.proposed
     # What the plant takes up is no difference: both are drawn about their means then.
     level = float(np.mean(curve.function)) if form.constant_is else 0.0
     scale, unit = (1e3, "mm") if form.covariate_unit == "m" else (1.0, form.covariate_unit)
