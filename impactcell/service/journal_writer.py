@@ -159,7 +159,7 @@ class JournalWriter:
         cycle_id, _ = self._waiting.popleft()
         if cycle_id is None:
             self._log.error("an entry of the journal is lost: %s", why)
-        else:
+        elif cycle_id != self.durable:  # else it is stored already
             self.lost += 1
             self._log.error("not stored, and lost: %s", why, cycle=cycle_id.cycle)
 

@@ -279,6 +279,28 @@ async def test_a_wrong_crc_is_read_again(fpga: RegisterMap) -> None:
         assert module.status.discarded == 1
 
 
+async def test_a_window_that_changes_while_it_is_read_is_read_again_also_without_a_crc(
+    fpga: RegisterMap,
+) -> None:
+    """The sequence number behind the samples is all that tells."""
+    registers = {name: register for name, register in fpga.registers.items() if name != "capture_crc32"}
+    layout = RegisterMap(fpga.name, registers)
+    device = ScriptedDevice(layout)
+    make(device)
+    address = layout["force"].address + 2000
+
+    def change() -> None:
+        device.image[address : address + 500] = 0
+        device.put("window_sequence_after", int(device.get("window_sequence")) + 2)
+        device.on_read.append((layout["window_sequence"].address, device._show))
+
+    device.on_read.append((address, change))
+    async with running(layout, device) as (_, module, receptions):
+        [received] = await take(receptions, 1)
+        assert_whole(received)
+        assert module.status.discarded == 1
+
+
 async def test_a_capture_that_never_fits_its_crc_is_passed_on_empty_and_the_next_is_good(
     fpga: RegisterMap,
 ) -> None:

@@ -105,6 +105,13 @@ def test_codes_that_mean_no_value_become_nan() -> None:
     assert register.encode(np.array([1.0, math.nan])).tolist() == [2, 0x8000]
 
 
+def test_a_code_that_means_no_value_becomes_nan_also_where_there_is_one_value() -> None:
+    register = Register("x", 0, "i16", unit="N", scale=0.5, not_a_number=-32768)
+    assert math.isnan(float(register.decode(register.encode(math.nan))))
+    assert register.decode(np.array([2], dtype=WIRE)) == 1.0
+    assert register.decode(np.array([0x8001], dtype=WIRE)) == -16383.5
+
+
 def test_units_become_si() -> None:
     speed = Register("v", 0, "f32", unit="mm/min")
     assert speed.decode(speed.encode(0.1)) == pytest.approx(0.1, rel=1e-7)

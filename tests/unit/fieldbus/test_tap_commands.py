@@ -85,6 +85,18 @@ async def test_a_tap_is_made_once_and_tells_its_cycle(fpga: RegisterMap) -> None
     assert device.taps[0] == pytest.approx((0.05, 0.0012, -1), rel=1e-6)
 
 
+async def test_the_command_after_the_last_number_is_the_first_and_never_none(fpga: RegisterMap) -> None:
+    """0 stands for no command: a module would never act on it."""
+    device = PositioningDevice(fpga)
+    device.put("command_accepted", 2**32 - 2)
+    numbers = []
+    device.on_command = lambda: numbers.append(int(device.get("command_accepted")))
+    async with ready(fpga, device) as (_, _, positioner):
+        for cycle in (1, 2):
+            assert await positioner.tap(COMMAND) == cycle
+    assert numbers == [2**32 - 1, 1]
+
+
 async def test_an_answer_lost_with_the_connection_does_not_repeat_the_tap(fpga: RegisterMap) -> None:
     device = PositioningDevice(fpga)
     async with ready(fpga, device) as (server, _, positioner):

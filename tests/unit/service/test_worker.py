@@ -47,7 +47,7 @@ async def test_an_entry_that_can_never_be_stored_blocks_nothing(
     assert "stored already" in worker.journal_fault
     assert await process(worker, replace(make_capture(2), time_ns=2**63)) == CycleId(1, 1)
     assert await process(worker, make_capture(3)) == CycleId(1, 3)
-    assert worker.journal_fault == ""
+    assert (worker.journal_fault, worker.lost) == ("", 1)
     await worker.close()
     assert cycles(tmp_path / "j") == [1, 3]
 

@@ -1,0 +1,63 @@
+"""What positioning has learned is there after a restart, and a new task plans with it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell import cell as core
+from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.transports import transport_for
+from impactcell.journal.retention import Retention
+from impactcell.journal.store import Journal
+from impactcell.positioning import PlannerPosterior
+from impactcell.records import PositioningState
+from impactcell.service.factory import cell_design, module_link
+from impactcell.service.positioning import PositioningTask
+from impactcell.service.worker import CellWorker
+from impactcell.settings import CellConfig, read_cell
+from tests.integration.processes import CONFIG
+from tests.snapshots import make_capture
+
+
+@pytest.fixture(scope="module")
+def cell() -> CellConfig:
+    return read_cell(CONFIG / "cells" / "positioning.yaml")
+
+
+def task_of(cell: CellConfig, design: core.CellDesign, worker: CellWorker) -> PositioningTask:
+    client = ModbusClient(transport_for(module_link(cell)))
+    module = ModuleAcquisition(cell.name, client, cell.register_map)
+    return PositioningTask(cell, design, module, worker, lambda: None)
+
+
+def assert_same(posterior: PlannerPosterior, expected: PlannerPosterior) -> None:
+    for name in ("weights", "means", "covs", "scatter_weights"):
+        np.testing.assert_array_equal(getattr(posterior, name), getattr(expected, name))
+    assert (posterior.taps, posterior.surprise) == (expected.taps, expected.surprise)
+
+
+async def test_the_planner_goes_on_after_a_restart(tmp_path: Path, cell: CellConfig) -> None:
+    design = cell_design(cell)
+    first = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    task = task_of(cell, design, first)
+    untaught = task.belief
+    learned = PlannerPosterior(
+        untaught.weights,
+        1.01 * untaught.means,
+        0.5 * untaught.covs,
+        untaught.scatter_weights,
+        taps=7,
+        surprise=0.25,
+    )
+    first.belief = learned
+    await first.process(make_capture(1), PositioningState(), None)
+    await first.close()
+    second = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    assert second.belief is not None
+    assert_same(second.belief, learned)
+    assert_same(task_of(cell, design, second).belief, learned)
+    await second.close()
+    with pytest.raises(AssertionError):
+        assert_same(untaught, learned)
