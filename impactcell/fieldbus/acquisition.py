@@ -143,8 +143,8 @@ class ModuleAcquisition:
         newest = CycleId(0, 0)
         overwritten = disagreements = 0
         while True:
+            sent_s = loop.time()
             try:
-                sent_s = loop.time()
                 status = await self._poll()
                 backoff.reset()
                 newest_now = CycleId(status.session, status.cycle_counter)
@@ -158,7 +158,8 @@ class ModuleAcquisition:
                 fetched = await self._reader.fetch(target, taken)
             except FieldbusError as error:
                 await self._disconnect(error)
-                await asyncio.sleep(backoff.next_delay_s())
+                # An attempt that ran into its timeout has waited long enough.
+                await asyncio.sleep(max(0.0, sent_s + backoff.next_delay_s() - loop.time()))
                 continue
             if fetched is NotFetched.OVERWRITTEN:  # look at the ring again, and then further from its end
                 overwritten = min(max(1, 2 * overwritten), self.registers.slots)

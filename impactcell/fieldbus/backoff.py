@@ -5,7 +5,7 @@ from typing import Final
 
 FIRST_S: Final = 0.02
 """Longest first delay, seconds: a module that restarts is back within some tens of milliseconds."""
-CEILING_S: Final = 0.5
+CEILING_S: Final = 0.4
 """Longest delay, seconds: what a first cycle may cost after the link is back."""
 
 
@@ -21,7 +21,7 @@ class Backoff:
         self._bound_s = FIRST_S
 
     def next_delay_s(self) -> float:
-        """Return the delay before the next attempt; it grows with each call."""
+        """Return the least time from this attempt to the next; it grows with each call."""
         delay_s = self._bound_s * self._random.uniform(0.5, 1.0)
         self._bound_s = min(2.0 * self._bound_s, CEILING_S)
         return delay_s

@@ -13,6 +13,10 @@ CYCLE_PERIOD: Final = 2**32 - 1
 """Cycle numbers before the first comes again: 32 bits, 0 being none."""
 
 
+_FEWER: Final = 8
+"""So many times fewer cycles since a restart make it likely that the counter was kept."""
+
+
 @dataclass(frozen=True, slots=True)
 class NextCapture:
     """The cycle to read next.
@@ -108,7 +112,7 @@ def _made_before(last: int, counter: int, held: int, *, complete: bool) -> int:
 
     A module counts from 1 again, goes on counting where it was, or begins where somebody set its counter. A
     ring that is not full tells which: it holds all that was made since the restart. Where it is full, the
-    counter is taken to have gone on if that means less than half as many cycles since.
+    counter is taken to have gone on if that means by far fewer cycles since.
 
     Parameters
     ----------
@@ -123,6 +127,6 @@ def _made_before(last: int, counter: int, held: int, *, complete: bool) -> int:
         return counter - 1
     since = cycles_after(last, counter)
     went_on = since <= CYCLE_PERIOD // 2
-    if complete and not (went_on and 2 * since < counter):
+    if complete and not (went_on and _FEWER * since < counter):
         return counter - 1 if counter <= CYCLE_PERIOD // 2 else 0
     return since - 1 if went_on else 0
