@@ -2,7 +2,7 @@
 
 Mutants are drawn with a seed; each is put into a copy of the tree, and only the tests of its room run, until
 the first that fails. A mutant is a line of a file, and is not tried twice.
-`python -m tests.benchmarks.mutation ROOM NUMBER` tries so many of a room; as a topic it prints what is on file.
+`python -m tests.benchmarks.mutation ROOM NUMBER` tries so many of a room; the topic prints what is on file.
 """
 
 import argparse
