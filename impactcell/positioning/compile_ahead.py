@@ -1,0 +1,32 @@
+"""Compiled before the first tap is asked for: no planning step has to wait for it."""
+
+from functools import cache
+
+import numpy as np
+
+from impactcell.positioning import planner_posterior
+from impactcell.positioning.action_selection import select_action
+from impactcell.positioning.displacement_quantiles import parameter_scenarios
+from impactcell.positioning.dynamic_programming import Goal
+from impactcell.positioning.lookahead_table import PlannerLimits, build_lookahead, stiffest
+from impactcell.positioning.quadrature import Z
+from impactcell.positioning.safety_limits import largest_force
+from impactcell.positioning.tap import Tap
+from impactcell.positioning.tap_model import model_of_tap
+
+
+@cache
+def compile_ahead() -> None:
+    """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
+    posterior = planner_posterior.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
+    limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
+    part = np.array([20.0, 9.81])
+    place = np.array([0.0, 1.0])
+    lookahead = build_lookahead(limits, posterior, part, place, 1.0)
+    select_action(
+        2e-3, lookahead.table, lookahead.value, limits.space(posterior, part),
+        parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,
+    )  # fmt: skip
+    tap = Tap(0.02, 2e-4)
+    model_of_tap(tap, posterior, part)
+    largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(posterior), 20.0, 9.81)
