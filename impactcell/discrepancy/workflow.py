@@ -50,6 +50,7 @@ from impactcell.discrepancy.search import (
     only_test,
     propose_experiments,
     select_model,
+    shared_error,
     simulate_held_out,
 )
 from impactcell.physics import Kind, Plant
@@ -185,7 +186,8 @@ def investigate(
     if not missing and len(outcome.validation.of_effects) < len(selection.added):
         selection, outcome = _confirmed_rival(context, selection, opened, outcome)
     final = outcome.final
-    conclusion = conclude(selection, _evidence(context, search_evidence, final), outcome.validation, missing)
+    evidence = _evidence(context, search_evidence, final)
+    conclusion = conclude(selection, evidence, outcome.validation, missing)
     law: LawFinding | None = None
     if not conclusion.remaining.explained and not missing:
         report_step("looking for a law that nobody has listed")
@@ -206,7 +208,7 @@ def investigate(
         held_nominal=outcome.held_nominal,
         held_final=outcome.held_final,
         selection=selection,
-        parameters=estimate_parameters(final, linearise(problem, final)),
+        parameters=estimate_parameters(final, linearise(problem, final), shared_error(evidence)),
         validation=outcome.validation,
         simulation=simulate_held_out(held_problem, nominal, final),
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,

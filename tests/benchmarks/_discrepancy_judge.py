@@ -24,6 +24,7 @@ ACTS = {
     "machine_vibration": MOVING | {"preload"},
     "magnetic_pull": frozenset({"free_slide"}),
     "relaxing_contact": CONTACT,
+    "wandering_force": MOVING | CONTACT,
 }
 """Phases in which the simulator's unlisted laws act: a law of contact in contact, one of the gap after it."""
 

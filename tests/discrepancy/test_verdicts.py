@@ -13,7 +13,7 @@ from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search.conclusion import missing_shots
-from impactcell.discrepancy.search.validation import GapMeasure, confirmed
+from impactcell.discrepancy.search.validation import GapMeasure, Part, confirmed
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture, Channel
 from tests.benchmarks._discrepancy_driven import Job, record
@@ -104,6 +104,17 @@ def test_a_gap_that_rises_or_hardly_falls_confirms_nothing(viscous: DiscrepancyR
     trifle = measure.change(nominal, replace(nominal, residual=0.9996 * nominal.residual))
     assert trifle.low > 0.0  # every shot agrees, and it is no fall worth a name
     assert not trifle.is_real()
+
+
+def test_traces_that_gain_what_the_friction_factors_lose_confirm_nothing(viscous: DiscrepancyResult) -> None:
+    spread = float(np.std(viscous.held_nominal.shot_parameters.log_factor))
+    measure = replace(measure_of(viscous), replicates=ReplicateSpread(spread, 12))
+    wide = viscous.held_final.shot_parameters
+    gap = measure.gap(viscous.held_nominal).trace
+    scattered = replace(wide, log_factor=wide.log_factor + 2.0 * gap * spread)
+    nested = [("a", replace(viscous.held_final, shot_parameters=scattered))]
+    assert measure.change(viscous.held_nominal, nested[0][1], (Part.TRACES,)).is_real()
+    assert confirmed(measure, nested, viscous.held_nominal) == {}
 
 
 def test_the_first_effect_that_is_not_confirmed_ends_the_list(viscous: DiscrepancyResult) -> None:

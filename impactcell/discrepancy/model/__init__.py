@@ -3,7 +3,7 @@
 from impactcell.discrepancy.model.block_selection import decided_blocks, usable_blocks
 from impactcell.discrepancy.model.constraints import Constraints, Roughness
 from impactcell.discrepancy.model.initial_guess import fit_nominal
-from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
+from impactcell.discrepancy.model.intervals import ParameterEstimate, SharedError, estimate_parameters
 from impactcell.discrepancy.model.least_squares import (
     Fit,
     fit,
@@ -43,6 +43,7 @@ __all__ = [
     "Problem",
     "Roughness",
     "Scores",
+    "SharedError",
     "SplitFits",
     "concatenate_products",
     "decided_blocks",

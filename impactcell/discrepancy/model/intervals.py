@@ -35,11 +35,29 @@ class ParameterEstimate:
     at_bound: bool
 
 
-def covariance(linearisation: LinearisedFit) -> Samples:
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedError:
+    """What all shots have in common of the error of a model: smooth shapes of random size.
+
+    Attributes
+    ----------
+    shapes : ndarray, shape (Q, p)
+        Products of each shape with the derivatives by the shared coordinates, summed over the shots.
+    variance : ndarray, shape (Q,)
+        Of the shapes' sizes.
+    """
+
+    shapes: Samples
+    variance: Samples
+
+
+def covariance(linearisation: LinearisedFit, shared_error: SharedError | None = None) -> Samples:
     """Covariance of the shared coordinates, shape (p, p).
 
     H^-1 (sum u_i u_i') H^-1 n/(n - p), with the leverage of every shot taken out of its own score
-    (Bell and McCaffrey 2002), since with some forty shots the plain sandwich is too narrow.
+    (Bell and McCaffrey 2002), since with some forty shots the plain sandwich is too narrow. What all shots
+    have in common does not scatter between them: with shapes s_q of variance c_q it adds sum c_q s_q s_q' to
+    the middle.
     """
     H = linearisation.information
     n, p = linearisation.shot_gradient.shape
@@ -52,14 +70,18 @@ def covariance(linearisation: LinearisedFit) -> Samples:
             np.eye(p) - MAX_LEVERAGE * share, linearisation.shot_gradient[i], rcond=None
         )[0]
         meat += np.outer(corrected, corrected)
+    if shared_error is not None:
+        meat += (shared_error.shapes.T * shared_error.variance) @ shared_error.shapes
     sandwich: Samples = inverse @ meat @ inverse
     return sandwich
 
 
-def estimate_parameters(fit: Fit, linearisation: LinearisedFit) -> tuple[ParameterEstimate, ...]:
+def estimate_parameters(
+    fit: Fit, linearisation: LinearisedFit, shared_error: SharedError | None = None
+) -> tuple[ParameterEstimate, ...]:
     """Every shared parameter with its interval."""
     shots = len(linearisation.bounds) - 1
-    spread = np.sqrt(np.maximum(np.diag(covariance(linearisation)), 0.0))
+    spread = np.sqrt(np.maximum(np.diag(covariance(linearisation, shared_error)), 0.0))
     quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, max(shots - len(fit.theta), 2)))
     parameter_estimates = []
     for coordinate, theta, std in zip(fit.coordinates, fit.theta, spread, strict=True):

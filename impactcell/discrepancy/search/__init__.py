@@ -17,6 +17,7 @@ from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
 from impactcell.discrepancy.search.held_out import HeldOutOutcome, OpenedShots
+from impactcell.discrepancy.search.model_error import ModelError, estimate_model_error, shared_error
 from impactcell.discrepancy.search.model_selection import nested_models, only_test, select_model
 from impactcell.discrepancy.search.open_loop import Simulation, SimulationError, simulate_held_out
 from impactcell.discrepancy.search.residual_map import ALL
@@ -45,6 +46,7 @@ __all__ = [
     "GapMeasure",
     "HeldOutOutcome",
     "Mapper",
+    "ModelError",
     "ModelEvidence",
     "OpenedShots",
     "Part",
@@ -59,11 +61,13 @@ __all__ = [
     "Validation",
     "conclude",
     "describe_gap",
+    "estimate_model_error",
     "exchanged",
     "missing_shots",
     "nested_models",
     "only_test",
     "propose_experiments",
     "select_model",
+    "shared_error",
     "simulate_held_out",
 ]

@@ -35,6 +35,8 @@ class SelectionResult:
         Everything that was fitted, the likeliest first.
     unconverged : tuple of tuple of str
         Sets of effects whose fits came to rest short of an optimum: they neither win nor lose.
+    remains : bool
+        The model that was accepted leaves something: its effects stand out, but do not suffice.
     """
 
     nominal: ModelEvidence
@@ -45,6 +47,7 @@ class SelectionResult:
     p_values: dict[str, float]
     alternatives: tuple[Alternative, ...] = field(default=())
     unconverged: tuple[tuple[str, ...], ...] = field(default=())
+    remains: bool = False
 
     def is_accepted(self, model: Fit) -> bool:
         """Whether the search ended with this model."""

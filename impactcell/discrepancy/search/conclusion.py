@@ -102,7 +102,8 @@ def conclude(
     established = tuple(validation.of_effects)
     ties = {effect: selection.ties.get(effect, ()) for effect in established}
     is_silent = evidence.p_value > ALPHA
-    explained = validation.is_at_floor and (is_silent or selection.is_accepted(evidence.fit))
+    suffices = selection.is_accepted(evidence.fit) and not selection.remains
+    explained = validation.is_at_floor and (is_silent or suffices)
     before, after = validation.gap_before, validation.gap_after
     is_open = not explained and before > MIN_OPEN_GAP
     remaining = Remaining(

@@ -25,8 +25,9 @@ def is_converged(problem: Problem, model: Fit, inner: Sequence[Fit] = ()) -> boo
     """
     if _is_beaten(problem, model, inner):
         return False
-    dispersion = max(float(model.misfit(problem.shots).sum()) / problem.shots.values.size, 1.0)
-    return promised_fall(problem, model) <= POLICY.max_promise * dispersion
+    size, misfit = problem.shots.values.size, float(model.misfit(problem.shots).sum())
+    limit = max(POLICY.max_promise * max(misfit / size, 1.0), POLICY.max_promised_share * (misfit - size))
+    return promised_fall(problem, model) <= limit
 
 
 def _is_beaten(problem: Problem, model: Fit, inner: Sequence[Fit]) -> bool:

@@ -29,6 +29,7 @@ from impactcell.discrepancy.search.candidate_fits import (
 )
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.convergence import converge
+from impactcell.discrepancy.search.dominance import accept_dominant
 from impactcell.discrepancy.search.evidence import CandidateScan, ModelEvidence, scan_candidates
 from impactcell.discrepancy.search.indistinguishability import (
     CandidateFit,
@@ -83,8 +84,24 @@ def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
     for stage in STAGES:
         state = stage(context, state)
         if state.result is not None:
-            return replace(state.result, unconverged=tuple(model.effects for model in state.unconverged))
+            result = state.result if state.result.accepted is not None else _dominant_or_none(context, state)
+            return replace(result, unconverged=tuple(model.effects for model in state.unconverged))
     raise AssertionError("the last stage ends every search")
+
+
+def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionResult:
+    """Accept what stands out where nothing suffices, else nothing."""
+    if state.result is None:
+        raise AssertionError("only a search that has ended")
+    dominant = accept_dominant(
+        context,
+        (state.evidence, state.latest),
+        state.singles,
+        state.screened,
+        state.pairs,
+        state.unconverged,
+    )
+    return dominant or state.result
 
 
 def only_test(context: SearchContext, nominal: Fit) -> SelectionResult:
@@ -167,7 +184,8 @@ def fit_pairs(context: SearchContext, state: SearchState) -> SearchState:
     pairs = prefer_interior(context.problem, rank_out_of_shot(context.problem, converged))
     if not pairs or not context.reaches_floor(pairs[0].fit):
         alternatives = compare_fits([*pairs, *state.singles])
-        return replace(state, result=reject(state.evidence, state.latest, alternatives))
+        rejected = reject(state.evidence, state.latest, alternatives)
+        return replace(state, scans=scans, pairs=pairs, result=rejected)
     return replace(state, scans=scans, pairs=pairs)
 
 

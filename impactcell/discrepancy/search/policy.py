@@ -34,6 +34,8 @@ class SearchPolicy:
     max_promise : float
         Fall of the cost, over the mean squared residual, that a converged fit may still promise; good fits
         have been seen to rest at 5, as events make the cost uneven.
+    max_promised_share : float
+        Or this share of what is left above the noise: far from the floor a fit ends earlier.
     max_nesting_loss : float
         Log-likelihood by which a fit may be behind a model inside it.
     min_refit_gain : float
@@ -42,6 +44,13 @@ class SearchPolicy:
         Share of the gap that an effect must explain where the floor is only a lower bound.
     max_rival_share : float
         Share of what it leaves by which a rival may be behind it and still be tied.
+    rival_probability : float
+        Probability of the ratio of what two models leave, beyond which one is told from the other although
+        neither reaches the floor.
+    dominance_error : float
+        Over the library, that an effect without part in a gap stands out; held-out shots are asked as well.
+    max_bound_lead : float
+        Share of the gap by which a shape at the end of its range may be ahead of the effect that stands out.
     """
 
     max_screened: int = 10
@@ -61,10 +70,14 @@ class SearchPolicy:
     max_first_effects: int = 4
     max_second_effects: int = 5
     max_promise: float = 12.0
+    max_promised_share: float = 1e-3
     max_nesting_loss: float = 1.0
     min_refit_gain: float = 2.0
     min_share_explained: float = 0.5
     max_rival_share: float = 0.5
+    rival_probability: float = 0.9
+    dominance_error: float = 0.05
+    max_bound_lead: float = 0.05
 
 
 POLICY = SearchPolicy()

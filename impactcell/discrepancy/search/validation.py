@@ -87,6 +87,10 @@ class GapChange:
         """Whether independent shots agree that the gap falls, and by more than a trifle."""
         return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= max_p
 
+    def rises(self, counted: Sequence[Part]) -> bool:
+        """Whether the whole gap rises although some part of it falls."""
+        return self.after.of(counted) > self.before.of(counted)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GapMeasure:
@@ -282,7 +286,7 @@ def confirmed(
     before = nominal
     for effect, model in nested:
         change = measure.change(before, model)
-        if not change.is_real(max_p):
+        if not change.is_real(max_p) or change.rises(counted_parts(measure, (before, model), [change])):
             break
         changes[effect] = change
         before = model

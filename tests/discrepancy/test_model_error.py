@@ -1,0 +1,107 @@
+"""What a model leaves is a quantity: level and pieces, what stands out of it, how it widens intervals."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from impactcell.discrepancy.model.intervals import SharedError, covariance
+from impactcell.discrepancy.report.result import result_document
+from impactcell.discrepancy.search.model_error import (
+    ModelError,
+    estimate_model_error,
+    largest_rival_excess,
+    share_p_value,
+)
+from impactcell.discrepancy.workflow import investigate
+from tests.discrepancy import study
+
+SHOTS, SAMPLES = 40, 600
+
+
+def left_by(residual: np.ndarray) -> ModelError:
+    """Model error of residuals of one channel, shape (SHOTS, SAMPLES)."""
+    bounds = SAMPLES * np.arange(SHOTS + 1)
+    shots = SimpleNamespace(
+        values=np.zeros(residual.size),
+        channel=np.ones(residual.size, dtype=np.int64),
+        samples_of=lambda shot: slice(int(bounds[shot]), int(bounds[shot + 1])),
+    )
+    problem: Any = SimpleNamespace(shots=shots, count=SHOTS)
+    model: Any = SimpleNamespace(residual=residual.ravel())
+    return estimate_model_error(problem, model)
+
+
+def smooth(rng: np.random.Generator, rows: int, correlation: float) -> np.ndarray:
+    """First-order autoregressions of unit variance, shape (rows, SAMPLES)."""
+    made = np.empty((rows, SAMPLES))
+    made[:, 0] = rng.standard_normal(rows)
+    for place in range(1, SAMPLES):
+        shock = math.sqrt(1.0 - correlation**2) * rng.standard_normal(rows)
+        made[:, place] = correlation * made[:, place - 1] + shock
+    return made
+
+
+def test_white_noise_has_no_level_and_a_piece_a_sample() -> None:
+    found = left_by(np.random.default_rng(1).standard_normal((SHOTS, SAMPLES)))
+    assert found.level < 0.12
+    assert found.pieces > SAMPLES
+
+
+def test_level_and_pieces_are_those_that_went_in() -> None:
+    rng = np.random.default_rng(2)
+    each = smooth(rng, SHOTS, 0.95)
+    found = left_by(rng.standard_normal(each.shape) + 2.0 * each)
+    assert found.level == pytest.approx(2.0, rel=0.15)
+    a_shot = SAMPLES * (1.0 - 0.95) / (1.0 + 0.95)  # samples over the integral of 0.95^|l|
+    same = left_by(rng.standard_normal(each.shape) + 2.0 * smooth(rng, 1, 0.95))
+    assert 0.7 * a_shot < same.pieces < 4.0 * a_shot  # all shots leave the same, but for the noise
+    assert found.pieces > 5.0 * a_shot
+
+
+def test_what_has_no_part_in_a_gap_stands_out_as_rarely_as_stated() -> None:
+    rng = np.random.default_rng(3)
+    pieces = 12
+    p_values = []
+    for _ in range(4000):
+        left, direction = rng.standard_normal((2, pieces))
+        taken = (left @ direction) ** 2 / (direction @ direction)
+        rest = ModelError(float(left @ left - taken), 1.0, float(pieces))
+        p_values.append(share_p_value(float(left @ left), rest, 1))
+    for level in (0.01, 0.05, 0.2):
+        assert np.mean(np.array(p_values) <= level) == pytest.approx(level, rel=0.35)
+
+
+def test_fewer_pieces_tell_fewer_rivals_apart() -> None:
+    few, many = (largest_rival_excess(ModelError(1.0, 1.0, pieces), 0.9) for pieces in (5.0, 100.0))
+    assert few > 3.0
+    assert 1.0 < many < 1.4
+
+
+def test_an_error_that_all_shots_share_widens_intervals_by_its_size() -> None:
+    rng = np.random.default_rng(4)
+    gradient = rng.standard_normal((SHOTS, 1))
+    linearisation: Any = SimpleNamespace(
+        information=np.array([[float(SHOTS)]]),
+        shot_gradient=gradient,
+        shot_information=np.ones((SHOTS, 1, 1)),
+    )
+    shared = SharedError(np.array([[3.0], [1.0]]), np.array([0.5, 0.0]))
+    widened = covariance(linearisation, shared) - covariance(linearisation)
+    assert widened[0, 0] == pytest.approx(3.0**2 * 0.5 / SHOTS**2)
+
+
+def test_an_effect_is_established_although_something_remains(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "RATE_HZ", 2000.0)
+    monkeypatch.setattr("impactcell.discrepancy.workflow.find_law", lambda *_: None)  # has tests of its own
+    job = study.Job("model_error", ("viscous_friction", "wandering_force"), 11, shots=24)
+    library = ("viscous_friction", "quadratic_drag", "stribeck_friction", "friction_drift")
+    outcome = result_document(investigate(study.campaign(job, (0.3, 0.15)), seed=11, library=library))
+    assert "viscous_friction" in {outcome["effects"][0]["effect"], *outcome["effects"][0]["tied_with"]}
+    assert outcome["effects"][0]["held_out"]["closed_ci95"][0] > 0.0
+    assert outcome["gap"]["held_out"]["after"] > 1.2
+    assert not outcome["remaining"]["explained"]
+    assert outcome["remaining"]["model_error"]["level"] > 0.5
+    assert "It leaves" in outcome["headline"]
