@@ -137,6 +137,7 @@ _STATE_2_RENAMED: Final[Mapping[str, str]] = {
 """Of all that `StoredState` holds."""
 _STATE_2_ADDED: Final[Mapping[str, Tree]] = {
     "state.tracker.clock.session": 0,
+    "state.tracker.wear_blocks": None,
     "state.model_digest": "",
     "state.model_changed": False,
     "state.alarms.delays.*.held_back": None,

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from impactcell.tracking.wear_batch import TrackerSettings, run_length_bank
-from impactcell.tracking.wear_batch.run_length_model import OFFSET, TOTAL, BankModel, Measurement
+from impactcell.tracking.wear_batch.run_length_model import BankModel, Measurement
 from tests.benchmarks import _charts, _streams
 from tests.benchmarks.table import Table
 
@@ -17,7 +17,6 @@ KNOWN_CYCLES = 3000  # in control before the first step
 APART = 120  # cycles in control between the places at which a step is tried
 LONGEST = 1200  # cycles a step is given
 PLACES = 25
-NO_LEVEL = np.zeros((1, 2))
 
 
 @njit(error_model="numpy")  # not kept on disk: machine code there is known by the sources beside it only
@@ -31,31 +30,18 @@ def _follow(
     model: BankModel,
     limit: float,
     found: np.ndarray,
-    level: np.ndarray,
 ) -> tuple[int, int, float]:
     n = 0
     for k in range(len(z)):
         t = first + k
         measurement = Measurement(z[k], 1.0, 1.0, 0.0, float(t), 0.0)
-        count, _, statistic = run_length_bank.update(bank, count, model, measurement, outliers, accepted)
+        count, _, statistic, _ = run_length_bank.update(bank, count, model, measurement, outliers, accepted)
         if statistic > limit:
             accepted = float(t)
             found[n] = t
             n += 1
             if n == len(found):
                 break
-        if len(level) > 1:
-            mean = square = inside = 0.0
-            for i in range(count):
-                share = math.exp(bank[i].log_weight)
-                own = bank[i].mean[TOTAL] - bank[i].mean[OFFSET]
-                mean += share * own
-                square += share * own**2
-                spread = bank[i].covariance
-                inside += share * (
-                    spread[TOTAL, TOTAL] - 2.0 * spread[TOTAL, OFFSET] + spread[OFFSET, OFFSET]
-                )
-            level[t, 0], level[t, 1] = mean, inside + square - mean**2
     return count, n, accepted
 
 
@@ -85,7 +71,7 @@ class Run:
     def copy(self) -> "Run":
         return Run(self.bank.copy(), self.count, self.model, self.outliers.copy(), self.accepted, self.cycle)
 
-    def follow(self, z: np.ndarray, most: int = 1000, level: np.ndarray = NO_LEVEL) -> np.ndarray:
+    def follow(self, z: np.ndarray, most: int = 1000) -> np.ndarray:
         """Take z in; give back the indices of the alarms and stop after the `most`-th."""
         found = np.zeros(most)
         self.count, n, self.accepted = _follow(
@@ -98,7 +84,6 @@ class Run:
             self.model,
             run_length_bank.threshold(DESIGN),
             found,
-            level,
         )
         self.cycle += len(z)
         return found[:n]

@@ -1,7 +1,7 @@
 """WearLimit: friction at the reference batch has passed the limit at which the surface counts as worn.
 
 It watches the probability that the level is above the limit, with hysteresis in probability: the level itself
-goes over the limit and back many times while it crosses.
+goes over the limit and back many times while it crosses. What is promised: it comes once that is 95 % sure.
 """
 
 from impactcell.alarms.rule import (
@@ -18,6 +18,8 @@ from impactcell.records import Evidence, WearState
 
 NAME = "WearLimit"
 """Published name."""
+INTERVAL_STDS = 1.96
+"""Half of the interval that is told, in standard deviations: 95 % of a normal distribution."""
 
 
 def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
@@ -29,21 +31,28 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
     if probability <= context.threshold:
         return RuleResult(NAME, holds=False)
     above = wear.level - wear.limit
+    since = _passed(wear, inputs.cycle, above)
+    evidence = Evidence(probability, context.settings.activate_above, since, above, wear.level_std)
+    return RuleResult(NAME, holds=True, message=_message(wear, evidence, inputs.cycle), evidence=evidence)
+
+
+def _passed(wear: WearState, cycle: int, above: float) -> int:
+    """Cycle at which a level that is `above` the limit now was at it."""
     is_rising = wear.rate_per_cycle > 0.0 < above
-    since = inputs.cycle - round(above / wear.rate_per_cycle) if is_rising else inputs.cycle
-    evidence = Evidence(probability, context.settings.activate_above, max(since, 0), above, wear.level_std)
-    return RuleResult(NAME, holds=True, message=_message(wear, evidence), evidence=evidence)
+    return max(cycle - round(above / wear.rate_per_cycle), 0) if is_rising else cycle
 
 
-def _message(wear: WearState, evidence: Evidence) -> Message:
-    since, sure = evidence.change_cycle, 100.0 * evidence.statistic
+def _message(wear: WearState, evidence: Evidence, cycle: int) -> Message:
+    since, sure, reach = evidence.change_cycle, 100.0 * evidence.statistic, INTERVAL_STDS * wear.level_std
+    first, last = (_passed(wear, cycle, evidence.size + edge) for edge in (reach, -reach))
     return Message(
         f"The surface is worn: friction is {wear.level:.4f} ± {wear.level_std:.4f}, its limit "
-        f"{wear.limit:.4f} was passed at about cycle {since} ({sure:.1f} % sure). "
+        f"{wear.limit:.4f} was passed at about cycle {since} ({first} to {last}; {sure:.1f} % sure). "
         "Renew the surface, then call ResetWear.",
         f"Die Oberfläche ist verschlissen: Reibung {german(wear.level, '.4f')} ± "
         f"{german(wear.level_std, '.4f')}, Grenze {german(wear.limit, '.4f')} etwa bei Zyklus {since} "
-        f"überschritten ({german(sure, '.1f')} % sicher). Oberfläche erneuern, danach ResetWear aufrufen.",
+        f"überschritten ({first} bis {last}; {german(sure, '.1f')} % sicher). "
+        "Oberfläche erneuern, danach ResetWear aufrufen.",
     )
 
 
@@ -54,7 +63,7 @@ RULE = AlarmRule(
     title=Message("Wear limit", "Verschleißgrenze"),
     description="The filtered friction has probably passed the wear limit.",
     settings=RuleSettings(
-        severity=700, on_delay=5, off_delay=20, activate_above=0.98, clear_below=0.5, told_step=1.0
+        severity=700, on_delay=5, off_delay=20, activate_above=0.95, clear_below=0.5, told_step=1.0
     ),
     condition_class=ConditionClass.MAINTENANCE,
     input_node="Wear/Level",

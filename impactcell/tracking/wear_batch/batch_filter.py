@@ -6,14 +6,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.records import Samples
-from impactcell.tracking.wear_batch import run_length_bank, wear_filter
+from impactcell.tracking.wear_batch import noise_scale, run_length_bank, wear_blocks, wear_filter
+from impactcell.tracking.wear_batch.block_filter import BlockModel
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale, scale_change
-from impactcell.tracking.wear_batch.run_length_model import SLOPE, TOTAL, BankModel, Measurement
+from impactcell.tracking.wear_batch.run_length_model import (
+    OFFSET,
+    SLOPE,
+    TOTAL,
+    BankModel,
+    Measurement,
+)
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import ChangePoint, TrackerState, UsableCycle
 
 FEWEST_DIFFERENCES = 18.0
 """Differences that the scale of the noise must rest on before a change is believed."""
+DEGREES_PER_DIFFERENCE = 2.0 / 3.0
+"""Degrees of freedom of a variance from n successive differences, over n (von Neumann 1941, Ann. Math. Stat.
+12:367): neighbours share an estimate."""
 LEARNING_DIFFERENCES = 100.0
 """Differences before which a scale that still moves is waited for."""
 SETTLED = 1.15
@@ -36,11 +46,14 @@ class BankUpdate:
         See `TrackerState`.
     statistic : float
         Of a change since the last one that was reported.
+    outlier_share : float
+        Probability that the cycle's estimate is an outlier.
     """
 
     bank: Samples
     outliers: tuple[float, float]
     statistic: float
+    outlier_share: float
 
 
 def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCycle) -> BankUpdate:
@@ -68,7 +81,41 @@ def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCyc
         bank, len(state.bank), model, measurement, outliers, float(state.accepted)
     )
     counts = float(outliers[0]), float(outliers[1])
-    return BankUpdate(run_length_bank.stored(bank, result.hypotheses), counts, result.statistic)
+    stored = run_length_bank.stored(bank, result.hypotheses)
+    return BankUpdate(stored, counts, result.statistic, result.outlier_share)
+
+
+SMALLEST_WEIGHT = 1e-6
+"""Share of its weight that an outlier keeps in its block: however far off, it moves nothing."""
+WEAR_OF_BANK = np.zeros((3, 4))
+"""Slope, level and total from the bank's mean."""
+WEAR_OF_BANK[0, SLOPE] = WEAR_OF_BANK[1, TOTAL] = WEAR_OF_BANK[2, TOTAL] = 1.0
+WEAR_OF_BANK[1, OFFSET] = -1.0
+
+
+def update_blocks(
+    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, updated: BankUpdate
+) -> wear_blocks.WearBlocks | None:
+    """Take a cycle, in the bank by now, into the blocks; None where the filter of known batches has it.
+
+    Blocks that begin in the middle, as after an earlier version or when ids stop coming, go on from the
+    bank. Where the rate itself walks at random, old blocks say little of it, and the bank reports alone.
+    """
+    observation, timing = cycle.observation, cycle.timing
+    is_known = settings.batch is BatchKnowledge.KNOWN and observation.batch_id is not None
+    if is_known or state.slope_variance > 0.0:
+        return None
+    unit = noise_scale.usual_variance(cycle.noise)
+    if state.wear_blocks is None:
+        mean, covariance = run_length_bank.moments(updated.bank)
+        wear = WEAR_OF_BANK @ mean, WEAR_OF_BANK @ covariance @ WEAR_OF_BANK.T
+        return wear_blocks.continue_from(timing.index + timing.lag, *wear, unit)
+    if timing.lag > 0:
+        return state.wear_blocks
+    weight = unit / cycle.variance * max(1.0 - updated.outlier_share, SMALLEST_WEIGHT)
+    blocks = wear_blocks.append(state.wear_blocks, timing.index, observation.mu_s, weight, cycle.announced)
+    model = BlockModel(unit, settings.step_std**2 * unit, state.level_variance)
+    return wear_blocks.update(blocks, model)
 
 
 def detect_change(
@@ -82,11 +129,12 @@ def detect_change(
     is_known = settings.batch is BatchKnowledge.KNOWN and cycle.observation.batch_id is not None
     ways = WAYS_KNOWN if is_known else 1.0
     threshold = run_length_bank.threshold(ways * settings.false_alarm_cycles)
-    is_quiet = cycle.announced < 0.0 or cycle.timing.lag > 0 or updated.statistic <= threshold
+    statistic = _student_statistic(updated.statistic, cycle.noise)
+    is_quiet = cycle.announced < 0.0 or cycle.timing.lag > 0 or statistic <= threshold
     if is_quiet or not _scale_is_known(state, cycle.noise):
         return state, None
     first, size, std = run_length_bank.locate_change_point(updated.bank, state.accepted, index)
-    change = ChangePoint(first, size, std, index, updated.statistic, threshold)
+    change = ChangePoint(first, size, std, index, statistic, threshold)
     return replace(state, accepted_before=state.accepted, accepted=index, change_point=change), change
 
 
@@ -131,6 +179,18 @@ def reason_not_ready(state: TrackerState) -> str:
     if _scale_is_known(state, state.noise):
         return ""
     return "no change of batch is reported yet: the scale of the noise is still being learned"
+
+
+def _student_statistic(statistic: float, noise: NoiseScale) -> float:
+    """Log statistic of a change where the variance of the noise is itself estimated, from few differences.
+
+    For a known variance the log likelihood ratio of a shift by t standard deviations is t^2/2, for one with
+    nu degrees of freedom (nu + 1)/2 log(1 + t^2/nu): what is certain by the first cycles' scale may not be.
+    """
+    if not 0.0 < statistic < math.inf:
+        return statistic
+    degrees = DEGREES_PER_DIFFERENCE * noise.weight
+    return 0.5 * (degrees + 1.0) * math.log1p(2.0 * statistic / degrees)
 
 
 def _scale_is_known(state: TrackerState, noise: NoiseScale) -> bool:

@@ -155,6 +155,11 @@ def variance(noise: NoiseScale, std: float) -> float:
     )
 
 
+def usual_variance(noise: NoiseScale) -> float:
+    """Variance of a usual estimate."""
+    return noise.factor * noise.usual_std**2
+
+
 def variances(noise: NoiseScale, stds: Samples) -> Samples:
     """Variances of the estimates of a history, whose noise is now known."""
     return noise.factor * _calibrated_variances(noise, stds)

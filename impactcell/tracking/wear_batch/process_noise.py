@@ -32,7 +32,7 @@ def update_process_noise(
 def _adapted(state: TrackerState, factor: float) -> tuple[TrackerState, list[str]]:
     if factor == 1.0:
         return state, []
-    level = adapt_process_noise(state.level_variance, factor, _unit(state))
+    level = adapt_process_noise(state.level_variance, factor, noise_scale.usual_variance(state.noise))
     if level == state.level_variance:
         return state, []
     moved = "raised" if factor > 1.0 else "lowered"
@@ -51,7 +51,8 @@ def _replayed(
     walks = noise_identification.RandomWalks(settings.level_noise, settings.slope_noise)
     if identifies:
         walks = noise_identification.identify_random_walks(settings, record, state.noise)
-    level, slope = walks.level**2 * _unit(state), walks.slope**2 * _unit(state)
+    unit = noise_scale.usual_variance(state.noise)
+    level, slope = walks.level**2 * unit, walks.slope**2 * unit
     if level == state.level_variance and slope == state.slope_variance and not is_rescaled:
         return state
     again = noise_identification.replay_bank(settings, record, state.noise, walks)
@@ -67,8 +68,3 @@ def _replayed(
         slope_variance=slope,
         replayed_noise=state.noise,
     )
-
-
-def _unit(state: TrackerState) -> float:
-    """Variance of a usual estimate."""
-    return state.noise.factor * state.noise.usual_std**2

@@ -64,11 +64,14 @@ class BankResult(NamedTuple):
         Log predictive density of the value.
     statistic : float
         Shiryaev-Roberts log statistic of a change after the last that was accepted.
+    outlier_share : float
+        Probability, now, that the measurement is an outlier.
     """
 
     hypotheses: int
     log_density: float
     statistic: float
+    outlier_share: float
 
 
 @compiled
@@ -110,7 +113,7 @@ def update(
     count = run_length_update.prune(bank, count, newest, accepted)
     since = max(accepted, newest - WINDOW)
     statistic = run_length_update.shiryaev_roberts(bank, count, since, model.hazard, model.slope_prior)
-    return BankResult(count, density, statistic)
+    return BankResult(count, density, statistic, outlier_share)
 
 
 @compiled
@@ -121,7 +124,7 @@ def update_series(
     total = 0.0
     for row in series[1:]:
         measurement = Measurement(row[0], row[1], row[2], row[3], row[4], row[5])
-        count, log_density, _ = update(bank, count, model, measurement, outliers, accepted)
+        count, log_density, _, _ = update(bank, count, model, measurement, outliers, accepted)
         total += log_density
     return count, total
 

@@ -11,6 +11,7 @@ from impactcell.tracking.wear_batch.noise_identification import CommissioningRec
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
 from impactcell.tracking.wear_batch.process_noise_adaptation import InnovationCorrelation
 from impactcell.tracking.wear_batch.run_length_bank import WIDTH
+from impactcell.tracking.wear_batch.wear_blocks import WearBlocks
 from impactcell.tracking.wear_batch.wear_filter import WearFilter
 
 
@@ -115,6 +116,8 @@ class TrackerState:
         The present known batch has been reported as shifted, or was expected to be.
     replayed_noise : NoiseScale
         As it was when the first cycles were last gone over with it.
+    wear_blocks : WearBlocks or None
+        What all cycles say of wear where nobody says of which batch they are; None while the filter does.
     """
 
     clock: CycleClock = field(default_factory=CycleClock)
@@ -136,6 +139,7 @@ class TrackerState:
     innovation_correlation: InnovationCorrelation = field(default_factory=InnovationCorrelation)
     level_variance: float = 0.0
     slope_variance: float = 0.0
+    wear_blocks: WearBlocks | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,13 @@ import math
 from dataclasses import dataclass, replace
 
 from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
-from impactcell.tracking.wear_batch import batch_filter, run_length_bank, wear_filter, wear_report
+from impactcell.tracking.wear_batch import (
+    batch_filter,
+    run_length_bank,
+    wear_blocks,
+    wear_filter,
+    wear_report,
+)
 from impactcell.tracking.wear_batch.run_length_model import OFFSET, SLOPE, TOTAL
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import (
@@ -47,6 +53,7 @@ def tracking_result(
 ) -> TrackingResult:
     """Report a cycle: by the filter where the batch is known, else by the bank."""
     notes = outcome.notes
+    probability = None
     quality = Quality.GOOD if outcome.used and not notes else Quality.UNCERTAIN
     if (
         state.filter is not None
@@ -56,9 +63,17 @@ def tracking_result(
         moments, offset, offset_std = _filter_moments(state.filter)
     else:
         moments, offset, offset_std = _bank_moments(state.bank)
+        blocks, index = state.wear_blocks, state.clock.last
+        if blocks is not None and len(blocks.slopes):
+            total = moments.level + offset
+            moments = wear_blocks.moments(blocks, index)
+            offset = total - moments.level
+            probability = wear_blocks.probability_above(blocks, index, settings.wear_limit)
     state = _refine_change_point(state)
     walks = (state.level_variance, state.slope_variance)
     wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes))
+    if probability is not None:
+        wear = replace(wear, probability_above_limit=probability)
     change = state.change_point
     not_ready = batch_filter.reason_not_ready(state)
     batch = BatchState(

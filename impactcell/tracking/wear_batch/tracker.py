@@ -10,6 +10,7 @@ from impactcell.tracking.wear_batch import (
     noise_scale,
     process_noise_adaptation,
     run_length_bank,
+    wear_blocks,
     wear_filter,
 )
 from impactcell.tracking.wear_batch.batch_filter import BankUpdate
@@ -94,6 +95,7 @@ def update(
         filter=known,
         bank=updated.bank,
         outliers=updated.outliers,
+        wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
         innovation_correlation=correlation,
     )
     if timing.lag == 0:
@@ -125,6 +127,7 @@ def _first_state(settings: TrackerSettings, state: TrackerState, cycle: UsableCy
         filter=None
         if batch is None
         else wear_filter.initial_state(observation.mu_s, variance, slope_std, batch),
+        wear_blocks=wear_blocks.begin(index, observation.mu_s, settings.slope_std) if batch is None else None,
         accepted=index,
         accepted_before=index,
         first_index=index,

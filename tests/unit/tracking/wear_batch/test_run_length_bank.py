@@ -28,7 +28,7 @@ def run(values, model, announced=None, variance=1.0, slope_std=0.1, accepted=0.0
     for t, value in enumerate(values[1:], start=1):
         told = 0.0 if announced is None else announced[t]
         measurement = Measurement(float(value), variance, 1.0, 0.0, float(t), float(told))
-        count, density, statistic = run_length_bank.update(
+        count, density, statistic, _ = run_length_bank.update(
             bank, count, model, measurement, outliers, accepted
         )
         densities.append(density)
@@ -119,7 +119,7 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
     oracle.R *= variance
     for t, value in enumerate(values[1:], start=1):
         measurement = Measurement(float(value), variance, 1.0, 0.0, float(t), -1.0)
-        count, density, _ = run_length_bank.update(bank, 1, model, measurement, np.zeros(2), 0.0)
+        count, density, *_ = run_length_bank.update(bank, 1, model, measurement, np.zeros(2), 0.0)
         oracle.predict()
         oracle.update(value)
         assert count == 1
@@ -140,7 +140,7 @@ def test_a_late_reading_gives_the_same_state_as_in_time():
         for t in order:
             passed, lag = float(max(t - newest, 0)), float(max(newest - t, 0))
             measurement = Measurement(float(values[t]), 1.0, passed, lag, float(t), -1.0)
-            count, _, _ = run_length_bank.update(bank, count, model, measurement, outliers, 0.0)
+            count, *_ = run_length_bank.update(bank, count, model, measurement, outliers, 0.0)
             newest = max(newest, t)
         return run_length_bank.moments(run_length_bank.stored(bank, count))
 
@@ -193,7 +193,7 @@ def test_how_many_outliers_there_are_is_learned(share):
     count, outliers, model = 2, np.zeros(2), BankModel(3e-3, 16.0, 0.0, 0.0, prior, 0.01)
     for t, value in enumerate(values[1:], start=1):
         measurement = Measurement(float(value), 1.0, 1.0, 0.0, float(t), 0.0)
-        count, _, _ = run_length_bank.update(bank, count, model, measurement, outliers, 0.0)
+        count, *_ = run_length_bank.update(bank, count, model, measurement, outliers, 0.0)
     learned = run_length_bank.outlier_probability(prior, *outliers)
     # a quarter of the outliers are too small to be told from good values
     assert 0.6 * share <= learned <= 1.2 * share + 0.2 * prior
@@ -221,7 +221,7 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
     count, accepted, its = len(first), 0.0, []
     for t in range(1, len(z)):
         measurement = Measurement(float(z[t]), 1.0, 1.0, 0.0, float(t), 0.0)
-        count, _, statistic = run_length_bank.update(bank, count, model, measurement, outliers, accepted)
+        count, _, statistic, _ = run_length_bank.update(bank, count, model, measurement, outliers, accepted)
         if statistic > run_length_bank.threshold(config.false_alarm_cycles):
             before, accepted = accepted, float(t)
             change, size, _ = run_length_bank.locate_change_point(

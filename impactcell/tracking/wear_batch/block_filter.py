@@ -1,0 +1,228 @@
+"""What a series of block means says of one slope, with the batch changes between them averaged over.
+
+Given the slope, batches share nothing but the level, and their changes can be averaged over forward along
+the blocks (Fearnhead 2006, Stat. Comput. 16:203). Segments are records of `SEGMENT`, oldest change first;
+functions change the first `count` in place. What is kept between cycles:
+`impactcell.tracking.wear_batch.wear_blocks`.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impactcell.numerics.jit import compiled
+from impactcell.records import Samples
+from impactcell.tracking.wear_batch.run_length_model import STEPS
+
+BLOCK = 16
+"""Cycles of one block: few enough that a change inside one costs no more than a block of its own."""
+HAZARD = 1e-3
+"""Prior probability of a change, a cycle: batches of a thousand. Where they are, three times as many put off
+the alarm of a passed limit by 700 cycles: every small step that may have been may pass for wear."""
+MOST_PROBABLE = 0.5
+"""Prior probability of a change between two blocks, at most."""
+SEGMENTS = 12
+"""Hypotheses of the last change that are kept for one slope; 60 say the same to three digits."""
+DROPPED = 1e-9
+"""Probability below which one is given up."""
+STEP_SCALES = np.array(
+    [math.hypot(STEPS[0][0], STEPS[0][1]), math.hypot(STEPS[2][0], STEPS[2][1]), STEPS[4][1]]
+)
+"""Standard deviations of a step, middling, small and large: those of the bank, up and down together."""
+STEP_SHARES = np.array([STEPS[0][2] + STEPS[1][2], STEPS[2][2] + STEPS[3][2], STEPS[4][2]])
+"""Their probabilities."""
+
+WEIGHT, CYCLE, VALUE, CHANGE = range(4)
+"""Columns of a block: sum of its weights, weighted means of index and mu_s, and what is known of a change
+just before it (see `UsableCycle.announced`)."""
+SLOPE, LEVEL, TOTAL = range(3)
+"""Order of what is known of the time before the blocks."""
+SEGMENT = np.dtype(
+    [
+        ("probability", np.float64),
+        ("change", np.float64),
+        ("level", np.float64),
+        ("total", np.float64),
+        ("level_variance", np.float64),
+        ("covariance", np.float64),
+        ("total_variance", np.float64),
+    ]
+)
+"""When the last change was, given the slope, and what follows from it for level and total at the origin."""
+Segments = NDArray[np.void]
+"""Array of `SEGMENT`, shape (k,)."""
+ROOM = SEGMENTS + len(STEP_SCALES)
+"""Segments that there can be before they are merged."""
+
+
+class BlockModel(NamedTuple):
+    """What is assumed of a series of blocks.
+
+    Attributes
+    ----------
+    variance : float
+        Of a usual estimate.
+    step_variance : float
+        Of the prior of a batch step.
+    level_walk : float
+        Variance a cycle of the random walk of the level.
+    """
+
+    variance: float
+    step_variance: float
+    level_walk: float
+
+
+@compiled
+def filter_slopes(
+    grid: Samples,
+    blocks: Samples,
+    origin: float,
+    mean: Samples,
+    covariance: Samples,
+    model: BlockModel,
+    weighed: Samples,
+) -> Samples:
+    """Log evidence of each slope; into `weighed` what the blocks say of level and total given it."""
+    evidence = np.empty(len(grid))
+    segments = np.empty(ROOM, SEGMENT)
+    for j in range(len(grid)):
+        apart = grid[j] - mean[SLOPE]
+        rate_level = covariance[LEVEL, SLOPE] / covariance[SLOPE, SLOPE]
+        rate_total = covariance[TOTAL, SLOPE] / covariance[SLOPE, SLOPE]
+        first = segments[0]
+        first.probability, first.change = 1.0, origin
+        first.level = mean[LEVEL] + rate_level * apart
+        first.total = mean[TOTAL] + rate_total * apart
+        first.level_variance = covariance[LEVEL, LEVEL] - rate_level * covariance[LEVEL, SLOPE]
+        first.covariance = covariance[LEVEL, TOTAL] - rate_level * covariance[TOTAL, SLOPE]
+        first.total_variance = covariance[TOTAL, TOTAL] - rate_total * covariance[TOTAL, SLOPE]
+        evidence[j], count = filter_blocks(segments, blocks, origin, grid[j], model)
+        merge(segments, 0, count)
+        last = segments[0]
+        weighed[j, 2], weighed[j, 3] = last.level, last.level_variance
+        weighed[j, 4], weighed[j, 5], weighed[j, 6] = last.total, last.covariance, last.total_variance
+    return evidence
+
+
+@compiled
+def filter_blocks(
+    segments: Segments, blocks: Samples, origin: float, slope: float, model: BlockModel
+) -> tuple[float, int]:
+    """Take the blocks into the first of `segments`; log evidence, and how many there are then."""
+    count, evidence, before = 1, 0.0, origin
+    for block in blocks:
+        cycle = block[CYCLE]
+        walk(segments, count, (cycle - before) * model.level_walk)
+        hazard = min(HAZARD * (cycle - before), MOST_PROBABLE) if block[CHANGE] == 0.0 else 0.0
+        if block[CHANGE] > 0.0:
+            hazard = 1.0
+        if hazard > 0.0:
+            count = spawn(segments, count, cycle, hazard, model.step_variance)
+        value = block[VALUE] - slope * (cycle - origin)
+        log_density, count = take(segments, count, value, model.variance / block[WEIGHT])
+        evidence += log_density
+        while count > SEGMENTS:
+            closest, least = 0, np.inf
+            for i in range(count - 1):
+                older, newer = segments[i], segments[i + 1]
+                apart = (newer.change - older.change + 0.5 * BLOCK) / (cycle - older.change + BLOCK)
+                cost = apart * min(older.probability, newer.probability)
+                if cost < least:
+                    closest, least = i, cost
+            merge(segments, closest, closest + 2)
+            for i in range(closest + 1, count - 1):
+                segments[i] = segments[i + 1]
+            count -= 1
+        before = cycle
+    return evidence, count
+
+
+@compiled
+def walk(segments: Segments, count: int, variance: float) -> None:
+    """Let the level have walked at random, and the friction of the batch with it."""
+    for i in range(count):
+        segment = segments[i]
+        segment.level_variance += variance
+        segment.covariance += variance
+        segment.total_variance += variance
+
+
+@compiled
+def spawn(segments: Segments, count: int, cycle: float, hazard: float, step_variance: float) -> int:
+    """Add what follows if a change came just before `cycle`, one for each size of step."""
+    changed = np.empty(count, segments.dtype)
+    for i in range(count):
+        changed[i] = segments[i]
+        segments[i].probability *= 1.0 - hazard
+    merge(changed, 0, count)
+    if hazard >= 1.0:
+        count = 0
+    for k in range(len(STEP_SCALES)):
+        segments[count] = changed[0]
+        segments[count].probability = hazard * STEP_SHARES[k]
+        segments[count].change = cycle
+        segments[count].total_variance += STEP_SCALES[k] ** 2 * step_variance
+        count += 1
+    return count
+
+
+@compiled
+def take(segments: Segments, count: int, value: float, variance: float) -> tuple[float, int]:
+    """Update every segment with one value; log density of the value, and how many segments are left."""
+    top = -np.inf
+    exponents = np.empty(count)
+    for i in range(count):
+        segment = segments[i]
+        spread = segment.total_variance + variance
+        innovation = value - segment.total
+        exponents[i] = -0.5 * innovation**2 / spread
+        top = max(top, exponents[i])
+        segment.probability /= math.sqrt(2.0 * math.pi * spread)
+        gain = segment.total_variance / spread
+        crossed = segment.covariance
+        segment.level += crossed / spread * innovation
+        segment.total += gain * innovation
+        segment.level_variance -= crossed**2 / spread
+        segment.covariance -= gain * crossed
+        segment.total_variance -= gain * segment.total_variance
+    total = 0.0
+    for i in range(count):
+        segments[i].probability *= math.exp(exponents[i] - top)
+        total += segments[i].probability
+    kept = 0
+    for i in range(count):
+        segments[i].probability /= total
+        if segments[i].probability > DROPPED:
+            if kept != i:
+                segments[kept] = segments[i]
+            kept += 1
+    return top + math.log(total), kept
+
+
+@compiled
+def merge(segments: Segments, first: int, last: int) -> None:
+    """Merge segments first..last-1 by moments into the first of them."""
+    total = level = share = 0.0
+    heaviest = first
+    for i in range(first, last):
+        segment = segments[i]
+        share += segment.probability
+        level += segment.probability * segment.level
+        total += segment.probability * segment.total
+        if segment.probability > segments[heaviest].probability:
+            heaviest = i
+    level, total = level / share, total / share
+    level_variance = covariance = total_variance = 0.0
+    for i in range(first, last):
+        segment = segments[i]
+        part, a, b = segment.probability / share, segment.level - level, segment.total - total
+        level_variance += part * (segment.level_variance + a * a)
+        covariance += part * (segment.covariance + a * b)
+        total_variance += part * (segment.total_variance + b * b)
+    change = segments[heaviest].change
+    into = segments[first]
+    into.probability, into.change, into.level, into.total = share, change, level, total
+    into.level_variance, into.covariance, into.total_variance = level_variance, covariance, total_variance

@@ -1,0 +1,138 @@
+"""Block means: against models solved in one piece, bounded in size, and begun in the middle."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import (
+    BatchKnowledge,
+    FrictionObservation,
+    TrackerSettings,
+    block_filter,
+    initial_state,
+    wear_blocks,
+)
+from impactcell.tracking.wear_batch.block_filter import BLOCK, STEP_SCALES, STEP_SHARES, BlockModel
+
+UNKNOWN = TrackerSettings(wear_limit=0.25, batch=BatchKnowledge.UNKNOWN)
+STD = 0.002
+MODEL = BlockModel(variance=STD**2, step_variance=16.0 * STD**2, level_walk=0.0)
+SURELY_NONE, ANNOUNCED = -1.0, 1.0
+
+
+def taken(values, cycles, change=None, model=MODEL):
+    wear = wear_blocks.begin(int(cycles[0]), values[0], 0.1)
+    for k, (cycle, value) in enumerate(zip(cycles.tolist(), values.tolist(), strict=True)):
+        told = ANNOUNCED if change is not None and k == change else SURELY_NONE
+        wear = wear_blocks.update(wear_blocks.append(wear, cycle, value, 1.0, told), model)
+    return wear
+
+
+def test_evidence_level_and_variance_of_each_slope_are_those_of_the_model_in_one_piece():
+    """One announced step of one of three sizes: a mixture of three normal distributions of all blocks."""
+    rng = np.random.default_rng(1)
+    cycles = np.arange(6) * 16.0
+    weight = rng.uniform(4.0, 16.0, 6)
+    values = (
+        0.2 + 3e-6 * cycles + np.where(np.arange(6) >= 3, 2.0 * STD, 0.0) + 0.3 * STD * rng.normal(size=6)
+    )
+    told = np.where(np.arange(6) == 3, ANNOUNCED, SURELY_NONE)
+    blocks = np.column_stack([weight, cycles, values, told])
+    before = 4.0 * STD**2  # level and total, which begin as one
+    mean, covariance = np.array([0.0, 0.2, 0.2]), np.full((3, 3), before)
+    covariance[0] = covariance[:, 0] = 0.0
+    covariance[0, 0] = 1e-10
+    grid, weighed = np.array([-1e-5, 0.0, 3e-6, 1e-5]), np.empty((4, 7))
+    walk = 0.01 * STD**2
+    model = MODEL._replace(level_walk=walk)
+    evidence = block_filter.filter_slopes(grid, blocks, 0.0, mean, covariance, model, weighed)
+    later = (np.arange(6) >= 3).astype(float)
+    walked = walk * np.minimum.outer(cycles, cycles)
+    for slope, log_evidence, row in zip(grid, evidence, weighed, strict=True):
+        densities, levels, squares = [], [], []
+        for scale in STEP_SCALES:
+            spread = before + walked + scale**2 * MODEL.step_variance * np.outer(later, later)
+            spread = spread + np.diag(STD**2 / weight)
+            z = values - slope * cycles - 0.2
+            densities.append(multivariate_normal.pdf(z, np.zeros(6), spread))
+            # the level after the last block, whose walk is that of all before
+            crossed = before + walk * np.minimum(cycles, cycles[-1])
+            gain = np.linalg.solve(spread, crossed)
+            level = 0.2 + gain @ z
+            levels.append(level)
+            squares.append(before + walk * cycles[-1] - gain @ crossed + level**2)
+        share = STEP_SHARES * densities / (STEP_SHARES @ densities)
+        assert log_evidence == pytest.approx(math.log(STEP_SHARES @ densities), abs=1e-9)
+        assert row[2] == pytest.approx(share @ levels, abs=1e-12)
+        assert row[3] == pytest.approx(share @ squares - (share @ levels) ** 2, rel=1e-6)
+
+
+def test_a_long_run_stays_small_and_loses_nothing_of_the_slope():
+    """Without batches it is a line through all cycles, whatever has been put together on the way."""
+    cycles = 25 * np.arange(3600)
+    values = 0.2 + 1e-8 * cycles + STD * np.random.default_rng(2).normal(size=len(cycles))
+    wear = taken(values, cycles)
+    assert wear.origin > 0  # the older half has become a Gaussian
+    assert len(wear.blocks) <= wear_blocks.MOST_BLOCKS + 1
+    found = wear_blocks.moments(wear, int(cycles[-1]))
+    used = (wear.weighed_blocks > 0) * (len(cycles) // BLOCK - 2) * BLOCK
+    line, spread = np.polyfit(cycles[:used], values[:used], 1, cov="unscaled")
+    std = STD * math.sqrt(spread[0, 0])
+    assert abs(found.slope - line[0]) < 0.25 * std
+    assert math.sqrt(found.slope_variance) == pytest.approx(std, rel=0.05)
+
+
+def test_the_probability_is_that_of_the_mixture():
+    slopes = np.array([[1e-6, 0.25, 0.20, 1e-8], [2e-6, 0.75, 0.21, 1e-8]])
+    wear = replace(wear_blocks.begin(0, 0.2, 0.1), slopes=slopes)
+    # levels at cycle 1000: 0.201 and 0.212, standard deviation 1e-4
+    assert wear_blocks.probability_above(wear, 1000, 0.206) == pytest.approx(0.75)
+    assert wear_blocks.probability_above(wear, 1000, 0.212) == pytest.approx(0.375)
+    assert wear_blocks.moments(wear, 1000).level == pytest.approx(0.25 * 0.201 + 0.75 * 0.212)
+
+
+def followed(state, values, first=0, settings=UNKNOWN, batch=None):
+    for i, value in enumerate(values.tolist(), start=first):
+        result = wear_batch.update(settings, state, FrictionObservation(i, value, STD, batch_id=batch))
+        state = result.state
+    return result
+
+
+def test_a_state_without_blocks_goes_on_from_what_its_bank_has_learned():
+    """As that of an earlier version, which kept none."""
+    values = 0.2 + 5e-6 * np.arange(600) + STD * np.random.default_rng(3).normal(size=600)
+    before = followed(initial_state(), values[:450])
+    old = replace(before.state, wear_blocks=None)
+    after = followed(old, values[450:], first=450)
+    whole = followed(before.state, values[450:], first=450)
+    assert after.state.wear_blocks.slopes.size
+    afresh = followed(initial_state(), values[450:])
+    assert after.wear.rate_std < 0.5 * afresh.wear.rate_std
+    assert after.wear.rate_std < 2.0 * whole.wear.rate_std
+    assert abs(after.wear.level - whole.wear.level) < whole.wear.level_std
+
+
+def test_an_outlier_moves_nothing_and_a_late_cycle_is_left_out():
+    values = 0.2 + STD * np.random.default_rng(4).normal(size=300)
+    plain = followed(initial_state(), values)
+    values[200] = 1.0
+    odd = followed(initial_state(), values)
+    assert abs(odd.wear.level - plain.wear.level) < 0.2 * plain.wear.level_std
+    late = FrictionObservation(250, 0.2, STD)
+    skipped = followed(initial_state(), values[:250])
+    ahead = followed(skipped.state, values[251:], first=251)
+    assert wear_batch.update(UNKNOWN, ahead.state, late).state.wear_blocks is ahead.state.wear_blocks
+
+
+def test_blocks_are_kept_only_where_nobody_says_of_which_batch_a_cycle_is():
+    values = 0.2 + STD * np.random.default_rng(5).normal(size=40)
+    known = TrackerSettings(wear_limit=0.25)
+    told = followed(initial_state(), values, settings=known, batch="A")
+    assert told.state.wear_blocks is None
+    untold = followed(told.state, values, first=40, settings=known)
+    assert untold.state.wear_blocks is not None
+    assert followed(untold.state, values, first=80, settings=known, batch="A").state.wear_blocks is None
