@@ -151,7 +151,9 @@ class Site:
         self.server.publish(cell, snapshot)
         return snapshot
 
-    def raise_alarm(self, name: str = "WearLimit", cell: str = CELL, message: str = "worn") -> Alarm:
+    def raise_alarm(
+        self, name: str = "WearLimit", cell: str = CELL, message: str = "worn", german: str = ""
+    ) -> Alarm:
         evidence = Evidence(
             statistic=0.95, threshold=0.9, change_cycle=7, size=0.01, size_std=0.002, false_alarm_cycles=1e5
         )
@@ -162,7 +164,7 @@ class Site:
                 EventKind.ACTIVATE,
                 self.cycle,
                 time.time_ns(),
-                message=Message(message, message),
+                message=Message(message, german or message),
                 severity=700,
                 evidence=evidence,
             ),

@@ -39,6 +39,7 @@ Who uses the server gives it an address space, methods and the answers of `host_
 `connection_table`           which connections there are, and what they may hold together
 `fan_out`                    what many listen to is told in slices; `retransmission_queue`: sent, not yet
                              acknowledged; `item_room`: how many monitored items a user may have
+`languages`                  texts in the language of a session, by its LocaleIds
 `history_service`            HistoryRead: raw values, aggregates, events
 `historical_variable`        spans of time, read page by page
 `history_aggregates`         Average, Minimum, Maximum, Count by their definition; `history_processed` reads

@@ -12,6 +12,7 @@ from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.data_change_filter import cut, parse_range
 from impactcell.opcua.host_interface import AccessPolicy, Permission, Role
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
 from impactcell.opcua.variable_store import with_timestamps
 
@@ -23,9 +24,10 @@ DEFAULT_BINARY: Final = ua.QualifiedName("Default Binary", 0)
 class AttributeService:
     """Answers Read and Write."""
 
-    def __init__(self, space: AddressSpace, access: AccessPolicy) -> None:
+    def __init__(self, space: AddressSpace, access: AccessPolicy, languages: Languages) -> None:
         self._space = space
         self._access = access
+        self._languages = languages
 
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
@@ -41,11 +43,14 @@ class AttributeService:
             raise StatusCodeError(ua.StatusCodes.BadMaxAgeInvalid)
         if parameters.TimestampsToReturn == ua.TimestampsToReturn.Invalid:
             raise StatusCodeError(ua.StatusCodes.BadTimestampsToReturnInvalid)
-        role = context.actor.role
+        role, language = context.actor.role, context.session.language
+
+        def read(value: ua.ReadValueId) -> ua.DataValue:
+            result = self._read_result(value, parameters.TimestampsToReturn, role)
+            return self._languages.data(result, language)
+
         response = ua.ReadResponse()
-        response.Results = await context.share.each(
-            read_values, lambda value: self._read_result(value, parameters.TimestampsToReturn, role)
-        )
+        response.Results = await context.share.each(read_values, read)
         return response
 
     def _read_result(

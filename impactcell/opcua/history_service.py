@@ -16,6 +16,7 @@ from impactcell.opcua.historical_variable import HistoricalVariable, ReadRange, 
 from impactcell.opcua.history_encoding import DataValueEncoder, history_data
 from impactcell.opcua.history_processed import ProcessedReading
 from impactcell.opcua.host_interface import AccessPolicy, HistoryProvider, Permission, RefusedError
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.method_service import status_of
 from impactcell.opcua.read_budget import ReadBudget
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
@@ -43,7 +44,10 @@ class _Unfinished:
 class HistoryService:
     """Answers HistoryRead."""
 
-    def __init__(self, space: AddressSpace, access: AccessPolicy, history: HistoryProvider) -> None:
+    def __init__(
+        self, space: AddressSpace, access: AccessPolicy, history: HistoryProvider, languages: Languages
+    ) -> None:
+        self._languages = languages
         self._space = space
         self._access = access
         self._history = history
@@ -99,6 +103,8 @@ class HistoryService:
                 result.HistoryData, is_empty, state = await self._go_on(
                     node.NodeId, parameters, state, budget
                 )
+                if isinstance(result.HistoryData, ua.HistoryEvent):
+                    self._translate(result.HistoryData, context.session.language)
                 if is_empty and state is None:
                     result.StatusCode = ua.StatusCode(ua.StatusCodes.GoodNoData)
         except StatusCodeError as fault:
@@ -109,6 +115,10 @@ class HistoryService:
             if state is not None:
                 result.ContinuationPoint = points.keep(_Unfinished(node.NodeId, type(details), state))
         return result
+
+    def _translate(self, events: ua.HistoryEvent, language: str | None) -> None:
+        for event in events.Events:
+            event.EventFields = [self._languages.variant(field, language) for field in event.EventFields]
 
     def _check_node(self, node: ua.HistoryReadValueId, context: RequestContext, *, events: bool) -> None:
         if context.session.closed:  # while a node before was read

@@ -5,7 +5,7 @@ what a role may do, what was. This module imports nothing of asyncua, so that it
 """
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -255,3 +255,5 @@ class Host:
     access: AccessPolicy
     audit: AuditLog
     history: HistoryProvider
+    translations: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """Of each language but English, its texts by the English ones."""

@@ -5,8 +5,7 @@ while an item only samples, and looks through all items to find one.
 """
 
 from collections import deque
-from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from asyncua import ua
 
@@ -27,7 +26,15 @@ MAX_EVENT_BYTES: Final = 256 * 1024
 """Longest queue of an event item, bytes."""
 OVERFLOW_EVENT: Final = ua.NodeId(ua.ObjectIds.EventQueueOverflowEventType)
 
-ReadyCallback = Callable[["DataMonitoredItem | EventMonitoredItem"], None]
+
+class ItemOwner(Protocol):
+    """The subscription of an item."""
+
+    def ready(self, item: Any) -> None:
+        """Learn that an item has something to report."""
+
+    def translated(self, variant: Any) -> Any:
+        """Give a value in the language of the session."""
 
 
 def with_overflow(data: ua.DataValue) -> ua.DataValue:
@@ -49,12 +56,12 @@ class DataMonitoredItem:
         space: AddressSpace,
         values: VariableStore,
         limits: ServerLimits,
-        ready: ReadyCallback,
+        owner: ItemOwner,
     ) -> None:
         target = request.ItemToMonitor
         self.id = item_id
         self._node, self._attribute = target.NodeId, target.AttributeId
-        self._values, self._space, self._limits, self._ready = values, space, limits, ready
+        self._values, self._space, self._limits, self._owner = values, space, limits, owner
         self._range = parse_range(target.IndexRange)
         self._queue: deque[SharedValue] = deque()
         self.mode = request.MonitoringMode
@@ -100,6 +107,7 @@ class DataMonitoredItem:
             return
         if self._range is not None:
             value = SharedValue(cut(value.data, self._range))
+        value = self._translated(value)
         if not self._filter.passes(value.data):
             return
         queue = self._queue
@@ -113,7 +121,14 @@ class DataMonitoredItem:
                 queue[-1] = SharedValue(with_overflow(value.data))
         else:
             queue.append(value)
-        self._ready(self)
+        self._owner.ready(self)
+
+    def _translated(self, value: SharedValue) -> SharedValue:
+        data = value.data
+        variant = self._owner.translated(data.Value)
+        if variant is data.Value:
+            return value
+        return SharedValue(ua.DataValue(variant, data.StatusCode, data.SourceTimestamp, data.ServerTimestamp))
 
     @property
     def waiting(self) -> int:
@@ -136,7 +151,7 @@ class DataMonitoredItem:
         elif before == ua.MonitoringMode.Disabled:
             self.offer_present()
         if self.waiting:
-            self._ready(self)
+            self._owner.ready(self)
 
     def close(self) -> None:
         """Watch no longer; what is still on its way does not arrive."""
@@ -154,11 +169,11 @@ class EventMonitoredItem:
         request: ua.MonitoredItemCreateRequest,
         space: AddressSpace,
         limits: ServerLimits,
-        ready: ReadyCallback,
+        owner: ItemOwner,
     ) -> None:
         self.id = item_id
         self.notifier = request.ItemToMonitor.NodeId
-        self._space, self._limits, self._ready = space, limits, ready
+        self._space, self._limits, self._owner = space, limits, owner
         notifies = read_attribute(space, self.notifier, ua.AttributeIds.EventNotifier)
         if notifies is None or not notifies & ua.EventNotifier.SubscribeToEvents.mask:
             raise StatusCodeError(ua.StatusCodes.BadAttributeIdInvalid)
@@ -195,7 +210,7 @@ class EventMonitoredItem:
                 del self._queue[1]
         self._queue.append(encoded)
         self._bytes += len(encoded)
-        self._ready(self)
+        self._owner.ready(self)
 
     def _is_full(self, more_bytes: int) -> bool:
         return len(self._queue) >= self._size or self._bytes + more_bytes > MAX_EVENT_BYTES
@@ -213,6 +228,7 @@ class EventMonitoredItem:
     def _encode(self, event: EventNotification) -> bytes:
         fields = self._filter.select(event)
         fields.ClientHandle = self.handle
+        fields.EventFields = [self._owner.translated(field) for field in fields.EventFields]
         return encode(fields)
 
     @property
@@ -234,7 +250,7 @@ class EventMonitoredItem:
             self._queue.clear()
             self._bytes = 0
         if self.waiting:
-            self._ready(self)
+            self._owner.ready(self)
 
     def close(self) -> None:
         """Forget what waits; what is still on its way does not arrive."""

@@ -96,7 +96,7 @@ class MonitoredItemService:
             raise StatusCodeError(ua.StatusCodes.BadAttributeIdInvalid)
         if target.AttributeId == ua.AttributeIds.EventNotifier:
             item = EventMonitoredItem(
-                subscription.next_item_id(), request, self._space, self._limits, subscription.ready
+                subscription.next_item_id(), request, self._space, self._limits, subscription
             )
             self._subscriptions.listen(item, subscription)
             return item
@@ -107,7 +107,7 @@ class MonitoredItemService:
             self._space,
             self._values,
             self._limits,
-            subscription.ready,
+            subscription,
         )
 
     async def modify_monitored_items(

@@ -21,6 +21,7 @@ from impactcell.opcua.historical_variable import VALUES_PER_PAGE
 from impactcell.opcua.history_processed import AGGREGATE_FUNCTIONS
 from impactcell.opcua.history_service import MAX_NODES_PER_READ, HistoryService
 from impactcell.opcua.host_interface import Actor, Host, RefusedError, ServerSettings
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.method_service import MethodService
 from impactcell.opcua.monitored_item_service import MonitoredItemService
 from impactcell.opcua.request_dispatch import RequestDispatcher, Service
@@ -66,7 +67,8 @@ class ServiceHost:
         self._listener: asyncio.Server | None = None
         self._clock: asyncio.Task[None] | None = None
         self._started = datetime.now(UTC)
-        self.subscription_service = SubscriptionService(settings.limits)
+        self._languages = Languages(host.translations)
+        self.subscription_service = SubscriptionService(settings.limits, self._languages)
         self.method_service = MethodService(space, host.access, host.audit)
         self._dispatcher: RequestDispatcher | None = None
 
@@ -96,19 +98,20 @@ class ServiceHost:
             self._authenticator,
             self._trust,
             settings.limits,
+            self._languages,
             allow_none=settings.allow_none,
         )
         services: dict[str, Service] = {
             **self._discovery.services(),
             **session_service.services(),
-            **AttributeService(self._space, host.access).services(),
-            **ViewService(self._space).services(),
+            **AttributeService(self._space, host.access, self._languages).services(),
+            **ViewService(self._space, self._languages).services(),
             **self.method_service.services(),
             **self.subscription_service.services(),
             **MonitoredItemService(
                 self._space, self._values, host.access, settings.limits, self.subscription_service
             ).services(),
-            **HistoryService(self._space, host.access, host.history).services(),
+            **HistoryService(self._space, host.access, host.history, self._languages).services(),
         }
         dispatcher = RequestDispatcher(self._sessions, services, self._connection_lost)
         factories = [
@@ -235,6 +238,7 @@ class ServiceHost:
         entries: list[tuple[int, Any, ua.VariantType]] = [
             (ids.Server_ServerArray, [self._settings.application_uri], kinds.String),
             (ids.Server_ServiceLevel, 255, kinds.Byte),
+            (ids.Server_ServerCapabilities_LocaleIdArray, self._languages.locale_ids, kinds.String),
             (ids.Server_Auditing, False, kinds.Boolean),
             (ids.Server_ServerStatus_StartTime, now, kinds.DateTime),
             (ids.Server_ServerStatus_State, int(ua.ServerState.Running), kinds.Int32),

@@ -15,6 +15,7 @@ from impactcell.opcua.authentication import Authenticator, ClientApplication
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.discovery_service import DiscoveryService
 from impactcell.opcua.host_interface import ServerLimits
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.request_dispatch import RequestContext, Service
 from impactcell.opcua.session_table import Session, SessionTable
 from impactcell.opcua.subscription_service import SubscriptionService
@@ -37,6 +38,7 @@ class SessionService:
         authenticator: Authenticator,
         trust: TrustList,
         limits: ServerLimits,
+        languages: Languages,
         *,
         allow_none: bool,
     ) -> None:
@@ -47,6 +49,7 @@ class SessionService:
         self._trust = trust
         self._limits = limits
         self._allow_none = allow_none
+        self._languages = languages
 
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
@@ -130,6 +133,7 @@ class SessionService:
             # Part 4, 5.7.3.1: another user may take the session, but not what the first one listens to.
             self._subscriptions.end_session(session, delete=True)
         session.actor = actor
+        session.language = self._languages.choose(parameters.LocaleIds) or session.language
         session.connection = context.connection
         session.last_seen = self._sessions.clock()
         context.connection.activated()

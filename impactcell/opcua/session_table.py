@@ -84,6 +84,7 @@ class Session:
     timeout_s: float
     nonce: bytes = b""
     actor: Actor | None = None
+    language: str | None = None
     last_seen: float = field(default_factory=time.monotonic)
     publish_requests: deque[PublishRequest] = field(default_factory=deque)
     browse: ContinuationPoints = field(default_factory=lambda: ContinuationPoints(MAX_BROWSE_POINTS))

@@ -17,6 +17,7 @@ from asyncua import ua
 from impactcell.opcua import notification_encoding
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import ServerLimits
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.monitored_item import DataMonitoredItem, EventMonitoredItem
 from impactcell.opcua.retransmission_queue import RetransmissionQueue
 from impactcell.opcua.session_table import PublishRequest, Session
@@ -43,6 +44,7 @@ class Subscription:
         session: Session,
         parameters: ua.CreateSubscriptionParameters,
         limits: ServerLimits,
+        languages: Languages,
         expired: Callable[[Any], None],
     ) -> None:
         self.id = number
@@ -52,6 +54,7 @@ class Subscription:
         self.enabled: bool = parameters.PublishingEnabled
         self.late = False
         self._limits = limits
+        self._languages = languages
         self._expired = expired
         self._ready_items: OrderedDict[int, MonitoredItem] = OrderedDict()
         self._status_changes: list[int] = []
@@ -173,6 +176,11 @@ class Subscription:
         if events:
             notifications.append(notification_encoding.events(events))
         return notifications
+
+    def translated(self, variant: Any) -> Any:
+        """Give a value in the language of the session."""
+        session = self.session
+        return variant if session is None else self._languages.variant(variant, session.language)
 
     def ready(self, item: MonitoredItem) -> None:
         """Learn that an item has something to report."""

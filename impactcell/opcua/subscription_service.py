@@ -17,6 +17,7 @@ from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.fan_out import FanOut
 from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.item_room import ItemRoom
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.monitored_item import EventMonitoredItem
 from impactcell.opcua.request_dispatch import RequestContext, Service, apply_to_each, check_operations
 from impactcell.opcua.session_table import PublishRequest, Session
@@ -34,8 +35,9 @@ EVENTS_AT_ONCE: Final = 10
 class SubscriptionService:
     """Holds all subscriptions and answers what clients ask of them."""
 
-    def __init__(self, limits: ServerLimits) -> None:
+    def __init__(self, limits: ServerLimits, languages: Languages) -> None:
         self._limits = limits
+        self._languages = languages
         self._subscriptions: dict[int, Subscription] = {}
         self._last_id = 0
         self._fan_out = FanOut(EVENTS_AT_ONCE)
@@ -143,7 +145,9 @@ class SubscriptionService:
         ):
             raise StatusCodeError(ua.StatusCodes.BadTooManySubscriptions)
         self._last_id += 1
-        subscription = Subscription(self._last_id, context.session, parameters, self._limits, self._remove)
+        subscription = Subscription(
+            self._last_id, context.session, parameters, self._limits, self._languages, self._remove
+        )
         self._subscriptions[subscription.id] = subscription
         response = ua.CreateSubscriptionResponse()
         response.Parameters.SubscriptionId = subscription.id

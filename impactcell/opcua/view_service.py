@@ -11,6 +11,7 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
 from impactcell.opcua.session_table import MAX_BROWSE_POINTS, ContinuationPoints
 from impactcell.opcua.type_instances import HAS_SUBTYPE, targets
@@ -33,8 +34,9 @@ DIRECTIONS: Final = {
 class ViewService:
     """Answers what clients ask of the shape of the address space."""
 
-    def __init__(self, space: AddressSpace) -> None:
+    def __init__(self, space: AddressSpace, languages: Languages) -> None:
         self._space = space
+        self._languages = languages
         self._subtypes: dict[ua.NodeId, frozenset[ua.NodeId]] = {}
 
     def services(self) -> dict[str, Service]:
@@ -58,18 +60,29 @@ class ViewService:
             parameters.RequestedMaxReferencesPerNode or MAX_REFERENCES_PER_NODE, MAX_REFERENCES_PER_NODE
         )
         response = ua.BrowseResponse()
-        answer = _Answer(context.session.browse)
+        answer, language = _Answer(context.session.browse), context.session.language
         response.Results = await context.share.each(
             (_Unfinished(description, max_references) for description in descriptions),
-            lambda unfinished: self._browse(unfinished, answer),
+            lambda unfinished: self._browse(unfinished, answer, language),
         )
         return response
 
-    def _browse(self, unfinished: "_Unfinished", answer: "_Answer") -> ua.BrowseResult:
+    def _browse(self, unfinished: "_Unfinished", answer: "_Answer", language: str | None) -> ua.BrowseResult:
         try:
-            return answer.page(self._references(unfinished.description), unfinished)
+            result = answer.page(self._references(unfinished.description), unfinished)
         except StatusCodeError as fault:
             return ua.BrowseResult(StatusCode=ua.StatusCode(fault.code))
+        mask = unfinished.description.ResultMask
+        result.References = [self._as_asked(reference, mask, language) for reference in result.References]
+        return result
+
+    def _as_asked(
+        self, reference: ua.ReferenceDescription, mask: int, language: str | None
+    ) -> ua.ReferenceDescription:
+        name = self._languages.text(reference.DisplayName, language)
+        if name is not reference.DisplayName:
+            reference = replace(reference, DisplayName=name)
+        return masked(reference, mask)
 
     def _references(self, description: ua.BrowseDescription) -> list[ua.ReferenceDescription]:
         node = self._space.get(description.NodeId)
@@ -82,7 +95,7 @@ class ViewService:
             description.ReferenceTypeId, subtypes=description.IncludeSubtypes
         )
         return [
-            masked(reference, description.ResultMask)
+            reference
             for reference in node.references
             if reference.IsForward in directions
             and (reference_types is None or reference.ReferenceTypeId in reference_types)
@@ -122,7 +135,7 @@ class ViewService:
                 return ua.BrowseResult(StatusCode=ua.StatusCode(fault.code))
             if parameters.ReleaseContinuationPoints:
                 return ua.BrowseResult()
-            return self._browse(unfinished, answer)
+            return self._browse(unfinished, answer, context.session.language)
 
         response = ua.BrowseNextResponse()
         response.Parameters.Results = await context.share.each(

@@ -10,6 +10,7 @@ from asyncua import ua
 from impactcell.alarms import RULES
 from impactcell.errors import SettingsError
 from impactcell.opcua.asyncua_adapter import AddressSpace, StandardServer, address_space, compute_attribute
+from impactcell.opcua.languages import TranslatedText
 from impactcell.opcua.type_instances import (
     HAS_TYPE_DEFINITION,
     instantiate,
@@ -99,6 +100,10 @@ class CellSpace:
             f"Cell {description.name}.",
             DESCRIPTIONS,
             self._is_wanted,
+        )
+        named = TranslatedText(f"Cell {description.name}.", de=f"Zelle {description.name}.")
+        set_attribute(
+            self._space, self.node, ua.AttributeIds.Description, named, ua.VariantType.LocalizedText
         )
         notifies = ua.EventNotifier.SubscribeToEvents.mask | ua.EventNotifier.HistoryRead.mask
         set_attribute(self._space, self.node, ua.AttributeIds.EventNotifier, notifies, ua.VariantType.Byte)

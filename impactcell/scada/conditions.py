@@ -13,6 +13,7 @@ from asyncua import ua
 
 from impactcell.alarms import RULES, is_retained
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
+from impactcell.opcua.languages import TranslatedText
 from impactcell.opcua.variable_store import GOOD, VariableStore, moment
 from impactcell.records import Alarm, Shelving
 from impactcell.scada.alarm_events import activation_id, event_id
@@ -139,7 +140,7 @@ class Condition:
                 "SourceName": (self.cell, ua.VariantType.String),
                 "Time": (time_of, ua.VariantType.DateTime),
                 "ReceiveTime": (time_of, ua.VariantType.DateTime),
-                "Message": (ua.LocalizedText(alarm.message or RULES[alarm.name].title.english), _LT),
+                "Message": (_message(alarm), _LT),
                 "Severity": (alarm.severity, ua.VariantType.UInt16),
                 "ConditionName": (alarm.name, ua.VariantType.String),
                 "BranchId": (ua.NodeId(), ua.VariantType.NodeId),
@@ -187,6 +188,12 @@ class Condition:
         yield ("ShelvingState", "CurrentState"), ua.Variant(ua.LocalizedText(text), _LT)
         yield ("ShelvingState", "CurrentState", "Id"), ua.Variant(ua.NodeId(state), ua.VariantType.NodeId)
         yield ("ShelvingState", "UnshelveTime"), ua.Variant(unshelve_ms(alarm), ua.VariantType.Double)
+
+
+def _message(alarm: Alarm) -> ua.LocalizedText:
+    title = RULES[alarm.name].title
+    english = alarm.message or title.english
+    return TranslatedText(english, de=alarm.message_de or (english if alarm.message else title.german))
 
 
 def _time_of(alarm: Alarm, time: datetime | None) -> datetime:

@@ -26,6 +26,7 @@ from impactcell.scada.audit_trail import AuditTrail
 from impactcell.scada.cell_history import CellHistory
 from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition
+from impactcell.scada.german import GERMAN
 from impactcell.scada.interface import Actions, CellDescription, ConditionAction, HistorySource
 from impactcell.scada.methods import (
     MAX_COMMENT,
@@ -110,7 +111,9 @@ class Server:
         values, access, audit = VariableStore(space), CellAccess(), AuditTrail()
         cells = [CellSpace(model, uris, description) for description in self._descriptions]
         history = self._history_of(cells)
-        host = ServiceHost(self._settings, Host(PRODUCT, users, access, audit, history), space, values)
+        host = ServiceHost(
+            self._settings, Host(PRODUCT, users, access, audit, history, {"de": GERMAN}), space, values
+        )
         table = MethodTable(host.method_service, access, audit)
         for cell in cells:
             name = cell.description.name

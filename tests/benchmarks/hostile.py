@@ -99,7 +99,7 @@ def _row(
 
 def tables(quick: bool = False) -> list[Table]:
     """Measure."""
-    seconds = 20.0 if quick else SECONDS
+    seconds = 30.0 if quick else SECONDS
     rows = asyncio.run(_rows(seconds))
     load = os.getloadavg()[2]
     note = (
