@@ -95,7 +95,8 @@ def test_directly_trusted_and_not(pki: Path) -> None:
     trust.check(der(client) + der(certificate("ca", 1, ca=True)))
 
 
-def test_chains_and_revocation(pki: Path) -> None:
+@pytest.mark.parametrize("whose", ["the client's", "its authority's"])
+def test_chains_and_revocation(pki: Path, whose: str) -> None:
     trust = TrustList(pki, URI)
     root = certificate("root", 1, ca=True)
     middle = certificate("middle", 2, ("root", 1), ca=True)
@@ -106,16 +107,15 @@ def test_chains_and_revocation(pki: Path) -> None:
     put(pki, "issuers", middle)
     trust.check(der(client))
     now = dt.datetime.now(dt.UTC)
-    revoked = (
-        x509.RevokedCertificateBuilder().serial_number(client.serial_number).revocation_date(now).build()
-    )
+    gone, issuer_key = (client, 2) if whose == "the client's" else (middle, 1)
+    revoked = x509.RevokedCertificateBuilder().serial_number(gone.serial_number).revocation_date(now).build()
     listed = (
         x509.CertificateRevocationListBuilder()
-        .issuer_name(client.issuer)
+        .issuer_name(gone.issuer)
         .last_update(now)
         .next_update(now + dt.timedelta(days=1))
         .add_revoked_certificate(revoked)
-        .sign(key(2), hashes.SHA256())
+        .sign(key(issuer_key), hashes.SHA256())
     )
     from cryptography.hazmat.primitives.serialization import Encoding
 

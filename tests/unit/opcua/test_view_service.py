@@ -5,6 +5,7 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace, NodeData
 from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.languages import Languages
 from impactcell.opcua.type_instances import set_attribute
 from impactcell.opcua.view_service import ViewService
 
@@ -59,7 +60,7 @@ def path(*names: str) -> ua.BrowsePath:
 
 def test_a_node_is_followed_once_however_many_ways_lead_to_it(space: CountedSpace) -> None:
     """To and fro twenty-five times: followed as a tree, the paths would be 10 to the power of 25."""
-    views = ViewService(space)
+    views = ViewService(space, Languages({}))
     assert views.follow(path(*("child", "hub") * 25)) == [ua.NodeId("hub")]
     assert space.visits <= 25 * (CHILDREN + 1)
     assert len(views.follow(path(*("child", "hub") * 24, "child"))) == CHILDREN
@@ -67,5 +68,5 @@ def test_a_node_is_followed_once_however_many_ways_lead_to_it(space: CountedSpac
 
 def test_a_path_that_leads_nowhere(space: CountedSpace) -> None:
     with pytest.raises(StatusCodeError) as refused:
-        ViewService(space).follow(path("child", "child"))
+        ViewService(space, Languages({})).follow(path("child", "child"))
     assert refused.value.code == ua.StatusCodes.BadNoMatch
