@@ -27,6 +27,8 @@ CONSTANTS: dict[str, tuple[tuple[Dimension, ...], str]] = {
 """What can be said to hold for all shots: its units, and an example."""
 NAMES = {"rate": "rate_hz"}
 """Names of constants that carry their unit."""
+OTHERS = (Quantity.COVARIATE, Quantity.IGNORED)
+"""What several columns can be: said once for each, or as a list in a file."""
 SECTIONS = ("columns", "units", "signs", "constants")
 """Blocks of a mapping file; beside them `excitation` and `trigger`."""
 
@@ -45,12 +47,20 @@ def read_given(
         Every name and value that is not known.
     """
     sections, from_file = _read(file) if file is not None else ({}, {})
+    others = {
+        name: Quantity(key)
+        for key in OTHERS
+        for name in yaml.safe_load(sections.get("columns", {}).pop(key, "[]"))
+    }
     for section in SECTIONS:
         for text in said.get(section, ()):
             name, equals, value = text.partition("=") if section != "units" else _split_last(text)
             if not equals or not name.strip() or not value.strip():
                 raise MeasurementError(f"{text!r} is not NAME=VALUE")
-            sections.setdefault(section, {})[name.strip()] = value.strip()
+            if section == "columns" and name.strip() in OTHERS:
+                others[value.strip()] = Quantity(name.strip())
+            else:
+                sections.setdefault(section, {})[name.strip()] = value.strip()
     faults: list[str] = []
     given = Given(
         {q: name for key, name in sections.get("columns", {}).items() if (q := _quantity(key, faults))},
@@ -66,6 +76,7 @@ def read_given(
             NAMES.get(key, key): _constant(key, text, faults)
             for key, text in sections.get("constants", {}).items()
         },
+        others,
     )
     if faults:
         raise MeasurementError("\n".join(faults))

@@ -55,6 +55,8 @@ class Given:
         Threshold of the force [N] at which contact begins; `none` where t = 0 is the contact already.
     constants : mapping
         Mass, velocity, direction, stroke, rate and gravity of all shots, in SI units, by their names.
+    others : mapping
+        Columns that are covariates or ignored, by their names.
     """
 
     columns: AbstractMapping[Quantity, str] = field(default_factory=dict)
@@ -63,6 +65,7 @@ class Given:
     excitation: Excitation | None = None
     trigger: float | str | None = None
     constants: AbstractMapping[str, float] = field(default_factory=dict)
+    others: AbstractMapping[str, Quantity] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +156,7 @@ def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) ->
     known = ", ".join(repr(name) for name in columns)
     faults = [
         f"there is no column {name!r}; the columns are {known}"
-        for name in (*given.columns.values(), *given.units)
+        for name in (*given.columns.values(), *given.units, *given.others)
         if name not in columns
     ]
     faults += [
@@ -173,6 +176,8 @@ def _unit_of(column: MeasuredColumn, given: Given) -> MeasuredUnit | None:
 def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[MeasuredColumn]) -> list[Assignment]:
     """Whatever a column could be, with how sure it is."""
     unit = _unit_of(column, given)
+    if column.name in given.others:
+        return []
     named = [quantity for quantity, name in given.columns.items() if name == column.name]
     if named:
         return [Assignment(column.name, named[0], unit, GIVEN, "given")]
@@ -219,6 +224,8 @@ def _score(
 def _further(column: MeasuredColumn, given: Given) -> Assignment:
     """Take a column that is none of the quantities for a covariate: it may still explain friction."""
     unit = _unit_of(column, given)
+    if column.name in given.others:
+        return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
     return Assignment(column.name, Quantity.COVARIATE, unit, SURE, "none of the known quantities")
 
 
@@ -262,7 +269,10 @@ def _faults(mapping: Mapping, tables: Sequence[Table]) -> list[str]:
                 f"'{item.quantity}={item.column}', or name the right one"
             )
     if mapping.of(Quantity.TIME) is None and any(sampling_step_s(t, mapping.given) is None for t in tables):
-        faults.append("no column of time was found; name it with --column time=NAME, or give --rate in Hz")
+        faults.append(
+            "no column of time was found; name it with --column time=NAME, or give its rate, as --set "
+            "rate=10kHz"
+        )
     if mapping.of(Quantity.POSITION) is None and mapping.of(Quantity.FORCE) is None:
         names = ", ".join(repr(item.column) for item in mapping.assignments)
         faults.append(

@@ -93,10 +93,29 @@ def _tables(path: Path, content: dict[str, Any], group: str, limits: Limits) -> 
         elif isinstance(value, str | float | int | np.generic):
             said[name] = value
     limits.check_shape(str(path), 0, len(columns))
+    tables += _cell_tables(path, content, group)
     own = tables_of(str(path), columns, group, said, "MATLAB")
     for table in own:
         limits.check_shape(str(path), len(table), len(table.columns))
     return own + tables
+
+
+def _cell_tables(path: Path, content: dict[str, Any], group: str) -> list[Table]:
+    """Give a table for each place in cell arrays of vectors; cell arrays of one length belong together."""
+    by_length: dict[int, dict[str, list[Any]]] = {}
+    for name, value in content.items():
+        if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+            items = value.ravel().tolist()
+            if items and all(isinstance(item, np.ndarray) and item.ndim in (1, 2) for item in items):
+                by_length.setdefault(len(items), {})[name] = items
+    tables: list[Table] = []
+    for length, cells in by_length.items():
+        for place in range(length):
+            columns = [c for name, items in cells.items() for c in _columns(name, items[place], None)]
+            tables += tables_of(
+                str(path), columns, f"{group} {place + 1}".strip(), note=f"MATLAB cell {place + 1}"
+            )
+    return tables
 
 
 def _columns(name: str, value: "np.ndarray[Any, Any]", units: object) -> list[tuple[str, str | None, Any]]:

@@ -9,6 +9,7 @@ from impactcell.errors import MeasurementError
 from impactcell.measurements.archive import ARCHIVES, unpacked
 from impactcell.measurements.dialect import Dialect
 from impactcell.measurements.hdf5 import read_hdf5
+from impactcell.measurements.json_file import read_json
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.matlab import read_matlab
 from impactcell.measurements.mdf4 import read_mdf4
@@ -32,7 +33,7 @@ KINDS: tuple[tuple[bytes, Reader], ...] = (
 def read_tables(
     path: Path, limits: Limits | None = None, dialect: Dialect | None = None
 ) -> tuple[Table, ...]:
-    """Read the tables of a measurement file: text, Parquet, HDF5, MDF, TDMS, MATLAB, or a zip of them.
+    """Read the tables of a measurement file: text, Parquet, HDF5, MDF, TDMS, MATLAB, JSON, or a zip.
 
     Parameters
     ----------
@@ -64,6 +65,8 @@ def read_tables(
                 return reader(path, limits)
         if path.suffix.lower() == ".mat":
             return read_matlab(path, limits)
+        if head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith((b"{", b"[{")) and path.suffix.lower() == ".json":
+            return read_json(path, limits)
         return read_text(path, limits, dialect or Dialect())
     except OSError as error:
         raise MeasurementError(f"{path}: cannot be read: {error.strerror}") from error

@@ -100,6 +100,22 @@ WORD_MATCH, TOKEN_MATCH, SYMBOL_MATCH = 0.65, 0.55, 0.4
 """How sure a name makes one: the whole name, a word of it, a letter."""
 UNIT_MATCH, UNIT_ALONE = 0.3, 0.45
 """What a unit that fits adds to a name, and how sure it makes one alone."""
+COMMAND_WORDS = frozenset(
+    (
+        "enable",
+        "enabled",
+        "goal",
+        "target",
+        "setpoint",
+        "soll",
+        "sollwert",
+        "status",
+        "flag",
+        "command",
+        "raw",
+    )
+)
+"""Words of a name that say that it was not measured."""
 RATE_WORDS = "sample_rate sampling_rate rate_hz abtastrate samplerate fs sampling_frequency abtastfrequenz"
 """Names under which a file says how often it was sampled."""
 STEP_WORDS = "dt sample_interval wf_increment abtastzeit sampling_interval abtastintervall delta_x increment"
@@ -137,6 +153,8 @@ def name_score(name: str, quantity: Quantity) -> tuple[float, str]:
         return WORD_MATCH, text
     if text in symbols:
         return SYMBOL_MATCH, text
+    if COMMAND_WORDS & set(text.split("_")) and quantity not in (Quantity.VELOCITY, Quantity.DIRECTION):
+        return 0.0, ""
     tokens = [re.sub(r"\d+$", "", token) for token in text.split("_")]
     for word in known:
         parts = word.split("_")

@@ -1,11 +1,13 @@
 """Binary files are read back exactly, and refused where they are too large, bombs or damaged."""
 
+import gc
 import gzip
 import io
+import json
 import tracemalloc
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -118,7 +120,15 @@ def test_round_trip(name: str, count: int, seed: int, dtype: str, tmp_path: Path
     }  # fmt: skip
 
 
+@pytest.fixture
+def collected() -> Iterator[None]:
+    """Collect what a test leaves before the next begins."""
+    yield
+    gc.collect()
+
+
 # asammdf's destructor stumbles over what its constructor did not get to.
+@pytest.mark.usefixtures("collected")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @every
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -244,3 +254,38 @@ def test_a_missing_reader_is_told_with_the_way_out(tmp_path: Path, monkeypatch: 
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     with pytest.raises(MeasurementError, match=r"pip install 'impactcell\[import\]'"):
         read_tables(path)
+
+
+def test_cell_arrays_of_matlab_are_a_table_each(tmp_path: Path) -> None:
+    runs = [arrays(40 + 10 * n, seed=n) for n in range(3)]
+    times, values = np.empty(3, dtype=object), np.empty(3, dtype=object)
+    for n, run in enumerate(runs):
+        times[n], values[n] = run["time"], np.stack([run["Force"], run["Position"]])
+    savemat(tmp_path / "a.mat", {"Time": times, "Y": values, "dt": 1e-4})
+    tables = read_tables(tmp_path / "a.mat")
+    assert [len(table) for table in tables] == [40, 50, 60]
+    for table, run in zip(tables, runs, strict=True):
+        assert [column.name for column in table.columns] == ["Time", "Y 1", "Y 2"]
+        np.testing.assert_array_equal(table.columns[2].values, run["Position"])
+
+
+def test_json_logs_are_read(tmp_path: Path) -> None:
+    log = tmp_path / "log.json"
+    entries = [
+        {"timestamp_s": 0.01 * i, "load": i, "on": i > 3, "gone": None if i else 1.0} for i in range(20)
+    ]
+    log.write_text(json.dumps({"mass": 0.49, "entries": entries}), encoding="utf-8")
+    (table,) = read_tables(log)
+    assert table.attributes["mass"] == "0.49"
+    assert [(c.name, c.unit) for c in table.columns][:2] == [("timestamp", "s"), ("load", None)]
+    assert np.isnan(table.columns[3].values[1:]).all()
+    log.write_text(json.dumps({"t_s": [0.0, 1.0], "F_n": [2.0, 3.0]}), encoding="utf-8")
+    assert [(c.name, c.unit) for c in read_tables(log)[0].columns] == [("t", "s"), ("F", "N")]
+    for text, told in (
+        ("{\n nonsense}", ":2: is not JSON"),
+        ("{}", "holds no list"),
+        ("[" * 100_000, "log.json"),
+    ):
+        log.write_text(text, encoding="utf-8")
+        with pytest.raises(MeasurementError, match=told):
+            read_tables(log)

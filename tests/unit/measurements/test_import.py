@@ -22,6 +22,7 @@ from impactcell.measurements import (
     read_tables,
     write_campaign,
 )
+from impactcell.measurements.given import read_given
 from impactcell.prediction import estimate_from_features
 from impactcell.prediction.joint_plant_fit import fit_plant
 from tests.unit.measurements.records import PLACE_M, sampled, taps, write_logger_file
@@ -135,7 +136,7 @@ def test_what_cannot_be_understood_is_told_and_nothing_written(
 
 
 def test_what_is_given_goes_before_what_is_guessed() -> None:
-    tables = [table(t=("s", TIME), F=("N", WAVE), Fx=("N", WAVE), x=("mm", WAVE))]
+    tables = [table(t=("s", TIME), F=("N", WAVE), Fx=("N", WAVE), x=("mm", -WAVE))]
     with pytest.raises(MeasurementError, match="there is no column 'G'"):
         guess(tables, Given(columns={Quantity.FORCE: "G"}))
     mapping = guess(tables, Given(columns={Quantity.FORCE: "Fx"}, units={"x": "um"}))
@@ -195,3 +196,28 @@ def test_a_mapping_file_says_the_same(files: list[Path], tmp_path: Path) -> None
     mapping.write_text("colums: {}\n", encoding="utf-8")
     with pytest.raises(MeasurementError, match="unknown key 'colums'"):
         run_verb(["import", str(files[0]), "--mapping", str(mapping), "-o", str(tmp_path / "d")])
+
+
+def test_columns_are_left_out_or_kept_as_covariates(tmp_path: Path) -> None:
+    tables = [
+        table(
+            t=("s", TIME),
+            F=("N", WAVE),
+            x=("m", -WAVE),
+            Speed=(None, WAVE),
+            torque_enable=(None, WAVE),
+            p=("bar", WAVE),
+        )
+    ]
+    with pytest.raises(MeasurementError, match="column 'Speed' \\(velocity\\) has no unit"):
+        make_campaign(tables, guess(tables))
+    given = read_given({"columns": ["ignored=Speed", "ignored=torque_enable"]})
+    imported = make_campaign(tables, guess(tables, given))
+    assert set(imported.campaign.shots[0].covariates) == {"p_pa"}
+    said = tmp_path / "map.yaml"
+    said.write_text("columns: {ignored: [Speed, torque_enable], covariate: [p]}\n", encoding="utf-8")
+    assert read_given({}, said).others == {
+        "Speed": Quantity.IGNORED, "torque_enable": Quantity.IGNORED, "p": Quantity.COVARIATE,
+    }  # fmt: skip
+    with pytest.raises(MeasurementError, match="there is no column 'gone'"):
+        guess(tables, read_given({"columns": ["ignored=gone"]}))
