@@ -141,7 +141,7 @@ def tables(*, quick: bool = False) -> list[Table]:
                     f"characters alone: {1e3 * floor_s:.1f} ms",
                 ],
             ],
-            "One request in flight, client and simulator in one process; the serial line takes no time but in "
+            "One request in flight, client and simulator in one process; a serial line takes no time but in "
             "the last row, where it takes that of its characters. No hardware.",
         ),
         Table(
@@ -152,6 +152,6 @@ def tables(*, quick: bool = False) -> list[Table]:
                 ["farthest from a fair share", "10 %", f"{100 * unfair:.1f} %"],
                 ["line in use", "", f"{100 * sum(shares.values()) * _REPLY_S / seconds:.0f} %"],
             ],
-            f"{seconds:.0f} s over RTU over TCP; blocks of 10 to 500 registers, each asked for again at once.",
+            f"{seconds:.0f} s over RTU over TCP; blocks of 10 to 500 registers, asked for again at once.",
         ),
     ]
