@@ -13,6 +13,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -69,7 +70,8 @@ def run(job: Job) -> dict[str, Any]:
     multiples = (multiple, wandering)
     given = campaign(job, multiples)
     started = time.process_time()
-    found = investigate(given, seed=job.seed)
+    with patch("impactcell.discrepancy.workflow.find_law", lambda *_: None):  # has a study of its own
+        found = investigate(given, seed=job.seed)
     outcome = result_document(found)
     return {
         "key": job.key,

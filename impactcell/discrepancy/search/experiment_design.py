@@ -1,17 +1,22 @@
-"""Which shots would tell tied effects apart, how many of them, and with what power."""
+"""Which shots would tell tied effects apart, how many of them, and with what power.
+
+A setting is looked for by the distance of two models' predictions; what it promises is then simulated: shots
+of one model with its noise and scatter, judged by both.
+"""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
 
-from impactcell.discrepancy.data import PreparedShot, concatenate_shots
-from impactcell.discrepancy.model import Fit, Problem
+from impactcell.discrepancy.data import PreparedShot, ShotSet, concatenate_shots
+from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.errors import PhysicsError
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
+from impactcell.records import Samples
 
 POWER = 0.9
 """Probability with which the shots proposed tell two effects apart."""
@@ -19,6 +24,12 @@ SIGNIFICANCE = 0.025
 """One-sided error of the test that they are proposed for."""
 MAX_SHOTS = 400
 """More shots than that are no proposal."""
+SIMULATED_SHOTS = 40
+"""Shots of a setting that are simulated: their scatter is known to a ninth."""
+MAX_SIMULATED_SETTINGS = 3
+"""Settings, the cheapest first, that are simulated until one keeps what it promises."""
+SIMULATION = 9
+"""Stream of random numbers of these shots, apart from those of other draws."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,20 +71,69 @@ def propose_experiments(
 
 
 def _cheapest_experiment(problem: Problem, best: Fit, rival_fit: Fit, effect: str, rival: str) -> Proposal:
-    feasible: list[tuple[int, str, float]] = []
+    feasible: list[tuple[int, str, PreparedShot]] = []
     for setting, shot in problem.shots.excitation.settings_within_reach(problem.shots.items):
         separation = _separation(problem, best, rival_fit, shot)
-        if separation <= 0.0:
-            continue
-        needed = (norm.ppf(1.0 - SIGNIFICANCE) + norm.ppf(POWER)) ** 2 / separation
-        count = max(math.ceil(needed), 2)
+        count = _shots_needed(math.sqrt(max(separation, 0.0)))
         if count <= MAX_SHOTS:
-            power = float(norm.cdf(math.sqrt(count * separation) - norm.ppf(1.0 - SIGNIFICANCE)))
-            feasible.append((count, setting, power))
-    if not feasible:
-        return Proposal((effect, rival), _separate_measurement(effect, rival), 0, 1.0)
-    count, setting, power = min(feasible, key=lambda one: one[0])
-    return Proposal((effect, rival), setting, count, power)
+            feasible.append((count, setting, shot))
+    for _, setting, shot in sorted(feasible, key=lambda one: one[0])[:MAX_SIMULATED_SETTINGS]:
+        per_shot = simulated_separation(problem, best, rival_fit, shot)
+        count = _shots_needed(per_shot)
+        if count <= MAX_SHOTS:
+            power = float(norm.cdf(math.sqrt(count) * per_shot - norm.ppf(1.0 - SIGNIFICANCE)))
+            return Proposal((effect, rival), setting, count, power)
+    return Proposal((effect, rival), _separate_measurement(effect, rival), 0, 1.0)
+
+
+def _shots_needed(per_shot: float) -> int:
+    """Shots that reach the power, from the mean difference of a shot over its standard deviation."""
+    if per_shot <= 0.0:
+        return MAX_SHOTS + 1
+    needed = ((norm.ppf(1.0 - SIGNIFICANCE) + norm.ppf(POWER)) / per_shot) ** 2
+    return max(math.ceil(min(needed, MAX_SHOTS + 1.0)), 2)
+
+
+def simulated_separation(problem: Problem, best: Fit, rival_fit: Fit, shot: PreparedShot) -> float:
+    """Log-likelihood by which simulated shots prefer the model that made them: mean over standard deviation.
+
+    Each shot has noise and a friction factor of its own, which both models fit to it. 0 where the plant has
+    no answer.
+    """
+    shots = concatenate_shots(
+        problem.shots.excitation,
+        problem.shots.gravity_m_s2,
+        problem.shots.stroke_m,
+        (shot,) * SIMULATED_SHOTS,
+        problem.shots.noise_std,
+    )
+    rng = np.random.default_rng(SIMULATION)
+    try:
+        model = Problem(shots, problem.batches, best.effects)
+        guess = model.initial_guess()
+        scatter = best.spread * rng.standard_normal(SIMULATED_SHOTS)
+        residual = model.residual(best.theta, replace(guess, log_factor=scatter))
+        made = shots.values + shots.unwhiten(rng.standard_normal(residual.size) - residual)
+        simulated = Problem(_with_values(shots, made), problem.batches, best.effects)
+        preferred, other = (refit_shot_parameters(simulated, fit) for fit in (best, rival_fit))
+    except (PhysicsError, ValueError):
+        return 0.0
+    difference = preferred.log_likelihood(simulated.shots) - other.log_likelihood(simulated.shots)
+    if not np.isfinite(difference).all():
+        return 0.0
+    return float(difference.mean()) / max(float(difference.std(ddof=1)), 1e-12)
+
+
+def _with_values(shots: ShotSet, values: Samples) -> ShotSet:
+    """Put other samples into the same shots."""
+    items = []
+    for place, shot in enumerate(shots.items):
+        ends = np.cumsum([len(channel) for channel in shot.values])[:-1]
+        force, position, actuator = np.split(values[shots.samples_of(place)], ends)
+        items.append(replace(shot, values=(force, position, actuator)))
+    return concatenate_shots(
+        shots.excitation, shots.gravity_m_s2, shots.stroke_m, tuple(items), shots.noise_std
+    )
 
 
 def _separate_measurement(effect: str, rival: str) -> str:
