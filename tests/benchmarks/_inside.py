@@ -1,10 +1,9 @@
-"""Wear, batches and outliers together, batch unknown: slope, shifts and the wear limit."""
+"""Wear, batches and outliers: the bank alone, told the scale of the noise, beside classical charts."""
 
 import math
 
 import numpy as np
 
-from impactcell.alarms import AlarmSettings, RuleSettings
 from tests.benchmarks import _charts, _classical, _steps, _streams
 from tests.benchmarks.table import Table
 
@@ -13,59 +12,16 @@ SEEDS = _streams.REPORTED
 STEP_SEEDS = _streams.REPORTED + 10_000
 
 
-def activations(holds_on: np.ndarray, holds_off: np.ndarray, rule: RuleSettings) -> list[int]:
-    """Cycles at which an alarm comes on that needs `holds_on` to come and goes when `holds_off` ends."""
-    on, held, missed, found = False, 0, 0, []
-    for t, (comes, stays) in enumerate(zip(holds_on.tolist(), holds_off.tolist(), strict=True)):
-        held = held + 1 if comes else 0
-        missed = missed + 1 if not stays else 0
-        if not on and held > rule.on_delay:
-            on, missed = True, 0
-            found.append(t)
-        elif on and missed > rule.off_delay:
-            on, held = False, 0
-    return found
-
-
-def crossing(seed: int) -> float:
-    """Wear limit of a stream, in sd above where it begins: drawn, and crossed inside the stream."""
-    return float(np.random.default_rng([5, seed]).uniform(0.8, 2.8))
-
-
-def wear_alarms(seed: int, truth: _streams.Stream, level: np.ndarray) -> dict[str, tuple[int, bool]]:
-    """By the alarm's kind: activations, and whether the first came before the true crossing."""
-    limit, rules = crossing(seed), AlarmSettings()
-    z = (level[:, 0] - limit) / np.sqrt(np.maximum(level[:, 1], 1e-12))
-    probability = 0.5 * np.array([math.erfc(-x / math.sqrt(2.0)) for x in z.tolist()])
-    rule = rules.rule("WearLimit")
-    bare = RuleSettings()
-    smooth = _classical.ewma(truth.values)
-    found = {
-        "ours": activations(probability > rule.activate_above, probability > rule.clear_below, rule),
-        "raw": activations(truth.values > limit, truth.values > limit, bare),
-        "EWMA": activations(smooth > limit, smooth > limit, bare),
-        "raw, delays": activations(truth.values > limit, truth.values > limit, rule),
-        "EWMA, delays": activations(smooth > limit, smooth > limit, rule),
-    }
-    true = limit / _streams.SLOPE
-    return {kind: (len(at), bool(at) and at[0] < true) for kind, at in found.items()}
-
-
-def wear_table(*, quick: bool) -> list[Table]:
+def wear_table(*, quick: bool) -> Table:
     runs = 40 if quick else 200
     errors, false, changes = [], 0, 0
-    worn: dict[str, list[tuple[int, bool]]] = {}
     for seed in range(SEEDS, SEEDS + runs):
         truth = _streams.stream(seed)
         run = _steps.Run.start(truth.values[0])
-        level = np.zeros((len(truth.values), 2))
-        level[0] = truth.values[0], 1.0
-        found = run.follow(truth.values[1:], level=level)
+        found = run.follow(truth.values[1:])
         mean, covariance = run.moments()
         best, best_std = _streams.oracle_slope(truth)
         errors.append((mean[1] - _streams.SLOPE, covariance[1, 1] ** 0.5, best - _streams.SLOPE, best_std))
-        for kind, outcome in wear_alarms(seed, truth, level).items():
-            worn.setdefault(kind, []).append(outcome)
         false += _streams.false_alarms(found, truth)
         changes += len(truth.changes)
     rows = slope_rows(np.array(errors), "<= 1.4", "")
@@ -73,27 +29,8 @@ def wear_table(*, quick: bool) -> list[Table]:
     note = (
         f"{runs} streams of 10000 cycles, {changes} batch steps; the compiled bank, scale of the noise given."
     )
-    made = [Table("Batch unknown: wear inside the stream", ["what", "bar", "measured", "95 %"], rows, note)]
-    kinds = list(worn)
-    of = {kind: np.array(seen, dtype=float) for kind, seen in worn.items()}
-    error = 1.96 / math.sqrt(runs)
-    limits = [
-        [
-            "activations per true crossing",
-            "<= 1.2",
-            *(f"{of[k][:, 0].mean():.2f} ± {error * of[k][:, 0].std():.2f}" for k in kinds),
-        ],
-        [
-            "too early",
-            "<= 5 %",
-            *(f"{100 * of[k][:, 1].mean():.1f} ± {100 * error * of[k][:, 1].std():.1f} %" for k in kinds),
-        ],
-    ]
-    note = (
-        f"The same {runs} streams, a limit drawn for each. Raw and EWMA ({_charts.EWMA_LAMBDA:g}) compare "
-        "the value itself with the limit; with delays: held 5 cycles, and gone for 20, as ours."
-    )
-    return [*made, Table("Batch unknown: wear limit", ["what", "bar", *kinds], limits, note)]
+    name = "The bank alone, batch unknown: wear inside the stream"
+    return Table(name, ["what", "bar", "measured", "95 %"], rows, note)
 
 
 def steps_table(*, quick: bool) -> Table:

@@ -1,4 +1,4 @@
-"""The whole of `track` on the streams: batch known, and beside the compiled bank with the batch unknown.
+"""The whole tracker on the streams with the batch known, and its first cycles.
 
 Each stream that is done is kept in bench-results/, for the code it was run with, so that an interrupted run
 goes on where it was.
@@ -14,8 +14,7 @@ import numpy as np
 
 from impactcell.tracking import wear_batch
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
-from impactcell.tracking.wear_batch.run_length_model import SLOPE
-from tests.benchmarks import _charts, _inside, _steps, _streams
+from tests.benchmarks import _inside, _streams
 from tests.benchmarks.table import Table
 
 UNIT, MEAN = 0.002, 0.2  # of a series in mu_s
@@ -47,51 +46,6 @@ def known_table(*, quick: bool) -> Table:
     rows.append(["batches said to differ", "", f"{100 * between / steps:.0f} %", f"of {steps}"])
     note = f"{runs} streams through all of `track`: scale, outliers and process noise learned on the way."
     return Table("Batch known: wear inside the stream", ["what", "bar", "measured", "95 %"], rows, note)
-
-
-def unknown_table(*, quick: bool) -> Table:
-    """The whole tracker beside the bank alone, which is told the scale of the noise, on the same streams."""
-    runs = 4 if quick else 20
-    rows, figures = [], {}
-    for size in _inside.SIZES:
-        figures[size] = (np.zeros(0), np.zeros(0))
-    whole, alone, false = [], [], [0, 0]
-    same = found_by_bank = 0
-    for i in range(runs):
-        seed = _inside.STEP_SEEDS + i
-        truth = _streams.stream(seed, sizes=_inside.SIZES)
-        done = _run(seed, BatchKnowledge.UNKNOWN, _inside.SIZES)
-        ours = np.array([cycle for cycle, _ in done["shifts"]], dtype=float)
-        run = _steps.Run.start(truth.values[0])
-        bank = run.follow(truth.values[1:])
-        mean = run.moments()[0][SLOPE]
-        whole.append((done["error"], done["std"], done["oracle"]))
-        alone.append((mean - _streams.SLOPE, 1.0, done["oracle"]))
-        pairs = zip(_streams.first_alarms(ours, truth), _streams.first_alarms(bank, truth), strict=True)
-        for (size, a), (_, b) in pairs:
-            mine, its = figures[size]
-            figures[size] = np.append(mine, a), np.append(its, b)
-        for k, found in enumerate((ours, bank)):
-            false[k] += _streams.false_alarms(found, truth)
-        found_by_bank += len(bank)
-        same += sum(bool(np.any(np.abs(ours - t) <= 3)) for t in bank)
-
-    def ratio(pairs: list[tuple[float, float, float]]) -> float:
-        e = np.array(pairs)
-        return math.sqrt((e[:, 0] ** 2).mean() / (e[:, 2] ** 2).mean())
-
-    rows.append(["slope RMSE / oracle", f"{ratio(whole):.3f}", f"{ratio(alone):.3f}"])
-    rows.append(["false batch alarms per 10000", *(f"{n / runs:.2f}" for n in false)])
-    for size, both in figures.items():
-        bound = _charts.optimal_delay(size, _steps.DESIGN)
-        found = np.isfinite(both[0]) & np.isfinite(both[1])
-        rows.append(
-            [f"delay / bound, steps of {size:g} sd", *(f"{d[found].mean() / bound:.3f}" for d in both)]
-        )
-        rows.append([f"not found, {size:g} sd", *(f"{(~np.isfinite(d)).sum()} of {len(d)}" for d in both)])
-    rows.append(["the bank's alarms that the tracker gives within 3 cycles", f"{same}", f"{found_by_bank}"])
-    note = f"{runs} streams of 10000 cycles; delays of the steps that both found."
-    return Table("Batch unknown: all of `track` beside the bank", ["what", "`track`", "bank"], rows, note)
 
 
 def starts_table(*, quick: bool) -> Table:

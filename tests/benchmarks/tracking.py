@@ -14,7 +14,7 @@ from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
-from tests.benchmarks import _declared, _inside, _signatures, _sizes, _slides, _steps, _tracker
+from tests.benchmarks import _declared, _inside, _signatures, _sizes, _slides, _steps, _track, _tracker
 from tests.benchmarks.table import Table
 
 
@@ -24,7 +24,7 @@ def tables(*, quick: bool = False) -> Iterator[Table]:
         cost_table,
         _inside.steps_table,
         _inside.wear_table,
-        _tracker.unknown_table,
+        _track.tables,
         _tracker.starts_table,
         _tracker.known_table,
         _declared.table,
