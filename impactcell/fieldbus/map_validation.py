@@ -5,6 +5,8 @@ from typing import Any, Final
 
 _TABLES: Final = ("holding", "input")
 _ORDERS: Final = ("big", "little")
+_LARGEST: Final = 1e300
+"""A scale or offset with which the largest code is still a number."""
 
 
 def _is_int(value: object) -> bool:
@@ -12,7 +14,7 @@ def _is_int(value: object) -> bool:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST
 
 
 def _is_codes(value: object) -> bool:
@@ -32,12 +34,18 @@ def _is_saturation(value: object) -> bool:
 
 _KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
     "address": ("an address 0..65535", lambda value: _is_int(value) and 0 <= value < 65_536),
-    "type": ("u16, i16, u32, i32, u64, f32, f64 or string", lambda value: isinstance(value, str)),
+    "type": (
+        "u16, i16, u32, i32, u64, i64, bcd16, bcd32, f32, f64 or string",
+        lambda value: isinstance(value, str),
+    ),
     "count": ("a whole number of at least 1", lambda value: _is_int(value) and value >= 1),
     "length": ("a whole number of registers, at least 1", lambda value: _is_int(value) and value >= 1),
     "table": ("holding or input", lambda value: value in _TABLES),
     "writable": ("true or false", lambda value: isinstance(value, bool)),
     "word_order": ("big or little", lambda value: value in _ORDERS),
+    "byte_order": ("big or little", lambda value: value in _ORDERS),
+    "bit": ("a bit 0..15", lambda value: _is_int(value) and 0 <= value < 16),
+    "offset": ("a number", _is_number),
     "scale": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
     "unit": ("text", lambda value: isinstance(value, str)),
     "not_a_number": ("a code", _is_int),
@@ -98,6 +106,11 @@ def _entry_faults(entry: object, units: Container[str], kinds: Container[str]) -
         faults.append("an array of strings is not supported")
     if unit and unit not in units:
         faults.append(f"unit {unit!r} is not known")
+    if kind == "string" and "offset" in entry:
+        faults.append("a text has no offset")
+    beside_bit = {"count", "scale", "offset", "unit", "not_a_number", "saturation", "codes"} & set(entry)
+    if "bit" in entry and (kind != "u16" or entry.get("writable") or beside_bit):
+        faults.append("a bit is one of a u16 that is only read, and has no scale, unit or codes")
     if kind in ("f32", "f64", "string") and ("not_a_number" in entry or "saturation" in entry):
         faults.append("not_a_number and saturation are codes of integer types")
     return faults
@@ -110,4 +123,6 @@ def _arguments(name: str, entry: Mapping[str, Any], order: str) -> dict[str, Any
         values["saturation"] = (values["saturation"][0], values["saturation"][1])
     if "scale" in values:
         values["scale"] = float(values["scale"])
+    if "offset" in values:
+        values["offset"] = float(values["offset"])
     return values

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from impactcell.errors import MapError
+from impactcell.fieldbus.bcd import NO_BCD, from_bcd, to_bcd
 
 WIRE: Final = np.dtype(">u2")
 """One register as Modbus carries it."""
@@ -50,11 +51,14 @@ KINDS: Final[Mapping[str, np.dtype[Any]]] = {
     "u32": np.dtype(">u4"),
     "i32": np.dtype(">i4"),
     "u64": np.dtype(">u8"),
+    "i64": np.dtype(">i8"),
+    "bcd16": np.dtype(">u2"),
+    "bcd32": np.dtype(">u4"),
     "f32": np.dtype(">f4"),
     "f64": np.dtype(">f8"),
 }
 """Numeric types of a register; `string` is the other one."""
-_NUMBERS: Final = {kind: Struct(f">{code}") for kind, code in zip(KINDS, "HhIiQfd", strict=True)}
+_NUMBERS: Final = {kind: Struct(f">{code}") for kind, code in zip(KINDS, "HhIiQqHIfd", strict=True)}
 """The same for a single number, without the detour over an array."""
 
 
@@ -80,8 +84,14 @@ class Register:
         Whether a client may write it.
     word_order : str
         `big`: the most significant word at the lowest address; `little`: at the highest.
+    byte_order : str
+        `big`: the most significant byte of a register first, as Modbus has it; `little`: last.
+    bit : int or None
+        Which bit of the register is the value, 0 the least significant; None: all of them.
     scale : float
         Size of one code, in `unit`.
+    offset : float
+        Value of code 0, in `unit`.
     unit : str
         Unit of the scaled value; empty for a plain code, which stays an integer.
     not_a_number : int or None
@@ -102,7 +112,10 @@ class Register:
     table: str = "holding"
     writable: bool = False
     word_order: str = "big"
+    byte_order: str = "big"
+    bit: int | None = None
     scale: float = 1.0
+    offset: float = 0.0
     unit: str = ""
     not_a_number: int | None = None
     saturation: tuple[int, int] | None = None
@@ -131,16 +144,23 @@ class Register:
         return self.scale * SI_FACTOR.get(self.unit, 1.0)
 
     @property
+    def si_offset(self) -> float:
+        """Value of code 0, SI."""
+        return self.offset * SI_FACTOR.get(self.unit, 1.0)
+
+    @property
     def is_code(self) -> bool:
-        """Whether it is a plain integer code, without scale or unit."""
-        return not self.unit and self.scale == 1.0 and self.kind not in ("f32", "f64", "string")
+        """Whether it is a plain integer code, without scale, offset or unit."""
+        plain = not self.unit and self.scale == 1.0 and not self.offset
+        return plain and self.kind not in ("f32", "f64", "string")
 
     @property
     def full_scale(self) -> tuple[float, float] | None:
         """Smallest and largest value the channel can show, SI; None where the map does not say."""
         if self.saturation is None:
             return None
-        return self.saturation[0] * self.si_factor, self.saturation[1] * self.si_factor
+        low, high = (code * self.si_factor + self.si_offset for code in self.saturation)
+        return low, high
 
     def raw(self, words: Words) -> NDArray[Any]:
         """Codes in `words`, shape (len(words) // words_per_value,), big-endian dtype of `kind`.
@@ -154,10 +174,7 @@ class Register:
             raise MapError(f"register {self.name} holds text, not codes")
         if words.size % self.words_per_value:
             raise MapError(f"register {self.name}: {words.size} words are no whole number of {self.kind}")
-        wire = np.ascontiguousarray(words, dtype=WIRE)
-        if self.word_order == "little" and self.words_per_value > 1:
-            wire = np.ascontiguousarray(wire.reshape(-1, self.words_per_value)[:, ::-1]).reshape(-1)
-        return wire.view(KINDS[self.kind])
+        return self._in_order(words).view(KINDS[self.kind])
 
     def decode(self, words: Words) -> Value:
         """Value in `words`: text, a number, or an array (also a shorter one than `count`).
@@ -170,28 +187,61 @@ class Register:
             If a single value is asked for from the wrong number of words.
         """
         if self.kind == "string":
-            text = np.ascontiguousarray(words, dtype=WIRE).tobytes().split(b"\0", 1)[0]
+            text = self._in_order(words).tobytes().split(b"\0", 1)[0]
             return text.decode("utf-8", errors="replace").rstrip()
         if self.count == 1:
             return self._number(words)
         raw = self.raw(words)
+        if self._is_bcd:
+            raw = from_bcd(raw)
         if self.is_code:
+            if self._is_bcd and (raw == NO_BCD).any():
+                raise MapError(f"register {self.name} ({self.address}) shows what is no decimal")
             return raw.astype(np.int64)
         codes = raw.astype(raw.dtype.newbyteorder("="))
         values: NDArray[np.float64] = np.multiply(codes, self.si_factor, dtype=np.float64)
+        if self.offset:
+            values += self.si_offset
         if self.not_a_number is not None:
             values[codes == self.not_a_number] = np.nan
+        if self._is_bcd:
+            values[codes == NO_BCD] = np.nan
         return values
 
     def _number(self, words: Words) -> int | float:
         if words.size != self.words:
             raise MapError(f"register {self.name} takes {self.words} words, not {words.size}")
         wire = words[::-1] if self.word_order == "little" else words
+        wire = wire.astype(WIRE, copy=False)
+        if self.byte_order == "little":
+            wire = wire.byteswap()
         code: int | float
-        (code,) = _NUMBERS[self.kind].unpack(wire.astype(WIRE, copy=False).tobytes())
+        (code,) = _NUMBERS[self.kind].unpack(wire.tobytes())
+        if self.bit is not None:
+            return int(code) >> self.bit & 1
+        if self._is_bcd:
+            code = int(from_bcd(self._in_order(words).view(KINDS[self.kind]))[0])
+            if code == NO_BCD:
+                if self.is_code:
+                    raise MapError(f"register {self.name} ({self.address}) shows what is no decimal")
+                return math.nan
         if self.is_code:
             return code
-        return math.nan if code == self.not_a_number else float(code) * self.si_factor
+        if code == self.not_a_number:
+            return math.nan
+        value = float(code) * self.si_factor
+        return value + self.si_offset if self.offset else value
+
+    @property
+    def _is_bcd(self) -> bool:
+        return self.kind in ("bcd16", "bcd32")
+
+    def _in_order(self, words: Words) -> Words:
+        """Put words and bytes from the map's order into that of `WIRE`, or back."""
+        wire = np.ascontiguousarray(words, dtype=WIRE)
+        if self.word_order == "little" and self.words_per_value > 1 and self.kind != "string":
+            wire = np.ascontiguousarray(wire.reshape(-1, self.words_per_value)[:, ::-1]).reshape(-1)
+        return wire.byteswap() if self.byte_order == "little" else wire
 
     def encode(self, value: ArrayLike | str) -> Words:
         """Words of `value` (SI, text, or an array of at most `count` values), dtype `WIRE`.
@@ -208,30 +258,35 @@ class Register:
             text = str(value).encode()
             if len(text) > 2 * self.length:
                 raise MapError(f"register {self.name}: {len(text)} bytes do not fit {self.length} registers")
-            return np.frombuffer(text.ljust(2 * self.length, b"\0"), dtype=WIRE).copy()
+            return self._in_order(np.frombuffer(text.ljust(2 * self.length, b"\0"), dtype=WIRE).copy())
+        if self.bit is not None:
+            raise MapError(f"register {self.name} is one bit of a register, which is only read")
         codes = self._codes(np.atleast_1d(np.asarray(value)))
         if codes.size > self.count:
             raise MapError(f"register {self.name}: {codes.size} values do not fit {self.count}")
-        wire = codes.view(WIRE)
-        if self.word_order == "little" and self.words_per_value > 1:
-            wire = np.ascontiguousarray(wire.reshape(-1, self.words_per_value)[:, ::-1]).reshape(-1)
-        return wire
+        return self._in_order(codes.view(WIRE))
 
     def _codes(self, values: NDArray[Any]) -> NDArray[Any]:
         dtype = KINDS[self.kind]
         if dtype.kind == "f":
-            return (values.astype(np.float64) / self.si_factor).astype(dtype)
+            return ((values.astype(np.float64) - self.si_offset) / self.si_factor).astype(dtype)
         info = np.iinfo(dtype)
+        least, most = (0, 10 ** (2 * dtype.itemsize) - 1) if self._is_bcd else (info.min, info.max)
         if values.dtype.kind in "iu" and self.is_code:  # exact: u64 does not pass through a float
-            if values.size and (int(values.min()) < info.min or int(values.max()) > info.max):
-                raise MapError(f"register {self.name}: value outside {info.min}..{info.max}")
-            return values.astype(dtype)
-        low, high = self.saturation or (info.min, info.max)
-        scaled = np.rint(values.astype(np.float64) / self.si_factor)
+            if values.size and (int(values.min()) < least or int(values.max()) > most):
+                raise MapError(f"register {self.name}: value outside {least}..{most}")
+            return to_bcd(values, dtype) if self._is_bcd else values.astype(dtype)
+        low, high = self.saturation or (least, most)
+        scaled = np.rint((values.astype(np.float64) - self.si_offset) / self.si_factor)
         missing = np.isnan(scaled)
         if missing.any() and self.not_a_number is None:
             raise MapError(f"register {self.name} has no code for a value that is not a number")
-        codes = np.clip(np.where(missing, 0.0, scaled), low, high).astype(dtype)
+        end = float(high) if int(float(high)) <= high else math.nextafter(float(high), 0.0)
+        clipped = np.clip(np.where(missing, 0.0, scaled), low, end)
+        if self._is_bcd:
+            clipped[missing] = self.not_a_number or 0
+            return to_bcd(clipped, dtype)
+        codes = clipped.astype(dtype)
         if self.not_a_number is not None:
             codes[missing] = self.not_a_number
         return codes

@@ -136,6 +136,8 @@ def _layout_faults(registers: Iterable[Register]) -> Iterator[str]:
         for other in ordered[i + 1 :]:
             if other.table != register.table or other.address >= register.end:
                 break
+            if None not in (register.bit, other.bit) and register.bit != other.bit:
+                continue
             yield f"registers {register.name} and {other.name} overlap at {other.address}"
 
 

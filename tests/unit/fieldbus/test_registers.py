@@ -15,13 +15,14 @@ from impactcell.errors import MapError
 from impactcell.fieldbus.register import SI_FACTOR
 from impactcell.fieldbus.registers import REQUIRED, WIRE, Register, RegisterMap, registers_crc32
 
-FORMATS = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "f64": "d"}
+FORMATS = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q", "f32": "f", "f64": "d"}
 PYMODBUS = {
     "u16": ModbusTcpClient.DATATYPE.UINT16,
     "i16": ModbusTcpClient.DATATYPE.INT16,
     "u32": ModbusTcpClient.DATATYPE.UINT32,
     "i32": ModbusTcpClient.DATATYPE.INT32,
     "u64": ModbusTcpClient.DATATYPE.UINT64,
+    "i64": ModbusTcpClient.DATATYPE.INT64,
     "f32": ModbusTcpClient.DATATYPE.FLOAT32,
     "f64": ModbusTcpClient.DATATYPE.FLOAT64,
 }
