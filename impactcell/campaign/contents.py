@@ -10,6 +10,37 @@ CHANNELS = {"force": "force_n", "position": "position_m", "actuator": "actuator_
 """Column of a trace for each sensor."""
 
 
+class Coordinate(enum.StrEnum):
+    """What moves: a place along a line, or an angle about an axis."""
+
+    TRANSLATION = "translation"
+    ROTATION = "rotation"
+
+
+COLUMNS: Mapping[Coordinate, Mapping[str, str]] = {
+    Coordinate.TRANSLATION: {
+        **CHANNELS,
+        "mass": "mass_kg",
+        "start": "start_m",
+        "force_noise": "noise_std_n",
+        "position_noise": "noise_std_m",
+        "actuator_noise": "noise_std_m",
+    },
+    Coordinate.ROTATION: {
+        "force": "torque_n_m",
+        "position": "angle_rad",
+        "actuator": "actuator_rad",
+        "mass": "inertia_kg_m2",
+        "start": "start_rad",
+        "force_noise": "noise_std_n_m",
+        "position_noise": "noise_std_rad",
+        "actuator_noise": "noise_std_rad",
+    },
+}
+"""Names of columns and keys in a campaign: where the coordinate is an angle, a force is a torque [N m],
+a place an angle [rad] and a mass an inertia [kg m²]."""
+
+
 class Excitation(enum.StrEnum):
     """What makes the part move."""
 
@@ -50,6 +81,8 @@ class Campaign:
         In the order of `shots.csv`, which is the order in which they were taken.
     columns : tuple of str
         Columns of `shots.csv`, so that what was not recorded is told from what was.
+    coordinate : Coordinate
+        Where it is a rotation, forces are torques [N m], places angles [rad] and masses inertias [kg m²].
     """
 
     excitation: Excitation
@@ -58,3 +91,4 @@ class Campaign:
     stroke_m: float = float("inf")
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     columns: tuple[str, ...] = ("shot",)
+    coordinate: Coordinate = Coordinate.TRANSLATION

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import yaml
 
-from impactcell.campaign.contents import CHANNELS, Excitation, Sensor
+from impactcell.campaign.contents import CHANNELS, COLUMNS, Coordinate, Excitation, Sensor
 from impactcell.campaign.faults import Faults, read_text
 
 FORMAT = 1
 """Version of the campaign directory."""
-NOISE_KEY = {"force": "noise_std_n", "position": "noise_std_m", "actuator": "noise_std_m"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +21,7 @@ class Header:
     gravity_m_s2: float
     stroke_m: float
     sensors: dict[str, Sensor]
+    coordinate: Coordinate = Coordinate.TRANSLATION
 
 
 def read_header(file: Path, faults: Faults) -> Header | None:
@@ -42,7 +42,7 @@ def read_header(file: Path, faults: Faults) -> Header | None:
     noted = len(faults)
     reader = _Reader(file, faults)
     top = reader.mapping(
-        root, "campaign.yaml", {"format", "excitation", "gravity_m_s2", "actuator", "sensors"}
+        root, "campaign.yaml", {"format", "excitation", "coordinate", "gravity_m_s2", "actuator", "sensors"}
     )
     if top is None:
         return None
@@ -53,10 +53,11 @@ def read_header(file: Path, faults: Faults) -> Header | None:
     stroke = reader.number(
         actuator.get("stroke_m"), "actuator.stroke_m", math.inf, positive=True, finite=False
     )
-    sensors = _sensors(reader, top)
+    coordinate = _coordinate(reader, top, excitation)
+    sensors = _sensors(reader, top, coordinate)
     if len(faults) > noted or excitation is None or gravity is None or stroke is None:
         return None
-    return Header(excitation, gravity, stroke, sensors)
+    return Header(excitation, gravity, stroke, sensors, coordinate)
 
 
 def _check_format(reader: "_Reader", top: dict[str, yaml.Node]) -> None:
@@ -81,11 +82,25 @@ def _excitation(reader: "_Reader", top: dict[str, yaml.Node]) -> Excitation | No
     return Excitation(value)
 
 
-def _sensors(reader: "_Reader", top: dict[str, yaml.Node]) -> dict[str, Sensor]:
+def _coordinate(reader: "_Reader", top: dict[str, yaml.Node], excitation: Excitation | None) -> Coordinate:
+    node = top.get("coordinate")
+    if node is None:
+        return Coordinate.TRANSLATION
+    value = node.value if isinstance(node, yaml.ScalarNode) else None
+    if value not in set(Coordinate):
+        reader.fault(node, f"coordinate {value!r} is not known; write one of {', '.join(Coordinate)}")
+        return Coordinate.TRANSLATION
+    coordinate = Coordinate(value)
+    if coordinate is Coordinate.ROTATION and excitation is Excitation.TAP:
+        reader.fault(node, "a tap goes along a line; what rotates is driven or free_slide")
+    return coordinate
+
+
+def _sensors(reader: "_Reader", top: dict[str, yaml.Node], coordinate: Coordinate) -> dict[str, Sensor]:
     sensors = {}
     nodes = reader.mapping(top.get("sensors"), "sensors", set(CHANNELS)) or {}
     for name, node in nodes.items():
-        noise_key = NOISE_KEY[name]
+        noise_key = COLUMNS[coordinate][f"{name}_noise"]
         keys = reader.mapping(node, f"sensors.{name}", {"rate_hz", noise_key}) or {}
         rate = reader.number(keys.get("rate_hz"), f"sensors.{name}.rate_hz", None, positive=True)
         noise = reader.number(keys.get(noise_key), f"sensors.{name}.{noise_key}", None, positive=True)

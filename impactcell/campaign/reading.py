@@ -4,7 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from impactcell.campaign.contents import Campaign, Excitation, Sensor
+from impactcell.campaign.contents import Campaign, Coordinate, Excitation, Sensor
 from impactcell.campaign.faults import Faults
 from impactcell.campaign.header import Header, read_header
 from impactcell.campaign.shots import ShotRow, read_shots
@@ -42,7 +42,12 @@ def read(directory: Path) -> Campaign:
         faults.add(directory, None, "is not a directory; name the directory that holds campaign.yaml")
         faults.raise_any()
     header = read_header(directory / "campaign.yaml", faults)
-    table = read_shots(directory / "shots.csv", header.excitation if header else None, faults)
+    table = read_shots(
+        directory / "shots.csv",
+        header.excitation if header else None,
+        faults,
+        header.coordinate if header else Coordinate.TRANSLATION,
+    )
     traces = directory / "traces"
     if not traces.is_dir():
         faults.add(traces, None, "is missing; it holds N.csv for every shot N")
@@ -65,6 +70,7 @@ def read(directory: Path) -> Campaign:
         stroke_m=header.stroke_m,
         sensors=header.sensors,
         columns=table[0],
+        coordinate=header.coordinate,
     )
 
 
@@ -102,7 +108,7 @@ def _check_orphans(traces: Path, numbers: set[int], faults: Faults) -> None:
 
 
 def _capture(file: Path, shot: ShotRow, header: Header | None, faults: Faults) -> Capture | None:
-    channels = read_trace(file, faults)
+    channels = read_trace(file, faults, header.coordinate if header else Coordinate.TRANSLATION)
     if channels is None or header is None:
         return None
     required, named = REQUIRED_CHANNELS[header.excitation]

@@ -3,11 +3,11 @@
 import csv
 import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from impactcell.campaign.contents import Excitation
+from impactcell.campaign.contents import COLUMNS, Coordinate, Excitation
 from impactcell.campaign.faults import Faults, read_text
 
 MM_PER_MIN = 1e-3 / 60.0
@@ -28,11 +28,15 @@ class ShotRow:
     covariates: dict[str, float | str]
 
 
-KNOWN_COLUMNS = ("shot", "velocity_mm_per_min", "mass_kg", "direction", "batch", "dwell_s", "start_m")
+KNOWN_COLUMNS = ("shot", "velocity_mm_per_min", "direction", "batch", "dwell_s")
+"""Columns that the format knows, beside mass and start, whose names go by the coordinate."""
 
 
 def read_shots(
-    file: Path, excitation: Excitation | None, faults: Faults
+    file: Path,
+    excitation: Excitation | None,
+    faults: Faults,
+    coordinate: Coordinate = Coordinate.TRANSLATION,
 ) -> tuple[tuple[str, ...], list[ShotRow]] | None:
     """Columns and rows of `shots.csv`; None after noting every fault of it."""
     text = read_text(file, faults)
@@ -63,7 +67,7 @@ def read_shots(
             faults.add(file, line, f"{len(row)} cells where the header has {len(names)}")
             continue
         shot = _Row(file, line, dict(zip(names, (cell.strip() for cell in row), strict=True)), faults).shot(
-            excitation
+            excitation, COLUMNS[coordinate]
         )
         if shot is None:
             continue
@@ -98,17 +102,19 @@ class _Row:
         self._cells = cells
         self._faults = faults
 
-    def shot(self, excitation: Excitation | None) -> ShotRow | None:
+    def shot(self, excitation: Excitation | None, columns: Mapping[str, str]) -> ShotRow | None:
         noted = len(self._faults)
         tap = excitation is Excitation.TAP
         number = self._number("shot", _is_count, "a whole number from 1", required=True)
         velocity = self._number("velocity_mm_per_min", _is_positive, "a positive number", required=tap)
-        mass = self._number("mass_kg", _is_positive, "a positive number or empty")
+        mass = self._number(columns["mass"], _is_positive, "a positive number or empty")
         direction = self._number("direction", _is_sign, "+1 or -1", default=1.0)
         dwell = self._number("dwell_s", _is_not_negative, "a number from 0 or empty")
-        start = self._number("start_m", math.isfinite, "a finite number or empty", default=0.0)
+        start = self._number(columns["start"], math.isfinite, "a finite number or empty", default=0.0)
         covariates = {
-            name: self._covariate(text) for name, text in self._cells.items() if name not in KNOWN_COLUMNS
+            name: self._covariate(text)
+            for name, text in self._cells.items()
+            if name not in (*KNOWN_COLUMNS, columns["mass"], columns["start"])
         }
         if len(self._faults) > noted:
             return None

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from impactcell.campaign.contents import CHANNELS
+from impactcell.campaign.contents import CHANNELS, COLUMNS, Coordinate
 from impactcell.campaign.faults import Faults, read_text
 from impactcell.records import Samples
 
@@ -12,7 +12,9 @@ MAX_FAULTS_PER_TRACE = 3
 """Faults of one kind told of one trace."""
 
 
-def read_trace(file: Path, faults: Faults) -> dict[str, tuple[Samples, Samples]] | None:
+def read_trace(
+    file: Path, faults: Faults, coordinate: Coordinate = Coordinate.TRANSLATION
+) -> dict[str, tuple[Samples, Samples]] | None:
     """Channels of a trace by sensor name.
 
     Returns
@@ -21,6 +23,7 @@ def read_trace(file: Path, faults: Faults) -> dict[str, tuple[Samples, Samples]]
         For each sensor its times and values, shape (n,) each, at the times at which it was sampled;
         None after noting every fault of the file.
     """
+    columns = {sensor: COLUMNS[coordinate][sensor] for sensor in CHANNELS}
     text = read_text(file, faults)
     if text is None:
         return None
@@ -31,7 +34,7 @@ def read_trace(file: Path, faults: Faults) -> dict[str, tuple[Samples, Samples]]
         faults.add(file, None, "is empty; a trace starts with `time_s,force_n,position_m`")
         return None
     names = [name.strip() for name in lines[0].split(",")]
-    if not _check_names(file, names, faults):
+    if not _check_names(file, names, columns, faults):
         return None
     if len(lines) == 1:
         faults.add(file, 1, "has no samples; take the shot out of shots.csv or record it again")
@@ -39,11 +42,11 @@ def read_trace(file: Path, faults: Faults) -> dict[str, tuple[Samples, Samples]]
     table = _numbers(file, lines, len(names), faults)
     if table is None:
         return None
-    return _channels(file, names, table, faults)
+    return _channels(file, names, columns, table, faults)
 
 
-def _check_names(file: Path, names: list[str], faults: Faults) -> bool:
-    known_columns = ["time_s", *CHANNELS.values()]
+def _check_names(file: Path, names: list[str], columns: dict[str, str], faults: Faults) -> bool:
+    known_columns = ["time_s", *columns.values()]
     noted = len(faults)
     if "time_s" not in names:
         faults.add(
@@ -55,7 +58,7 @@ def _check_names(file: Path, names: list[str], faults: Faults) -> bool:
         elif name in names[:column]:
             faults.add(file, 1, f"column {name!r} appears twice; keep one")
     if len(faults) == noted and len(names) == 1:
-        faults.add(file, 1, f"has no channel; add one of {', '.join(CHANNELS.values())}")
+        faults.add(file, 1, f"has no channel; add one of {', '.join(columns.values())}")
     return len(faults) == noted
 
 
@@ -112,7 +115,7 @@ def _parse_cells(file: Path, cells: list[str], width: int, faults: Faults) -> Sa
 
 
 def _channels(
-    file: Path, names: list[str], table: Samples, faults: Faults
+    file: Path, names: list[str], columns: dict[str, str], table: Samples, faults: Faults
 ) -> dict[str, tuple[Samples, Samples]] | None:
     time = table[:, names.index("time_s")]
     noted = len(faults)
@@ -128,7 +131,7 @@ def _channels(
     if len(faults) > noted:
         return None
     channels = {}
-    for sensor, name in CHANNELS.items():
+    for sensor, name in columns.items():
         if name not in names:
             continue
         values = table[:, names.index(name)]

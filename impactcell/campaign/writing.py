@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from impactcell.campaign.contents import CHANNELS, Campaign
-from impactcell.campaign.header import FORMAT, NOISE_KEY
+from impactcell.campaign.contents import CHANNELS, COLUMNS, Campaign, Coordinate
+from impactcell.campaign.header import FORMAT
 from impactcell.campaign.shots import MM_PER_MIN
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel
@@ -47,7 +47,7 @@ def write(campaign: Campaign, directory: Path) -> None:
         traces = beside / "traces"
         traces.mkdir()
         for shot in campaign.shots:
-            (traces / f"{shot.cycle}.csv").write_text(_trace(shot), encoding="utf-8")
+            (traces / f"{shot.cycle}.csv").write_text(_trace(shot, campaign.coordinate), encoding="utf-8")
         if directory.is_dir():
             directory.rmdir()
         beside.rename(directory)
@@ -70,6 +70,8 @@ def _header(campaign: Campaign) -> str:
         f"excitation: {campaign.excitation}",
         f"gravity_m_s2: {_text(campaign.gravity_m_s2)}",
     ]
+    if campaign.coordinate is not Coordinate.TRANSLATION:
+        lines.append(f"coordinate: {campaign.coordinate}")
     if math.isfinite(campaign.stroke_m):
         lines += ["actuator:", f"  stroke_m: {_text(campaign.stroke_m)}"]
     if campaign.sensors:
@@ -77,7 +79,7 @@ def _header(campaign: Campaign) -> str:
     for name, sensor in campaign.sensors.items():
         noise = "null" if sensor.noise_std is None else _text(sensor.noise_std)
         rate = "" if sensor.rate_hz is None else f"rate_hz: {_text(sensor.rate_hz)}, "
-        lines.append(f"  {name}: {{{rate}{NOISE_KEY[name]}: {noise}}}")
+        lines.append(f"  {name}: {{{rate}{COLUMNS[campaign.coordinate][f'{name}_noise']}: {noise}}}")
     return "\n".join(lines) + "\n"
 
 
@@ -95,7 +97,7 @@ def _cell(shot: Capture, name: str) -> str:
             return str(shot.cycle)
         case "velocity_mm_per_min":
             return _velocity(shot.velocity_m_s)
-        case "mass_kg":
+        case "mass_kg" | "inertia_kg_m2":
             return _text(shot.mass_kg)
         case "direction":
             return str(shot.direction)
@@ -103,17 +105,17 @@ def _cell(shot: Capture, name: str) -> str:
             return shot.batch_id or ""
         case "dwell_s":
             return _text(shot.dwell_s)
-        case "start_m":
+        case "start_m" | "start_rad":
             return _text(shot.start_m)
         case _:
             value = shot.covariates.get(name, "")
             return value if isinstance(value, str) else _text(value)
 
 
-def _trace(shot: Capture) -> str:
+def _trace(shot: Capture, coordinate: Coordinate) -> str:
     channels: dict[str, Channel] = {
-        column: channel
-        for column, channel in zip(CHANNELS.values(), (shot.force, shot.position, shot.actuator), strict=True)
+        COLUMNS[coordinate][sensor]: channel
+        for sensor, channel in zip(CHANNELS, (shot.force, shot.position, shot.actuator), strict=True)
         if channel is not None
     }
     out = [",".join(["time_s", *channels])]

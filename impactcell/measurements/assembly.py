@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from impactcell.campaign import Campaign, Excitation, Sensor
+from impactcell.campaign import COLUMNS, Campaign, Coordinate, Excitation, Sensor
 from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.captures import channel_of, described
@@ -16,6 +16,7 @@ from impactcell.measurements.recognition import CHANNELS, Quantity
 from impactcell.measurements.recorded import MAX_FAULTS_TOLD, Record, records_of
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
+from impactcell.measurements.units import Dimension
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel, Samples
 
@@ -27,6 +28,9 @@ not."""
 DRIVE_REVERSAL = 0.25
 """Force of the other sign as a share of the largest from which on it drives both ways; a contact only
 pushes."""
+
+ROTATING = (Dimension.TORQUE, Dimension.ANGLE, Dimension.INERTIA)
+"""Units of force, position and mass where the coordinate is an angle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +63,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     notes: list[str] = []
     excitation = given.excitation or _excitation(records, notes)
     _check_channels(records, excitation)
+    coordinate = _coordinate(mapping, excitation)
     if excitation is Excitation.TAP:
         captures, notes_of_taps = taps_of(records, given)
         notes += notes_of_taps
@@ -74,7 +79,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         gravity_m_s2=given.constants.get("gravity", STANDARD_GRAVITY_M_S2),
         stroke_m=given.constants.get("stroke", math.inf) if excitation is Excitation.TAP else math.inf,
         sensors=_sensors(captures),
-        columns=_columns(captures, excitation),
+        columns=_columns(captures, excitation, coordinate),
+        coordinate=coordinate,
     )
     data_faults = inspect_campaign(campaign)
     try:
@@ -141,11 +147,31 @@ def _whole(number: int, record: Record, given: Given) -> Capture:
     return described(number, record, given, {str(q): channel_of(record, q, first) for q in CHANNELS})
 
 
-def _columns(captures: Sequence[Capture], excitation: Excitation) -> tuple[str, ...]:
+def _coordinate(mapping: Mapping, excitation: Excitation) -> Coordinate:
+    """Rotation where the units of the channels are of one: N m, rad, kg m²."""
+    dimensions = {
+        str(item.quantity): item.unit.dimension
+        for item in mapping.assignments
+        if item.unit is not None and item.quantity in (*CHANNELS, Quantity.MASS)
+    }
+    rotating = {name for name, dimension in dimensions.items() if dimension in ROTATING}
+    if not rotating:
+        return Coordinate.TRANSLATION
+    if rotating != set(dimensions):
+        told = ", ".join(f"{name} in {dimension.value}" for name, dimension in dimensions.items())
+        raise MeasurementError(
+            f"{told}: some are of a rotation and some of a translation; give units that fit"
+        )
+    if excitation is Excitation.TAP:
+        raise MeasurementError("a tap goes along a line; say --excitation driven for what rotates")
+    return Coordinate.ROTATION
+
+
+def _columns(captures: Sequence[Capture], excitation: Excitation, coordinate: Coordinate) -> tuple[str, ...]:
     names = ["shot"]
     if excitation is Excitation.TAP:
         names += ["velocity_mm_per_min"]
-    names += ["mass_kg"]
+    names += [COLUMNS[coordinate]["mass"]]
     if excitation is not Excitation.DRIVEN:
         names += ["direction"]
     if any(capture.batch_id is not None for capture in captures):
@@ -153,7 +179,7 @@ def _columns(captures: Sequence[Capture], excitation: Excitation) -> tuple[str, 
     if any(math.isfinite(capture.dwell_s) for capture in captures):
         names.append("dwell_s")
     if any(capture.start_m != 0.0 for capture in captures):
-        names.append("start_m")
+        names.append(COLUMNS[coordinate]["start"])
     return (*names, *dict.fromkeys(name for capture in captures for name in capture.covariates))
 
 

@@ -1,6 +1,7 @@
 """From files as people have them to a campaign: meaning of columns, trigger, cuts, what is told."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,9 @@ import pytest
 
 from impactcell import campaign
 from impactcell.api.friction import calibrated, with_masses
-from impactcell.campaign import Excitation
+from impactcell.campaign import Coordinate, Excitation
 from impactcell.cli.app import run_verb
-from impactcell.errors import MeasurementError
+from impactcell.errors import CampaignError, MeasurementError
 from impactcell.features import extract
 from impactcell.measurements import (
     Given,
@@ -221,3 +222,29 @@ def test_columns_are_left_out_or_kept_as_covariates(tmp_path: Path) -> None:
     }  # fmt: skip
     with pytest.raises(MeasurementError, match="there is no column 'gone'"):
         guess(tables, read_given({"columns": ["ignored=gone"]}))
+
+
+def test_what_rotates_is_a_campaign_of_torque_angle_and_inertia(tmp_path: Path) -> None:
+    rotating = table(t=("s", TIME), Drehmoment=("Ncm", 100.0 * WAVE), Winkel=("deg", -90.0 * WAVE))
+    given = read_given({"constants": ["mass=49 kgcm2"]})
+    write_campaign([rotating], guess([rotating], given), tmp_path / "c")
+    assert "coordinate: rotation" in (tmp_path / "c" / "campaign.yaml").read_text(encoding="utf-8")
+    head = (tmp_path / "c" / "traces" / "1.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert head == "time_s,torque_n_m,angle_rad"
+    back = campaign.read(tmp_path / "c")
+    (shot,) = back.shots
+    assert back.coordinate is Coordinate.ROTATION
+    assert shot.mass_kg == pytest.approx(0.0049)
+    assert shot.force is not None
+    assert shot.position is not None
+    np.testing.assert_allclose(shot.force.values, WAVE)
+    np.testing.assert_allclose(shot.position.values, -0.5 * np.pi * WAVE)
+    mixed = table(t=("s", TIME), Drehmoment=("Nm", WAVE), Weg=("mm", -WAVE))
+    with pytest.raises(MeasurementError, match="some are of a rotation and some of a translation"):
+        make_campaign([mixed], guess([mixed], given))
+    with pytest.raises(MeasurementError, match="a tap goes along a line"):
+        make_campaign([rotating], guess([rotating], replace(given, excitation=Excitation.TAP)))
+    yaml = tmp_path / "c" / "campaign.yaml"
+    yaml.write_text(yaml.read_text(encoding="utf-8").replace("rotation", "spin"), encoding="utf-8")
+    with pytest.raises(CampaignError, match=r"campaign\.yaml:4: coordinate 'spin' is not known"):
+        campaign.read(tmp_path / "c")
