@@ -9,6 +9,8 @@ from impactcell.campaign import contacts
 from impactcell.campaign.contents import Campaign, Excitation
 from impactcell.records import Capture, Channel
 
+FEWEST_SAMPLES = 10
+"""Samples of force below which no contact is looked for: a baseline and a rise want as many."""
 MIN_LATE_STEPS = 3.0
 """Sampling steps by which a contact has to come late before a record is taken to have begun earlier."""
 MIN_LATE_S = 1e-3
@@ -43,15 +45,16 @@ def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     return replace(campaign, shots=kept), tuple(notes)
 
 
+def _late_onset(force: Channel | None) -> int | None:
+    """Sample at which contact begins; None where it is the first, or there is none to see."""
+    if force is None or len(force.values) < FEWEST_SAMPLES or np.ptp(force.values) == 0.0:
+        return None
+    found = contacts.contact_onsets(force.time_s, force.values, contacts.baseline_of(force.values))
+    return found[0] if found and found[0] > 0 else None
+
+
 def _from_onset(shots: Sequence[Capture], notes: list[str]) -> tuple[Capture, ...]:
-    onsets: list[int | None] = []
-    for shot in shots:
-        force = shot.force
-        if force is None or len(force.values) < 10 or np.ptp(force.values) == 0.0:
-            onsets.append(None)
-            continue
-        found = contacts.contact_onsets(force.time_s, force.values, contacts.baseline_of(force.values))
-        onsets.append(found[0] if found and found[0] > 0 else None)
+    onsets = [_late_onset(shot.force) for shot in shots]
     late = [
         (shot, shot.force, onset)
         for shot, onset in zip(shots, onsets, strict=True)

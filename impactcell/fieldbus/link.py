@@ -49,11 +49,13 @@ class TlsFiles:
 TRANSPORTS: Final = ("tcp", "tls", "udp", "rtu_over_tcp", "rtu")
 """What a request travels on: Modbus TCP, the same encrypted, or in datagrams, RTU frames over TCP, a line."""
 _PARITY_BITS: Final = {"N": 0, "E": 1, "O": 1}
+"""Bits of a character for each parity: none, even, odd."""
 _RTU_SILENCE: Final = 3.5
 """Characters of silence that end an RTU frame (Modbus over Serial Line V1.02, section 2.5.1.1)."""
 _RTU_SILENCE_FAST_S: Final = 1.75e-3
 """The same above 19 200 baud, where it does not shrink any more (ibid.)."""
 _FAST_BAUD: Final = 19_200
+"""Baud rate from which on that holds (ibid.)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -211,7 +211,12 @@ def _score(
         why = f"named {word!r}"
         return (min(score + UNIT_MATCH, 0.99), f"{why}, unit fits") if fits and unit else (score, why)
     alone = quantity in (Quantity.TIME, Quantity.FORCE, Quantity.POSITION)
-    if fits and alone and unit is not None and unit.dimension is not Dimension.NONE:
+    return _score_by_unit(unit, columns, given) if fits and alone and unit is not None else (0.0, "")
+
+
+def _score_by_unit(unit: MeasuredUnit, columns: Sequence[MeasuredColumn], given: Given) -> tuple[float, str]:
+    """How sure a unit alone makes what a column is."""
+    if unit.dimension is not Dimension.NONE:
         same = [
             other for other in columns if (of := _unit_of(other, given)) and of.dimension is unit.dimension
         ]

@@ -92,6 +92,7 @@ _FURTHER = (
     ("%", Dimension.NONE, 0.01),
     ("1", Dimension.NONE, 1.0),
 )
+"""Symbol, dimension and factor of units that take no prefix (BIPM, The International System of Units)."""
 _WORDS = {
     "sec": "s", "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "msec": "ms",
     "millisekunden": "ms", "milliseconds": "ms", "microseconds": "us", "usec": "us", "minutes": "min",
@@ -109,6 +110,7 @@ _RATES = {
     (Dimension.LENGTH, 2): Dimension.ACCELERATION,
     (Dimension.ANGLE, 1): Dimension.ANGULAR_VELOCITY,
 }
+"""What a dimension becomes over a power of time."""
 _SUFFIX_WORDS = {"n": "N", "nm": "nm", "v": "V", "a": "A", "k": "K", "hz": "Hz", "kn": "kN", "pa": "Pa"}
 """Units of a name in lower case, as in `force_n`, that lower case would hide."""
 

@@ -16,6 +16,7 @@ TICKS_TO_1970: Final = 116_444_736_000_000_000
 """From 1601, where a DateTime begins, to 1970."""
 _COUNT: Final = struct.Struct("<i")
 _VALUE_BIT, _STATUS_BIT, _SOURCE_BIT, _SERVER_BIT = 1, 2, 4, 8
+"""Bits of a DataValue's mask that say what follows (Part 6, 5.2.2.17)."""
 
 
 class DataValueEncoder:

@@ -28,7 +28,7 @@ EVENTS_AT_ONCE: Final = 10
 
 
 @dataclass(frozen=True, slots=True)
-class _Unfinished:
+class _UnfinishedRead:
     """What a continuation point stands for: it goes on with the same node and the same kind of question."""
 
     node: ua.NodeId
@@ -113,7 +113,7 @@ class HistoryService:
             result.StatusCode = status_of(refused)
         else:
             if state is not None:
-                result.ContinuationPoint = points.keep(_Unfinished(node.NodeId, type(details), state))
+                result.ContinuationPoint = points.keep(_UnfinishedRead(node.NodeId, type(details), state))
         return result
 
     def _translate(self, events: ua.HistoryEvent, language: str | None) -> None:

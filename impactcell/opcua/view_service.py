@@ -62,12 +62,14 @@ class ViewService:
         response = ua.BrowseResponse()
         answer, language = _Answer(context.session.browse), context.session.language
         response.Results = await context.share.each(
-            (_Unfinished(description, max_references) for description in descriptions),
+            (_UnfinishedBrowse(description, max_references) for description in descriptions),
             lambda unfinished: self._browse(unfinished, answer, language),
         )
         return response
 
-    def _browse(self, unfinished: "_Unfinished", answer: "_Answer", language: str | None) -> ua.BrowseResult:
+    def _browse(
+        self, unfinished: "_UnfinishedBrowse", answer: "_Answer", language: str | None
+    ) -> ua.BrowseResult:
         try:
             result = answer.page(self._references(unfinished.description), unfinished)
         except StatusCodeError as fault:
@@ -220,7 +222,7 @@ class ViewService:
 
 
 @dataclass(frozen=True, slots=True)
-class _Unfinished:
+class _UnfinishedBrowse:
     """What a continuation point of Browse stands for: the question, and how far it has been answered."""
 
     description: ua.BrowseDescription
@@ -236,7 +238,9 @@ class _Answer:
         self._kept = 0
         self._room = MAX_REFERENCES_PER_ANSWER
 
-    def page(self, references: list[ua.ReferenceDescription], unfinished: _Unfinished) -> ua.BrowseResult:
+    def page(
+        self, references: list[ua.ReferenceDescription], unfinished: _UnfinishedBrowse
+    ) -> ua.BrowseResult:
         """Answer with as many references as fit, and keep where to go on.
 
         Raises

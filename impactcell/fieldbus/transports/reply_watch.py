@@ -20,6 +20,7 @@ from impactcell.fieldbus.codec import Request, check_reply
 from impactcell.fieldbus.transports.mbap import HEADER, MAX_LENGTH
 
 _CRC_LENGTH: Final = 2
+"""Bytes of the CRC that ends an RTU frame (Modbus over Serial Line V1.02, section 2.5.1.2)."""
 _EXCEPTION_LENGTH: Final = 2
 """Bytes of the PDU of a refusal."""
 

@@ -88,9 +88,11 @@ def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCyc
 SMALLEST_WEIGHT = 1e-6
 """Share of its weight that an outlier keeps in its block: however far off, it moves nothing."""
 WEAR_OF_BANK = np.zeros((3, 4))
-"""Slope, level and total from the bank's mean."""
+"""Slope, level and total from the bank's mean: the level is the total less the offset."""
 WEAR_OF_BANK[0, SLOPE] = WEAR_OF_BANK[1, TOTAL] = WEAR_OF_BANK[2, TOTAL] = 1.0
+"""Each is what the bank has under that name [1]."""
 WEAR_OF_BANK[1, OFFSET] = -1.0
+"""Offsets are no wear [1]."""
 
 
 def update_blocks(
