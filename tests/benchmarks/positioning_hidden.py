@@ -21,14 +21,9 @@ LEARNING = 10
 QUICK_TASKS = 20
 """Of one cell of each condition, where nothing has been gathered."""
 COLUMNS = (
-    "hidden",
-    "tasks",
-    "overshot",
-    "95 % interval",
-    "inside after ten",
-    "taps a task",
-    "tasks until told",
-)
+    "hidden", "tasks", "overshot", "95 % interval", "inside after ten", "taps a task", "tasks until told",
+    "before: overshot, inside after ten, taps",
+)  # fmt: skip
 """Of the tables."""
 
 
@@ -53,7 +48,17 @@ def tasks_until_told(attempts: Sequence[Attempt]) -> list[float]:
     ]
 
 
-def row(condition: Condition, attempts: Sequence[Attempt]) -> list[str]:
+def earlier(attempts: Sequence[Attempt]) -> str:
+    """What the planner without a discrepancy made of the same tasks; empty where that was not run."""
+    if not attempts:
+        return ""
+    settled = share([a for a in attempts if a.number >= LEARNING], inside)
+    percent = 100.0 * settled.hits / max(settled.of, 1)
+    taps = np.mean([a.taps for a in attempts])
+    return f"{share(attempts, overshot).hits} of {len(attempts)}, {percent:.1f} %, {taps:.2f}"
+
+
+def row(condition: Condition, attempts: Sequence[Attempt], before: Sequence[Attempt]) -> list[str]:
     """One condition; a missed bar is bold."""
     over = share(attempts, overshot)
     settled = share([a for a in attempts if a.number >= LEARNING], inside)
@@ -68,19 +73,26 @@ def row(condition: Condition, attempts: Sequence[Attempt]) -> list[str]:
         percent if settled.hits >= 0.98 * settled.of else f"**{percent}**",
         f"{np.mean([a.taps for a in attempts]):.2f}",
         "" if math.isinf(told) else f"{told:g}",
+        earlier(before),
     ]
 
 
-def by_condition(title: str, conditions: Sequence[Condition], attempts: Sequence[Attempt]) -> Table:
-    rows, every = [], []
+def by_condition(
+    title: str, conditions: Sequence[Condition], attempts: Sequence[Attempt], before: Sequence[Attempt]
+) -> Table:
+    rows: list[list[str]] = []
+    every: list[Attempt] = []
+    every_before: list[Attempt] = []
     for condition in conditions:
         part = [attempt for attempt in attempts if attempt.condition == condition.key]
+        part_before = [attempt for attempt in before if attempt.condition == condition.key]
         if part:
-            rows.append(row(condition, part))
+            rows.append(row(condition, part, part_before))
             every += part
+            every_before += part_before
     over, settled = share(every, overshot), share([a for a in every if a.number >= LEARNING], inside)
     totals = ["all", str(len(every)), str(over), over.interval, str(settled)]
-    rows.append([*totals, f"{np.mean([a.taps for a in every]):.2f}", ""])
+    rows.append([*totals, f"{np.mean([a.taps for a in every]):.2f}", "", earlier(every_before)])
     return Table(
         title, COLUMNS, rows,
         "Bars: overshoot 1 in 1000 over all, the interval of each row holds 0.3 %; inside 99.5 % over all, "
@@ -94,8 +106,14 @@ def tables() -> list[Table]:
     path = path_of(RESULTS, SEEDS, LABEL)
     if not path.exists():
         run(path, [*effects, *others], SEEDS, [0], QUICK_TASKS, math.inf)
-    attempts = read_attempts(path)
+    attempts, before = read_attempts(path), read_attempts(path_of(RESULTS, SEEDS, "before"))
+    topics = (
+        ("Positioning with an effect hidden, by effect", effects),
+        ("Positioning with other scatter, mass, batches and starts", others),
+    )
+    known = {attempt.condition for attempt in attempts}
     return [
-        by_condition("Positioning with an effect hidden, by effect", effects, attempts),
-        by_condition("Positioning with other scatter, mass, batches and starts", others, attempts),
+        by_condition(title, conditions, attempts, before)
+        for title, conditions in topics
+        if any(condition.key in known for condition in conditions)
     ]
