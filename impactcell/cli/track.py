@@ -110,11 +110,16 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     if not cell:
         return math.nan
     try:
-        return float(cell)
+        number = float(cell)
     except ValueError:
         raise SeriesError(
             f"{path}:{line}: {name} `{cell}` is not a number; leave it empty if missing"
         ) from None
+    if name == "mu_s_std" and not math.isfinite(number):
+        raise SeriesError(
+            f"{path}:{line}: {name} `{cell}` is no standard deviation; leave it empty if it is not known"
+        )
+    return number
 
 
 def _as_json(series: TrackedSeries) -> dict[str, object]:

@@ -18,6 +18,7 @@ from impactcell.journal.retention import Retention
 from impactcell.journal.store import AuditEntry
 from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.cell_logger import CellLogger
+from impactcell.process.condition_log import ConditionLog
 from impactcell.records import (
     BatchAnnouncement,
     Evidence,
@@ -86,7 +87,7 @@ class CellTask:
         if damage:
             self.worker.tell_journal_event(damage)
         self._publisher = CellPublisher(cell.name, self.worker.alarms, self._positioning_state, self.log)
-        self._notes: tuple[str, ...] = ()
+        self._conditions = ConditionLog(self.log)
         self._on_snapshot = on_snapshot
         self._module = ModuleAcquisition(
             cell.name,
@@ -116,15 +117,15 @@ class CellTask:
         status, snapshot = self.status, self.worker.snapshot
         return CellHealth(
             cell=self.cell.name,
-            connected=status.connected,
             cycles=status.received,
             missed=status.missed,
             last_cycle=snapshot.cycle if snapshot else 0,
-            round_trip_ms=status.round_trip_s * 1e3,
+            round_trip_s=status.round_trip_s,
             mu_s=snapshot.friction.mu_s.value if snapshot else float("nan"),
             wear_level=snapshot.wear.level if snapshot else float("nan"),
-            alarms_active=sum(alarm.active for alarm in self.worker.alarms),
-            journal_ok=not self.worker.journal_fault,
+            alarms={alarm.name: alarm.active for alarm in self.worker.alarms},
+            link_fault="" if status.connected else status.reason,
+            journal_fault=self.worker.journal_fault,
         )
 
     @property
@@ -232,10 +233,7 @@ class CellTask:
         if task is not None:
             await self.worker.run(partial(task.update_friction, result.step_result.snapshot))
         snapshot, notes = result.step_result.snapshot, result.step_result.notes
-        for note in notes:
-            if note not in self._notes:
-                self.log.info("%s", note, cycle=capture.cycle)
-        self._notes = notes
+        self._conditions.update(notes, capture.cycle)
         self._last_cycle_s, self._stale = time.monotonic(), False
         self._publisher.publish(snapshot, capture)
         self._publisher.publish_module(self.status)

@@ -5,7 +5,7 @@ import logging
 import math
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import TracebackType
@@ -15,6 +15,8 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
 from prometheus_client.registry import Collector, CollectorRegistry
 
+from impactcell.alarms import RULES
+from impactcell.alarms.rules import journal_fault
 from impactcell.errors import SettingsError
 
 log = logging.getLogger(__name__)
@@ -22,38 +24,46 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class CellHealth:
-    """What monitoring shows of one cell."""
+    """What monitoring shows of one cell.
+
+    Attributes
+    ----------
+    alarms : mapping
+        Whether each is active, by its published name.
+    link_fault, journal_fault : str
+        Why the module does not answer, or the journal cannot be written; empty while all is well.
+    """
 
     cell: str
-    connected: bool
     cycles: int
     missed: int
     last_cycle: int
-    round_trip_ms: float
+    round_trip_s: float
     mu_s: float
     wear_level: float
-    alarms_active: int
-    journal_ok: bool
+    alarms: Mapping[str, bool]
+    link_fault: str = ""
+    journal_fault: str = ""
 
     @property
-    def healthy(self) -> bool:
-        """The module answers and the journal can be written."""
-        return self.connected and self.journal_ok
+    def reason(self) -> str:
+        """Why it is not healthy; empty where it is: the module answers and the journal can be written."""
+        return "; ".join(fault for fault in (self.link_fault, self.journal_fault) if fault)
 
 
 def waiting_cell(cell: str) -> CellHealth:
     """Health of a cell that waits until its journal can be opened; the alarm is the journal's."""
     return CellHealth(
         cell,
-        connected=False,
         cycles=0,
         missed=0,
         last_cycle=0,
-        round_trip_ms=math.nan,
+        round_trip_s=math.nan,
         mu_s=math.nan,
         wear_level=math.nan,
-        alarms_active=1,
-        journal_ok=False,
+        alarms={name: name == journal_fault.NAME for name in RULES},
+        link_fault="not connected yet",
+        journal_fault="the journal cannot be opened; the cell waits for it",
     )
 
 
@@ -65,7 +75,7 @@ PATIENCE_S = 5.0
 """How long a scraper may take to send its request, or to take the answer."""
 
 _METRICS: tuple[tuple[str, str, str, Callable[[CellHealth], float]], ...] = (
-    ("gauge", "connected", "1 while the module answers", lambda h: float(h.connected)),
+    ("gauge", "connected", "1 while the module answers", lambda h: float(not h.link_fault)),
     ("counter", "cycles", "Cycles processed since the start", lambda h: h.cycles),
     (
         "counter",
@@ -74,12 +84,12 @@ _METRICS: tuple[tuple[str, str, str, Callable[[CellHealth], float]], ...] = (
         lambda h: h.missed,
     ),
     ("gauge", "last_cycle", "Number of the last cycle", lambda h: h.last_cycle),
-    ("gauge", "round_trip_milliseconds", "Of the last Modbus request", lambda h: h.round_trip_ms),
+    ("gauge", "round_trip_seconds", "Of the last Modbus request", lambda h: h.round_trip_s),
     ("gauge", "static_friction", "mu_s of the last cycle", lambda h: h.mu_s),
     ("gauge", "wear_level", "Tracked mu_s at the reference batch", lambda h: h.wear_level),
-    ("gauge", "alarms_active", "Active alarms", lambda h: h.alarms_active),
-    ("gauge", "journal_ok", "1 while the journal can be written", lambda h: float(h.journal_ok)),
+    ("gauge", "journal_ok", "1 while the journal can be written", lambda h: float(not h.journal_fault)),
 )
+"""Kind, name, help and value of each metric; units are base units, as Prometheus asks for."""
 
 
 class _Cells(Collector):
@@ -95,6 +105,13 @@ class _Cells(Collector):
             for cell in cells:
                 family.add_metric([cell.cell], value(cell))
             yield family
+        alarms = GaugeMetricFamily(
+            "impactcell_alarm_active", "1 while the alarm is active", labels=["cell", "alarm"]
+        )
+        for cell in cells:
+            for name, is_active in cell.alarms.items():
+                alarms.add_metric([cell.cell, name], float(is_active))
+        yield alarms
 
 
 class _Server(ThreadingHTTPServer):
@@ -128,9 +145,12 @@ class Monitoring:
                 if self.path == "/metrics":
                     self._answer(200, CONTENT_TYPE_LATEST, generate_latest(registry))
                 elif self.path == "/healthz":
-                    cells = {cell.cell: cell.healthy for cell in health()}
-                    status = 200 if all(cells.values()) else 503
-                    self._answer(status, "application/json", json.dumps(cells).encode())
+                    reasons = {cell.cell: cell.reason for cell in health()}
+                    content = {
+                        name: {"healthy": not reason, "reason": reason} for name, reason in reasons.items()
+                    }
+                    status = 503 if any(reasons.values()) else 200
+                    self._answer(status, "application/json", json.dumps(content).encode())
                 else:
                     self.send_error(404, "only /healthz and /metrics are here")
 

@@ -142,7 +142,7 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
             obstacle.rmdir()
             await watched.until("press-1", 3)
             with await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz") as answer:
-                assert json.load(answer) == {"press-1": True}
+                assert json.load(answer) == {"press-1": {"healthy": True, "reason": ""}}
             await actions.start_batch("press-1", "B", expected=True, actor=actor)
             assert (
                 await history.values("press-1", "Friction/StaticFriction", HistoryRequest(None, None, 1))

@@ -106,6 +106,8 @@ def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
         ("cycle,mu_s,mu_s_std\nx,0.2,0.1\n", ":2: cycle `x` is not a whole number"),
         ("cycle,mu_s,mu_s_std\ninf,0.2,0.1\n", ":2: cycle `inf` is not a whole number"),
         ("cycle,mu_s,mu_s_std\n1,abc,0.1\n", ":2: mu_s `abc` is not a number"),
+        ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2,nan\n", ":3: mu_s_std `nan` is no standard deviation"),
+        ("cycle,mu_s,mu_s_std\n1,0.2,inf\n", ":2: mu_s_std `inf` is no standard deviation"),
         (
             "cycle,mu_s,mu_s_std\n1,nan,0.1\n2,inf,0.1\n",
             "only 0 of 2 cycles can be used, it takes 2; mu_s is",

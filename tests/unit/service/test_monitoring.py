@@ -1,6 +1,7 @@
 """Health and metrics as a scraper sees them."""
 
 import json
+import re
 import socket
 import struct
 import urllib.error
@@ -11,9 +12,12 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from impactcell.errors import SettingsError
+from impactcell.process.shipped import ROOT
 from impactcell.service.monitoring import CellHealth, Monitoring
 
-PRESS = CellHealth("press-1", True, 12, 3, 40, 0.5, 0.2, 0.19, 1, True)
+PRESS = CellHealth("press-1", 12, 3, 40, 5e-4, 0.2, 0.19, {"WearLimit": True, "ModelGap": False})
+
+METRIC = re.compile(r"impactcell_\w+")
 
 
 def get(port: int, path: str) -> tuple[int, str]:
@@ -30,7 +34,7 @@ def test_metrics_name_the_cell_and_parse() -> None:
         status, text = get(http.port, "/metrics")
     assert status == 200
     samples = {
-        (sample.name, sample.labels["cell"]): sample.value
+        (sample.name, *(sample.labels[n] for n in ("cell", "alarm") if n in sample.labels)): sample.value
         for family in text_string_to_metric_families(text)
         for sample in family.samples
     }
@@ -38,15 +42,29 @@ def test_metrics_name_the_cell_and_parse() -> None:
     assert samples["impactcell_cycles_total", "press-2"] == 7
     assert samples["impactcell_cycles_missed_total", "press-1"] == 3
     assert samples["impactcell_static_friction", "press-1"] == 0.2
+    assert samples["impactcell_round_trip_seconds", "press-1"] == 5e-4
+    assert samples["impactcell_alarm_active", "press-1", "WearLimit"] == 1
+    assert samples["impactcell_alarm_active", "press-2", "ModelGap"] == 0
 
 
-@pytest.mark.parametrize("broken", [{"connected": False}, {"journal_ok": False}])
-def test_one_sick_cell_makes_the_process_unhealthy(broken: dict[str, bool]) -> None:
-    sick = replace(PRESS, cell="press-2", **broken)  # type: ignore[arg-type]
+def test_the_dashboard_asks_for_metrics_that_there_are() -> None:
     with Monitoring("127.0.0.1", 0, lambda: [PRESS]) as http:
-        assert get(http.port, "/healthz") == (200, json.dumps({"press-1": True}))
+        families = {f.name for f in text_string_to_metric_families(get(http.port, "/metrics")[1])}
+    dashboard = json.loads((ROOT / "docs" / "grafana" / "impactcell.json").read_text())
+    asked = [target["expr"] for panel in dashboard["panels"] for target in panel["targets"]]
+    names = {name.removesuffix("_total") for expression in asked for name in METRIC.findall(expression)}
+    assert names == families
+
+
+@pytest.mark.parametrize("broken", [{"link_fault": "refused"}, {"journal_fault": "disk full"}])
+def test_one_sick_cell_makes_the_process_unhealthy_and_says_why(broken: dict[str, str]) -> None:
+    sick = replace(PRESS, cell="press-2", **broken)  # type: ignore[arg-type]
+    well = {"press-1": {"healthy": True, "reason": ""}}
+    ill = {"press-2": {"healthy": False, "reason": next(iter(broken.values()))}}
+    with Monitoring("127.0.0.1", 0, lambda: [PRESS]) as http:
+        assert get(http.port, "/healthz") == (200, json.dumps(well))
     with Monitoring("127.0.0.1", 0, lambda: [PRESS, sick]) as http:
-        assert get(http.port, "/healthz") == (503, json.dumps({"press-1": True, "press-2": False}))
+        assert get(http.port, "/healthz") == (503, json.dumps(well | ill))
         assert get(http.port, "/")[0] == 404
 
 
