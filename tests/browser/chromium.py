@@ -58,17 +58,18 @@ class Browser:
     def open(self, address: str) -> None:
         self.driver.get(address)
 
-    def find(self, css: str) -> Any:
+    def find(self, css: str, patience_s: float = PATIENCE_S) -> Any:
         """Wait for an element that is shown."""
-        return self.until(lambda: next((e for e in self.all(css) if e.is_displayed()), None), css)
+        shown = lambda: next((e for e in self.all(css) if e.is_displayed()), None)  # noqa: E731
+        return self.until(shown, css, patience_s)
 
     def all(self, css: str) -> list[Any]:
         return self.driver.find_elements(By.CSS_SELECTOR, css)
 
-    def until(self, condition: Any, what: str = "") -> Any:
+    def until(self, condition: Any, what: str = "", patience_s: float = PATIENCE_S) -> Any:
         """Wait until a condition gives something."""
         changing = (StaleElementReferenceException,)  # a page that gives way to the next one
-        wait = WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02, ignored_exceptions=changing)
+        wait = WebDriverWait(self.driver, patience_s, poll_frequency=0.02, ignored_exceptions=changing)
         try:
             return wait.until(lambda _: condition())
         except TimeoutException:
