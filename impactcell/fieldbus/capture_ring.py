@@ -126,7 +126,7 @@ def _made_before(last: int, counter: int, held: int, *, complete: bool) -> int:
     if held == counter:  # from 1 again, and all are there
         return counter - 1
     since = cycles_after(last, counter)
-    went_on = since <= CYCLE_PERIOD // 2
+    went_on = held <= since <= CYCLE_PERIOD // 2  # a start empties the ring
     if complete and not (went_on and _FEWER * since < counter):
         return counter - 1 if counter <= CYCLE_PERIOD // 2 else 0
     return since - 1 if went_on else 0

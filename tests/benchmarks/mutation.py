@@ -23,11 +23,11 @@ from tests.benchmarks.table import Table
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "bench-results" / "mutation.jsonl"
 SEED = 20261122
-LONGEST_S = 240.0
+LONGEST_S = 300.0
 """A mutant whose tests take longer hangs, and counts as noticed."""
 ROOMS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "cell": (("impactcell/cell/*.py",), ("tests/unit/cell", "tests/unit/service/test_worker.py")),
-    "journal": (("impactcell/journal/*.py",), ("tests/unit/journal", "tests/unit/service")),
+    "journal": (("impactcell/journal/*.py",), ("tests/unit/journal",)),
     "intake": (
         ("impactcell/service/worker.py", "impactcell/service/journal_writer.py"),
         ("tests/unit/service", "tests/unit/journal"),

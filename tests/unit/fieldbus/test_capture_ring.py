@@ -101,6 +101,9 @@ def test_a_counter_that_is_kept_is_told_from_one_that_began_anew_by_the_smaller_
     want = next_capture(CycleId(1, 65_530), 2, 65_600, ring_of(65_600, 65_531))
     assert want is not None
     assert (want.cycle_id, want.missed) == (CycleId(2, 65_593), 62)
+    want = next_capture(CycleId(1, 23), 2, 24, ring_of(24, 1))  # a start empties the ring: not from 23 on
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, 17), 16)
     want = next_capture(CycleId(1, 5), 2, 40, ring_of(40, 1))
     assert want is not None
     assert (want.cycle_id, want.missed) == (CycleId(2, 33), 32)
