@@ -10,16 +10,18 @@ from pathlib import Path
 from impactcell import cell as core
 from impactcell.alarms import AlarmSettings, initial_state
 from impactcell.cell.preprocessing import BatchNaming
+from impactcell.errors import JournalError
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import unpack_state
 from impactcell.records import PositioningState
 from impactcell.serialization import pack
 from impactcell.service.factory import cell_design
 from impactcell.settings import read_cell
-from tests.integration.processes import simulator, started, write_cell
+from tests.integration.forked import forked
+from tests.integration.processes import simulator, write_cell
 
-PERIOD_S = 1.0
-LONGEST_LIFE_S = 2.0
+PERIOD_S = 0.5
+LONGEST_LIFE_S = 1.0
 """A service is killed within this time after it has connected."""
 OVERWRITTEN = r"cycle=(\d+) (\d+) before it are lost: the module had overwritten them"
 
@@ -62,17 +64,26 @@ async def crash(directory: Path, kills: int, seed: int) -> Outcome:
     async with simulator(directory, strikes=strikes, deviations=[], batches=one_batch) as module:
         path = write_cell(directory, module["port"])
         for _ in range(kills):
-            async with started("impactcell", "run", str(path)) as service:
+            async with forked("impactcell", "run", str(path)) as service:
                 await service.line("connected to")
                 await asyncio.sleep(moments.uniform(0.0, LONGEST_LIFE_S))
                 service.process.kill()
                 await service.process.wait()
             told += service.lines
-        async with started("impactcell", "run", str(path)) as service:
+        async with forked("impactcell", "run", str(path)) as service:
             await service.line("connected to")
-            await asyncio.sleep(2 * PERIOD_S)
+            while _stored(directory) <= kills:
+                await asyncio.sleep(PERIOD_S)
         told += service.lines
     return judged(path, directory / "press-1.sqlite", told)
+
+
+def _stored(directory: Path) -> int:
+    try:
+        with Journal(directory / "press-1.sqlite", "press-1", read_only=True) as journal:
+            return journal.count()
+    except JournalError:  # not made yet
+        return 0
 
 
 def judged(cell_file: Path, journal_file: Path, told: list[str]) -> Outcome:

@@ -5,11 +5,11 @@ import contextlib
 import json
 import re
 import sys
-from asyncio.subprocess import PIPE, Process
+from asyncio.subprocess import PIPE
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import yaml
 
@@ -19,11 +19,22 @@ START_S = 90.0
 """The first start on a machine compiles."""
 
 
+class AnyProcess(Protocol):
+    """What a test needs of a process."""
+
+    @property
+    def returncode(self) -> int | None: ...
+    def kill(self) -> None: ...
+    def terminate(self) -> None: ...
+    async def wait(self) -> int | None: ...
+
+
 @dataclass
 class Running:
     """A process with the lines it wrote to standard error."""
 
-    process: Process
+    process: AnyProcess
+    output: asyncio.StreamReader | None = None
     lines: list[str] = field(default_factory=list)
     news: asyncio.Condition = field(default_factory=asyncio.Condition)
 
@@ -39,6 +50,16 @@ class Running:
         assert match, f"no line with {pattern!r} in:\n" + "\n".join(self.lines)
         return match
 
+    async def follow(self, errors: asyncio.StreamReader) -> None:
+        """Take what the process writes to standard error, up to its end."""
+        async for line in errors:
+            async with self.news:
+                self.lines.append(line.decode().rstrip())
+                self.news.notify_all()
+        await self.process.wait()
+        async with self.news:
+            self.news.notify_all()
+
 
 @contextlib.asynccontextmanager
 async def started(*arguments: str) -> AsyncIterator[Running]:
@@ -46,19 +67,9 @@ async def started(*arguments: str) -> AsyncIterator[Running]:
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", *arguments, stdout=PIPE, stderr=PIPE, cwd=ROOT
     )
-    running = Running(process)
-
-    async def follow() -> None:
-        assert process.stderr is not None
-        async for line in process.stderr:
-            async with running.news:
-                running.lines.append(line.decode().rstrip())
-                running.news.notify_all()
-        await process.wait()
-        async with running.news:
-            running.news.notify_all()
-
-    reader = asyncio.create_task(follow())
+    assert process.stderr is not None
+    running = Running(process, process.stdout)
+    reader = asyncio.create_task(running.follow(process.stderr))
     try:
         yield running
     finally:
@@ -82,9 +93,9 @@ async def simulator(
     path.write_text(yaml.safe_dump(scenario))
     truth = directory / "truth.jsonl"
     async with started("simulator", "serve", str(path), "--truth", str(truth)) as running:
-        assert running.process.stdout is not None
+        assert running.output is not None
         async with asyncio.timeout(START_S):
-            line = await running.process.stdout.readline()
+            line = await running.output.readline()
         assert line, "\n".join(running.lines)
         yield {**json.loads(line), "truth": truth, "running": running}
 
