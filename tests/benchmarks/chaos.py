@@ -19,7 +19,7 @@ from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.transports import transport_for
-from simulator.faults import Fault, FaultKind
+from simulator.faults import Fault, FaultInjector, FaultKind
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 from tests.benchmarks._chaos_faults import KINDS, REBOOTS, FaultPlan, FaultyDevice, FaultyWire
@@ -29,8 +29,10 @@ from tests.benchmarks.table import Table
 CELLS, FAULTS_A_CELL = 10, 50
 """At a time, and faulty exchanges of each in a run."""
 WINDOWS = (1, 4, 16)
-PROBABILITY = 0.004
-"""Of each fault of memory or wire in an exchange; those of the server have a tenth of it each."""
+PROBABILITY = 0.001
+"""Of each fault of the server in a reply; of all of memory and wire together it is `MEMORY_AND_WIRE`."""
+MEMORY_AND_WIRE = 0.04
+"""Probability that something befalls a reading in the module's memory, and a reply on the wire."""
 SAMPLES = 600
 EPOCH_NS = 1_795_255_128_000_000_000
 """Time of the cycle before the first; each is a second later, so that its time tells which it is."""
@@ -118,15 +120,15 @@ def reboot(kind: str, device: ScriptedDevice, account: Account, plan: FaultPlan)
 async def cell(seed: int, faults: int) -> dict[str, int]:
     """Let one cell run until so many faults have happened, then in peace until all is there."""
     registers = RegisterMap.from_mapping(yaml.safe_load(MAP.read_text(encoding="utf-8")))
-    plan, account = FaultPlan(seed, PROBABILITY * 10), Account()
+    plan, account = FaultPlan(seed, MEMORY_AND_WIRE), Account()
     device = FaultyDevice(ScriptedDevice(registers, session=7), plan)
     link = {"window": WINDOWS[seed % len(WINDOWS)], "timeout_s": TIMEOUT_S}
-    server = ModbusServer(device)
+    server = ModbusServer(device, faults=FaultInjector(seed))
     await server.start()
     wire = FaultyWire(server.port, plan)
     await wire.start()
     for kind in FaultKind:
-        server.faults.inject(Fault(kind, probability=PROBABILITY / 10, seconds=0.2))
+        server.faults.inject(Fault(kind, probability=PROBABILITY, seconds=0.2))
     client = ModbusClient(transport_for(ModuleLink(port=wire.port, **link)))
     stuck = goes_on = False
 
