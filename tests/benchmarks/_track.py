@@ -2,7 +2,8 @@
 
 Beside an oracle that knows the noise, the outliers and when batches changed, and alarms where P(level above
 limit) has been beyond `SURE` for as long as the alarm's own delay. Each stream that is done is kept in
-bench-results/, for the code it was run with: ``python -m tests.benchmarks._track FIRST COUNT`` runs a piece.
+bench-results/, for the code it was run with: ``python -m tests.benchmarks._track FIRST COUNT`` runs a piece,
+``python -m tests.benchmarks._track STREAMS`` prints the tables of so many.
 """
 
 import hashlib
@@ -103,8 +104,8 @@ def delays(found: np.ndarray, truth: _streams.Stream) -> list[tuple[float, float
     return seen
 
 
-def tables(*, quick: bool) -> list[Table]:
-    done = [run(SEEDS + i) for i in range(4 if quick else 200)]
+def tables(*, quick: bool, streams: int = 200) -> list[Table]:
+    done = [run(SEEDS + i) for i in range(4 if quick else streams)]
     return [_alarm_table(done), _shift_table(done)]
 
 
@@ -190,7 +191,6 @@ def _shift_table(done: list[dict]) -> Table:
             ]
         )
     cycles = len(done) * _streams.CYCLES
-    low, high = poisson.interval(0.95, max(false, 1e-9))
     at_least = poisson.sf(false - 1, cycles / _steps.DESIGN)
     rows.append(
         [
@@ -216,6 +216,9 @@ def _share(of: np.ndarray) -> str:
 
 
 if __name__ == "__main__":
-    first, count = int(sys.argv[1]), int(sys.argv[2])
-    for i in range(first, first + count):
-        run(SEEDS + i)
+    if len(sys.argv) == len(["program", "streams"]):
+        print("\n".join(table.markdown() for table in tables(quick=False, streams=int(sys.argv[1]))))
+    else:
+        first, count = int(sys.argv[1]), int(sys.argv[2])
+        for i in range(first, first + count):
+            run(SEEDS + i)

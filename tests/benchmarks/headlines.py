@@ -47,16 +47,16 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
     ),
     (
         (
-            "**Follow.** `track` on 20 streams with wear, outliers and unknown batches: a step of 1 / 2"
-            " standard deviations is found after {one} / {two} times the least possible delay (of steps"
-            " that were found); {false} false alarms in 10 000 cycles."
+            "**Follow.** `track` on streams with wear, outliers and unknown batches: a step of 1 / 2 "
+            "standard deviations is found after {one} / {two} times the least possible delay, those not "
+            "found counted to the next step; {false} false alarms in 100 000 cycles."
         ),
         _of(
-            "Batch unknown: all of `track` beside the bank",
-            "`track`",
-            one="delay / bound, steps of 1 sd",
-            two="delay / bound, steps of 2 sd",
-            false="false batch alarms per 10000",
+            "Batches and slope through `track`, batch unknown",
+            "measured",
+            one="delay / bound, 1 sd",
+            two="delay / bound, 2 sd",
+            false="false batch alarms per 100 000 cycles",
         ),
     ),
     (
