@@ -47,7 +47,7 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
     ),
     (
         (
-            "**Follow.** `track` on streams with wear, outliers and unknown batches: a step of 1 / 2 "
+            "**Follow.** `track` on 30 streams with wear, outliers and unknown batches: a step of 1 / 2 "
             "standard deviations is found after {one} / {two} times the least possible delay, those not "
             "found counted to the next step; {false} false alarms in 100 000 cycles."
         ),
