@@ -37,6 +37,7 @@
 """
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar
 
 
@@ -125,7 +126,17 @@ class FieldbusError(ImpactCellError):
 
 
 class MapError(FieldbusError):
-    """A register map that overlaps itself, leaves the register space or lacks a needed register."""
+    """A register map that overlaps itself, leaves the register space or lacks a needed register.
+
+    Attributes
+    ----------
+    faults : tuple of str
+        All that is wrong with it, one after another.
+    """
+
+    def __init__(self, message: str, faults: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.faults = tuple(faults) or (message,)
 
 
 class WrongDeviceError(FieldbusError):

@@ -5,6 +5,7 @@ from pathlib import Path
 import yaml
 
 from generators.markdown import code, table
+from impactcell.fieldbus.map_registers import REQUIRED
 from impactcell.fieldbus.map_validation import _KEYS
 from impactcell.fieldbus.register import KINDS, SI_FACTOR
 
@@ -32,6 +33,8 @@ def keys() -> str:
             "## Keys of an entry",
             entry,
             f"Types: {', '.join(map(code, (*KINDS, 'string')))}. Units: {', '.join(map(code, SI_FACTOR))}.",
+            "## What is required, and why",
+            table(("register", "what it proves or gives"), [(code(n), why) for n, why in REQUIRED.items()]),
             "## The layout `fpga-v1`",
             table(("register", "address", "type", "unit", "writable", "meaning"), rows),
         ]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from impactcell.errors import FieldbusError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.map_registers import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.probe import ProbeResult
 from impactcell.fieldbus.probe import probe as probe_module
@@ -35,6 +36,7 @@ def probe(cell: Path) -> None:
     module = ModuleAcquisition(config.name, ModbusClient(transport_for(link)), config.register_map)
     result = asyncio.run(probe_module(module))
     rows = [("link", f"{link}, {1e3 * result.round_trip_s:.2f} ms a request"), *_rows(result)]
+    rows += [("no promise", text) for text in not_promised(config.register_map.registers)]
     print_result("\n".join(f"{name:12}{text}" for name, text in rows))
     if result.faults:
         raise FieldbusError("\n".join(result.faults))

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from impactcell.errors import MapError
+from impactcell.fieldbus.map_registers import REQUIRED
 from impactcell.fieldbus.map_validation import validate_map
 from impactcell.fieldbus.register import KINDS, SI_FACTOR, WIRE, Register, Value, Words
 
@@ -61,10 +62,14 @@ class RegisterMap:
         name, declared, faults = validate_map(mapping, units=SI_FACTOR, kinds=KINDS)
         registers = {key: Register(**values) for key, values in declared.items()}
         faults += _layout_faults(registers.values())
-        faults += [f"register {key} is missing" for key in REQUIRED if key not in mapping["registers"]]
+        faults += [
+            f"register {key} is missing: {why}"
+            for key, why in REQUIRED.items()
+            if key not in mapping["registers"]
+        ]
         faults += _window_faults(registers)
         if faults:
-            raise MapError(f"register map {name}: " + "; ".join(faults))
+            raise MapError(f"register map {name}: " + "; ".join(faults), faults)
         return cls(name, registers)
 
     def __getitem__(self, name: str) -> Register:
@@ -116,15 +121,6 @@ def registers_crc32(*blocks: Words) -> int:
     for words in blocks:
         crc = zlib.crc32(np.ascontiguousarray(words, dtype=WIRE).data, crc)
     return crc
-
-
-REQUIRED: Final = (
-    "module_name", "map_version", "state", "session", "cycle_counter", "ring_cycle", "slot_select",
-    "window_sequence", "window_slot", "window_session", "window_cycle", "cycle_time", "velocity",
-    "force_rate", "force_start", "force_count", "force",
-    "position_rate", "position_start", "position_count", "position", "window_sequence_after",
-)  # fmt: skip
-"""Registers without which no cycle can be read consistently; all others a map may leave out."""
 
 
 def _layout_faults(registers: Iterable[Register]) -> Iterator[str]:

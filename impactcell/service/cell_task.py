@@ -12,6 +12,7 @@ from impactcell.alarms import RuleResult
 from impactcell.alarms.rules import journal_fault, module_connection, positioning_fault
 from impactcell.errors import ImpactCellError, JournalError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
+from impactcell.fieldbus.map_registers import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports import Transport, transport_for
 from impactcell.journal.retention import Retention
@@ -95,6 +96,8 @@ class CellTask:
             cell.register_map,
             self._link_changed,
         )
+        for text in not_promised(cell.register_map.registers):
+            self.log.info("register map %s: %s", cell.register_map.name, text)
         self._positioning: PositioningTask | None = None
         if cell.settings.positioning is not None:
             self._positioning = PositioningTask(

@@ -79,16 +79,26 @@ def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
     Raises
     ------
     SettingsError
-        With every fault of the file, each with its name.
+        With every fault of the file, each with its place.
     """
-    data, _ = yaml_loader.load(path)
+    data, positions = yaml_loader.load(path)
     if not isinstance(data, dict):
         raise SettingsError(f"{path}:1:1: a register map is a mapping of format, name and registers")
     try:
         register_map = RegisterMap.from_mapping(data)
     except MapError as error:
-        raise SettingsError("\n".join(f"{path}: {fault}" for fault in str(error).splitlines())) from error
+        places = [positions.key(_place_in_map(fault)) for fault in error.faults]
+        lines = [f"{path}:{place}: {fault}" for place, fault in zip(places, error.faults, strict=True)]
+        raise SettingsError("\n".join(lines)) from error
     return register_map if word_order is None else register_map.with_word_order(word_order)
+
+
+def _place_in_map(fault: str) -> tuple[str, ...]:
+    """Say what part of a map file a fault is about."""
+    words = fault.replace(":", " ").split()
+    if words[0] in ("register", "registers"):
+        return ("registers", words[1])
+    return (words[-1],) if fault.startswith("unknown key") else (words[0],)
 
 
 def _port(cell: CellConfig) -> int | None:

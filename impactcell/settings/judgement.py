@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from impactcell.fieldbus.map_registers import not_promised, unknown_names
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
 from impactcell.settings.cells import CellConfig
@@ -48,7 +49,7 @@ def judge_cell(cell: CellConfig) -> list[CellFinding]:
         Its file is not what it was.
     """
     _, positions = yaml_loader.load(cell.path)
-    remarks = [*_of_model(cell), *_of_service(cell)]
+    remarks = [*_of_model(cell), *_of_map(cell), *_of_service(cell)]
     findings = [
         CellFinding(cell.path, positions.value(remark.place), remark.message, remark.is_fault)
         for remark in remarks
@@ -110,6 +111,12 @@ def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:
             f"taps are at most {limit:g} mm/min, the model is calibrated for {slowest * 60e3:g} to "
             f"{fastest * 60e3:g} mm/min; {calibrate}",
         )
+
+
+def _of_map(cell: CellConfig) -> Iterator[_Remark]:
+    registers = cell.register_map.registers
+    for text in (*unknown_names(registers), *not_promised(registers)):
+        yield _Remark(("module", "register_map"), f"{cell.register_map.name}: {text}", is_fault=False)
 
 
 def _of_service(cell: CellConfig) -> Iterator[_Remark]:

@@ -1,0 +1,134 @@
+"""Another module: the page's examples are read, faults of a map have a place, cells of one line agree."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from pydantic import ValidationError
+
+from impactcell.errors import SettingsError
+from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.map_registers import NAMES, not_promised
+from impactcell.fieldbus.map_validation import validate_map
+from impactcell.fieldbus.register import KINDS, SI_FACTOR
+from impactcell.fieldbus.registers import Register
+from impactcell.service.factory import module_link
+from impactcell.settings import read_cell, read_cells
+from impactcell.settings.cells import read_register_map
+from impactcell.settings.judgement import judge_cell
+from impactcell.settings.sections import ModuleSection
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = (ROOT / "docs" / "how-to" / "another-module.md").read_text(encoding="utf-8")
+BLOCKS = [
+    yaml.safe_load(text) for text in re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+]
+SHIPPED = ROOT / "config" / "maps" / "fpga-v1.yaml"
+
+
+def cell_file(directory: Path, name: str = "press-1", **module: Any) -> Path:
+    cell = {
+        "format": 1, "cell": name, "alarms": {"wear_limit": 0.25},
+        "module": {"register_map": str(SHIPPED), **module},
+        "model": str(ROOT / "config" / "models" / "prototype.yaml"),
+        "journal": {"file": f"{name}.sqlite"}, "web": None,
+    }  # fmt: skip
+    path = directory / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(cell))
+    return path
+
+
+def link_of(directory: Path, **module: Any) -> ModuleLink:
+    return module_link(read_cell(cell_file(directory, **module)))
+
+
+@pytest.mark.parametrize("block", [block["module"] for block in BLOCKS if "module" in block])
+def test_the_links_of_the_page_are_links(block: dict[str, Any], tmp_path: Path) -> None:
+    for file in ("plant.pem", "service.pem", "service.key"):
+        (tmp_path / file).touch()
+    link = link_of(tmp_path, **{**block, "register_map": str(SHIPPED)})
+    assert link.transport == block["transport"]
+    if link.transport == "rtu":
+        assert str(link) == "/dev/ttyUSB0 at 115200 baud 8N2 device 3"
+        assert link.serial is not None
+        assert link.serial.character_s == pytest.approx(11 / 115_200)
+    if link.tls is not None:
+        assert link.tls.server_name == "press-1.plant"
+
+
+def test_the_page_has_every_transport_but_the_plain_one() -> None:
+    shown = {block["module"]["transport"] for block in BLOCKS if "module" in block}
+    assert shown == {"rtu", "rtu_over_tcp", "udp", "tls"}
+
+
+def test_the_registers_of_the_page_are_registers() -> None:
+    (entries,) = [block for block in BLOCKS if "module" not in block]
+    _, registers, faults = validate_map({"format": 1, "registers": entries}, SI_FACTOR, KINDS)
+    assert not faults
+    force = Register(**registers["peak_force"])
+    assert force.decode(force.encode(20.5)) == 20.5
+
+
+@pytest.mark.parametrize(
+    ("module", "told"),
+    [
+        ({"transport": "rtu"}, "`serial` belongs to `transport: rtu`"),
+        ({"serial": {"device": "/dev/ttyS0"}}, "`serial` belongs to `transport: rtu`"),
+        ({"transport": "tls"}, "needs `tls` with its certificates"),
+        ({"transport": "udp", "tls": {"ca_certificate": str(SHIPPED)}}, "does not go with"),
+        ({"transport": "ascii"}, "transport"),
+        ({"transport": "rtu", "serial": {"device": "x", "parity": "mark"}}, "parity"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(module: dict[str, Any], told: str) -> None:
+    with pytest.raises(ValidationError, match=told):
+        ModuleSection.model_validate({"register_map": SHIPPED, **module})
+
+
+def test_cells_of_one_line_agree_about_it(tmp_path: Path) -> None:
+    line = {"device": "/dev/ttyUSB0", "baudrate": 19_200}
+    first = cell_file(tmp_path, "a", transport="rtu", serial=line)
+    second = cell_file(tmp_path, "b", transport="rtu", serial=line, device_id=2)
+    assert len(read_cells([first, second])) == 2
+    faster = cell_file(tmp_path, "c", transport="rtu", serial={**line, "baudrate": 9600}, device_id=3)
+    with pytest.raises(SettingsError, match=r"has another module\.serial; they share one connection"):
+        read_cells([first, faster])
+    other_line = cell_file(tmp_path, "d", transport="rtu", serial={"device": "/dev/ttyUSB1"})
+    assert len(read_cells([first, other_line])) == 2
+
+
+def test_faults_of_a_map_have_line_and_column(tmp_path: Path) -> None:
+    text = SHIPPED.read_text().replace("{address: 36, type: u32,", "{address: 36, type: u33,")
+    text = text.replace("  window_session:", "  window_sesion:")
+    path = tmp_path / "wrong.yaml"
+    path.write_text(text)
+    with pytest.raises(SettingsError) as caught:
+        read_register_map(path)
+    lines = text.splitlines()
+    at = lines.index("  cycle_counter:") + 1
+    said = str(caught.value).splitlines()
+    assert any(line.startswith(f"{path}:{at}:3: register cycle_counter: type must be") for line in said)
+    at = lines.index("registers:") + 1
+    missing = "register window_session is missing: the window shows a cycle of this session"
+    assert any(line.startswith(f"{path}:{at}:1: {missing}") for line in said)
+
+
+def test_what_a_map_does_not_promise_and_what_nothing_uses_is_told(tmp_path: Path) -> None:
+    content = yaml.safe_load(SHIPPED.read_text())
+    del content["registers"]["capture_crc32"]
+    content["registers"]["peak_forse"] = content["registers"].pop("peak_force")
+    path = tmp_path / "poorer.yaml"
+    path.write_text(yaml.safe_dump(content))
+    told = [str(finding) for finding in judge_cell(read_cell(cell_file(tmp_path, register_map=str(path))))]
+    assert any("note: fpga-v1: register peak_forse is not used; did you mean peak_force?" in t for t in told)
+    assert any(
+        "no register capture_crc32: a wrong bit in header or samples is not noticed" in t for t in told
+    )
+
+
+def test_the_shipped_map_promises_all_and_has_no_name_that_nothing_uses() -> None:
+    registers = read_register_map(SHIPPED).registers
+    assert not_promised(registers) == ()
+    assert set(registers) == set(NAMES)
