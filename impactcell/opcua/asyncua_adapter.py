@@ -40,6 +40,7 @@ from cryptography import exceptions
 
 __all__ = [
     "INVALID_SIGNATURE",
+    "MAX_READS_BEFORE_LOGIN",
     "SECURITY_POLICIES",
     "SIGNATURE_CHECKS",
     "AddressSpace",
@@ -95,6 +96,9 @@ As many as the operations of one request."""
 MAX_READS: Final = 4_000
 """Reads from the buffer for one piece of a message, some 8 ms; the largest event filter takes 3 500."""
 
+MAX_READS_BEFORE_LOGIN: Final = 500
+"""The same for a request that needs no session, a millisecond; opening a session takes a hundred."""
+
 Decoder = Callable[[Buffer], Any]
 
 
@@ -117,18 +121,21 @@ class StrictBuffer(Buffer):  # type: ignore[misc]
     def __init__(self, data: bytes, start: int = 0, size: int = -1) -> None:
         super().__init__(data, start, size)
         self._reads = [0]
+        self._most = MAX_READS
 
-    def begin_piece(self) -> None:
-        """Begin another piece of the message."""
+    def begin_piece(self, most: int | None = None) -> None:
+        """Begin another piece of the message; from now on each is read `most` times."""
         self._reads[0] = 0
+        if most is not None:
+            self._most = most
 
     def read(self, size: int) -> bytes:
         """Read and take `size` bytes."""
         if size < 0:
             raise NotEnoughData(f"a length of {size}")
         self._reads[0] += 1
-        if self._reads[0] > MAX_READS:
-            raise NotEnoughData(f"more than {MAX_READS} values in one piece")
+        if self._reads[0] > self._most:
+            raise NotEnoughData(f"more than {self._most} values in one piece")
         data: bytes = super().read(size)
         return data
 
@@ -137,7 +144,7 @@ class StrictBuffer(Buffer):  # type: ignore[misc]
         if size == -1 or size > len(self):
             size = len(self)
         view = StrictBuffer(self._data, self._cur_pos, size)
-        view._reads = self._reads
+        view._reads, view._most = self._reads, self._most
         return view
 
 

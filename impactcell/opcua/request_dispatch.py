@@ -11,7 +11,7 @@ from typing import Any
 
 from asyncua import ua
 
-from impactcell.opcua.asyncua_adapter import StrictBuffer
+from impactcell.opcua.asyncua_adapter import MAX_READS_BEFORE_LOGIN, StrictBuffer
 from impactcell.opcua.binary_codec import (
     MAX_OPERATIONS,
     DecodingError,
@@ -135,6 +135,8 @@ class RequestDispatcher:
         session = None
         if service.needs_session:
             session = self._sessions.resolve(header.AuthenticationToken, connection)
+        else:
+            body.begin_piece(MAX_READS_BEFORE_LOGIN)
         parameters: Any = body
         if service.parameters is not None:
             parameters = await decode_parameters(service.parameters, body, connection.share)

@@ -31,7 +31,7 @@ MIN_CHUNK: Final = 8_192
 """Shortest chunk a client may ask for, bytes (Part 6, 7.1.2.3)."""
 MAX_OPEN_BYTES: Final = 10_240
 """Longest OPN: a chain of certificates, and few blocks to decrypt, of which each takes a millisecond."""
-MAX_ENCRYPTED_BYTES: Final = 4_096
+MAX_ENCRYPTED_BYTES: Final = 2_048
 """The part of it that is encrypted with the server's key: request and signature take half of it at most."""
 MIN_LIFETIME_MS: Final = 60_000
 """Shortest lifetime of a security token, milliseconds."""

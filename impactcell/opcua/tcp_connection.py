@@ -187,6 +187,8 @@ class TcpConnection(asyncio.Protocol):
 
     async def _serve(self) -> None:
         while (frame := await self._frames.get()) is not None:
+            if not self.has_session:  # of all those who have not logged in, one in each round of the loop
+                await self.share.turns.wait()
             self.share.begin()
             self._queued_bytes -= frame[0].packet_size
             if self._paused and not self._is_ahead(2) and self._transport is not None:

@@ -231,7 +231,7 @@ async def filters(client: Client, index: int) -> None:
         )
         for i in range(199)
     ] + [ua.ContentFilterElement(ua.FilterOperator.IsNull, [filter_.SelectClauses[0]])]
-    await _create(client, number, ua.NodeId("press-1", index), 12, 50, filter_)
+    await _create(client, number, ua.NodeId("press-1", index), 12, 25, filter_)
 
 
 async def items(client: Client, index: int) -> None:

@@ -36,12 +36,28 @@ def make_past(path: Path) -> None:
             journal.append(capture, make_snapshot(capture, 0.2 + 1e-6 * number), b"", ())
 
 
+class LoopWatch:
+    """How long each step on the event loop took, in processor time: what else runs does not count."""
+
+    def __init__(self) -> None:
+        self.held_s: list[float] = []
+        run = asyncio.events.Handle._run
+
+        def watched(handle: asyncio.Handle) -> None:
+            begin = time.thread_time()
+            run(handle)
+            self.held_s.append(time.thread_time() - begin)
+
+        asyncio.events.Handle._run = watched  # type: ignore[method-assign]
+
+
 class Cells:
     """What the cells do: work in a thread of each, then publish; and how late that was."""
 
     def __init__(self, here: Site) -> None:
         self.here = here
         self.late_s: list[float] = []
+        self.watch = LoopWatch()
         self.published = self.due = self.lost = 0
         self._threads = {cell: ThreadPoolExecutor(1) for cell in CELLS}
 
@@ -71,10 +87,12 @@ async def tell(cells: Cells) -> None:
             "due": cells.due,
             "lost": cells.lost + cells.due - cells.published,
             "late_ms": list(late_ms),
+            "held_ms": list(1e3 * np.percentile(cells.watch.held_s, [99.9, 100])),
             "rss_mb": process.memory_info().rss / 2**20,
         }
         cells.due, cells.published, cells.lost = cells.due - cells.published, 0, 0
         cells.late_s.clear()
+        cells.watch.held_s.clear()
         sys.stdout.write(json.dumps(state) + "\n")
         sys.stdout.flush()
 
