@@ -17,6 +17,8 @@ from impactcell.opcua.loop_share import LoopShare
 
 MAX_OPERATIONS: Final = 10_000
 """Operations in one request where a service sets no other limit."""
+MAX_RESPONSE_BYTES: Final = 1024 * 1024
+"""Longest response; sixteen chunks to encrypt, some 8 ms."""
 NOT_DECODED: Final = (
     ua.UaError,
     ValueError,
@@ -95,10 +97,19 @@ def decode_type(body: Buffer) -> ua.NodeId:
 
 
 async def encode_response(response: object, share: LoopShare) -> bytes:
-    """Encode a response, one result after the other."""
-    pieces = list[bytes]()
+    """Encode a response, one result after the other.
+
+    Raises
+    ------
+    StatusCodeError
+        BadResponseTooLarge: to encrypt it would keep the loop for longer than a turn may last.
+    """
+    pieces, size = list[bytes](), 0
     for piece in encoded_pieces(response):
         pieces.append(piece)
+        size += len(piece)
+        if size > MAX_RESPONSE_BYTES:
+            raise StatusCodeError(ua.StatusCodes.BadResponseTooLarge)
         await share.give_way()
     return b"".join(pieces)
 

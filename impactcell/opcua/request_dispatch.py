@@ -118,7 +118,10 @@ class RequestDispatcher:
             return
         if not isinstance(answer, bytes):
             answer.ResponseHeader.RequestHandle = handle
-            answer = await encode_response(answer, connection.share)
+            try:
+                answer = await encode_response(answer, connection.share)
+            except StatusCodeError as fault:
+                answer = service_fault(handle, fault.code)
         connection.respond(request_id, handle, answer)
 
     async def _answer(

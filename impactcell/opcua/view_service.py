@@ -18,7 +18,7 @@ from impactcell.opcua.type_instances import HAS_SUBTYPE, targets
 
 MAX_REFERENCES_PER_NODE: Final = 1_000
 """References in one answer for a node; more come by continuation point."""
-MAX_REFERENCES_PER_ANSWER: Final = 10_000
+MAX_REFERENCES_PER_ANSWER: Final = 5_000
 """References of all nodes in one answer."""
 MAX_PATH_ELEMENTS: Final = 50
 """Elements of one browse path."""

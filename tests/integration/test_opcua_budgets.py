@@ -288,3 +288,18 @@ async def test_a_request_that_takes_long_to_decode_is_refused(here: Site) -> Non
         await wire.send(message(channel, 13, body))
         answer = (await wire.receive())[1]
         assert struct.unpack("<I", answer[16 + 4 + 8 + 4 : 16 + 4 + 8 + 8])[0] == codes.BadDecodingError
+
+
+async def test_an_answer_that_would_be_too_long_is_refused(
+    here: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is encrypted keeps the loop: a curve that is asked for a thousand times in one request."""
+    monkeypatch.setattr("impactcell.opcua.binary_codec.MAX_RESPONSE_BYTES", 10_000)
+    async with await here.client() as client:
+        node = (await here.node(client, "Wear/Level")).nodeid
+        request = ua.ReadRequest()
+        request.Parameters.NodesToRead = [ua.ReadValueId(NodeId=node, AttributeId=13)] * 1_000
+        with pytest.raises(ua.UaStatusCodeError) as refused:
+            await client.uaclient.protocol.send_request(request)
+        assert refused.value.code == codes.BadResponseTooLarge
+        await (await here.node(client, "Module/Connected")).read_data_value(False)
