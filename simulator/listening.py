@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from simulator.faults import FaultInjector
 from simulator.modbus_server import ModbusServer, RegisterDevice
-from simulator.rtu import RtuConnection
+from simulator.rtu_over_tcp import RtuOverTcpServer
 from simulator.scenario import Listen
 from simulator.serial_line import SerialServer, pace_of
 from simulator.udp_server import UdpServer
@@ -28,9 +28,7 @@ def server_of(
         case "udp":
             return UdpServer(device, unit, host=host, port=port, faults=faults, before=before)
         case "rtu_over_tcp":
-            return ModbusServer(
-                device, unit, host=host, port=port, faults=faults, before=before, connection=RtuConnection
-            )
+            return RtuOverTcpServer(device, unit, host=host, port=port, faults=faults, before=before)
         case _:
             tls = _tls(listen) if listen.transport == "tls" else None
             return ModbusServer(device, unit, host=host, port=port, faults=faults, before=before, tls=tls)

@@ -15,7 +15,7 @@ from typing import Final, Protocol, Self
 import numpy as np
 
 from impactcell.fieldbus.registers import WIRE, Words
-from simulator.client_connection import Answering, ClientConnection
+from simulator.client_connection import ClientConnection
 from simulator.faults import FaultInjector
 
 
@@ -62,14 +62,15 @@ class ModbusServer:
         What befalls replies.
     before : callable, optional
         Called before requests are answered, to bring the device up to date.
-    connection : callable
-        Makes the connection of each client.
 
     Attributes
     ----------
     devices : dict
         Unit id to device; more than one make it a gateway.
     """
+
+    connection: type[ClientConnection] = ClientConnection
+    """What each client is served by."""
 
     def __init__(
         self,
@@ -81,7 +82,6 @@ class ModbusServer:
         faults: FaultInjector | None = None,
         before: Callable[[], None] | None = None,
         tls: ssl.SSLContext | None = None,
-        connection: Callable[[Answering], ClientConnection] = ClientConnection,
     ) -> None:
         self.device = device
         self.device_id = device_id
@@ -93,14 +93,13 @@ class ModbusServer:
         self.links: list[ClientConnection] = []
         self.devices: dict[int, RegisterDevice] = {device_id: device}
         self._tls = tls
-        self._connection = connection
         self._server: asyncio.Server | None = None
 
     async def start(self) -> None:
         """Listen; `port` then is the port that was given by the system if it was 0."""
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(
-            lambda: self._connection(self), self.host, self.port, ssl=self._tls
+            lambda: self.connection(self), self.host, self.port, ssl=self._tls
         )
         self.port = self._server.sockets[0].getsockname()[1]
 

@@ -14,7 +14,7 @@ from impactcell.fieldbus.registers import WIRE, Words
 from impactcell.fieldbus.transports import transport_for
 from simulator.faults import FaultInjector
 from simulator.modbus_server import ModbusServer, RegisterDevice
-from simulator.rtu import RtuConnection
+from simulator.rtu_over_tcp import RtuOverTcpServer
 from simulator.serial_line import SerialServer
 from simulator.udp_server import UdpServer
 from tests.certificates import Authority
@@ -56,7 +56,7 @@ def server_for(
     if kind == "udp":
         return UdpServer(device, faults=faults), None
     if kind == "rtu_over_tcp":
-        return ModbusServer(device, faults=faults, connection=RtuConnection), None
+        return RtuOverTcpServer(device, faults=faults), None
     if kind == "tcp":
         return ModbusServer(device, faults=faults), None
     authority = Authority(directory, "plant")

@@ -14,8 +14,7 @@ from impactcell.fieldbus.link import ModuleLink, SerialLine
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports import Transports, transport_for
 from simulator.faults import Fault, FaultInjector, FaultKind
-from simulator.modbus_server import ModbusServer
-from simulator.rtu import RtuConnection
+from simulator.rtu_over_tcp import RtuOverTcpServer
 from simulator.serial_line import SerialServer, pace_of
 from tests.benchmarks.table import Table
 from tests.transports import KINDS, Image, connected
@@ -80,7 +79,7 @@ async def _shares(seconds: float) -> Counter[int]:
     loop, answered = asyncio.get_running_loop(), Counter[int]()
     faults = FaultInjector(1)
     faults.inject(Fault(FaultKind.DELAY, seconds=_REPLY_S))
-    server = ModbusServer(Image(), faults=faults, connection=RtuConnection)
+    server = RtuOverTcpServer(Image(), faults=faults)
     async with server:
         for unit in range(1, _UNITS + 1):
             server.devices[unit] = server.device
