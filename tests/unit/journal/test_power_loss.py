@@ -87,7 +87,7 @@ def cuts(tmp_path: Path, number: int, prepare: Callable[[Journal], None]) -> lis
     for moment in moments:
         try:
             found.append(lost(recording.steps[:moment], tmp_path / str(moment), draw))
-        except (JournalError, sqlite3.Error) as error:
+        except (JournalError, sqlite3.Error, TypeError) as error:  # of a row that is all nothing
             found.append(f"{type(error).__name__}: {error}")
     return [each for each in found if each]
 
