@@ -116,6 +116,13 @@ def test_what_remains_beside_an_established_effect_is_a_sentence_of_its_own(
     assert "in free slide with velocity" in page_of(both, tmp_path).text
 
 
+def test_an_interval_that_ends_at_a_bound_is_shown_as_one(tied: DiscrepancyResult, tmp_path: Path) -> None:
+    assert "bound of its range" not in page_of(tied, tmp_path).text
+    ended = replace(tied.parameters[0], at_bound=True)
+    page = page_of(replace(tied, parameters=(ended, *tied.parameters[1:])), tmp_path)
+    assert page.text.count("bound of its range") == 1
+
+
 def test_parameters_have_their_units_and_regions_their_place(tied: DiscrepancyResult) -> None:
     shown = page_context(tied, "a campaign")
     units = {row["name"]: row["unit"] for row in shown["parameters"]}

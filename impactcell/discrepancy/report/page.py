@@ -111,6 +111,7 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
                 "value": item.value,
                 "low": item.low,
                 "high": item.high,
+                "at_bound": item.at_bound,
                 "unit": _unit(item),
             }
             for item in result.parameters
