@@ -242,7 +242,7 @@ def disk_after_cut(steps: list[Step], directory: Path, draw: random.Random) -> N
         elif step.what in ("write", "truncate"):
             files[step.name].pending.append(step)
     share = draw.choice((0.0, 0.5, 0.9, 1.0))
-    for name in {*files, *safe}:
+    for name in sorted({*files, *safe}):
         stored = draw.choice((safe.get(name), files.get(name)))
         if stored is not None and not name.endswith("-shm"):
             (directory / name).write_bytes(stored.after_cut(draw, share))
