@@ -11,7 +11,7 @@ from typing import Any
 
 from asyncua import ua
 
-from impactcell.opcua.asyncua_adapter import MAX_READS_BEFORE_LOGIN, StrictBuffer
+from impactcell.opcua.asyncua_adapter import MAX_READS_BEFORE_LOGIN, StrictBuffer, field_decoders
 from impactcell.opcua.binary_codec import (
     MAX_OPERATIONS,
     DecodingError,
@@ -87,6 +87,9 @@ class RequestDispatcher:
         self._sessions = sessions
         self._services = {request_id(name): service for name, service in services.items()}
         self._lost = lost
+        for service in services.values():
+            if service.parameters is not None:
+                field_decoders(service.parameters)  # made now, and not while the first client waits for it
 
     def disconnected(self, connection: TcpConnection) -> None:
         """Pass on that a connection has gone."""

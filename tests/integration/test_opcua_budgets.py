@@ -49,8 +49,9 @@ async def test_half_hellos_give_way_to_newcomers() -> None:
                     await (await here.node(client, "Module/Connected")).read_data_value(False)
 
 
-async def test_who_has_logged_in_does_not_give_way() -> None:
-    async with site(limits=ServerLimits(connections=2, undisturbed_s=0.0, **SLOW)) as here:
+@pytest.mark.parametrize("bound", ["connections", "connections_per_address"])
+async def test_who_has_logged_in_does_not_give_way(bound: str) -> None:
+    async with site(limits=ServerLimits(**{bound: 2}, undisturbed_s=0.0, **SLOW)) as here:
         async with await here.client() as first, await here.client("operator") as second:
             async with raw(here) as wire:
                 assert await wire.error() == codes.BadTcpServerTooBusy
