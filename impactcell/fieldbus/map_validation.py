@@ -95,8 +95,12 @@ def _entry_faults(entry: object, units: Container[str], kinds: Container[str]) -
             faults.append(f"unknown key {key}")
         elif not _KEYS[key][1](value):
             faults.append(f"{key} must be {_KEYS[key][0]}, not {value!r}")
-    if faults:
-        return faults
+    return faults or _combination_faults(entry, units, kinds)
+
+
+def _combination_faults(entry: Mapping[str, Any], units: Container[str], kinds: Container[str]) -> list[str]:
+    """Say which keys, each of them sound, do not go together."""
+    faults: list[str] = []
     kind, unit = entry["type"], entry.get("unit", "")
     if kind != "string" and kind not in kinds:
         faults.append(f"type must be {_KEYS['type'][0]}, not {kind!r}")

@@ -13,7 +13,7 @@ from dataclasses import replace
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import JournalError, SettingsError
-from impactcell.fieldbus.transports import Transport, Transports
+from impactcell.fieldbus.transports import Transports
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.signals import stop_on_signals
@@ -121,15 +121,13 @@ class Service:
         faults: list[JournalError] = []
         for cell in self._cells:
             try:
-                self.running[cell.name] = CellTask(cell, self._on_snapshot, self._transport(cell))
+                self.running[cell.name] = CellTask(
+                    cell, self._on_snapshot, self._transports.transport_for(module_link(cell))
+                )
             except JournalError as error:
                 faults.append(error)
         if faults and not self.running and not any(fault.retry for fault in faults):
             raise JournalError("\n".join(map(str, faults)))
-
-    def _transport(self, cell: CellConfig) -> Transport:
-        """Make a cell's transport; cells behind one gateway, or on one line, share its connection."""
-        return self._transports.transport_for(module_link(cell))
 
     def _health(self) -> list[CellHealth]:
         cells = [(cell.name, self.running.get(cell.name)) for cell in self._cells]
@@ -228,7 +226,9 @@ class Service:
         while True:
             # In a thread: a disk may take its time, and the others go on.
             opening = asyncio.create_task(
-                asyncio.to_thread(CellTask, cell, self._on_snapshot, self._transport(cell))
+                asyncio.to_thread(
+                    CellTask, cell, self._on_snapshot, self._transports.transport_for(module_link(cell))
+                )
             )
             try:
                 self.running[cell.name] = await asyncio.shield(opening)
