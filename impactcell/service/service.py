@@ -82,7 +82,8 @@ class Service:
         self.pages: dict[str, str] = {}
         """Address of the page that each cell is on, if any, once `run` has started."""
         self._feeds: dict[str, LiveFeed] = {}
-        self._transports = Transports(map(module_link, cells))
+        shared = Transports(map(module_link, cells))
+        self._transports = {cell.name: shared.transport_for(module_link(cell)) for cell in cells}
 
     async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
         """Run until `stop` is set; `started` is called when every endpoint listens."""
@@ -121,9 +122,7 @@ class Service:
         faults: list[JournalError] = []
         for cell in self._cells:
             try:
-                self.running[cell.name] = CellTask(
-                    cell, self._on_snapshot, self._transports.transport_for(module_link(cell))
-                )
+                self.running[cell.name] = CellTask(cell, self._on_snapshot, self._transports[cell.name])
             except JournalError as error:
                 faults.append(error)
         if faults and not self.running and not any(fault.retry for fault in faults):
@@ -226,9 +225,7 @@ class Service:
         while True:
             # In a thread: a disk may take its time, and the others go on.
             opening = asyncio.create_task(
-                asyncio.to_thread(
-                    CellTask, cell, self._on_snapshot, self._transports.transport_for(module_link(cell))
-                )
+                asyncio.to_thread(CellTask, cell, self._on_snapshot, self._transports[cell.name])
             )
             try:
                 self.running[cell.name] = await asyncio.shield(opening)
