@@ -105,7 +105,10 @@ async def test_a_foreign_journal_keeps_its_own_cell_out_and_no_other(
                 await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz")
             with caught.value as answer:
                 assert answer.code == 503
-                assert json.load(answer) == {"well": True, "odd": False}
+                seen = json.load(answer)
+        assert seen["well"] == {"healthy": True, "reason": ""}
+        assert seen["odd"]["healthy"] is False
+        assert "the journal cannot be opened" in seen["odd"]["reason"]
     assert (tmp_path / "odd.sqlite").read_bytes() == foreign
     assert "cell=odd waits until its journal can be opened" in caplog.text
     assert "odd.sqlite" in caplog.text
