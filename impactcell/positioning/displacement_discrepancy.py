@@ -2,13 +2,15 @@
 
 The part moves by D instead of the model's D_0 (Kennedy and O'Hagan, 2001)::
 
-    D = D_0 exp(phi · w) + delta psi · w,   w ~ N(0, W)
+    ln D = ln D_0 + phi(tap) · w,   w ~ N(0, W)
 
 and the weights w are learned with the parameters, as one Gaussian. Where the model is right they come out
-as zero, within a standard deviation that shrinks with each tap. What slides freely is off by a share of
-itself, phi, and what is pushed by a share of the indentation delta = mu_k m g / k, psi::
+as zero, within a standard deviation that shrinks with each tap. phi takes a displacement apart into what is
+pushed, which is off by a share of the indentation delta = mu_k m g / k, and what slides freely, which is off
+by a share of itself::
 
-    f = (D_0 - (stroke - delta)) / (D_0 + delta)     share that slides, 0 to 1
+    f = (D_0 - (stroke - delta)) / D_0     share that slides, 0 to 1
+    c = (1 - f) delta / D_0                indentation beside what is pushed
 """
 
 import math
@@ -20,8 +22,8 @@ from impactcell.records import Samples
 
 FEATURES = 10
 """Weights of the discrepancy: one a line of `discrepancy_features`."""
-PRIOR_STD = np.array([0.03, 0.03, 0.03, 0.03, 0.03, 0.1, 0.05, 0.05, 0.05, 0.03])
-"""Of a weight before the first tap: 3 % of a displacement, up to 10 % of an indentation; a choice."""
+PRIOR_STD = np.full(FEATURES, 0.03)
+"""Of a weight before the first tap: 3 % of a displacement, or of an indentation; a choice."""
 LEARNED_STD = np.full(FEATURES, 0.012)
 """Of a weight after a handful of taps, for what is to be expected of the taps to come."""
 VELOCITY_M_S = 0.03
@@ -30,17 +32,15 @@ MASS_KG = 15.0
 """In the middle of what a cell handles: the discrepancy is told against it."""
 POSITION_M = 0.02
 """Over which a discrepancy of the position grows to its weight."""
-LOSS_M = 0.5e-3
+LOSS_M = 1e-3
 """Displacement beside which a loss of energy in the contact is told."""
 
 
 @compiled
 def discrepancy_features(
     tap: Samples, displacement: float, part: Samples, place: Samples, out: Samples
-) -> float:
-    """Write phi of a tap to the first row of `out`, psi to the second, and return the share f that slides.
-
-    Both are zero for a tap that moves nothing.
+) -> None:
+    """Write phi of a tap to `out`, shape (FEATURES,); zero for a tap that moves nothing.
 
     Parameters
     ----------
@@ -52,31 +52,27 @@ def discrepancy_features(
         Mass (kg) first.
     place : ndarray, shape (2,)
         Where the part lies (m, along +1) and the direction of the tap.
-    out : ndarray, shape (2, FEATURES)
     """
-    out[:] = 0.0
     if not displacement > 0.0:
-        return 0.0
+        out[:] = 0.0
+        return
     velocity, stroke, indentation = tap
     pushed = 0.0 if math.isinf(stroke) else stroke - indentation
-    f = min(max((displacement - pushed) / (displacement + indentation), 0.0), 1.0)
+    f = min(max((displacement - pushed) / displacement, 0.0), 1.0)
+    c = (1.0 - f) * min(indentation / displacement, 1.0)
     speed, mass = math.log(velocity / VELOCITY_M_S), math.log(part[0] / MASS_KG)
-    # friction of the place: halfway along the way, in its direction
-    along = (place[0] + 0.5 * place[1] * displacement) / POSITION_M
-    phi, psi = out
-    phi[0] = f
-    phi[1] = f * speed
-    phi[2] = f * mass
-    phi[3] = f * along
-    phi[4] = f * along * MASS_KG / part[0]
-    phi[8] = f * min(LOSS_M / displacement, 1.0) * MASS_KG / part[0]
-    phi[9] = f * place[1]
-    psi[3] = (1.0 - f) * along
-    psi[4] = psi[3] * MASS_KG / part[0]
-    psi[5] = math.exp(-displacement / indentation)
-    psi[6] = (1.0 - f) * mass
-    psi[7] = (1.0 - f) * speed
-    return float(f)
+    # friction slows what slides and deepens the indentation: halfway along the way, in its direction
+    along = (f + c) * (place[0] + 0.5 * place[1] * displacement) / POSITION_M
+    out[0] = f
+    out[1] = f * speed
+    out[2] = f * mass
+    out[3] = along
+    out[4] = along * MASS_KG / part[0]
+    out[5] = c
+    out[6] = c * mass
+    out[7] = c * speed
+    out[8] = f * min(LOSS_M / displacement, 1.0) * MASS_KG / part[0]
+    out[9] = f * place[1]
 
 
 DEPENDS_ON = {

@@ -17,8 +17,6 @@ from impactcell.positioning.planner_posterior import FRICTION, PARAMETERS, Plann
 from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
 
-FOLD_FREE = 0.3
-"""Difference of two sensitivities that is not taken for a fold: a slide's own is 0.8 to 1.2."""
 ACROSS = 4
 """Directions across the line: parameters other than friction."""
 
@@ -34,11 +32,9 @@ class Scenarios(NamedTuple):
     weights : ndarray, shape (nodes + 2 ACROSS, FEATURES)
         Of the discrepancy, with each of these.
     root : ndarray, shape (FEATURES, FEATURES)
-        root @ root.T is the covariance of the weights that goes with no parameter.
-    log_friction : ndarray, shape (nodes,)
-        Along the line.
-    scatter : ndarray, shape (nodes, 3)
-        Of the displacement, of the contact, and of folds, at each node.
+        phi @ root @ root.T @ phi is the variance of the discrepancy that goes with no parameter.
+    scatter : ndarray, shape (nodes, 2)
+        Of the displacement and of the contact, at each node.
     part, place : ndarray
         As in `displacements` and in `discrepancy_features`.
     """
@@ -46,7 +42,6 @@ class Scenarios(NamedTuple):
     plants: Samples
     weights: Samples
     root: Samples
-    log_friction: Samples
     scatter: Samples
     part: Samples
     place: Samples
@@ -86,7 +81,6 @@ def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, 
         plant_parameters(theta),
         weights,
         np.ascontiguousarray(root),
-        np.ascontiguousarray(theta[: z.size, FRICTION]),
         np.ascontiguousarray(scales[:, 1:]),
         part,
         place,
@@ -116,68 +110,41 @@ def displacement_quantiles(
     across = (rows.shape[0] - nodes) // 2
     course = np.empty(count)
     square = np.zeros(count)
-    features = np.empty((count, 2, weights.shape[1]))
-    sliding = np.empty(count)
+    features = np.empty((count, weights.shape[1]))
     tap = np.empty(3)
-    delta = rows[middle, 3] * part[0] * part[1] / rows[middle, 0]
-    tap[0], tap[2] = velocity, delta
+    tap[0], tap[2] = velocity, rows[middle, 3] * part[0] * part[1] / rows[middle, 0]
     displacements(velocity, strokes, rows[middle], part, course)
     for j in range(count):
         tap[1] = strokes[j]
-        sliding[j] = discrepancy_features(tap, course[j], part, scenarios.place, features[j])
+        discrepancy_features(tap, course[j], part, scenarios.place, features[j])
     for q in range(nodes):
         displacements(velocity, strokes, rows[q], part, course)
         for j in range(count):
-            out[j, q] = with_discrepancy(course[j], delta, features[j], weights[q])
+            out[j, q] = course[j] * math.exp(product(features[j], weights[q]))
     other = np.empty(count)
     for a in range(across):
         p, n = nodes + a, nodes + across + a
         displacements(velocity, strokes, rows[p], part, course)
         displacements(velocity, strokes, rows[n], part, other)
         for j in range(count):
-            above = with_discrepancy(course[j], delta, features[j], weights[p])
-            below = with_discrepancy(other[j], delta, features[j], weights[n])
+            above = course[j] * math.exp(product(features[j], weights[p]))
+            below = other[j] * math.exp(product(features[j], weights[n]))
             step = max(abs(above - out[j, middle]), abs(below - out[j, middle]))
             square[j] += step * step
-    line, slope = np.empty(nodes), np.empty(weights.shape[1])
-    root, log_friction = scenarios.root, scenarios.log_friction
+    line = np.empty(nodes)
+    root = scenarios.root
     for j in range(count):
         line[:] = out[j]
-        slope[:] = line[middle] * features[j, 0] + delta * features[j, 1]
+        share = 0.0
         for a in range(root.shape[1]):
-            square[j] += product(slope, root[:, a]) ** 2
-        fold = fold_share(line, log_friction, sliding[j], delta)
+            share += product(features[j], root[:, a]) ** 2
+        square[j] += share * line[middle] ** 2
         for q in range(nodes):
             if q != middle:
+                by_contact = scenarios.scatter[q, 1] * min(tap[2], line[middle])
                 by_itself = scenarios.scatter[q, 0] * line[middle]
-                by_contact = scenarios.scatter[q, 1] * (1.0 - sliding[j]) * delta
-                by_fold = scenarios.scatter[q, 2] * fold * line[middle]
-                aside = math.sqrt(square[j] + by_itself**2 + by_contact**2 + by_fold**2)
+                aside = math.sqrt(square[j] + by_itself**2 + by_contact**2)
                 out[j, q] = max(reach(line, z, q, middle, aside), 0.0)
-
-
-@compiled
-def with_discrepancy(displacement: float, delta: float, features: Samples, weights: Samples) -> float:
-    """Displacement (m) with what the model lacks; a tap that moves nothing by the model moves nothing."""
-    if not displacement > 0.0:
-        return displacement
-    share = math.exp(product(features[0], weights))
-    return max(displacement * share + delta * product(features[1], weights), 0.0)
-
-
-@compiled
-def fold_share(line: Samples, log_friction: Samples, sliding: float, delta: float) -> float:
-    """By how much the sensitivity of a displacement to friction differs from that of a push and a slide.
-
-    0 for those, 1 and more where the displacement stays, or falls, as friction does.
-    """
-    middle = line.size // 2
-    low, high = line[middle + 1], line[middle - 1]
-    if not (low > 0.0 and high > 0.0):
-        return 0.0
-    sensitivity = math.log(low / high) / (log_friction[middle - 1] - log_friction[middle + 1])
-    usual = sliding + (1.0 - sliding) * min(delta / line[middle], 1.0)
-    return float(min(max(abs(sensitivity - usual) - FOLD_FREE, 0.0), 1.0))
 
 
 @compiled

@@ -43,11 +43,6 @@ class ValueFunction(NamedTuple):
     overshoot: Samples
 
 
-def without_later_risk(value: ValueFunction) -> ValueFunction:
-    """Leave the overshoots of later taps to when they are chosen."""
-    return value._replace(overshoot=np.zeros_like(value.overshoot))
-
-
 class Actions(NamedTuple):
     """Taps to choose from in a sweep.
 

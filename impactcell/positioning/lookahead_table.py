@@ -29,7 +29,7 @@ STALE = np.concatenate([[0.02, 0.04, 0.08, 0.03, 2.0], np.full(FEATURES, 0.03)])
 """Change of the posterior's mean or standard deviation, in its units, after which a table is made anew."""
 SCATTER_Z = np.array([1.0, 3.0])
 """Nodes at which scatter is compared."""
-STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02, 0.03], [6e-3, 6e-3, 0.04, 0.06]])
+STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02], [6e-3, 6e-3, 0.04]])
 """Change of the scatter at these nodes after which a table is made anew."""
 
 
@@ -156,7 +156,7 @@ def _sliding_share(
     indentation = plant[3] * part[0] * part[1] / plant[0]
     pushed = np.where(np.isfinite(limits.strokes), limits.strokes - indentation, 0.0)
     size = np.maximum(middle, 1e-9)
-    f = np.clip((middle - pushed) / (size + indentation), 0.0, 1.0)
+    f = np.clip((middle - pushed) / size, 0.0, 1.0)
     share: Samples = np.nan_to_num(f + (1.0 - f) * np.minimum(indentation / size, 1.0))
     return share
 

@@ -3,19 +3,19 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
 from impactcell.errors import PositioningError
 from impactcell.physics import Plant, free_motion
 from impactcell.positioning import planner_posterior
-from impactcell.positioning.action_selection import SelectedAction, select_action
-from impactcell.positioning.compile_ahead import compile_ahead
+from impactcell.positioning.action_selection import select_action
 from impactcell.positioning.displacement_quantiles import (
     displacement_quantiles,
     parameter_scenarios,
 )
-from impactcell.positioning.dynamic_programming import without_later_risk
+from impactcell.positioning.dynamic_programming import Goal
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 from impactcell.positioning.lookahead_table import (
     SCATTER_Z,
@@ -34,9 +34,7 @@ from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.positioning.tap_model import model_of_tap
 from impactcell.records import Quality, Samples, Signature, TapPredictions
 
-TRIES = ((1.0, 1.0), (20.0, 1.0), (400.0, 1.0), (1.0, 0.5), (20.0, 0.5), (400.0, 0.5))
-"""Factors on the penalty of an overshoot and on the bound, tried in turn; a half is for one tap alone."""
-PROGRESS = 0.1  # of the distance: the least that such a tap is expected to cover
+CAUTION = (1.0, 20.0, 400.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
 REMEMBERED = 64  # tables, of parts of different mass
 
@@ -100,7 +98,7 @@ class TapPlanner:
             self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
             self.overshoot_probability,
         )  # fmt: skip
-        compile_ahead()
+        _ready()
         self._posterior = planner_posterior.prior(
             plant.stiffness_n_per_m,
             plant.damping_n_s_per_m,
@@ -159,9 +157,28 @@ class TapPlanner:
         distance = abs(remaining_m)
         part = self._part(mass_kg)
         place = np.array([position_m, math.copysign(1.0, remaining_m)])
-        action = self._select(distance, part, place)
-        if isinstance(action, Unreachable):
-            return action
+        scenarios = parameter_scenarios(self._posterior, Z, part, place)
+        least = 1.0
+        for caution in CAUTION:
+            lookahead = self._lookahead(part, place, caution)
+            if not lookahead.furthest_m > 0.0:
+                return Unreachable(
+                    f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
+                    f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
+                )
+            action, safest = select_action(
+                distance, lookahead.at(place), lookahead.value, self._limits.space(self._posterior, part),
+                scenarios, self._limits.goal(caution), self.overshoot_probability,
+            )  # fmt: skip
+            if action is not None:
+                break
+            least = min(least, safest)
+        else:
+            return Unreachable(
+                f"{distance * 1e6:.1f} µm remain, and every tap for a part of {mass_kg:.3g} kg overshoots "
+                f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
+                f"(the safest with {least:.2g})"
+            )
         moved = self._band(action.velocity_m_s, action.stroke_m, part, place)
         return Tap(
             velocity_m_s=action.velocity_m_s,
@@ -173,40 +190,6 @@ class TapPlanner:
             expected_taps=action.cost,
             overshoot_probability=action.overshoot,
             position_m=position_m,
-        )
-
-    def _select(self, distance: float, part: Samples, place: Samples) -> SelectedAction | Unreachable:
-        """Choose the tap of least cost whose task keeps the bound; else one that itself keeps a share of it.
-
-        What a task risks in taps to come is worked out from what is known now. Where that is too much, a
-        tap that is safe in itself tells more, and the next one is decided on then.
-        """
-        posterior, limits = self._posterior, self._limits
-        scenarios = parameter_scenarios(posterior, Z, part, place)
-        least, bound = 1.0, self.overshoot_probability
-        for caution, share in TRIES:
-            lookahead = self._lookahead(part, place, caution)
-            if not lookahead.furthest_m > 0.0:
-                return Unreachable(
-                    f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
-                    f"moves a part of {part[0]} kg at friction {posterior.mu_k:.3f}"
-                )
-            value = lookahead.value if share == 1.0 else without_later_risk(lookahead.value)
-            action, safest = select_action(
-                distance, lookahead.at(place), value, limits.space(posterior, part), scenarios,
-                limits.goal(caution), share * bound,
-            )  # fmt: skip
-            if action is not None and (
-                share == 1.0
-                or self._band(action.velocity_m_s, action.stroke_m, part, place)[BAND_Z.size // 2]
-                >= max(self.tolerance_m, PROGRESS * distance)
-            ):
-                return action
-            least = min(least, safest)
-        return Unreachable(
-            f"{distance * 1e6:.1f} µm remain, and every tap for a part of {part[0]:.3g} kg overshoots "
-            f"{self.tolerance_m * 1e6:.3g} µm with a probability above {bound:.2g} "
-            f"(the safest with {least:.2g})"
         )
 
     def observe(self, tap: Tap, moved_m: float, mass_kg: float) -> None:
@@ -285,3 +268,20 @@ class TapPlanner:
         self._lookaheads.append(lookahead)
         del self._lookaheads[:-REMEMBERED]
         return lookahead
+
+
+@cache
+def _ready() -> None:
+    """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
+    posterior = planner_posterior.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
+    limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
+    part = np.array([20.0, 9.81])
+    place = np.array([0.0, 1.0])
+    lookahead = build_lookahead(limits, posterior, part, place, 1.0)
+    select_action(
+        2e-3, lookahead.table, lookahead.value, limits.space(posterior, part),
+        parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,
+    )  # fmt: skip
+    tap = Tap(0.02, 2e-4)
+    model_of_tap(tap, posterior, part)
+    largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(posterior), 20.0, 9.81)

@@ -40,7 +40,7 @@ class Step(NamedTuple):
     """One Gaussian after one displacement.
 
     `likelihood` is a logarithm, `surprise` the normalised innovation; `innovation` (m), its `variance` but
-    for scatter (m²) and the `reaches` of the scatter (m), shape (4,), are those foretold before it.
+    for scatter (m²) and the `reaches` of the scatter (m), shape (3,), are those foretold before it.
     """
 
     mean: Samples
@@ -132,7 +132,7 @@ def merge_components(posterior: PlannerPosterior) -> PlannerPosterior:
 
 
 def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapModel, moved_m: float) -> Step:
-    """One Gaussian after one displacement; `scatter` has the expected squares of the four of it.
+    """One Gaussian after one displacement; `scatter` has the expected squares of the three of it.
 
     What is regressed are the parameters and the tap's friction factor; the weights of the discrepancy act on
     the logarithm, and their slope is known.
@@ -143,24 +143,23 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
     prior = np.zeros((size + 1, size + 1))
     prior[:size, :size] = cov
     prior[size, size] = scatter[0]
-    delta = model.indentation_m
-    beside = np.array([moved_m, (1.0 - model.sliding) * delta, model.fold * moved_m])
-    noise = POSITION_NOISE_M**2 + float(scatter[1:] @ beside**2)
+    by_itself, by_contact = moved_m, min(model.indentation_m, abs(moved_m))
+    noise = POSITION_NOISE_M**2 + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
     point, after = before.copy(), prior
     weight, surprise, likelihood, crooked = 1.0, 0.0, -math.inf, 0.0
-    foretold, rest, reaches = 0.0, 1.0, np.zeros(4)
+    foretold, rest, reaches = 0.0, 1.0, np.zeros(3)
     slope = np.zeros(size + 1)
     for iteration in range(ITERATIONS):
         block = after[np.ix_(regressed, regressed)]
         root = np.linalg.cholesky(block + 1e-12 * np.diag(np.diag(prior)[regressed]))
-        share, offset = model.features @ point[PARAMETERS:size]
-        values = math.exp(share) * model.response(point[regressed] + POINTS @ root.T) + delta * offset
+        factor = math.exp(float(model.features @ point[PARAMETERS:size]))
+        values = factor * model.response(point[regressed] + POINTS @ root.T)
         if not np.isfinite(values).all():
-            return Step(mean, cov, -math.inf, 0.0, 0.0, 1.0, np.zeros(4))
+            return Step(mean, cov, -math.inf, 0.0, 0.0, 1.0, np.zeros(3))
         centre = float(values.mean())
         white = POINTS.T @ (values - centre) / len(POINTS)
         slope[regressed] = np.linalg.solve(root.T, white)
-        slope[PARAMETERS:size] = (centre - delta * offset) * model.features[0] + delta * model.features[1]
+        slope[PARAMETERS:size] = centre * model.features
         bent = float(((values - centre - POINTS @ white) ** 2).sum()) / (len(POINTS) - 7)
         crooked = max(bent, CROOKED * crooked)
         innovation = moved_m - centre - float(slope @ (before - point))
@@ -170,7 +169,7 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
             weight = min(1.0, (DEGREES + 1.0) / (DEGREES + surprise**2))
             likelihood = -0.5 * math.log(variance)
             likelihood -= 0.5 * (DEGREES + 1.0) * math.log1p(surprise**2 / DEGREES)
-            reaches = np.concatenate([slope[size:], beside])
+            reaches = np.array([slope[size], by_itself, by_contact])
             foretold, rest = innovation, variance - float(scatter @ reaches**2)
         gain = prior @ slope / variance
         new = before + weight * gain * innovation

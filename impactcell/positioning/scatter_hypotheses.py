@@ -2,12 +2,9 @@
 
 Each tap has a friction factor of its own, 1 + sigma_f z; beside it the displacement scatters by a share
 sigma_d of itself and by a share sigma_c of the indentation, as a contact or a surface does that is not the
-same everywhere. A part that is caught up with and struck again moves by an amount that folds over as
-friction varies: a model that is a little wrong misses by sigma_r of the share r by which its sensitivity
-to friction differs from that of a push and a slide. What one tap deviates by, with a variance S that is not
-scatter, is told of all four::
+same everywhere. What one tap deviates by, with a variance S that is not scatter, is told of all three::
 
-    p(deviation | sigma) = N(0, S + (sigma_f dD/dz)² + (sigma_d D)² + (sigma_c delta)² + (sigma_r r D)²)
+    p(deviation | sigma) = N(0, S + (sigma_f dD/dz)² + (sigma_d D)² + (sigma_c delta)²)
 
 Taps at which these differ tell them apart. The sum over the grid is exact; a tap in 50 may be an outlier.
 """
@@ -17,9 +14,9 @@ from scipy.special import ndtr, ndtri
 
 from impactcell.records import Samples
 
-FRICTION_STD = np.array([0.004, 0.0075, 0.013, 0.021, 0.03, 0.042, 0.06, 0.085])
+FRICTION_STD = np.array([0.004, 0.0075, 0.012, 0.02, 0.03, 0.042, 0.06, 0.085])
 """sigma_f: surfaces scatter by 0.5 to 8 %."""
-FRICTION_PRIOR = np.array([0.015, 0.02, 0.025, 0.05, 0.62, 0.2, 0.05, 0.02])
+FRICTION_PRIOR = np.array([0.02, 0.03, 0.07, 0.18, 0.42, 0.2, 0.06, 0.02])
 """About the 3 % of the paper's surfaces."""
 DISPLACEMENT_STD = np.array([0.001, 0.003, 0.006, 0.012, 0.024, 0.045, 0.085])
 """sigma_d: next to nothing where the model is right, up to 8 %."""
@@ -29,28 +26,24 @@ CONTACT_STD = np.array([0.005, 0.03, 0.08, 0.2])
 """sigma_c: of the indentation."""
 CONTACT_PRIOR = np.array([0.72, 0.18, 0.07, 0.03])
 """As for the displacement."""
-FOLD_STD = np.array([0.002, 0.05, 0.15])
-"""sigma_r: of a displacement that folds over."""
-FOLD_PRIOR = np.array([0.6, 0.25, 0.15])
-"""A model need not be much off to miss there."""
 OUTLIER = 0.02
 """Share of taps that do not belong ..."""
 OUTLIER_STD = 5.0
 """... and deviate by so many times as much."""
-MEMORY = 150.0
+MEMORY = 400.0
 """Taps after which what was learned of the scatter fades."""
 REACH = np.concatenate([[0.0], np.geomspace(1e-4, 0.8, 120)])
 """Deviations at which the distribution of the scatter is tabulated."""
 
-AXES = (FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD, FOLD_STD)
-"""Kinds of scatter."""
-GRID = np.stack(np.meshgrid(*AXES, indexing="ij"), axis=-1).reshape(-1, len(AXES))
-"""All combinations, shape (g, 4)."""
+GRID = np.stack(np.meshgrid(FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD, indexing="ij"), axis=-1).reshape(
+    -1, 3
+)
+"""All combinations, shape (g, 3)."""
 
 
 def prior_weights() -> Samples:
     """Probability of each combination before the first tap, shape (g,)."""
-    prior = np.einsum("i,j,k,l->ijkl", FRICTION_PRIOR, DISPLACEMENT_PRIOR, CONTACT_PRIOR, FOLD_PRIOR).ravel()
+    prior = np.einsum("i,j,k->ijk", FRICTION_PRIOR, DISPLACEMENT_PRIOR, CONTACT_PRIOR).ravel()
     weights: Samples = prior / prior.sum()
     return weights
 
@@ -60,7 +53,7 @@ PRIOR_WEIGHTS = prior_weights()
 
 
 def mean_variances(weights: Samples) -> Samples:
-    """Return the expected squares of sigma_f, sigma_d, sigma_c and sigma_r, shape (4,)."""
+    """Return the expected squares of sigma_f, sigma_d and sigma_c, shape (3,)."""
     variances: Samples = weights @ GRID**2
     return variances
 
@@ -76,7 +69,7 @@ def update_weights(
     components, innovations, variances : ndarray, shape (c,)
         Probability of each Gaussian of the posterior, what the tap deviated from it by (m), and the variance
         of that which is not scatter (m²).
-    reaches : ndarray, shape (c, 4)
+    reaches : ndarray, shape (c, 3)
         What one unit of each scatter moves the part by, m.
     """
     total = variances[:, None] + reaches**2 @ (GRID**2).T
@@ -93,16 +86,17 @@ def update_weights(
 
 
 def quantile_scales(weights: Samples, z: Samples) -> Samples:
-    """Return the standard deviation that each scatter has at the nodes z, shape (nodes, 4).
+    """Return the standard deviation that each scatter has at the nodes z, shape (nodes, 3).
 
     A sum of normal distributions has heavier tails than one: at node z it reaches Q(z), and counts there as
     a normal one of standard deviation Q(z) / z.
     """
     nodes = np.maximum(np.abs(z), 0.05)
-    scales = np.empty((z.size, len(AXES)))
-    cube = weights.reshape([std.size for std in AXES])
-    for n, std in enumerate(AXES):
-        share = cube.sum(axis=tuple(axis for axis in range(len(AXES)) if axis != n))
+    scales = np.empty((z.size, 3))
+    shape = (FRICTION_STD.size, DISPLACEMENT_STD.size, CONTACT_STD.size)
+    cube = weights.reshape(shape)
+    for n, std in enumerate((FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD)):
+        share = cube.sum(axis=tuple(axis for axis in range(3) if axis != n))
         tail = share @ ndtr(-REACH / std[:, None])
         score = -ndtri(np.maximum(tail, 1e-300))
         scales[:, n] = np.interp(nodes, score, REACH) / nodes

@@ -7,40 +7,25 @@ import numpy as np
 
 from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning.displacement_discrepancy import FEATURES, discrepancy_features
-from impactcell.positioning.displacement_quantiles import fold_share, plant_parameters
+from impactcell.positioning.displacement_quantiles import plant_parameters
 from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior
 from impactcell.positioning.tap import Tap
 from impactcell.records import Samples
 
-NEARBY = 0.02
-"""Of friction: where the sensitivity to it is looked at."""
 LEAST_FACTOR = 0.05
 """Of a tap's friction: the model has no friction that is zero or less."""
-NO_FEATURES = np.zeros((2, FEATURES))
+NO_FEATURES = np.zeros(FEATURES)
 """Of a tap whose discrepancy is not asked for."""
 Response = Callable[[Samples], Samples]
 """Displacements (m), shape (n,), for rows of (theta, z sigma), shape (n, 6)."""
 
 
 class TapModel(NamedTuple):
-    """What is foretold of a tap.
-
-    Attributes
-    ----------
-    response : callable
-    features : ndarray, shape (2, FEATURES)
-        phi and psi of its discrepancy.
-    indentation_m : float
-        delta.
-    sliding, fold : float
-        Share that slides, and `fold_share`.
-    """
+    """Response to a tap, phi of its discrepancy, and the indentation delta (m)."""
 
     response: Response
     features: Samples = NO_FEATURES
     indentation_m: float = 0.0
-    sliding: float = 1.0
-    fold: float = 0.0
 
 
 def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapModel:
@@ -54,12 +39,8 @@ def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapMod
     median = np.append(posterior.mean[:PARAMETERS], 0.0)[None]
     plant = plant_parameters(median)[0]
     indentation = float(plant[3] * part[0] * part[1] / plant[0])
-    features = np.empty((2, FEATURES))
+    features = np.empty(FEATURES)
     place = np.array([tap.position_m, float(tap.direction)])
     commanded = np.array([tap.velocity_m_s, tap.stroke_m, indentation])
-    # friction a little above, at and a little below its median
-    factors = np.array([NEARBY, 0.0, -NEARBY])
-    line = response(np.column_stack([np.tile(median[0, :PARAMETERS], (3, 1)), factors]))
-    sliding = discrepancy_features(commanded, float(line[1]), part, place, features)
-    fold = fold_share(line, np.log1p(factors), sliding, indentation)
-    return TapModel(response, features, indentation, sliding, fold)
+    discrepancy_features(commanded, float(response(median)[0]), part, place, features)
+    return TapModel(response, features, indentation)

@@ -47,7 +47,7 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
     ),
     (
         (
-            "**Follow.** `track` on 30 streams with wear, outliers and unknown batches: a step of 1 / 2 "
+            "**Follow.** `track` on 300 streams with wear, outliers and unknown batches: a step of 1 / 2 "
             "standard deviations is found after {one} / {two} times the least possible delay, those not "
             "found counted to the next step; {false} false alarms in 100 000 cycles."
         ),
@@ -61,7 +61,8 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
     ),
     (
         (
-            "**Explain.** One effect hidden in a campaign, gap of 2 or more: named, or tied with it, in"
+            "**Explain.** With the rules before format 2 of its result, not run again since: one effect "
+            "hidden in a campaign, gap of 2 or more: named, or tied with it, in"
             " {named}; nothing hidden: something named in {nothing}."
         ),
         _of(

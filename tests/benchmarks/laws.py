@@ -46,6 +46,8 @@ def is_exact(row: Row) -> bool:
 
 
 def line(what: str, bar: str, share: Share, *, met: bool) -> list[str]:
+    if not share.of:
+        return [what, bar, "not run", ""]
     value = f"{share.hits}/{share.of} = {100 * share.hits / max(share.of, 1):.1f} %"
     return [what, bar, value if met else f"**{value}**", share.interval]
 
