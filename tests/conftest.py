@@ -8,14 +8,20 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 
-# The same examples in every run, and no example fails because the machine was busy.
+# The same examples in every run, and no example fails because the machine was busy. Hypothesis also draws
+# constants from the modules imported so far, and which those are depends on what a worker has run before:
+# they are left to the search, `pytest --hypothesis-profile search`, whose examples are new each time.
 settings.register_profile(
     "repeatable", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
+settings.register_profile("search", settings.get_profile("repeatable"), derandomize=False, print_blob=True)
 settings.load_profile("repeatable")
+_is_local = providers.is_local_module_file
+providers.is_local_module_file = lambda path: settings.default.derandomize is False and _is_local(path)
 
 
 @pytest.fixture(scope="session")

@@ -75,16 +75,14 @@ def find_layout(lines: Sequence[str], source: str, delimiter: str, decimal: str)
             f"what is before the table"
         )
     above = _rows_above(lines, first, delimiter, width, source)
-    for index, cells in above:
-        if any(
-            parse_number(cells[column], decimal) is not None and not is_missing(cells[column])
-            for column in numeric
-        ):
+    with_numbers = [row for row in above if _has_number(row[1], numeric, decimal)]
+    for index, cells in with_numbers:
+        if not is_comment(lines[index]):
             raise MeasurementError(
                 f"{source}:{index + 1}: {delimiter.join(cells)[:60]!r} is neither a header nor a row of "
-                f"numbers; correct "
-                f"or remove the line"
+                f"numbers; correct or remove the line"
             )
+    above = [row for row in above if row not in with_numbers]
     unit_row = next((row for row in above if _is_unit_row(row[1])), None)
     header = _header(above, unit_row)
     names, units = [""] * width, [""] * width
@@ -100,6 +98,14 @@ def find_layout(lines: Sequence[str], source: str, delimiter: str, decimal: str)
         None if header is None else header[0] + 1, None if unit_row is None else unit_row[0] + 1,
         _attributes(lines[: min(table_rows, default=first)], delimiter),
     )  # fmt: skip
+
+
+def _has_number(cells: Sequence[str], numeric: frozenset[int], decimal: str) -> bool:
+    """Whether a row has a number where the table has numbers; a header has none there."""
+    return any(
+        parse_number(cells[column], decimal) is not None and not is_missing(cells[column])
+        for column in numeric
+    )
 
 
 def is_comment(line: str) -> bool:

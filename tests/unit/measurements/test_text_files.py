@@ -211,3 +211,12 @@ def test_what_is_no_text_is_refused(tmp_path: Path, content: bytes, told: str) -
         one(tmp_path / "missing.csv")
     with pytest.raises(MeasurementError, match="is not a file"):
         one(tmp_path)
+
+
+def test_a_number_in_a_comment_is_no_row_of_the_table(tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    rows = "".join(f"{k},0 0,0 0,0\n" for k in range(8))
+    path.write_text(f"# exported\n# Masse: 18,9 kg\nTime Force Position\n{rows}", encoding="utf-8")
+    table = one(path)
+    assert [column.name for column in table.columns] == ["Time", "Force", "Position"]
+    assert table.attributes["Masse"] == "18,9 kg"
