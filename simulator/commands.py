@@ -12,6 +12,9 @@ from simulator.tasks import PartSequence
 SINGLE_PRECISION: Final = 1.0 + 1e-6
 """The registers are single precision: a limit itself must not be refused for its last bit."""
 
+LEAST_VELOCITY_M_S: Final = 1e-6
+"""Slowest movement of the actuator [m/s]; a slower command is refused. An assumption of the simulator's."""
+
 
 class ModuleState(enum.IntEnum):
     """Codes of the register `state`."""
@@ -49,7 +52,8 @@ def commanded(image: RegisterImage, positioning: Positioning, parts: PartSequenc
     velocity, stroke = float(image.get("command_velocity")), float(image.get("command_stroke"))
     direction = int(image.get("command_direction"))
     most_velocity = positioning.most_velocity_mm_per_min * MM_PER_MIN * SINGLE_PRECISION
-    if not (0.0 < velocity <= most_velocity and 0.0 < stroke <= positioning.most_stroke_m * SINGLE_PRECISION):
+    most_stroke = positioning.most_stroke_m * SINGLE_PRECISION
+    if not (LEAST_VELOCITY_M_S <= velocity <= most_velocity and 0.0 < stroke <= most_stroke):
         return None
     if direction not in positioning.directions:
         return None

@@ -49,6 +49,7 @@ def test_the_same_command_twice_strikes_once() -> None:
     [
         {"velocity": 0.2},
         {"velocity": 0.0},
+        {"velocity": 1e-41},
         {"velocity": math.nan},
         {"stroke": 0.01},
         {"stroke": -0.001},
