@@ -1,7 +1,9 @@
 """The OPC UA server of the service: cells in, nodes out."""
 
+import contextlib
+import gc
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -43,6 +45,18 @@ from impactcell.scada.users import Users
 _log = logging.getLogger(__name__)
 
 PRODUCT: Final = Product("impactcell", "urn:impactcell", __version__)
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Keep the garbage collector from looking through an address space that grows: most of a second."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 class Server:
@@ -103,6 +117,14 @@ class Server:
                 "OPC UA: nobody can log in: %s names no user; add one with `impactcell users add`",
                 self._users_file,
             )
+        with _uncollected():
+            host = await self._built(users)
+        await host.start()
+        self._host = host
+        return self
+
+    async def _built(self, users: Users) -> ServiceHost:
+        """Build the address space, and what serves it."""
         model = await new_standard_server(self._settings.application_uri)
         await load_types(model)
         space = address_space(model)
@@ -125,9 +147,7 @@ class Server:
                 self._conditions[name, alarm] = condition
                 bind_condition(table, cell, condition, self._actions)
         bind_refresh(table, host.subscription_service, self._conditions)
-        await host.start()
-        self._host = host
-        return self
+        return host
 
     def _history_of(self, cells: Sequence[CellSpace]) -> CellHistory:
         variables = {cell.path(path): (cell.description.name, path) for cell in cells for path in HISTORY}
