@@ -29,12 +29,21 @@ _OPERATORS: Final = {
 }
 _WORDS_ONLY: Final = ("log", "logging", "warning", "debug", "info", "error", "exception", "format")
 """Calls that only say something."""
+_NO_EFFECT: Final = ("strict", "stacklevel", "maxsize")
+"""Arguments of `zip`, warnings and caches that change nothing of what comes out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One fault: the text from `start` to `end` of the source becomes `text`."""
+    """One fault: the text from `start` to `end` of the source becomes `text`.
 
+    Attributes
+    ----------
+    function : str
+        Qualified name of the function that it is in; empty at the level of the module or of a class.
+    """
+
+    function: str
     line: int
     start: int
     end: int
@@ -56,40 +65,50 @@ def mutants(source: str) -> list[Mutant]:
     def place(line: int, column: int) -> int:
         return starts[line - 1] + len(lines[line - 1].encode()[:column].decode())
 
-    found = []
-    for node, new in _changes(ast.parse(source)):
-        start = place(node.lineno, node.col_offset)
-        end = place(node.end_lineno or node.lineno, node.end_col_offset or 0)
-        text = new if isinstance(new, str) else f"({ast.unparse(new)})"
-        found.append(Mutant(node.lineno, start, end, source[start:end], text))
-    return found
+    every = []
+    for function, node in _behaving(ast.parse(source)):
+        for changed, new in _changes(node):
+            start = place(changed.lineno, changed.col_offset)
+            end = place(changed.end_lineno or changed.lineno, changed.end_col_offset or 0)
+            text = new if isinstance(new, str) else f"({ast.unparse(new)})"
+            every.append(Mutant(function, changed.lineno, start, end, source[start:end], text))
+    return every
 
 
-def _changes(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, ast.expr | str]]:
-    for node in _behaving(tree):
-        match node:
-            case ast.Compare(left, [operator], right) if type(operator) in _COMPARISONS:
-                yield node, ast.Compare(left, [_COMPARISONS[type(operator)]()], right)
-            case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
-                yield node, ast.BinOp(left, _OPERATORS[type(operator)](), right)
-            case ast.BoolOp(operator, values):
-                other = ast.Or() if isinstance(operator, ast.And) else ast.And()
-                yield node, ast.BoolOp(other, values)
-            case ast.UnaryOp(ast.Not(), operand):
-                yield node, operand
-            case ast.Constant(bool(value)):
-                yield node, ast.Constant(not value)
-            case ast.Constant(int(value) | float(value)):
-                yield node, ast.Constant(value + 1)
-            case ast.If(test) | ast.While(test) | ast.IfExp(test) if not isinstance(test, ast.Constant):
-                yield test, ast.UnaryOp(ast.Not(), test)
-            case ast.Expr(ast.Call() | ast.Await()):
-                yield node, "pass"
-            case ast.Return(value) if value is not None and not isinstance(value, ast.Constant):
-                yield value, ast.Constant(None)
+def _changes(node: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, ast.expr | str]]:
+    match node:
+        case ast.Compare(left, [operator], right) if type(operator) in _COMPARISONS:
+            yield node, ast.Compare(left, [_COMPARISONS[type(operator)]()], right)
+        case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
+            yield node, ast.BinOp(left, _OPERATORS[type(operator)](), right)
+        case ast.BoolOp(operator, values):
+            other = ast.Or() if isinstance(operator, ast.And) else ast.And()
+            yield node, ast.BoolOp(other, values)
+        case ast.UnaryOp(ast.Not(), operand):
+            yield node, operand
+        case ast.Constant(bool(value)):
+            yield node, ast.Constant(not value)
+        case ast.Constant(int(value) | float(value)):
+            yield node, ast.Constant(value + 1)
+        case ast.If(test) | ast.While(test) | ast.IfExp(test) if not _is_changed_itself(test):
+            yield test, ast.UnaryOp(ast.Not(), test)
+        case ast.Expr(ast.Call() | ast.Await()):
+            yield node, "pass"
+        case ast.Return(value) if value is not None and not isinstance(value, ast.Constant):
+            yield value, ast.Constant(None)
 
 
-def _behaving(tree: ast.AST) -> Iterator[ast.AST]:
+def _is_changed_itself(test: ast.expr) -> bool:
+    """Whether the negation of a condition is a mutant of its own already, or says nothing."""
+    match test:
+        case ast.Constant() | ast.UnaryOp(ast.Not()):
+            return True
+        case ast.Compare(_, [ast.Eq() | ast.NotEq() | ast.Is() | ast.IsNot() | ast.In() | ast.NotIn()]):
+            return True
+    return False
+
+
+def _behaving(tree: ast.AST, function: str = "", within: str = "") -> Iterator[tuple[str, ast.AST]]:
     """Walk through what a program does: no annotations, no texts, nothing that only says something."""
     for name, value in ast.iter_fields(tree):
         if name in ("annotation", "returns", "decorator_list"):
@@ -97,9 +116,48 @@ def _behaving(tree: ast.AST) -> Iterator[ast.AST]:
         for node in value if isinstance(value, list) else [value]:
             if not isinstance(node, ast.AST) or isinstance(node, ast.JoinedStr | ast.Raise | ast.Import):
                 continue
+            if isinstance(node, ast.keyword) and node.arg in _NO_EFFECT:
+                continue
             if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-                function = node.value.func
-                if isinstance(function, ast.Attribute) and function.attr in _WORDS_ONLY:
+                called = node.value.func
+                if isinstance(called, ast.Attribute) and called.attr in _WORDS_ONLY:
                     continue
-            yield node
-            yield from _behaving(node)
+            yield function, node
+            match node:
+                case ast.FunctionDef(name=own) | ast.AsyncFunctionDef(name=own):
+                    yield from _behaving(node, within + own, f"{within}{own}.<locals>.")
+                case ast.ClassDef(name=own):
+                    yield from _behaving(node, function, f"{within}{own}.")
+                case _:
+                    yield from _behaving(node, function, within)
+
+
+def compiled_with(source: str, line: int) -> frozenset[str]:
+    """Name of the compiled function, or of the constant of the module, that a line of a source is in.
+
+    Empty for a line of which no machine code is made.
+    """
+    for node in ast.parse(source).body:
+        if node.lineno <= line <= (node.end_lineno or node.lineno):
+            match node:
+                case ast.FunctionDef(name, decorator_list=decorators):
+                    if any("compiled" in ast.unparse(decorator) for decorator in decorators):
+                        return frozenset({name})
+                case ast.Assign(targets):
+                    return frozenset(t.id for t in targets if isinstance(t, ast.Name))
+                case ast.AnnAssign(ast.Name(name)):
+                    return frozenset({name})
+    return frozenset()
+
+
+def users_of(names: frozenset[str], sources: list[str]) -> frozenset[str]:
+    """Names of all functions that use one of `names`, or a function that does, and so on."""
+    uses = [
+        (node.name, {n.id for n in ast.walk(node) if isinstance(n, ast.Name)})
+        for source in sources
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef)
+    ]
+    while names < (more := names | {name for name, used in uses if used & names}):
+        names = more
+    return names

@@ -1,30 +1,35 @@
 """Single faults put into the code: how many of them a test of the same room notices.
 
-Mutants are drawn with a seed; each is put into a copy of the tree, and only the tests of its room run, until
-the first that fails. A mutant is a line of a file, and is not tried twice.
-`python -m tests.benchmarks.mutation ROOM NUMBER` tries so many of a room; the topic prints what is on file.
+Mutants are drawn with a seed. Each runs in a process of its own, forked off one that has the libraries
+loaded, and only with the tests of its room that go through the function it is in, the quickest first, until
+one fails; one that these do not notice gets all tests of its room. A mutant is a place in a function, and is
+not tried twice. `python -m tests.benchmarks.mutation ROOM NUMBER [SECONDS]` tries so many of a room, and
+begins none after SECONDS; with `--again` it tries those that survived. The topic prints what is on file.
 """
 
 import argparse
+import hashlib
 import json
 import math
-import os
+import multiprocessing
 import random
-import shutil
-import subprocess
 import sys
 import tempfile
+import time
+from collections import Counter
 from pathlib import Path
 from typing import Any, Final
 
-from tests.benchmarks._mutants import Mutant, mutants
+from tests.benchmarks._mutants import Mutant, compiled_with, mutants, users_of
+from tests.benchmarks._mutation_run import LIBRARIES, ROOT, as_it_is, with_fault
 from tests.benchmarks.table import Table
 
-ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "bench-results" / "mutation.jsonl"
 SEED = 20261122
-LONGEST_S = 300.0
-"""A mutant whose tests take longer hangs, and counts as noticed."""
+BAR = 0.9
+"""Share of the faults that is to be noticed."""
+LONGEST_S, LONGER = 60.0, 5.0
+"""A mutant whose tests take LONGEST_S and LONGER times as long as without it hangs, and counts as noticed."""
 ROOMS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "cell": (("impactcell/cell/*.py",), ("tests/unit/cell", "tests/unit/service/test_worker.py")),
     "journal": (("impactcell/journal/*.py",), ("tests/unit/journal",)),
@@ -54,13 +59,33 @@ ROOMS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
 """What is mutated, and the tests that have to notice."""
 
 
-def drawn(room: str) -> list[tuple[Path, Mutant]]:
-    """All mutants of a room in the order in which they are tried."""
+Key = tuple[str, str, str, str, int]
+"""File, function, before, after, and which of those that look the same."""
+
+
+def files_of(room: str) -> tuple[str, ...]:
+    """Sources of a room."""
     patterns, _ = ROOMS[room]
-    files = sorted(file for pattern in patterns for file in ROOT.glob(pattern))
-    every = [(file.relative_to(ROOT), m) for file in files for m in mutants(file.read_text(encoding="utf-8"))]
-    random.Random(f"{SEED} {room}").shuffle(every)
-    return every
+    return tuple(str(f.relative_to(ROOT)) for f in sorted(f for p in patterns for f in ROOT.glob(p)))
+
+
+def drawn(room: str) -> dict[Key, Mutant]:
+    """All mutants of a room in the order in which they are tried."""
+    every: dict[Key, Mutant] = {}
+    alike: Counter[tuple[str, ...]] = Counter()
+    for file in files_of(room):
+        for mutant in mutants((ROOT / file).read_text(encoding="utf-8")):
+            look = (file, mutant.function, mutant.before, mutant.text)
+            every[(*look, alike[look])] = mutant
+            alike[look] += 1
+    keys = list(every)
+    random.Random(f"{SEED} {room}").shuffle(keys)
+    return {key: every[key] for key in keys}
+
+
+def key_of(row: dict[str, Any]) -> Key:
+    """Name the mutant that a row is about."""
+    return row["file"], row["function"], row["before"], row["after"], row["number"]
 
 
 def on_file() -> list[dict[str, Any]]:
@@ -68,44 +93,71 @@ def on_file() -> list[dict[str, Any]]:
     return [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.exists() else []
 
 
-def attempt(room: str, number: int) -> None:
-    """Try the next mutants of a room, so many."""
-    tried = {(row["file"], row["line"], row["before"], row["after"]) for row in on_file()}
-    with tempfile.TemporaryDirectory() as directory:
-        tree = Path(directory)
-        for part in ("impactcell", "simulator", "tests", "config", "docs"):
-            ignored = shutil.ignore_patterns("__pycache__", "_build")
-            shutil.copytree(ROOT / part, tree / part, ignore=ignored)
-        for part in ("pyproject.toml", "README.md", "CHANGELOG.md"):
-            shutil.copy(ROOT / part, tree / part)
-        if not _passes(tree, ROOMS[room][1]):
+def attempt(room: str, number: int, seconds: float, *, again: bool) -> None:
+    """Try the next mutants of a room, so many; or those that survived."""
+    begin, every = time.monotonic(), drawn(room)
+    rows = {key_of(row): row for row in on_file()}
+    survived = [key for key, row in rows.items() if not row["killed"] and "equivalent" not in row]
+    order = [key for key in (survived if again else every) if key in every and (again or key not in rows)]
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload(list(LIBRARIES))
+    profile = _profile(room, processes)
+    for key in order[:number]:
+        if time.monotonic() - begin > seconds:
+            break
+        killed = _is_noticed(every[key], key[0], profile, processes)
+        row = dict(zip(("file", "function", "before", "after", "number"), key, strict=True))
+        first = {"at first": False} if key in rows and killed else {}
+        rows[key] = {"room": room, "line": every[key].line, **row, "killed": killed, **first}
+        RESULTS.write_text("".join(json.dumps(row) + "\n" for row in rows.values()))
+        said = f"{time.monotonic() - begin:.0f} s: {'killed' if killed else 'SURVIVED'}"
+        print(f"{said} line {every[key].line} {key}", file=sys.stderr, flush=True)
+
+
+def _profile(room: str, processes: Any) -> dict[str, dict[str, Any]]:
+    """Tests of a room with their duration and what they go through; kept while neither changes."""
+    _, tests = ROOMS[room]
+    sources = [ROOT / file for file in files_of(room)]
+    sources += [
+        f for t in tests for f in ([ROOT / t] if t.endswith(".py") else sorted((ROOT / t).rglob("*.py")))
+    ]
+    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+    path = Path(tempfile.gettempdir()) / f"impactcell-mutation-{digest}.json"
+    if not path.exists():
+        process = processes.Process(target=as_it_is, args=(tests, files_of(room), path))
+        process.start()
+        process.join()
+        if not path.exists():
             sys.exit(f"the tests of {room} do not pass as they are")
-        for file, mutant in drawn(room):
-            key = str(file), mutant.line, mutant.before, mutant.text
-            if number <= 0 or key in tried:
-                continue
-            number -= 1
-            source = (ROOT / file).read_text(encoding="utf-8")
-            (tree / file).write_text(mutant.applied(source), encoding="utf-8")
-            killed = not _passes(tree, ROOMS[room][1])
-            (tree / file).write_text(source, encoding="utf-8")
-            row = dict(zip(("file", "line", "before", "after"), key, strict=True))
-            RESULTS.parent.mkdir(exist_ok=True)
-            with RESULTS.open("a") as out:
-                out.write(json.dumps({"room": room, **row, "killed": killed}) + "\n")
-            print(f"{'killed' if killed else 'SURVIVED'} {key}", file=sys.stderr, flush=True)
+    profile: dict[str, dict[str, Any]] = json.loads(path.read_text())
+    return profile
 
 
-def _passes(tree: Path, tests: tuple[str, ...]) -> bool:
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", *tests]
-    environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
-    try:
-        run = subprocess.run(
-            command, cwd=tree, env=environment, capture_output=True, timeout=LONGEST_S, check=False
+def _is_noticed(mutant: Mutant, file: str, profile: dict[str, dict[str, Any]], processes: Any) -> bool:
+    source = (ROOT / file).read_text(encoding="utf-8")
+    product = [path.read_text(encoding="utf-8") for path in (ROOT / "impactcell").rglob("*.py")]
+    changed = compiled_with(source, mutant.line)
+    users = users_of(changed, product) if changed else frozenset[str]()
+
+    def goes_through(test: dict[str, Any]) -> bool:
+        names = (name.split(".<locals>")[0].split(".")[-1] for _, name in test["through"])
+        return [file, mutant.function] in test["through"] or any(name in users for name in names)
+
+    near = [name for name, test in profile.items() if goes_through(test)]
+    rest = [name for name in profile if name not in set(near)]
+    for tests in (near, rest):
+        process = processes.Process(
+            target=with_fault, args=(tuple(tests), file, mutant.applied(source), users)
         )
-    except subprocess.TimeoutExpired:
-        return False
-    return run.returncode == 0
+        if tests:
+            process.start()
+            process.join(LONGEST_S + LONGER * sum(profile[name]["s"] for name in tests))
+            code = process.exitcode
+            process.kill()
+            process.join()
+            if code != 0:
+                return True
+    return False
 
 
 def interval(killed: int, tried: int) -> str:
@@ -117,24 +169,33 @@ def interval(killed: int, tried: int) -> str:
 
 
 def tables() -> list[Table]:
-    """How many of the mutants on file were noticed, by room."""
+    """How many of the mutants on file were noticed, by room, and those that were not."""
     rows = []
     for room in ROOMS:
-        results = [row["killed"] for row in on_file() if row["room"] == room]
-        size = len(drawn(room))
-        if results:
-            killed = sum(results)
-            text = f"{100 * killed / len(results):.0f} % ({killed} of {len(results)})"
-            rows.append((room, f"{size}", ">= 90 %", text, interval(killed, len(results))))
-        else:
-            rows.append((room, f"{size}", ">= 90 %", "not tried", ""))
+        tried = [row for row in on_file() if row["room"] == room]
+        real = [row for row in tried if "equivalent" not in row]
+        killed = sum(row["killed"] for row in real)
+        first = sum(row["killed"] and row.get("at first", True) for row in real)
+        noticed = f"{100 * killed / len(real):.0f} % ({killed} of {len(real)})" if real else "not tried"
+        shown = noticed if real and killed >= BAR * len(real) else f"**{noticed}**"
+        sure = interval(killed, len(real)) if real else ""
+        equal = len(tried) - len(real)
+        rows.append((room, f"{len(drawn(room))}", f"{equal}", f"{first}", f">= {BAR:.0%}", shown, sure))
+    survivors = [
+        (row["room"], f"{row['file']}: {row['function']}", f"`{row['before']}` to `{row['after']}`",
+         row.get("equivalent", "**not noticed**"))
+        for row in on_file() if not row["killed"]
+    ]  # fmt: skip
     return [
         Table(
             "Single faults in the code that a test of the same room notices",
-            ("room", "possible", "bar", "noticed", "interval (95 %)"),
+            ("room", "possible", "change nothing", "noticed at first", "bar", "noticed", "interval (95 %)"),
             rows,
-            f"Drawn with seed {SEED} from comparisons, operators, constants, conditions, calls and results.",
-        )
+            f"Drawn with seed {SEED} from comparisons, operators, constants, conditions, calls and results. "
+            "Noticed at first: before tests were written for those that survived. Those that change nothing "
+            "are listed below with the reason, and do not count.",
+        ),
+        Table("Faults that no test notices", ("room", "where", "fault", "why"), survivors),
     ]
 
 
@@ -142,5 +203,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.mutation", description=__doc__)
     parser.add_argument("room", choices=ROOMS)
     parser.add_argument("number", type=int)
+    parser.add_argument("seconds", type=float, nargs="?", default=math.inf)
+    parser.add_argument("--again", action="store_true", help="those that survived")
     arguments = parser.parse_args()
-    attempt(arguments.room, arguments.number)
+    attempt(arguments.room, arguments.number, arguments.seconds, again=arguments.again)
