@@ -1,6 +1,6 @@
-"""The command line in a process that is forked off one in which all is loaded: it begins within milliseconds.
+"""A command line in a process that is forked off one in which all is loaded: it begins within milliseconds.
 
-What is tried by killing a service often is not how long Python takes to load it.
+How long Python takes to load a program is not what these tests try.
 """
 
 import asyncio
@@ -14,10 +14,12 @@ from collections.abc import AsyncIterator
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 
-from tests.integration.processes import Running
+from tests.integration.running import Running
 
 _SERVER = multiprocessing.get_context("forkserver")
-_SERVER.set_forkserver_preload(["impactcell.cli.app", "impactcell.service", "tests.integration.preloaded"])
+_SERVER.set_forkserver_preload(
+    ["impactcell.cli.app", "impactcell.service", "simulator.serving", "tests.integration.preloaded"]
+)
 
 
 class ForkedProcess:
@@ -25,10 +27,12 @@ class ForkedProcess:
 
     def __init__(self, process: ForkServerProcess) -> None:
         self._process = process
+        self._end = asyncio.create_task(asyncio.to_thread(process.join))
+        # Nobody else asks for the exit code: it can be read once.
 
     @property
     def returncode(self) -> int | None:
-        return self._process.exitcode
+        return self._process.exitcode if self._end.done() else None
 
     def kill(self) -> None:
         self._process.kill()
@@ -37,30 +41,41 @@ class ForkedProcess:
         self._process.terminate()
 
     async def wait(self) -> int | None:
-        await asyncio.to_thread(self._process.join)
+        await asyncio.shield(self._end)
         return self._process.exitcode
 
 
-def _run(arguments: tuple[str, ...], errors: Connection) -> None:
+def _run(arguments: tuple[str, ...], output: Connection, errors: Connection) -> None:
     signal.set_wakeup_fd(-1)
+    os.dup2(output.fileno(), 1)
     os.dup2(errors.fileno(), 2)
+    output.close()
+    errors.close()
     sys.argv = list(arguments)
     runpy.run_module(arguments[0], run_name="__main__", alter_sys=True)
+
+
+async def _stream(connection: Connection) -> tuple[asyncio.StreamReader, asyncio.BaseTransport]:
+    """Read a connection as bytes."""
+    stream = asyncio.StreamReader()
+    end = os.fdopen(os.dup(connection.fileno()), "rb")
+    connection.close()
+    transport, _ = await asyncio.get_running_loop().connect_read_pipe(
+        lambda: asyncio.StreamReaderProtocol(stream), end
+    )
+    return stream, transport
 
 
 @contextlib.asynccontextmanager
 async def forked(*arguments: str) -> AsyncIterator[Running]:
     """Run a Python module; it is ended by SIGTERM afterwards."""
-    receiver, sender = _SERVER.Pipe(duplex=False)
-    process = _SERVER.Process(target=_run, args=(arguments, sender))
+    (output, writes_output), (errors, writes_errors) = (_SERVER.Pipe(duplex=False) for _ in range(2))
+    process = _SERVER.Process(target=_run, args=(arguments, writes_output, writes_errors))
     await asyncio.to_thread(process.start)
-    sender.close()
-    lines = asyncio.StreamReader()
-    transport, _ = await asyncio.get_running_loop().connect_read_pipe(
-        lambda: asyncio.StreamReaderProtocol(lines), os.fdopen(os.dup(receiver.fileno()), "rb")
-    )
-    receiver.close()
-    running = Running(ForkedProcess(process))
+    writes_output.close()
+    writes_errors.close()
+    (text, one), (lines, other) = await _stream(output), await _stream(errors)
+    running = Running(ForkedProcess(process), text)
     reader = asyncio.create_task(running.follow(lines))
     try:
         yield running
@@ -69,5 +84,6 @@ async def forked(*arguments: str) -> AsyncIterator[Running]:
             running.process.terminate()
         await running.process.wait()
         await reader
-        transport.close()
+        one.close()
+        other.close()
         process.close()

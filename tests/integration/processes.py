@@ -3,62 +3,19 @@
 import asyncio
 import contextlib
 import json
-import re
 import sys
 from asyncio.subprocess import PIPE
 from collections.abc import AsyncIterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import yaml
 
+from tests.integration.forked import forked
+from tests.integration.running import START_S, Running
+
 ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config"
-START_S = 90.0
-"""The first start on a machine compiles."""
-
-
-class AnyProcess(Protocol):
-    """What a test needs of a process."""
-
-    @property
-    def returncode(self) -> int | None: ...
-    def kill(self) -> None: ...
-    def terminate(self) -> None: ...
-    async def wait(self) -> int | None: ...
-
-
-@dataclass
-class Running:
-    """A process with the lines it wrote to standard error."""
-
-    process: AnyProcess
-    output: asyncio.StreamReader | None = None
-    lines: list[str] = field(default_factory=list)
-    news: asyncio.Condition = field(default_factory=asyncio.Condition)
-
-    async def line(self, pattern: str, timeout_s: float = START_S) -> re.Match[str]:
-        """Wait for a line of standard error."""
-
-        def found() -> re.Match[str] | None:
-            return next((m for text in self.lines if (m := re.search(pattern, text))), None)
-
-        async with asyncio.timeout(timeout_s), self.news:
-            await self.news.wait_for(lambda: found() or self.process.returncode is not None)
-        match = found()
-        assert match, f"no line with {pattern!r} in:\n" + "\n".join(self.lines)
-        return match
-
-    async def follow(self, errors: asyncio.StreamReader) -> None:
-        """Take what the process writes to standard error, up to its end."""
-        async for line in errors:
-            async with self.news:
-                self.lines.append(line.decode().rstrip())
-                self.news.notify_all()
-        await self.process.wait()
-        async with self.news:
-            self.news.notify_all()
 
 
 @contextlib.asynccontextmanager
@@ -92,7 +49,7 @@ async def simulator(
     path = directory / "scenario.yaml"
     path.write_text(yaml.safe_dump(scenario))
     truth = directory / "truth.jsonl"
-    async with started("simulator", "serve", str(path), "--truth", str(truth)) as running:
+    async with forked("simulator", "serve", str(path), "--truth", str(truth)) as running:
         assert running.output is not None
         async with asyncio.timeout(START_S):
             line = await running.output.readline()

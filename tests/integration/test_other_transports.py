@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from tests.certificates import Authority
-from tests.integration.processes import simulator, started, truths, write_cell
+from tests.integration.forked import forked
+from tests.integration.processes import simulator, truths, write_cell
 from tests.integration.test_probe import probed
 
 DECIMATED = {
@@ -69,7 +70,7 @@ async def test_a_cell_runs_on_a_serial_line_of_115200_baud(tmp_path: Path) -> No
         tmp_path, listen=listen, strikes=strikes, sensors=DECIMATED, batches=[{"from_cycle": 1, "id": "A"}]
     ) as told:
         cell = write_cell(tmp_path, 502, module=reached("rtu", told, None))
-        async with started("impactcell", "run", str(cell)) as service:
+        async with forked("impactcell", "run", str(cell)) as service:
             await service.line(r"cell=press-1 at (\S+)")
             async with asyncio.timeout(120):
                 while len(truths(told["truth"])) < 4 or len(stored(tmp_path)) < 4:

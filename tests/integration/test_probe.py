@@ -1,21 +1,19 @@
 """`impactcell probe` looks at a live module. Truth: what the simulator says it did."""
 
-import asyncio
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.integration.processes import CONFIG, ROOT, simulator, write_cell
+from tests.integration.forked import forked
+from tests.integration.processes import CONFIG, simulator, write_cell
 
 
 async def probed(cell: Path) -> tuple[int | None, str, str]:
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "impactcell", "probe", str(cell),
-        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, cwd=ROOT,
-    )  # fmt: skip
-    out, err = await process.communicate()
-    return process.returncode, out.decode(), err.decode()
+    async with forked("impactcell", "probe", str(cell)) as process:
+        assert process.output is not None
+        out = await process.output.read()
+        code = await process.process.wait()
+    return code, out.decode(), "".join(f"{line}\n" for line in process.lines)
 
 
 async def test_identity_status_and_one_tap_are_shown(tmp_path: Path) -> None:
