@@ -27,7 +27,6 @@ providers.is_local_module_file = lambda path: settings.default.derandomize is Fa
 
 def pytest_collection_finish() -> None:
     """Keep the garbage collector from looking through all modules again and again: a third of the time."""
-    gc.collect()
     gc.freeze()
 
 

@@ -2,9 +2,9 @@
 
 Mutants are drawn with a seed. Each runs in a process of its own, forked off one that has the libraries
 loaded, and only with the tests of its room that go through the function it is in, the quickest first, until
-one fails; one that these do not notice gets all tests of its room. A mutant is a place in a function, and is
-not tried twice. `python -m tests.benchmarks.mutation ROOM NUMBER [SECONDS]` tries so many of a room, and
-begins none after SECONDS; with `--again` it tries those that survived. The topic prints what is on file.
+one fails. A mutant is a place in a function, and is not tried twice.
+`python -m tests.benchmarks.mutation ROOM NUMBER [SECONDS]` tries so many of a room, and begins none after
+SECONDS; with `--again` those that survived, with all tests of the room. The topic prints what is on file.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -59,6 +60,8 @@ ROOMS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
 """What is mutated, and the tests that have to notice."""
 
 
+Start = Callable[..., Any]
+"""Makes a process."""
 Key = tuple[str, str, str, str, int]
 """File, function, before, after, and which of those that look the same."""
 
@@ -105,7 +108,7 @@ def attempt(room: str, number: int, seconds: float, *, again: bool) -> None:
     for key in order[:number]:
         if time.monotonic() - begin > seconds:
             break
-        killed = _is_noticed(every[key], key[0], profile, processes)
+        killed = _is_noticed(every[key], key[0], profile, again, processes.Process)
         row = dict(zip(("file", "function", "before", "after", "number"), key, strict=True))
         first = {"at first": False} if key in rows and killed else {}
         rows[key] = {"room": room, "line": every[key].line, **row, "killed": killed, **first}
@@ -133,7 +136,9 @@ def _profile(room: str, processes: Any) -> dict[str, dict[str, Any]]:
     return profile
 
 
-def _is_noticed(mutant: Mutant, file: str, profile: dict[str, dict[str, Any]], processes: Any) -> bool:
+def _is_noticed(
+    mutant: Mutant, file: str, profile: dict[str, dict[str, Any]], all_tests: bool, start: Start
+) -> bool:
     source = (ROOT / file).read_text(encoding="utf-8")
     product = [path.read_text(encoding="utf-8") for path in (ROOT / "impactcell").rglob("*.py")]
     changed = compiled_with(source, mutant.line)
@@ -141,23 +146,22 @@ def _is_noticed(mutant: Mutant, file: str, profile: dict[str, dict[str, Any]], p
 
     def goes_through(test: dict[str, Any]) -> bool:
         names = (name.split(".<locals>")[0].split(".")[-1] for _, name in test["through"])
-        return [file, mutant.function] in test["through"] or any(name in users for name in names)
-
-    near = [name for name, test in profile.items() if goes_through(test)]
-    rest = [name for name in profile if name not in set(near)]
-    for tests in (near, rest):
-        process = processes.Process(
-            target=with_fault, args=(tuple(tests), file, mutant.applied(source), users)
+        return (
+            [file, mutant.function] in test["through"]
+            or any(name in users for name in names)
+            or (not mutant.function and any(entered == file for entered, _ in test["through"]))
         )
-        if tests:
-            process.start()
-            process.join(LONGEST_S + LONGER * sum(profile[name]["s"] for name in tests))
-            code = process.exitcode
-            process.kill()
-            process.join()
-            if code != 0:
-                return True
-    return False
+
+    tests = tuple(name for name, test in profile.items() if all_tests or goes_through(test))
+    if not tests:
+        return False
+    process = start(target=with_fault, args=(tests, file, mutant.applied(source), users))
+    process.start()
+    process.join(LONGEST_S + LONGER * sum(profile[name]["s"] for name in tests))
+    code = process.exitcode
+    process.kill()
+    process.join()
+    return bool(code != 0)
 
 
 def interval(killed: int, tried: int) -> str:

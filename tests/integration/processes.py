@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from impactcell.process import yaml_loader
 from tests.integration.forked import forked
 from tests.integration.running import START_S, Running
 
@@ -36,18 +37,23 @@ async def started(*arguments: str) -> AsyncIterator[Running]:
         await reader
 
 
+def scenario_content(base: str, changes: dict[str, Any]) -> dict[str, Any]:
+    """Read a scenario of the simulator, and change it."""
+    content: dict[str, Any] = yaml_loader.load(CONFIG / "sim" / f"{base}.yaml")[0]
+    content["register_map"] = str(CONFIG / "maps" / "fpga-v1.yaml")
+    content["listen"]["port"] = 0
+    for key, value in changes.items():
+        content[key] = {**content.get(key, {}), **value} if isinstance(value, dict) else value
+    return content
+
+
 @contextlib.asynccontextmanager
 async def simulator(
     directory: Path, base: str = "prototype", **changes: Any
 ) -> AsyncIterator[dict[str, Any]]:
     """Serve a scenario with `changes`; gives the addresses it printed, and the `truth` file."""
-    scenario = yaml.safe_load((CONFIG / "sim" / f"{base}.yaml").read_text())
-    scenario["register_map"] = str(CONFIG / "maps" / "fpga-v1.yaml")
-    scenario["listen"]["port"] = 0
-    for key, value in changes.items():
-        scenario[key] = {**scenario.get(key, {}), **value} if isinstance(value, dict) else value
     path = directory / "scenario.yaml"
-    path.write_text(yaml.safe_dump(scenario))
+    path.write_text(yaml.safe_dump(scenario_content(base, changes)))
     truth = directory / "truth.jsonl"
     async with forked("simulator", "serve", str(path), "--truth", str(truth)) as running:
         assert running.output is not None

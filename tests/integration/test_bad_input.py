@@ -19,6 +19,7 @@ from impactcell.scada import Actor, HistoryRequest, RefusedError, Role
 from impactcell.service.history_source import JournalHistory
 from impactcell.service.operator_commands import OperatorCommands
 from tests.integration.processes import CONFIG, simulator, write_cell
+from tests.integration.stepped import stepped
 from tests.integration.watched import serving
 
 pytestmark = pytest.mark.timeout(240)
@@ -32,15 +33,13 @@ async def test_captures_of_no_use(tmp_path: Path, caplog: pytest.LogCaptureFixtu
     faulty = [{"cycle": 3 + 2 * i, "kind": kind} for i, kind in enumerate(KINDS)]
     cycles = 3 + 2 * len(KINDS)
     changes: dict[str, Any] = {
-        "strikes": {"period_s": 0.25, "cycles": cycles},
         "faulty_captures": faulty,
         "batches": [{"from_cycle": 1, "id": "A"}],
         "deviations": [],
     }
-    async with (
-        simulator(tmp_path, **changes) as module,
-        serving(write_cell(tmp_path, module["port"])) as watched,
-    ):
+    async with stepped(**changes) as module, serving(write_cell(tmp_path, module.port)) as watched:
+        await watched.connected("press-1")
+        module.strike(cycles)
         snapshots = await watched.until("press-1", cycles)
     by_cycle = {snapshot.cycle: snapshot for snapshot in snapshots}
     assert sorted(by_cycle) == list(range(1, cycles + 1))
@@ -60,30 +59,35 @@ async def test_alarms_are_logged_as_they_come_and_every_cycle_where_asked(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.DEBUG, "impactcell")
-    async with simulator(tmp_path, strikes={"period_s": 0.2}) as module:
-        path = write_cell(tmp_path, module["port"], alarms={"wear_limit": 0.1})
+    async with stepped() as module:
+        path = write_cell(tmp_path, module.port, alarms={"wear_limit": 0.1})
         async with serving(path) as watched:
+            await watched.connected("press-1")
+            module.strike(12)
+            await watched.until("press-1", 12)
             await watched.alarm("press-1", "WearLimit", active=True)
-            seen = len(watched.snapshots["press-1"])
-            await watched.until("press-1", seen + 3)
+            module.strike(3)
+            await watched.until("press-1", 15)
     lines = [record.getMessage() for record in caplog.records]
     assert sum("alarm WearLimit is active: " in line for line in lines) == 1
-    for snapshot in watched.snapshots["press-1"][: seen + 3]:
+    for snapshot in watched.snapshots["press-1"][:15]:
         start = f"cell=press-1 cycle={snapshot.cycle} mu_s {snapshot.friction.mu_s.value:.4f}"
         assert any(line.startswith(start) for line in lines)
 
 
 async def test_one_sick_cell_leaves_the_other_alone(tmp_path: Path) -> None:
-    strikes = {"period_s": 0.25}
-    async with simulator(tmp_path, strikes=strikes) as module:
-        well = write_cell(tmp_path, module["port"], "well")
+    async with stepped() as module:
+        well = write_cell(tmp_path, module.port, "well")
         absent = write_cell(tmp_path, 1, "absent")
-        stranger = write_cell(tmp_path, module["port"], "stranger", module={"device_id": 9})
+        stranger = write_cell(tmp_path, module.port, "stranger", module={"device_id": 9})
         async with serving(well, absent, stranger) as watched:
+            await watched.connected("well")
+            module.strike(5)
             await watched.until("well", 5)
             assert "127.0.0.1:1" in await watched.alarm("absent", "ModuleConnection", active=True)
             message = await watched.alarm("stranger", "ModuleConnection", active=True)
             assert "device_id 9" in message or "device 9" in message
+            module.strike(3)
             await watched.until("well", 8)
 
 
@@ -94,10 +98,12 @@ async def test_a_foreign_journal_keeps_its_own_cell_out_and_no_other(
     foreign = b"this is somebody's text file, not a journal\n" * 40
     (tmp_path / "odd.sqlite").write_bytes(foreign)
     monitoring = {"port": 0}
-    async with simulator(tmp_path, strikes={"period_s": 0.25}) as module:
-        well = write_cell(tmp_path, module["port"], "well", monitoring=monitoring)
+    async with stepped() as module:
+        well = write_cell(tmp_path, module.port, "well", monitoring=monitoring)
         odd = write_cell(tmp_path, 1, "odd", monitoring=monitoring)
         async with serving(well, odd) as watched:
+            await watched.connected("well")
+            module.strike(3)
             await watched.until("well", 3)
             at = re.search(r"metrics at (http://\S+)", caplog.text)
             assert at is not None
@@ -125,8 +131,8 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
     obstacle = tmp_path / "press-1.sqlite.lock"
     obstacle.mkdir()
     actor = Actor("anna", Role.ENGINEER, "127.0.0.1")
-    async with simulator(tmp_path, strikes={"period_s": 0.25}) as module:
-        path = write_cell(tmp_path, module["port"], monitoring={"port": 0})
+    async with stepped() as module:
+        path = write_cell(tmp_path, module.port, monitoring={"port": 0})
         async with serving(path) as watched:
             at = re.search(r"metrics at (http://\S+)", caplog.text)
             assert at is not None
@@ -143,6 +149,8 @@ async def test_a_cell_starts_by_itself_once_its_journal_can_be_opened(
             with pytest.raises(RefusedError, match="cannot be opened"):
                 await history.values("press-1", "Friction/StaticFriction", HistoryRequest(None, None, 1))
             obstacle.rmdir()
+            await watched.connected("press-1")
+            module.strike(3)
             await watched.until("press-1", 3)
             with await asyncio.to_thread(urllib.request.urlopen, f"{at[1]}/healthz") as answer:
                 assert json.load(answer) == {"press-1": {"healthy": True, "reason": ""}}
@@ -161,8 +169,8 @@ async def test_another_map_version_is_refused_by_name(tmp_path: Path) -> None:
     text = (CONFIG / "maps" / "fpga-v1.yaml").read_text()
     newer = tmp_path / "fpga-v2.yaml"
     newer.write_text(text.replace("type: u16, expect: 1", "type: u16, expect: 2"))
-    async with simulator(tmp_path, strikes={"period_s": 0.5}) as module:
-        cell = write_cell(tmp_path, module["port"], module={"register_map": str(newer)})
+    async with stepped() as module:
+        cell = write_cell(tmp_path, module.port, module={"register_map": str(newer)})
         async with serving(cell) as watched:
             message = await watched.alarm("press-1", "ModuleConnection", active=True)
     assert "register map_version (16)" in message

@@ -9,7 +9,7 @@ from tests.integration.crashes import crash
 
 @pytest.mark.timeout(300)
 async def test_ten_kills(tmp_path: Path) -> None:
-    outcome = await crash(tmp_path, kills=10, seed=20261121)
+    outcome = await crash(tmp_path, kills=10, seed=20261121, period_s=0.2)
     assert outcome.cycles == sorted(set(outcome.cycles))
     assert outcome.lost == 0
     assert outcome.same_state

@@ -28,7 +28,7 @@ class Watched:
     async def connected(self, cell: str, timeout_s: float = 60.0) -> None:
         """Wait until the module of a cell answers."""
         async with asyncio.timeout(timeout_s):
-            while not self.service.running[cell].status.connected:
+            while (task := self.service.running.get(cell)) is None or not task.status.connected:
                 await asyncio.sleep(0.02)
 
     async def alarm(self, cell: str, name: str, *, active: bool, timeout_s: float = 60.0) -> str:
