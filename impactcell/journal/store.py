@@ -9,13 +9,14 @@ A `Journal` is used from one thread at a time; `impactcell.service.worker` gives
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from impactcell.errors import JournalDamagedError, JournalError
+from impactcell.journal.audit_entries import AuditEntry, stored_audit
 from impactcell.journal.capture_codec import decode_capture, encode_capture
 from impactcell.journal.checksums import CheckedTables
 from impactcell.journal.database import Upgrade, errors, open_database, set_aside
@@ -27,17 +28,6 @@ from impactcell.journal.salvage import stored_captures
 from impactcell.journal.schema import cycle_row
 from impactcell.journal.stored_forms import ALARM, load_alarms
 from impactcell.records import Alarm, Capture, CycleId, Snapshot
-
-
-@dataclass(frozen=True, slots=True)
-class AuditEntry:
-    """Who did what, when, and what came of it."""
-
-    time_ns: int
-    user: str
-    action: str
-    arguments: str
-    result: str
 
 
 class Journal:
@@ -267,13 +257,7 @@ class Journal:
     def audit(self) -> tuple[AuditEntry, ...]:
         """Return every action of a person, oldest first."""
         with errors(self.path):
-            rows = self._db.execute("SELECT * FROM audit ORDER BY id").fetchall()
-            names = self._tables.columns["audit"]
-            entries = [
-                dict(zip(names, row, strict=True)) for row in rows if self._tables.is_whole("audit", row)
-            ]
-        fields = AuditEntry.__dataclass_fields__
-        return tuple(AuditEntry(**{name: entry[name] for name in fields}) for entry in entries)
+            return stored_audit(self._db, self._tables)
 
     def _blob(self, table: str) -> bytes | None:
         with errors(self.path):

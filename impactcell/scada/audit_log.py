@@ -1,8 +1,10 @@
-"""The audit log of what people do elsewhere than over OPC UA: who, what, and what came of it."""
+"""The audit log of what people do, over OPC UA and elsewhere: who, what, and what came of it."""
 
 import logging
 from collections.abc import Awaitable
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
+
+from asyncua import ua
 
 from impactcell.alarms import EventKind
 from impactcell.opcua.host_interface import Actor, RefusedError
@@ -11,16 +13,26 @@ T = TypeVar("T")
 
 _log: Final = logging.getLogger("impactcell.audit")
 
+MAX_ARGUMENT: Final = 200
+"""Longest part of an argument that is logged, characters."""
+
+
+def _log_outcome(actor: Actor, what: str, refusal: str = "") -> None:
+    who = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
+    if refusal:
+        _log.warning("%s: %s: refused, %s", who, what, refusal)
+    else:
+        _log.info("%s: %s: done", who, what)
+
 
 async def audited(actor: Actor, what: str, work: Awaitable[T]) -> T:
     """Do what a person asks for, and log who asked and what came of it."""
-    who = f"{actor.user} ({actor.role.name.lower()}) from {actor.address}"
     try:
         result = await work
     except RefusedError as refused:
-        _log.warning("%s: %s: refused, %s: %s", who, what, refused.code, refused)
+        _log_outcome(actor, what, f"{refused.code}: {refused}")
         raise
-    _log.info("%s: %s: done", who, what)
+    _log_outcome(actor, what)
     return result
 
 
@@ -32,3 +44,31 @@ def describe_action(cell: str, name: str, event: EventKind, comment: str, shelve
     if event is EventKind.SHELVE_TIMED:
         what += f" ({shelve_s:g} s)"
     return what
+
+
+class MethodAudit:
+    """Implements `opcua.AuditLog`: every call of a method, refused ones too, but for refreshes."""
+
+    def __init__(self) -> None:
+        self._names: dict[tuple[ua.NodeId, ua.NodeId], str] = {}
+
+    def add_method(self, owner: ua.NodeId, method: ua.NodeId, name: str) -> None:
+        """Give a method of an object the name it is logged by; an empty one is not logged."""
+        self._names[owner, method] = name
+
+    def method_called(self, actor: Actor, request: ua.CallMethodRequest, status: int, reason: str) -> None:
+        """Log a call."""
+        ids = request.ObjectId, request.MethodId
+        name = self._names.get(ids, " ".join(node.to_string() for node in ids))
+        if not name:
+            return
+        arguments = ", ".join(_written(argument.Value) for argument in request.InputArguments or [])
+        code = ua.StatusCode(status)
+        _log_outcome(actor, f"{name}({arguments})", "" if code.is_good() else f"{code.name} {reason}")
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, ua.LocalizedText):
+        value = value.Text
+    text = value.hex() if isinstance(value, bytes) else repr(value)
+    return text if len(text) <= MAX_ARGUMENT else f"{text[:MAX_ARGUMENT]}..."

@@ -13,7 +13,7 @@ from impactcell.opcua.request_dispatch import RequestContext
 from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.quantities import BY_PATH, MILLIMETRE
 from impactcell.scada.access_policy import CellAccess
-from impactcell.scada.audit_trail import AuditTrail
+from impactcell.scada.audit_log import MethodAudit
 from impactcell.scada.cell_nodes import CellSpace
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition, refresh_event
 from impactcell.scada.interface import Actions, CellDescription
@@ -64,7 +64,7 @@ _CONDITION_METHODS: Final[Mapping[EventKind, tuple[str, tuple[int, ...], tuple[I
 class MethodTable:
     """Makes methods callable; tells the access policy in which area they lie, and the audit their names."""
 
-    def __init__(self, methods: MethodService, access: CellAccess, audit: AuditTrail) -> None:
+    def __init__(self, methods: MethodService, access: CellAccess, audit: MethodAudit) -> None:
         self._methods = methods
         self._access = access
         self._audit = audit

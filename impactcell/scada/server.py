@@ -23,8 +23,7 @@ from impactcell.opcua.variable_store import VariableStore
 from impactcell.quantities import HISTORY
 from impactcell.records import Alarm, ModuleStatus, Snapshot
 from impactcell.scada.access_policy import CellAccess
-from impactcell.scada.audit_log import audited, describe_action
-from impactcell.scada.audit_trail import AuditTrail
+from impactcell.scada.audit_log import MethodAudit, audited, describe_action
 from impactcell.scada.cell_history import CellHistory
 from impactcell.scada.cell_nodes import CellSpace, cell_notifiers, load_types, method_declarations
 from impactcell.scada.conditions import MAX_SHELVE_S, Condition
@@ -130,7 +129,7 @@ class Server:
         space = address_space(model)
         _offer_aggregates(space)
         uris = await model.get_namespace_array()
-        values, access, audit = VariableStore(space), CellAccess(), AuditTrail()
+        values, access, audit = VariableStore(space), CellAccess(), MethodAudit()
         cells = [CellSpace(model, uris, description) for description in self._descriptions]
         history = self._history_of(cells)
         host = ServiceHost(

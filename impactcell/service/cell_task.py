@@ -10,13 +10,12 @@ from functools import partial
 
 from impactcell.alarms import RuleResult
 from impactcell.alarms.rules import journal_fault, module_connection, positioning_fault
-from impactcell.errors import ImpactCellError, JournalError, PositioningError
+from impactcell.errors import ImpactCellError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.fieldbus.map_registers import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports import Transport, transport_for
-from impactcell.journal.retention import Retention
-from impactcell.journal.store import AuditEntry
+from impactcell.journal.audit_entries import AuditEntry
 from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.condition_log import ConditionLog
@@ -28,13 +27,13 @@ from impactcell.records import (
     Snapshot,
 )
 from impactcell.scada import Server
-from impactcell.service.factory import cell_design, module_link, retention_policy
-from impactcell.service.journal_writer import open_journal
+from impactcell.service.factory import cell_design, module_link
 from impactcell.service.monitoring import CellHealth
+from impactcell.service.opening import opened_worker
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.publisher import CellPublisher
-from impactcell.service.worker import CellWorker
-from impactcell.settings import CellConfig, read_cell
+from impactcell.service.reloading import model_time_ns, reloaded_cell
+from impactcell.settings import CellConfig
 from impactcell.web.live_feed import LiveFeed
 
 TICK_S = 1.0
@@ -45,12 +44,6 @@ STALE_AT_LEAST_S = 5.0
 """... but not before so many seconds."""
 
 SnapshotCallback = Callable[[str, Snapshot], None]
-
-
-UNCHANGEABLE = (
-    *("cell", "module", "opcua", "web", "journal", "monitoring", "identification", "positioning"),
-)
-"""Sections of a cell file that only a restart takes over."""
 
 
 class CellTask:
@@ -76,38 +69,28 @@ class CellTask:
     ) -> None:
         self.cell = cell
         self.log = CellLogger(logging.getLogger(__name__), cell.name)
-        settings = cell.settings.journal
-        journal, damage = (None, "") if settings is None else open_journal(settings.file, cell.name)
-        keep = Retention() if settings is None else retention_policy(settings)
-        try:
-            self.worker = CellWorker(cell_design(cell), journal, keep)
-        except JournalError:
-            if journal is not None:
-                journal.close()
-            raise
-        if damage:
-            self.worker.tell_journal_event(damage)
+        self.worker = opened_worker(cell)
         self._publisher = CellPublisher(cell.name, self.worker.alarms, self._positioning_state, self.log)
         self._conditions = ConditionLog(self.log)
         self._on_snapshot = on_snapshot
+        self._link_changes: asyncio.Queue[ModuleStatus] = asyncio.Queue()
         self._module = ModuleAcquisition(
             cell.name,
             ModbusClient(transport or transport_for(module_link(cell))),
             cell.register_map,
-            self._link_changed,
+            self._link_changes.put_nowait,
         )
         for text in not_promised(cell.register_map.registers):
             self.log.info("register map %s: %s", cell.register_map.name, text)
+        self._positioning_change = asyncio.Event()
         self._positioning: PositioningTask | None = None
         if cell.settings.positioning is not None:
             self._positioning = PositioningTask(
-                cell, cell_design(cell), self._module, self.worker, self._positioning_changed
+                cell, cell_design(cell), self._module, self.worker, self._positioning_change.set
             )
-        self._positioning_change = asyncio.Event()
-        self._link_changes: asyncio.Queue[ModuleStatus] = asyncio.Queue()
         self._last_cycle_s = time.monotonic()
         self._stale = False
-        self._model_seen_ns = self._model_time_ns()
+        self._model_seen_ns = model_time_ns(cell)
 
     @property
     def status(self) -> ModuleStatus:
@@ -158,27 +141,17 @@ class CellTask:
 
     async def reload(self) -> None:
         """Take over from the cell's files what can change without a restart: model, tracking, alarms."""
-        self._model_seen_ns = self._model_time_ns()
+        self._model_seen_ns = model_time_ns(self.cell)
         try:
-            reloaded = await asyncio.to_thread(read_cell, self.cell.path)
+            self.cell = await asyncio.to_thread(reloaded_cell, self.cell, self.log)
         except ImpactCellError as error:
             self.log.warning("not reloaded, all goes on as before: %s", error)
             return
-        unchangeable = {
-            name: getattr(self.cell.settings, name)
-            for name in UNCHANGEABLE
-            if getattr(reloaded.settings, name) != getattr(self.cell.settings, name)
-        }
-        if unchangeable:
-            self.log.warning("changed, but taken over only by a restart: %s", ", ".join(unchangeable))
-        self.cell = replace(
-            self.cell, settings=reloaded.settings.model_copy(update=unchangeable), model=reloaded.model
-        )
         design = cell_design(self.cell)
         await self.worker.redesign(design)
         if self._positioning is not None:
             self._positioning.redesign(design)
-        self.log.info("reloaded; model %s", reloaded.model.name)
+        self.log.info("reloaded; model %s", self.cell.model.name)
 
     async def set_target(self, target_m: float, audit: AuditEntry) -> None:
         """Start a positioning task.
@@ -255,9 +228,6 @@ class CellTask:
     def _positioning_state(self) -> PositioningState:
         return PositioningState() if self._positioning is None else self._positioning.state
 
-    def _positioning_changed(self) -> None:
-        self._positioning_change.set()
-
     async def _publish_positioning(self) -> None:
         """Publish the task between cycles too, and raise or clear its alarm."""
         while True:
@@ -278,9 +248,6 @@ class CellTask:
 
     def _with_losses(self, status: ModuleStatus) -> ModuleStatus:
         return replace(status, missed=status.missed + self.worker.lost)
-
-    def _link_changed(self, status: ModuleStatus) -> None:
-        self._link_changes.put_nowait(status)
 
     async def _publish_link(self) -> None:
         while True:
@@ -312,15 +279,8 @@ class CellTask:
                 self._publisher.mark_stale(time.time_ns())
             await self.worker.retry()
             await self._check_journal()
-            if self._model_time_ns() not in (0, self._model_seen_ns):
+            if model_time_ns(self.cell) not in (0, self._model_seen_ns):
                 await self.reload()
-
-    def _model_time_ns(self) -> int:
-        """When the model file was written; 0 while it is being replaced, or cannot be seen."""
-        try:
-            return self.cell.settings.model.stat().st_mtime_ns
-        except OSError:
-            return 0
 
     def _publish_restored(self) -> None:
         self._publisher.publish_alarms(self.worker.alarms, unchanged=True)

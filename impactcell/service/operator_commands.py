@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind
 from impactcell.errors import PositioningError
-from impactcell.journal.store import AuditEntry
+from impactcell.journal.audit_entries import AuditEntry
 from impactcell.scada import Actor, RefusedError
 from impactcell.service.cell_task import CellTask
 

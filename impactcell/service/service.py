@@ -8,11 +8,10 @@ import signal
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from dataclasses import replace
 
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
-from impactcell.errors import JournalError, SettingsError
+from impactcell.errors import JournalError
 from impactcell.fieldbus.transports import Transports
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
@@ -22,18 +21,15 @@ from impactcell.service.cell_task import CellTask, SnapshotCallback
 from impactcell.service.factory import (
     cell_description,
     cell_design,
-    cell_facts,
     module_link,
-    page_settings,
     server_settings,
 )
 from impactcell.service.history_source import JournalHistory
 from impactcell.service.monitoring import CellHealth, Monitoring, waiting_cell
 from impactcell.service.operator_commands import OperatorCommands
-from impactcell.service.page_gateway import PageGateway
+from impactcell.service.pages import served_pages
 from impactcell.settings import CellConfig
-from impactcell.settings.web_section import WebSection
-from impactcell.web import CellNews, PageServer, TourStop
+from impactcell.web import CellNews, TourStop
 from impactcell.web.live_feed import LiveFeed
 
 log = logging.getLogger("impactcell.service")
@@ -95,13 +91,15 @@ class Service:
             servers = {}
             for endpoint in dict.fromkeys(cell.settings.opcua.endpoint for cell in self._cells):
                 servers[endpoint] = await stack.enter_async_context(self._server(endpoint, history))
-            for cell in self._cells:
-                self.endpoints[cell.name] = servers[cell.settings.opcua.endpoint].endpoint
-            await stack.enter_async_context(self._pages(servers))
+            shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in self._cells}
+            self.endpoints |= {name: server.endpoint for name, server in shown_by.items()}
+            pages = await stack.enter_async_context(
+                served_pages(self._cells, shown_by, OperatorCommands(self.running), self._tours)
+            )
+            self.pages |= {name: page.endpoint for name, page in pages.items()}
+            self._feeds |= {name: page.feed for name, page in pages.items()}
             tasks = [
-                asyncio.create_task(
-                    self._keep_running(cell, servers[cell.settings.opcua.endpoint]), name=cell.name
-                )
+                asyncio.create_task(self._keep_running(cell, shown_by[cell.name]), name=cell.name)
                 for cell in self._cells
             ]
             tasks.append(asyncio.create_task(_watchdog(), name="watchdog"))
@@ -148,49 +146,6 @@ class Service:
             history,
             OperatorCommands(self.running),
         )
-
-    @contextlib.asynccontextmanager
-    async def _pages(self, servers: Mapping[str, Server]) -> AsyncIterator[None]:
-        """Serve a page for each `web.endpoint`, from a thread of its own."""
-        with_page = [cell for cell in self._cells if cell.settings.web is not None]
-        async with contextlib.AsyncExitStack() as stack:
-            for section in dict.fromkeys(cell.settings.web for cell in with_page):
-                cells = [cell for cell in with_page if cell.settings.web == section]
-                if section is not None:
-                    await self._page(section, cells, servers, stack)
-            yield
-
-    async def _page(
-        self,
-        section: WebSection,
-        cells: Sequence[CellConfig],
-        servers: Mapping[str, Server],
-        stack: contextlib.AsyncExitStack,
-    ) -> None:
-        shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in cells}
-        settings = page_settings(cells[0], section)
-        facts = [
-            replace(cell_facts(cell, self.endpoints[cell.name]), tour=self._tours.get(cell.name, ()))
-            for cell in cells
-        ]
-        gateway = PageGateway(shown_by, OperatorCommands(self.running), cells, settings.certificates)
-        page = PageServer(settings, facts, gateway)
-        try:
-            await asyncio.to_thread(page.start)
-        except SettingsError as error:
-            if "web" in cells[0].settings.model_fields_set:
-                raise
-            # Nobody asked for the page at this address: another service of this machine may have it.
-            log.warning("%s; no page for now", error)
-            return
-        stack.push_async_callback(asyncio.to_thread, page.stop)
-        if not (settings.is_encrypted or section.is_on_loopback):
-            log.warning(
-                "page: http beyond loopback is allowed (web.allow_without_encryption): anybody can listen"
-            )
-        log.info("page at %s", page.endpoint)
-        self.pages |= dict.fromkeys(shown_by, page.endpoint)
-        self._feeds |= dict.fromkeys(shown_by, page.feed)
 
     @contextlib.asynccontextmanager
     async def _monitoring(self) -> AsyncIterator[None]:

@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -12,8 +11,9 @@ from typing import TypeVar
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, RuleResult, Transition
 from impactcell.cell import CellDesign, CellState, StepResult
+from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.retention import Retention
-from impactcell.journal.store import AuditEntry, Journal
+from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import MODEL, StoredState, pack_state
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import (
@@ -26,17 +26,12 @@ from impactcell.records import (
     Snapshot,
 )
 from impactcell.serialization.tree import Unknown
+from impactcell.service.guarded_step import guarded_step
 from impactcell.service.journal_writer import JournalWriter
 from impactcell.service.restoring import restored_state
 from impactcell.service.warmup import warm_up
 
 T = TypeVar("T")
-
-_CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-"""Cores that this process may use."""
-_computing = threading.BoundedSemaphore(_CORES)
-"""As many cells compute at a time as there are cores, in the order in which they came: more would finish
-later, all of them, and keep the event loop waiting for the interpreter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,7 +143,9 @@ class CellWorker:
         faults: tuple[str, ...] = (),
     ) -> CycleResult:
         """Take one cycle through the pipeline and store it."""
-        processed = await self.run(lambda: self._process(capture, positioning, announcement, faults))
+        processed = await self.run(
+            lambda: self._store(capture, self._step(capture, positioning, announcement, faults))
+        )
         if self._journal_writer.maintenance_due:
             self._thread.submit(self._maintain, capture.time_ns)  # what is shown need not wait for it
         return processed
@@ -232,15 +229,16 @@ class CellWorker:
             self.log.warning("the grid of the signature was changed: the signature is learned anew")
         return fitted
 
-    def _process(
+    def _step(
         self,
         capture: Capture,
         positioning: PositioningState,
         announcement: BatchAnnouncement | None,
         faults: tuple[str, ...],
-    ) -> CycleResult:
-        with _computing:
-            step_result = self._step(capture, positioning, announcement, faults)
+    ) -> StepResult:
+        return guarded_step(self.log, self._design, self._state, capture, positioning, announcement, faults)
+
+    def _store(self, capture: Capture, step_result: StepResult) -> CycleResult:
         self.last = CycleId(capture.session, capture.cycle)
         self._state, self._snapshot = step_result.state, step_result.snapshot
         if self._journal_writer.journal is None:
@@ -256,23 +254,6 @@ class CellWorker:
             self._journal_writer.maintain(time_ns)
         except Exception:
             self.log.exception("the journal could not be tidied")
-
-    def _step(
-        self,
-        capture: Capture,
-        positioning: PositioningState,
-        announcement: BatchAnnouncement | None,
-        faults: tuple[str, ...],
-    ) -> StepResult:
-        try:
-            return core.step(self._design, self._state, capture, positioning, announcement, faults)
-        except Exception as error:
-            # A capture that nobody foresaw must not stop the cell: the cycle counts, its content does not.
-            name = self._design.name
-            self.log.exception("cannot be computed; it counts as unreadable", cycle=capture.cycle)
-            fault = f"{name}: cycle {capture.cycle}: cannot be computed ({type(error).__name__}: {error})"
-            empty = replace(capture, force=None, position=None, actuator=None, summary=None)
-            return core.step(self._design, self._state, empty, positioning, announcement, (*faults, fault))
 
     def _blob(self) -> bytes:
         return pack_state(StoredState(self._state, self._snapshot, self.belief), self._unknown)

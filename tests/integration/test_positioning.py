@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from impactcell.errors import PositioningError
-from impactcell.journal.store import AuditEntry
+from impactcell.journal.audit_entries import AuditEntry
 from tests.integration.processes import simulator, told, write_cell
 from tests.integration.watched import Watched, serving
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from impactcell.errors import JournalError
+from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.retention import Retention
-from impactcell.journal.store import AuditEntry, Journal
+from impactcell.journal.store import Journal
 from impactcell.records import Alarm, CycleId
 from tests.snapshots import make_capture, make_snapshot
 from tests.unit.journal.lossy_disk import Recording, Step, disk_after_cut, recorded

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
+from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import FREE_SHARE, Retention
-from impactcell.journal.store import AuditEntry, Journal
+from impactcell.journal.store import Journal
 from impactcell.records import Alarm, CycleId
 from tests.snapshots import make_capture, make_snapshot
 

@@ -11,9 +11,10 @@ from impactcell import cell as core
 from impactcell.campaign import read
 from impactcell.cli.export import export
 from impactcell.errors import JournalDamagedError, JournalError
+from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import Retention
-from impactcell.journal.store import AuditEntry, Journal
+from impactcell.journal.store import Journal
 from impactcell.records import CycleId
 from impactcell.service.journal_writer import open_journal
 from impactcell.service.worker import CellWorker

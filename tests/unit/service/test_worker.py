@@ -273,7 +273,7 @@ async def test_no_more_cells_compute_at_a_time_than_there_are_cores(
             with lock:
                 at_work -= 1
 
-    monkeypatch.setattr("impactcell.service.worker._computing", threading.BoundedSemaphore(2))
+    monkeypatch.setattr("impactcell.service.guarded_step._computing", threading.BoundedSemaphore(2))
     monkeypatch.setattr(core, "step", counted)
     cells = [CellWorker(design, None, Retention()) for _ in range(5)]
     await asyncio.gather(*(process(cell, make_capture(1)) for cell in cells))
