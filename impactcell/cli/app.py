@@ -222,7 +222,7 @@ def discrepancy(
     from impactcell.cli.discrepancy import discrepancy as run_discrepancy
     from impactcell.cli.effects import offer
 
-    offer(effects or (), scheduler)
+    offer(effects or ())
     run_discrepancy(
         campaign, output, cell=cell, journal=journal, seed=seed, scheduler=scheduler, as_json=as_json
     )

@@ -2,11 +2,10 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from impactcell.api.findings import write_findings
 from impactcell.campaign import Campaign, read
@@ -117,17 +116,8 @@ def _mapper(scheduler: str | None) -> Iterator[Mapper]:
             yield lambda function, items: list(pool.map(function, items))
         return
     try:
-        from distributed import Client
+        from impactcell.cli.cluster import cluster_mapper
     except ImportError as error:
         raise DiscrepancyError("--scheduler needs dask: pip install 'impactcell[cluster]'") from error
-    try:
-        client: Any = Client(scheduler, timeout=10)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise DiscrepancyError(f"no dask scheduler answers at {scheduler}: {error}") from error
-    with client:
-
-        def on_cluster(function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
-            futures = [client.submit(function, item, pure=False) for item in items]
-            return list(client.gather(futures))
-
-        yield on_cluster
+    with cluster_mapper(scheduler) as mapper:
+        yield mapper

@@ -9,7 +9,7 @@ from impactcell.physics.outside_effects import effect_files, load_effect, offer_
 from impactcell.process.console import print_note, print_result
 
 
-def offer(paths: Sequence[Path], scheduler: str | None = None) -> None:
+def offer(paths: Sequence[Path]) -> None:
     """Offer the effects of files and folders, and of installed plug-ins.
 
     Raises
@@ -17,10 +17,6 @@ def offer(paths: Sequence[Path], scheduler: str | None = None) -> None:
     EffectError
         What cannot be used, a line each.
     """
-    if paths and scheduler is not None:
-        raise EffectError(
-            "effects of files are known in this process only; without --scheduler, or install them"
-        )
     try:
         offered = (*offer_installed(), *offer_effects(paths))
     except PhysicsError as error:

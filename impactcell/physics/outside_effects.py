@@ -4,9 +4,12 @@ Such a file is like one of `impactcell.physics.effects`: it defines one `EFFECT`
 Python and is run: load only files that you trust as much as the program itself.
 """
 
+import atexit
 import importlib.util
+import shutil
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -102,6 +105,33 @@ def offer_effects(paths: Sequence[Path]) -> tuple[str, ...]:
         offer_effect(effect)
         _SOURCES[effect.identifier] = file
     return tuple(effect.identifier for effect in loaded.values())
+
+
+def offered_texts() -> dict[str, str]:
+    """Give the text of each file of effects on offer, by its effect: what another process needs."""
+    return {identifier: file.read_text(encoding="utf-8") for identifier, file in _SOURCES.items()}
+
+
+def offer_texts(texts: Mapping[str, str]) -> None:
+    """Offer the effects of another process, as `offered_texts` gives them there.
+
+    Raises
+    ------
+    PhysicsError
+        As `offer_effects`, and where an effect of the same name but with another text is on offer here.
+    """
+    here = offered_texts()
+    changed = [
+        identifier for identifier in texts if here.get(identifier, texts[identifier]) != texts[identifier]
+    ]
+    if changed:
+        raise PhysicsError(f"has another {', '.join(changed)} on offer; start it anew")
+    folder = Path(tempfile.mkdtemp(prefix="impactcell-effects-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    files = [folder / f"{identifier}.py" for identifier in texts if identifier not in here]
+    for file in files:
+        file.write_text(texts[file.stem], encoding="utf-8")
+    offer_effects(files)
 
 
 def source_of(identifier: str) -> Path | None:

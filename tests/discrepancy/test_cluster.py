@@ -2,12 +2,17 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from impactcell import campaign as campaigns
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.errors import DiscrepancyError
+from impactcell.physics import Ensemble, TapInput, outside_effects
+from impactcell.physics.effects import withdraw_effect
+from impactcell.physics.outside_effects import offer_effects
 from tests.discrepancy.test_workflow import make
+from tests.unit.physics.test_outside_effects import OWN
 
 
 @pytest.mark.filterwarnings("default")
@@ -21,6 +26,36 @@ def test_two_worker_processes_change_nothing(tmp_path: Path) -> None:
         discrepancy(tmp_path / "campaign", tmp_path / "there", scheduler=cluster.scheduler_address)
     here, there = ((tmp_path / name / "result.json").read_bytes() for name in ("here", "there"))
     assert here == there
+
+
+@pytest.mark.filterwarnings("default")
+def test_workers_know_an_effect_of_the_users_own(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    from impactcell.cli.cluster import cluster_mapper
+
+    file = tmp_path / "own_pull.py"
+    file.write_text(OWN, encoding="utf-8")
+    offer_effects([file])
+    try:
+        time_s = np.linspace(0.0, 0.05, 20)
+        slide = Ensemble(
+            [TapInput(1.0, 18.9)], ["own_pull"],
+            position_time_s=[time_s], initial_speed_m_s=np.array([0.1]),
+        )  # fmt: skip
+        plants = [np.array([6.5e5, 465.0, 0.2, 0.152, pull_n]) for pull_n in (0.0, 5.0)]
+        with (
+            distributed.LocalCluster(
+                n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
+            ) as cluster,
+            cluster_mapper(cluster.scheduler_address) as mapper,
+        ):
+            for pull_n, position_m in zip((0.0, 5.0), mapper(slide.samples, plants), strict=True):
+                braking = 0.152 * 9.81 - pull_n / 18.9
+                parabola = 0.1 * time_s - 0.5 * braking * time_s**2
+                np.testing.assert_allclose(position_m, parabola, rtol=1e-9, atol=1e-12)
+    finally:
+        withdraw_effect("own_pull")
+        outside_effects._SOURCES.pop("own_pull")
 
 
 @pytest.mark.filterwarnings("default")

@@ -48,6 +48,7 @@ def test_the_law_is_named_by_its_form_and_proved(found: DiscrepancyResult) -> No
     assert law.values(np.array([upper]))[0] == pytest.approx(DRAG * upper, rel=0.02)
     assert found.law.change.after.trace < 1.1
     assert found.law.change.is_real()
+    assert law.effect() is find_effect(law.identifier)  # found again, it is the effect that is there
 
 
 def test_a_law_that_merely_contains_it_is_no_equivalent(found: DiscrepancyResult) -> None:

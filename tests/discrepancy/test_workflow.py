@@ -52,6 +52,12 @@ def test_nothing_is_named_where_nothing_is_hidden() -> None:
     )
 
 
+@pytest.mark.parametrize("library", [(), ("batch_shift",)])
+def test_a_library_of_which_no_shot_can_test_anything_names_nothing(library: tuple[str, ...]) -> None:
+    found = investigate(make(shots=20), library=library)
+    assert (found.verdict, found.added) == ("no_gap", ())
+
+
 @pytest.mark.parametrize("effect", ["viscous_friction", "channel_skew", "friction_drift"])
 def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
     found = investigate(make(effect))

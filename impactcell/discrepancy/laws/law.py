@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.grammar import WAVES, Shape, evaluate, name
@@ -151,13 +152,20 @@ class Law:
 
     def effect(self) -> Effect:
         """Effect that the text defines, ready to enter a plant."""
-        space: dict[str, object] = {"__name__": self.identifier}
-        exec(compile(self.text(), f"<{self.identifier}>", "exec"), space)  # noqa: S102  # our own text
-        effect = space["EFFECT"]
-        if not isinstance(effect, Effect):
-            raise TypeError(self.identifier)
+        effect = _run(self.text(), self.identifier)
         add_effect(effect)
         return effect
+
+
+@cache
+def _run(text: str, identifier: str) -> Effect:
+    """Run the text of an effect file; the same text is the same effect, however often it is found."""
+    space: dict[str, object] = {"__name__": identifier}
+    exec(compile(text, f"<{identifier}>", "exec"), space)  # noqa: S102  # our own text
+    effect = space["EFFECT"]
+    if not isinstance(effect, Effect):
+        raise TypeError(identifier)
+    return effect
 
 
 _WORDS = {

@@ -76,10 +76,10 @@ def candidate_directions(
     """Directions of the effects of `library` that the fit does not have yet."""
     visited = visited_range(problem, fit)
     names: list[str] = []
-    parts: list[DirectionProducts] = []
     groups: list[int] = []
     points: list[GridPoint] = []
     unit = direction_products(linearisation, np.zeros(problem.shots.values.size), np.ones(problem.count))
+    parts = [unit.select(np.arange(0))]  # and no more, where the shots can test no effect of the library
     for identifier in library:
         if identifier in fit.effects:
             continue

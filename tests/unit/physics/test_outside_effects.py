@@ -13,7 +13,13 @@ from impactcell.errors import EffectError, PhysicsError, SettingsError
 from impactcell.physics import Plant, TapInput, outside_effects, simulate_free_slide
 from impactcell.physics.effect_contract import contract_faults
 from impactcell.physics.effects import LIBRARY, withdraw_effect
-from impactcell.physics.outside_effects import load_effect, offer_effects, offer_installed
+from impactcell.physics.outside_effects import (
+    load_effect,
+    offer_effects,
+    offer_installed,
+    offer_texts,
+    offered_texts,
+)
 from impactcell.prediction.model import Model, Prior
 from impactcell.settings.model_file import read_model, write_model
 
@@ -140,19 +146,20 @@ def test_what_cannot_be_offered_is_told_and_nothing_offered(own: Path) -> None:
     with pytest.raises(PhysicsError, match="is no identifier"):
         load_effect(own.parent / "my-effect.py")
     assert set(LIBRARY) == before
-    with pytest.raises(EffectError, match="without --scheduler"):
-        run_verb(
-            [
-                "discrepancy",
-                "nowhere",
-                "-o",
-                str(own.parent / "d"),
-                "--effects",
-                str(own),
-                "--scheduler",
-                "tcp://x",
-            ]
-        )
+
+
+def test_another_process_is_given_the_text(own: Path) -> None:
+    offer_effects([own])
+    texts = offered_texts()
+    assert texts == {"own_pull": OWN}
+    offer_texts(texts)  # the same text once more
+    with pytest.raises(PhysicsError, match="another own_pull"):
+        offer_texts({"own_pull": OWN.replace("return p[0]", "return -p[0]")})
+    withdraw_effect("own_pull")
+    outside_effects._SOURCES.pop("own_pull")
+    offer_texts(texts)
+    assert "own_pull" in LIBRARY
+    assert offered_texts() == texts
 
 
 def test_no_traceback_reaches_the_user(own: Path) -> None:
