@@ -25,7 +25,7 @@ from simulator.cycle import RunningTap
 from simulator.image import RegisterImage
 from simulator.plant import NeverAtRestError, TapInput, simulate_tap
 from simulator.process import strike_conditions
-from simulator.recorder import record
+from simulator.recorder import Recording, record
 from simulator.scenario import Scenario
 from simulator.scenario_file import MM_PER_MIN
 from simulator.tasks import PartSequence
@@ -71,9 +71,7 @@ class Device:
     ) -> None:
         self.scenario = scenario
         self._image = RegisterImage(registers, session)
-        self._room = {
-            name: registers[name].count for name in ("force", "position", "actuator") if name in registers
-        }
+        self._recording = Recording.of(registers)
         self._epoch_ns = epoch_ns
         self._began_s = now_s
         self._now_s = 0.0
@@ -185,11 +183,12 @@ class Device:
         scenario = self.scenario
         self._tap = None
         faulty = next((entry.kind for entry in scenario.faulty_captures if entry.cycle == self._made), "")
-        samples, rates = record(scenario, ended.motion, self._room, ended.met.random, faulty)
+        samples, rates = record(scenario, ended.motion, self._recording, ended.met.random, faulty)
         time_ns = self._time_ns(ended.began_s)
         header = (
             ended.header(time_ns, self._announcements.batch_id, mass_stated=scenario.part.mass_stated) | rates
         )
+        header |= self._figures(header, ended.met.random)
         self._rested_s = self._now_s
         self._image.put("state", ModuleState.READY)
         if scenario.positioning is not None:
@@ -205,6 +204,13 @@ class Device:
         self._show_part()
         self._announcements.announce(self._made, self.cycle)
 
+    def _figures(self, header: Mapping[str, float | str], random: np.random.Generator) -> dict[str, float]:
+        """Give the module's own figures, with the errors that its map tells of."""
+        registers = self._image.registers
+        told = [name for name in ("peak_force", "sliding_distance") if name in registers]
+        stds = {name: registers[name].si_std for name in told if registers[name].std is not None}
+        return {name: float(header[name]) + std * random.standard_normal() for name, std in stds.items()}
+
     def _time_ns(self, own_s: float) -> int:
         return self._epoch_ns and self._epoch_ns + round(own_s / self.scenario.acceleration * 1e9)
 
@@ -218,8 +224,17 @@ class Device:
             raise BlockingIOError
         return self._image.read(table, address, count)
 
-    def write(self, address: int, words: Words) -> None:
-        """Write registers, and act on them.
+    @property
+    def identification(self) -> Mapping[int, str]:
+        """What the module says to function 43/14."""
+        return {0: "impactcell", 1: "SIM", 2: "1.0", 4: "Simulated measuring module", 5: self.scenario.name}
+
+    def write_coils(self, address: int, bits: Words) -> None:
+        """Write coils, and act on them; raises as `write`."""
+        self.write(address, bits, "coil")
+
+    def write(self, address: int, words: Words, table: str = "holding") -> None:
+        """Write registers or coils, and act on them.
 
         Raises
         ------
@@ -233,7 +248,7 @@ class Device:
         if self._now_s < self._busy_until_s:
             raise BlockingIOError
         commanded = self._image.get("command_sequence")
-        self._image.write(address, words)
+        self._image.write(address, words, table)
         self._announcements.take(self.cycle)
         if self._image.get("command_abort"):
             self._abort()

@@ -32,11 +32,11 @@ class RegisterImage:
         """Return words; LookupError beyond the map."""
         return self._image.read(table, address, count)
 
-    def write(self, address: int, words: Words) -> None:
+    def write(self, address: int, words: Words, table: str = "holding") -> None:
         """Write words and take acknowledgements; LookupError and ValueError as the device's `write`."""
-        self._image.write(address, words)
+        self._image.write(address, words, table)
         for session, cycle in self._image.acknowledged:
-            if session == self.session and cycle:
+            if session == int(self.get("session")) and cycle:
                 self.put("acknowledged_cycle", cycle)
         self._image.acknowledged.clear()
 

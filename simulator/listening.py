@@ -3,8 +3,9 @@
 import ssl
 from collections.abc import Callable
 
+from simulator.answers import RegisterDevice
 from simulator.faults import FaultInjector
-from simulator.modbus_server import ModbusServer, RegisterDevice
+from simulator.modbus_server import ModbusServer
 from simulator.rtu_over_tcp import RtuOverTcpServer
 from simulator.scenario import Listen
 from simulator.serial_line import SerialServer, pace_of

@@ -1,7 +1,8 @@
 """A Modbus TCP server for a simulated device, and, on demand, a peer that breaks every rule.
 
-Functions 3, 4, 6 and 16; all others are refused with exception 1. Pipelined requests are answered in order,
-several clients are served. The device is a plain object that knows nothing of sockets.
+Functions 1 to 6, 15, 16, 22, 23 and 43/14 (see `answers`); all others are refused with exception 1. Pipelined
+requests are answered in order, several clients are served. The device is a plain object that knows nothing of
+sockets.
 """
 
 import asyncio
@@ -10,11 +11,9 @@ import ssl
 import struct
 from collections.abc import Callable
 from types import TracebackType
-from typing import Final, Protocol, Self
+from typing import Self
 
-import numpy as np
-
-from impactcell.fieldbus.registers import WIRE, Words
+from simulator.answers import RegisterDevice, answer
 from simulator.client_connection import ClientConnection
 from simulator.faults import FaultInjector
 
@@ -27,26 +26,6 @@ class ExceptionCode(enum.IntEnum):
     ILLEGAL_VALUE = 3
     DEVICE_BUSY = 6
     GATEWAY_NO_RESPONSE = 11
-
-
-_TABLES: Final = {3: "holding", 4: "input"}
-"""Which table a reading function shows."""
-_READ: Final = struct.Struct(">BHH")
-_TWO: Final = struct.Struct(">HH")
-_HEADS: Final = {
-    (function, count): bytes((function, 2 * count)) for function in _TABLES for count in range(1, 126)
-}
-"""What the reply to a read begins with."""
-
-
-class RegisterDevice(Protocol):
-    """What the server needs of a device."""
-
-    def read(self, table: str, address: int, count: int) -> Words:
-        """Return `count` registers; LookupError where there is no such address, BlockingIOError if busy."""
-
-    def write(self, address: int, words: Words) -> None:
-        """Write holding registers; LookupError as above, ValueError for a value that is refused."""
 
 
 class ModbusServer:
@@ -141,37 +120,11 @@ class ModbusServer:
             return self.no_such_device(function)
         try:
             return answer(device, function, pdu)
+        except NotImplementedError:
+            return bytes((function | 0x80, ExceptionCode.ILLEGAL_FUNCTION))
         except LookupError:
             return bytes((function | 0x80, ExceptionCode.ILLEGAL_ADDRESS))
         except BlockingIOError:
             return bytes((function | 0x80, ExceptionCode.DEVICE_BUSY))
-        except (ValueError, struct.error):
+        except (ValueError, IndexError, struct.error):
             return bytes((function | 0x80, ExceptionCode.ILLEGAL_VALUE))
-
-
-def answer(device: RegisterDevice, function: int, pdu: bytes) -> bytes:
-    """Return the reply PDU of a device; raises what `RegisterDevice` raises."""
-    table = _TABLES.get(function)
-    if table is not None:
-        _, address, count = _READ.unpack(pdu)
-        if not 1 <= count <= 125:
-            raise ValueError(count)
-        if address + count > 65_536:
-            raise LookupError(address)
-        words = device.read(table, address, count)
-        if words.dtype is not WIRE:
-            words = words.astype(WIRE, copy=False)
-        return _HEADS[function, count] + words.tobytes()
-    if function == 6:
-        address, _ = _TWO.unpack(pdu[1:])
-        device.write(address, np.frombuffer(pdu, dtype=WIRE, offset=3))
-        return pdu
-    if function == 16:
-        address, count = _TWO.unpack_from(pdu, 1)
-        if not 1 <= count <= 123 or len(pdu) != 6 + 2 * count or pdu[5] != 2 * count:
-            raise ValueError(count)
-        if address + count > 65_536:
-            raise LookupError(address)
-        device.write(address, np.frombuffer(pdu, dtype=WIRE, offset=6))
-        return pdu[:5]
-    return bytes((function | 0x80, ExceptionCode.ILLEGAL_FUNCTION))

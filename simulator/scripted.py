@@ -1,7 +1,6 @@
 """A module without a plant: it serves the cycles it is given, and lies where it is told to."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -9,16 +8,12 @@ from numpy.typing import ArrayLike
 
 from impactcell.fieldbus.registers import REGISTER_SPACE, WIRE, RegisterMap, Words, registers_crc32
 
-_ARRAYS: Final = ("force", "position", "actuator")
 LAST_CYCLE: Final = 2**32 - 1
 """Largest cycle number: 32 bits."""
-
-
-@dataclass(slots=True)
-class _Slot:
-    """Words of the window as one slot shows it, from `window_slot` up to `window_sequence_after`."""
-
-    words: Words
+_FEW_CYCLES: Final = {"u16": 2**16, "bcd16": 10**4, "bcd32": 10**8}
+"""After so many cycles a counter of these types begins with 0 again."""
+_NOT_OF_A_SLOT: Final = ("window_sequence", "capture_ready", "cycle_counter")
+"""Read with a capture, but not part of it."""
 
 
 class ScriptedDevice:
@@ -27,52 +22,77 @@ class ScriptedDevice:
     Parameters
     ----------
     registers : RegisterMap
-        The layout it speaks.
+        The layout it speaks; without a ring it has one buffer.
     session, counter : int
         Where its life begins.
     """
 
     def __init__(self, registers: RegisterMap, session: int = 1, counter: int = 0) -> None:
         self.registers = registers
+        declared = {register.table for register in registers.registers.values()}
         self.image: Words = np.zeros(REGISTER_SPACE, dtype=WIRE)
+        self.images: dict[str, Words] = {table: np.zeros(REGISTER_SPACE, dtype=WIRE) for table in declared}
+        self.images["holding"] = self.image
+        self.images.setdefault("input", self.image)  # without any of its own, the same image
         self.acknowledged: list[tuple[int, int]] = []
         self.on_read: list[tuple[int, Any]] = []
         """Pairs of an address and a function called when that address is read next."""
-        self._window = registers["window_slot"].address
-        self._after = registers["window_sequence_after"].address
-        self._end = max(register.end for register in registers.registers.values())
-        self._writable = np.zeros(REGISTER_SPACE, dtype=bool)
+        self._ends = dict.fromkeys(self.images, 0)
+        self._writable = {table: np.zeros(REGISTER_SPACE, dtype=bool) for table in ("holding", "coil")}
         for register in registers.registers.values():
+            self._ends[register.table] = max(self._ends[register.table], register.end)
             if register.writable:
-                self._writable[register.address : register.end] = True
+                self._writable[register.table][register.address : register.end] = True
             if register.expect is not None:
                 self.put(register.name, register.expect)
+        if self.images["input"] is self.image:
+            self._ends["input"] = self._ends["holding"]
         self._status: slice | None = None
         if "status_crc32" in registers:
             self._status = slice(registers["state"].address, registers["status_crc32"].address)
-        self._slots: list[_Slot] = []
+        header = (register.name for register in registers.header())
+        self._of_slot = [name for name in header if name not in _NOT_OF_A_SLOT]
+        self._slots: list[dict[str, Words]] = []
         self._sequence = 2
-        self.put("state", 1)
+        self._put_if_there("state", 1)
         self.start(session, counter)
+
+    def _put_if_there(self, name: str, value: ArrayLike | str) -> None:
+        if name in self.registers:
+            self.put(name, value)
 
     def put(self, name: str, value: ArrayLike | str) -> None:
         """Show `value` in a register."""
-        words = self.registers[name].encode(value)
-        address = self.registers[name].address
-        self.image[address : address + words.size] = words
+        register = self.registers[name]
+        image = self.images[register.table]
+        image[register.address : register.end] = self._encoded_beside(image, name, value)
+
+    def _encoded_beside(self, image: Words, name: str, value: ArrayLike | str) -> Words:
+        """Words of a value, in what else its registers show: other bits, or the rest of an array."""
+        register = self.registers[name]
+        words = image[register.address : register.end].copy()
+        if register.bit is not None:
+            mask = register.bit_mask()
+            return (words & ~mask) | (mask if value else np.zeros_like(mask))
+        if register.kind == "bit":
+            value = np.minimum(np.asarray(value, dtype=np.int64), 1)
+        encoded = register.encode(value)
+        words[: encoded.size] = encoded
+        return words
 
     def get(self, name: str) -> Any:
         """Return what a register shows."""
         register = self.registers[name]
-        return register.decode(self.image[register.address : register.end])
+        return register.decode(self.images[register.table][register.address : register.end])
 
     def start(self, session: int, counter: int = 0) -> None:
         """Begin a life: an empty ring, and the counter where it is told."""
-        blank = np.zeros(self._after - self._window, dtype=WIRE)
-        self._slots = [_Slot(blank) for _ in range(self.registers.slots)]
-        self.put("session", session)
+        self._slots = [{} for _ in range(self.registers.slots)]
+        if "session" in self.registers:
+            few = _FEW_CYCLES.get(self.registers["session"].kind)
+            self.put("session", session if few is None else session % few)
         self.put("cycle_counter", counter)
-        self.put("ring_cycle", np.zeros(self.registers.slots, dtype=np.int64))
+        self._put_if_there("ring_cycle", np.zeros(self.registers.slots, dtype=np.int64))
         self._selected = 0
         self._newest = 0
         self._show()
@@ -87,65 +107,83 @@ class ScriptedDevice:
 
         `samples` holds force, position and actuator in SI; `header` any register of the window.
         """
-        cycle = int(self.get("cycle_counter")) % LAST_CYCLE + 1
+        cycle = self._after(int(self.get("cycle_counter")))
         slot = self.next_slot
-        words = self._encoded(slot, cycle, samples, header)
-        self._slots[slot] = _Slot(words)
-        ring = np.array(self.get("ring_cycle"))
-        ring[slot] = cycle
+        self._slots[slot] = self._encoded(slot, cycle, samples, header)
         if slot == self._selected:
             self._show()
         self._newest = slot
-        self.put("ring_cycle", ring)
-        if "newest_slot" in self.registers:
-            self.put("newest_slot", slot)
+        if self.registers.has_ring:
+            ring = np.array(self.get("ring_cycle"))
+            ring[slot] = cycle
+            self.put("ring_cycle", ring)
+        self._put_if_there("newest_slot", slot)
         self.put("cycle_counter", cycle)
         return cycle
 
+    def _after(self, cycle: int) -> int:
+        """Return what the counter shows after a cycle."""
+        few = _FEW_CYCLES.get(self.registers["cycle_counter"].kind)
+        return cycle % LAST_CYCLE + 1 if few is None else (cycle + 1) % few
+
     def _encoded(
         self, slot: int, cycle: int, samples: Mapping[str, ArrayLike], header: Mapping[str, float | str]
-    ) -> Words:
-        words = np.zeros(self._after - self._window, dtype=WIRE)
+    ) -> dict[str, Words]:
+        """Words of a capture, register by register; unused parts of arrays are left out."""
+        registers = self.registers
+        session = int(self.get("session")) if "session" in registers else 0
         values: dict[str, ArrayLike | str] = {
-            "window_slot": slot,
-            "window_session": int(self.get("session")),
-            "window_cycle": cycle,
-        }
-        used = []
-        for name in _ARRAYS:
-            if name in samples:
-                encoded = self.registers[name].encode(samples[name])
-                used.append(encoded)
-                values[f"{name}_count"] = encoded.size // self.registers[name].words_per_value
-                at = self.registers[name].address - self._window
-                words[at : at + encoded.size] = encoded
+            "window_slot": slot, "window_session": session, "window_cycle": cycle
+        }  # fmt: skip
+        words = {name: registers[name].encode(samples[name]) for name in registers.arrays if name in samples}
+        used = list(words.values())
+        for name in registers.arrays:
+            values[f"{name}_count"] = (
+                words[name].size // registers[name].words_per_value if name in words else 0
+            )
+        values["sample_count"] = max((int(np.size(each)) for each in samples.values()), default=0)
         values |= header
-        for name, value in values.items():
-            register = self.registers[name]
-            at = register.address - self._window
-            words[at : at + register.words] = register.encode(value)
-        if "capture_crc32" in self.registers and "capture_crc32" not in header:
-            register = self.registers["capture_crc32"]
-            at = register.address - self._window
-            words[at : at + 2] = register.encode(registers_crc32(words[:at], *used))
+        words |= {name: registers[name].encode(values[name]) for name in self._of_slot if name in values}
+        if "capture_crc32" in registers and "capture_crc32" not in header:
+            crc = registers["capture_crc32"]
+            words[crc.name] = crc.encode(registers_crc32(self._before(crc.address, words), *used))
         return words
+
+    def _before(self, end: int, words: Mapping[str, Words]) -> Words:
+        """Return the registers of a slot's header up to an address, with 0 between those of the map."""
+        first = min(self.registers[name].address for name in self._of_slot)
+        block = np.zeros(end - first, dtype=WIRE)
+        for name in self._of_slot:
+            at = self.registers[name].address - first
+            if name in words and name != "capture_crc32":
+                block[at : at + words[name].size] = words[name]
+        return block
 
     def _show(self) -> None:
         """Show the selected slot in the window, under a new sequence number."""
         self._sequence += 2
-        self.put("window_sequence", self._sequence)
-        self.put("window_sequence_after", self._sequence)
-        self.image[self._window : self._after] = self._slots[self._selected].words
+        self._put_if_there("window_sequence", self._sequence)
+        self._put_if_there("window_sequence_after", self._sequence)
+        slot = self._slots[self._selected]
+        for name in (*self._of_slot, *self.registers.arrays):
+            register = self.registers[name]
+            shown = self.images[register.table][register.address : register.end]
+            used = slot[name].size if name in slot else 0
+            shown[:used] = slot.get(name, 0)
+            shown[used:] = 0
+        self._put_if_there("capture_ready", int(bool(slot)))
 
-    def read(self, table: str, address: int, count: int) -> Words:  # noqa: ARG002 - both tables are one here
-        """Return registers; LookupError beyond the map."""
-        if address + count > self._end:
+    def read(self, table: str, address: int, count: int) -> Words:
+        """Return registers, or bits; LookupError beyond the map, NotImplementedError without such a table."""
+        if table not in self.images:
+            raise NotImplementedError(table)
+        if address + count > self._ends[table]:
             raise LookupError(address)
         self._show_status_crc(address, count)
         for hook in [hook for hook in self.on_read if address <= hook[0] < address + count]:
             self.on_read.remove(hook)
             hook[1]()
-        return self.image[address : address + count]
+        return self.images[table][address : address + count]
 
     def _show_status_crc(self, address: int, count: int) -> None:
         """Bring the CRC of the status block up to date where a reading of it begins or goes on."""
@@ -156,22 +194,36 @@ class ScriptedDevice:
         ):
             self.put("status_crc32", registers_crc32(self.image[self._status]))
 
-    def write(self, address: int, words: Words) -> None:
-        """Write registers; LookupError where the map does not let them be, ValueError for a bad slot."""
-        if not self._writable[address : address + words.size].all():
+    def write(self, address: int, words: Words, table: str = "holding") -> None:
+        """Write registers or coils; raises as `read`, LookupError also where the map lets none be written.
+
+        ValueError for a slot that there is not.
+        """
+        if table not in self.images:
+            raise NotImplementedError(table)
+        if not self._writable[table][address : address + words.size].all():
             raise LookupError(address)
-        select = self.registers["slot_select"].address
-        if address <= select < address + words.size:
-            slot = int(words[select - address])
+        written = range(address, address + words.size)
+        if self.registers.has_ring and self._lies_in("slot_select", table, written):
+            slot = int(words[self.registers["slot_select"].address - address])
             if slot >= self.registers.slots:
                 raise ValueError(slot)
             if slot != self._selected:
                 self._selected = slot
                 self._show()
-        self.image[address : address + words.size] = words
-        if "acknowledge_cycle" in self.registers:
-            acknowledge = self.registers["acknowledge_cycle"].address
-            if address <= acknowledge < address + words.size:
-                self.acknowledged.append(
-                    (int(self.get("acknowledge_session")), int(self.get("acknowledge_cycle")))
-                )
+        self.images[table][address : address + words.size] = words
+        if self._lies_in("acknowledge_cycle", table, written):
+            told_by = next(
+                (name for name in ("acknowledge_session", "session") if name in self.registers), ""
+            )
+            session = int(self.get(told_by)) if told_by else 0
+            self.acknowledged.append((session, int(self.get("acknowledge_cycle"))))
+
+    def write_coils(self, address: int, bits: Words) -> None:
+        """Write coils; LookupError where the map lets none be."""
+        self.write(address, bits, "coil")
+
+    def _lies_in(self, name: str, table: str, written: range) -> bool:
+        if name not in self.registers:
+            return False
+        return self.registers[name].table == table and self.registers[name].address in written

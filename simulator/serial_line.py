@@ -12,9 +12,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Final, Self
 
+from simulator.answers import RegisterDevice
 from simulator.client_connection import ClientConnection
 from simulator.faults import FaultInjector
-from simulator.modbus_server import ModbusServer, RegisterDevice
+from simulator.modbus_server import ModbusServer
 from simulator.rtu import RtuConnection
 
 _AT_ONCE: Final = 16

@@ -12,8 +12,9 @@ from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE, Words
 from impactcell.fieldbus.transports import transport_for
+from simulator.answers import RegisterDevice
 from simulator.faults import FaultInjector
-from simulator.modbus_server import ModbusServer, RegisterDevice
+from simulator.modbus_server import ModbusServer
 from simulator.rtu_over_tcp import RtuOverTcpServer
 from simulator.serial_line import SerialServer
 from simulator.udp_server import UdpServer
@@ -27,10 +28,19 @@ SILENT_S = 30.0
 
 
 class Image:
-    """65 000 registers, each showing its address."""
+    """65 000 registers, each showing its address, as many coils and discrete inputs, and who made it."""
 
     def __init__(self) -> None:
         self.words = np.arange(65_536).astype(WIRE)
+        self.bits = {table: bits_of(seed) for seed, table in enumerate(("coil", "discrete"))}
+        self.identification = {
+            0: "Works",
+            1: "M-17",
+            2: "3.4",
+            4: "Measuring module",
+            5: "ü" * 60,
+            6: "x" * 90,
+        }
         self.busy = 0
         self.writes: list[tuple[int, list[int]]] = []
 
@@ -40,11 +50,22 @@ class Image:
             raise BlockingIOError
         if address + count > 65_000:
             raise LookupError(address)
+        if table in self.bits:
+            return self.bits[table][address : address + count]
         return self.words[address : address + count]
 
     def write(self, address: int, words: Words) -> None:
         self.writes.append((address, words.tolist()))
         self.words[address : address + words.size] = words
+
+    def write_coils(self, address: int, bits: Words) -> None:
+        self.writes.append((address, bits.tolist()))
+        self.bits["coil"][address : address + bits.size] = bits
+
+
+def bits_of(seed: int) -> Words:
+    """65 536 bits that a shift or another order would change."""
+    return np.random.default_rng(seed).integers(0, 2, 65_536).astype(WIRE)
 
 
 def server_for(

@@ -5,9 +5,11 @@ from pathlib import Path
 import yaml
 
 from generators.markdown import code, table
-from impactcell.fieldbus.map_registers import REQUIRED
+from impactcell.fieldbus.map_promises import not_promised
+from impactcell.fieldbus.map_registers import CONSTANTS, MEASURED, NEEDED_BY, REQUIRED
 from impactcell.fieldbus.map_validation import _KEYS
-from impactcell.fieldbus.register import KINDS, SI_FACTOR
+from impactcell.fieldbus.register_types import KINDS, SI_FACTOR
+from impactcell.fieldbus.registers import RegisterMap
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ROOT / "config" / "maps" / "fpga-v1.yaml"
@@ -28,14 +30,37 @@ def keys() -> str:
         )
         for name, register in shipped.items()
     ]
+    constants = ", ".join(map(code, CONSTANTS))
     return "\n\n".join(
         [
             "## Keys of an entry",
             entry,
             f"Types: {', '.join(map(code, (*KINDS, 'string')))}. Units: {', '.join(map(code, SI_FACTOR))}.",
+            f"With `value` (and `unit`) in its place, what is always the same: {constants}.",
             "## What is required, and why",
-            table(("register", "what it proves or gives"), [(code(n), why) for n, why in REQUIRED.items()]),
+            table(("register", "what it proves or gives"), _required()),
+            "## What is then not promised",
+            "As `impactcell check`, `impactcell probe` and the log say it of the maps of poorer modules:",
+            table(("map", "not promised"), _promises()),
             "## The layout `fpga-v1`",
             table(("register", "address", "type", "unit", "writable", "meaning"), rows),
         ]
     )
+
+
+def _required() -> list[tuple[str, str]]:
+    """Say what any map has, and what it has beside some registers."""
+    rows = [(code(name), why) for name, why in REQUIRED.items()]
+    rows.append((" or ".join(map(code, MEASURED)), "friction"))
+    for name, needs in NEEDED_BY.items():
+        rows += [(f"beside {code(name)}: {' or '.join(map(code, each))}", why) for each, why in needs]
+    return rows
+
+
+def _promises() -> list[tuple[str, str]]:
+    """Say what the maps of poorer modules do not promise."""
+    rows = []
+    for file in sorted(SHIPPED.parent.glob("*.yaml")):
+        register_map = RegisterMap.from_mapping(yaml.safe_load(file.read_text(encoding="utf-8")))
+        rows += [(code(register_map.name), text) for text in not_promised(register_map)]
+    return rows

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from impactcell.errors import FieldbusError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
-from impactcell.fieldbus.map_registers import not_promised
+from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.probe import ProbeResult
 from impactcell.fieldbus.probe import probe as probe_module
@@ -36,7 +36,7 @@ def probe(cell: Path) -> None:
     module = ModuleAcquisition(config.name, ModbusClient(transport_for(link)), config.register_map)
     result = asyncio.run(probe_module(module))
     rows = [("link", f"{link}, {1e3 * result.round_trip_s:.2f} ms a request"), *_rows(result)]
-    rows += [("no promise", text) for text in not_promised(config.register_map.registers)]
+    rows += [("no promise", text) for text in not_promised(config.register_map)]
     print_result("\n".join(f"{name:12}{text}" for name, text in rows))
     if result.faults:
         raise FieldbusError("\n".join(result.faults))
@@ -44,9 +44,12 @@ def probe(cell: Path) -> None:
 
 def _rows(result: ProbeResult) -> Iterator[tuple[str, str]]:
     status = result.status
-    yield "identity", ", ".join(f"{name} {value}" for name, value in result.identity.items())
+    identity = ", ".join(f"{name} {value}" for name, value in result.identity.items())
+    yield "identity", identity or "the map has no register of it"
+    if result.identification:
+        yield "made by", ", ".join(f"{name} {text}" for name, text in result.identification.items())
     held = sum(1 for cycle in status.ring if cycle)
-    ring = f"the ring holds {held} of {len(status.ring)}"
+    ring = f"the ring holds {held} of {len(status.ring)}" if len(status.ring) > 1 else "one buffer"
     yield "status", f"{status.state}, session {status.session}, cycle {status.cycle_counter}, {ring}"
     if status.batch is not None and status.batch.sequence:
         yield "batch", f"{status.batch.batch_id} announced from cycle {status.batch.from_cycle} on"
@@ -74,12 +77,14 @@ def _tap_rows(capture: Capture) -> Iterator[tuple[str, str]]:
     summary = capture.summary
     force, position = capture.force, capture.position
     if force is None:
-        yield "force", "no samples"
+        figure = "" if summary is None else f"; the module says {summary.peak_force_n:.4g} N"
+        yield "force", f"no samples{figure}"
     else:
         figure = "" if summary is None else f" (the module says {summary.peak_force_n:.4g} N)"
         yield "force", f"{_samples(force)}, largest {force.values.max():.4g} N{figure}"
     if position is None:
-        yield "position", "no samples"
+        figure = "" if summary is None else f"; slid {1e3 * summary.sliding_distance_m:.4g} mm, it says"
+        yield "position", f"no samples{figure}"
     else:
         figure = "" if summary is None else f" (slid {1e3 * summary.sliding_distance_m:.4g} mm, it says)"
         yield "position", f"{_samples(position)}, moved {1e3 * abs(position.values[-1]):.4g} mm{figure}"

@@ -7,6 +7,7 @@ the link does: that is said in `Module.status` and in the `faults` of a `Receive
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import replace
 from types import TracebackType
@@ -16,17 +17,18 @@ from impactcell.errors import FieldbusError
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_consistent, next_capture
-from impactcell.fieldbus.decoding import StatusBlock
+from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.identity import IdentityCheck
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.poll_schedule import PollSchedule
 from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.status_reader import StatusReader
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import CycleId, ModuleStatus
+from impactcell.records import Capture, CycleId, ModuleStatus
 
 __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
 
@@ -69,6 +71,7 @@ class ModuleAcquisition:
         self.register_client = RegisterClient(client, registers)
         self._status_reader = StatusReader(self.register_client)
         self._reader = CaptureReader(cell, self.register_client)
+        self._numbers = CycleNumbers.of(registers["cycle_counter"].kind)
         self._status = ModuleStatus()
         self._on_change = on_change
         self._ready = asyncio.Event()
@@ -145,7 +148,7 @@ class ModuleAcquisition:
         while True:
             sent_s = loop.time()
             try:
-                status = await self._poll()
+                status = self._numbers.status(await self._poll(), taken.last)
                 backoff.reset()
                 newest_now = CycleId(status.session, status.cycle_counter)
                 schedule.record_poll(sent_s, loop.time(), new=newest_now != newest)
@@ -170,16 +173,16 @@ class ModuleAcquisition:
                 await asyncio.sleep(schedule.delay_s(loop.time()))
                 continue
             overwritten, disagreements = overwritten // 2, 0
-            capture = replace(fetched.capture, session=target.cycle_id.session)
+            capture = self._dated(replace(fetched.capture, session=target.cycle_id.session))
             last = taken.last
             schedule.update(
-                1e-9 * capture.time_ns or loop.time(),
+                1e-9 * fetched.capture.time_ns or loop.time(),
                 cycles_after(last.cycle, target.cycle_id.cycle)
                 if last and last.session == target.cycle_id.session
                 else 0,
                 newest=target.cycle_id == newest,
             )
-            taken.add(target.cycle_id, fetched.header, capture.time_ns)
+            taken.add(target.cycle_id, fetched.header, fetched.capture.time_ns)
             received = ReceivedCycle(
                 capture, target.cycle_id, target.missed, target.restarted, fetched.faults
             )
@@ -187,6 +190,10 @@ class ModuleAcquisition:
             yield received
             if taken.last == newest:  # nothing waits behind it
                 await asyncio.sleep(schedule.delay_s(loop.time()))
+
+    def _dated(self, capture: Capture) -> Capture:
+        """Date a capture of a module without a clock: it was made when it was read, for all one knows."""
+        return capture if "cycle_time" in self.registers else replace(capture, time_ns=time.time_ns())
 
     def _target(self, last: CycleId | None, status: StatusBlock, skip: int) -> NextCapture | None:
         """Choose the cycle to read; None where there is none, or the status block contradicts itself."""
@@ -225,7 +232,7 @@ class ModuleAcquisition:
     async def _send_acknowledgement(self) -> None:
         cycle_id = self._durable
         if cycle_id is not None and "acknowledge_cycle" in self.registers:
-            values = {"acknowledge_cycle": cycle_id.cycle}
+            values = {"acknowledge_cycle": self._numbers.shown(cycle_id.cycle)}
             if "acknowledge_session" in self.registers:
                 values["acknowledge_session"] = cycle_id.session
             await self.register_client.write_values(values)

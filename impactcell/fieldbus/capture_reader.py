@@ -1,24 +1,29 @@
 """One capture, read through the module's window so that it is never a mixture of two.
 
-The window shows one slot of the ring. Its sequence number is read before and after the samples: only if it is
-even and has not changed, if slot, session and cycle are the wanted ones and the CRC fits, is the reading
-used. A reading that the link interrupts is taken up where it stopped, if the window still shows the same and
-there is a CRC to prove the whole.
+The window shows one slot of the ring, or the one buffer of the module. Its sequence number is read before and
+after the samples: only if it is even and has not changed, if slot, session and cycle are the wanted ones and
+the CRC fits, is the reading used. Of a module that has neither sequence number nor CRC each capture is read
+twice, and used where both readings agree. A reading that the link interrupts is taken up where it stopped, if
+the window still shows the same and there is a CRC to prove the whole.
 """
 
 import asyncio
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
+
+import numpy as np
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
+from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.register_image import RegisterImage
-from impactcell.fieldbus.registers import Value, Words, registers_crc32
+from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Words, registers_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
+from impactcell.fieldbus.status_block import integer
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.records import Capture, CycleId
 
@@ -34,7 +39,6 @@ _PAUSE_S, _LONGEST_PAUSE_S = 0.001, 0.25
 slot, or another client be selecting others."""
 _REQUEST_FAULTS: Final = (1, 2, 3)
 """Exceptions that the request earns; all others tell of a module, or a gateway, that cannot answer now."""
-_ARRAYS: Final = ("force", "position", "actuator")
 
 
 class NotFetched(enum.Enum):
@@ -72,7 +76,8 @@ class _PartialCapture:
 
     target: NextCapture
     header: Mapping[str, Value]
-    words: Words
+    identity: bytes
+    covered: Words
     blocks: dict[str, PartialBlock]
 
     @property
@@ -94,6 +99,8 @@ class CaptureReader:
         self._cell = cell
         self._client = client
         self._registers = client.registers
+        self._numbers = CycleNumbers.of(client.registers["cycle_counter"].kind)
+        self._spans = _spans(client.registers)
         self._partial: _PartialCapture | None = None
         self._target: NextCapture | None = None
         self._attempts = 0
@@ -156,7 +163,8 @@ class CaptureReader:
 
     def _is_urgent(self, target: NextCapture) -> bool:
         """Whether so many newer ones wait in the ring that they would be lost for this one."""
-        return cycles_after(target.cycle_id.cycle, target.counter) >= self._registers.slots // 2
+        waiting = cycles_after(target.cycle_id.cycle, target.counter)
+        return waiting >= max(1, self._registers.slots // 2)  # nobody waits behind one buffer
 
     def _progressed(self) -> bool:
         """Whether the interrupted reading got further than the one before."""
@@ -167,77 +175,122 @@ class CaptureReader:
 
     async def _read_header(self, target: NextCapture, taken: TakenCycles) -> _PartialCapture | NotFetched:
         """Show the slot and read its header, or go on with the reading that was interrupted."""
-        client, registers = self._client, self._registers
+        client = self._client
         if self._partial is not None:
-            words = self._words(await client.read_header())
-            if words.tobytes() == self._partial.words.tobytes():
-                return self._partial
+            image, partial = await client.read_header(), self._partial
+            same_sequence = image.values.get("window_sequence") == partial.header.get("window_sequence")
+            if same_sequence and self._identifying(image) == partial.identity:
+                return partial
             self._partial = None
             self.discarded += 1
         image = await client.read_header(target.slot)
-        if image.values["window_slot"] != target.slot:
+        if image.values.get("window_slot", target.slot) != target.slot:
             image = await client.read_header()
-        header, words = image.values, self._words(image)
-        if _at_rest(header["window_sequence"]) and header["window_slot"] == target.slot:
-            integer, wanted = decoding.integer, target.cycle_id
-            shown = CycleId(integer(header["window_session"]), integer(header["window_cycle"]))
-            if taken.holds(shown, self._identifying(words), integer(header["cycle_time"]), target):
+        header, identity = image.values, self._identifying(image)
+        if _at_rest(header) and header.get("window_slot", target.slot) == target.slot:
+            wanted, shown = target.cycle_id, self._shown(header, target)
+            if taken.holds(shown, identity, integer(header.get("cycle_time", 0)), target):
                 return NotFetched.TAKEN
             if shown != wanted:
                 newer = shown.session == wanted.session and is_after(shown.cycle, wanted.cycle)
                 return NotFetched.OVERWRITTEN if newer else NotFetched.NOT_SHOWN
-        counts = decoding.sample_counts(registers, header)
-        blocks = {name: client.partial_block(name, count) for name, count in counts.items()}
-        self._partial = _PartialCapture(target, header, words, blocks)
+        self._partial = _PartialCapture(target, header, identity, self._covered(image), self._blocks(header))
         self._fewest_missing = self._partial.missing_requests
         return self._partial
 
-    def _words(self, image: RegisterImage) -> Words:
-        return image.words(self._registers["window_sequence"], self._registers.header()[-1].end)
+    def _shown(self, header: Mapping[str, Value], target: NextCapture) -> CycleId:
+        """Which cycle a header is of, as far as it says."""
+        name = "window_cycle" if "window_cycle" in header else "cycle_counter"
+        cycle = self._numbers.number(integer(header[name]), near=target.cycle_id.cycle)
+        return CycleId(integer(header.get("window_session", target.cycle_id.session)), cycle)
 
-    def _identifying(self, words: Words) -> bytes:
+    def _blocks(self, header: Mapping[str, Value]) -> dict[str, PartialBlock]:
+        counts = decoding.sample_counts(self._registers, header)
+        return {name: self._client.partial_block(name, count) for name, count in counts.items()}
+
+    def _identifying(self, image: RegisterImage) -> bytes:
         """Words of a header that stay the same while its capture does."""
-        return words[self._registers["window_sequence"].words :].tobytes()
+        return b"".join(image.words(first, end).tobytes() for first, end in self._spans)
+
+    def _covered(self, image: RegisterImage) -> Words:
+        """Words of a header that its CRC covers."""
+        crc = self._registers.registers.get("capture_crc32")
+        return np.zeros(0, WIRE) if crc is None else image.words(self._registers.covered(), crc.address)
 
     async def _read_samples(self, partial: _PartialCapture) -> str | None:
-        """Read the samples and what follows them; return why the reading is of no use, None if it is good."""
+        """Read the samples and what proves them; return why the reading is of no use, None if it is good."""
         registers, header, target = self._registers, partial.header, partial.target
-        before = header["window_sequence"]
-        identity = (header["window_slot"], header["window_session"], header["window_cycle"])
-        if not _at_rest(before):
-            return f"register window_sequence shows {before}: the window was being changed"
-        if identity != (target.slot, target.cycle_id.session, target.cycle_id.cycle):
-            address = registers["window_slot"].address
-            return f"register window_slot ({address}) shows {identity[0]} instead of {target.slot}"
+        if not _at_rest(header):
+            return "the module was changing its window"
+        slot = header.get("window_slot", target.slot)
+        if (slot, self._shown(header, target)) != (target.slot, target.cycle_id):
+            name = "window_slot" if "window_slot" in registers else "window_cycle"
+            return f"register {name} ({registers[name].address}) shows {header[name]}, which is not asked for"
         provable = "capture_crc32" in registers
         if provable and (excessive := decoding.excessive_counts(registers, header)):
-            return excessive[0]  # no CRC can cover samples that the map has no room for
-        complete, last = self._client.modbus.complete, self._client.partial_block("window_sequence_after", 1)
-        if provable:  # in whatever order the device answers
+            return next(iter(excessive.values()))  # no CRC can cover samples that the map has no room for
+        if "window_sequence" in registers:
+            fault = await self._read_watched(partial, at_once=provable)
+        elif not provable:
+            fault = await self._read_twice(partial)
+        else:
+            fault = None
+            await self._client.modbus.complete(*partial.blocks.values())
+        if fault is None and provable:
+            crc = registers["capture_crc32"]
+            samples = [partial.blocks[name].words() for name in registers.arrays]
+            if header["capture_crc32"] != registers_crc32(partial.covered, *samples):
+                return f"register capture_crc32 ({crc.address}) does not fit what was read"
+        return fault
+
+    async def _read_watched(self, partial: _PartialCapture, *, at_once: bool) -> str | None:
+        """Read the samples between two looks at the sequence number; `at_once`, a CRC proves their order."""
+        complete = self._client.modbus.complete
+        last = self._client.partial_block("window_sequence_after", 1)
+        if at_once:  # in whatever order the device answers
             await complete(*partial.blocks.values(), last)
         else:
             await complete(*partial.blocks.values())
             await complete(last)
-        after = registers["window_sequence_after"].decode(last.words())
-        if before != after:
-            return f"register window_sequence changed from {before} to {after} meanwhile"
-        if provable:
-            crc = registers["capture_crc32"]
-            first = registers["window_sequence"]
-            covered = partial.words[first.words : crc.address - first.address]
-            samples = [partial.blocks[name].words() for name in _ARRAYS if name in partial.blocks]
-            if header["capture_crc32"] != registers_crc32(covered, *samples):
-                return f"register capture_crc32 ({crc.address}) does not fit what was read"
-        return None
+        before = partial.header["window_sequence"]
+        after = self._registers["window_sequence_after"].decode(last.words())
+        if before == after:
+            return None
+        return f"register window_sequence changed from {before} to {after} meanwhile"
+
+    async def _read_twice(self, partial: _PartialCapture) -> str | None:
+        """Read the samples, then samples and header once more, for nothing else proves them."""
+        again = self._blocks(partial.header)
+        await self._client.modbus.complete(*partial.blocks.values())
+        await self._client.modbus.complete(*again.values())
+        image = await self._client.read_header()
+        agree = all(again[name].words().tobytes() == partial.blocks[name].words().tobytes() for name in again)
+        if agree and _at_rest(image.values) and self._identifying(image) == partial.identity:
+            return None
+        return "two readings of it differ: the module was changing it"
 
     def _assemble(self, partial: _PartialCapture) -> FetchedCapture:
         samples = {name: block.words() for name, block in partial.blocks.items()}
         capture, faults = decoding.capture_from_words(self._registers, partial.header, samples)
-        identifying = self._identifying(partial.words)
+        capture = replace(capture, cycle=partial.target.cycle_id.cycle)
         named = tuple(f"{self._cell}: cycle {capture.cycle}: {fault}" for fault in faults)
-        return FetchedCapture(capture, identifying, readable=True, faults=named)
+        return FetchedCapture(capture, partial.identity, readable=True, faults=named)
 
 
-def _at_rest(sequence: Value) -> bool:
-    """Whether the window was at rest."""
-    return isinstance(sequence, int) and sequence % 2 == 0
+def _at_rest(header: Mapping[str, Value]) -> bool:
+    """Whether the window was at rest, as far as the module says."""
+    sequence = header.get("window_sequence", 0)
+    return isinstance(sequence, int) and sequence % 2 == 0 and header.get("capture_ready", 1) == 1
+
+
+def _spans(registers: RegisterMap) -> list[tuple[Register, int]]:
+    """Give pieces of what identifies a capture, each from a register to an address."""
+    spans: list[tuple[Register, int]] = []
+    for register in registers.header():
+        if register.name in ("window_sequence", "capture_ready"):
+            continue
+        if spans and spans[-1][0].table == register.table and spans[-1][1] == register.address:
+            spans[-1] = spans[-1][0], register.end
+        else:
+            spans.append((register, register.end))
+    return spans

@@ -1,4 +1,4 @@
-"""Words of the module's window and status block become a `Capture` and a `StatusBlock`. Pure, never fails.
+"""Words of the module's window become a `Capture`. Pure, never fails.
 
 What is wrong with a value is said in `faults`, each naming cell, cycle and register; the value itself is then
 left out (nan, None), so that nothing wrong is ever passed on as measured.
@@ -10,59 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.fieldbus.registers import Register, RegisterMap, Value, Words
-from impactcell.records import BatchAnnouncement, Capture, Channel, Summary, uniform_times
-
-
-@dataclass(frozen=True, slots=True)
-class PositioningStatus:
-    """What the module says of positioning; see the map for the codes.
-
-    Attributes
-    ----------
-    state, result : str
-        Names of the codes of `positioning_state` and `command_result`.
-    position_m, target_m : float
-        Where the part lies, and where the PLC wants it.
-    target_sequence : int
-        Raised by the PLC with each new target.
-    mass_kg : float
-        nan where the PLC does not know it.
-    accepted_command : int
-        Sequence number of the last command that the module looked at.
-    cycle : int
-        Cycle made by that command, 0 for none.
-    """
-
-    state: str
-    result: str
-    position_m: float
-    target_m: float
-    target_sequence: int
-    mass_kg: float
-    accepted_command: int
-    cycle: int
-
-
-@dataclass(frozen=True, slots=True)
-class StatusBlock:
-    """The status block of one poll."""
-
-    state: str
-    session: int
-    cycle_counter: int
-    ring: tuple[int, ...]
-    batch: BatchAnnouncement | None
-    positioning: PositioningStatus | None
-
-
-STATUS_REGISTERS = (
-    "state", "session", "cycle_counter", "ring_cycle",
-    "batch_sequence", "batch_from_cycle", "batch_announced",
-    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
-    "command_accepted", "command_cycle", "status_crc32",
-)  # fmt: skip
-"""Registers of a poll, where the map has them."""
+from impactcell.fieldbus.registers import RegisterMap, Value, Words
+from impactcell.fieldbus.status_block import integer, number
+from impactcell.records import Capture, Channel, Summary, uniform_times
 
 LIGHTEST_KG, HEAVIEST_KG = 0.01, 1e5
 """What a part can weigh; anything else is a wrong register, and would cost the estimators much time."""
@@ -71,72 +21,32 @@ LATEST_NS = 2**63 - 1
 OUT_OF_SCALE = 5.0
 """Factor between the module's own figure and its samples: no tap explains it, every wrong unit exceeds it."""
 
-_BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
-_POSITIONING = STATUS_REGISTERS[7:-1]
-"""Those of a positioning cell."""
-
-
-def _code_name(register: Register, value: Value) -> str:
-    code = int(value) if isinstance(value, int | float) else -1
-    return register.codes.get(code, f"unknown ({code})")
-
-
-def integer(value: Value) -> int:
-    """Give a value that is an integer; 0 for any other."""
-    return value if isinstance(value, int) else 0
-
-
-def _number(value: Value) -> float:
-    return float(value) if isinstance(value, int | float) else math.nan
-
-
-def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> StatusBlock:
-    """Put the decoded registers of `STATUS_REGISTERS` together."""
-    batch = positioning = None
-    if all(name in values for name in _BATCH):
-        batch = BatchAnnouncement(
-            integer(values["batch_sequence"]),
-            integer(values["batch_from_cycle"]),
-            str(values["batch_announced"]),
-        )
-    if all(name in values for name in _POSITIONING):
-        positioning = PositioningStatus(
-            state=_code_name(registers["positioning_state"], values["positioning_state"]),
-            result=_code_name(registers["command_result"], values["command_result"]),
-            position_m=_number(values["part_position"]),
-            target_m=_number(values["target_position"]),
-            target_sequence=integer(values["target_sequence"]),
-            mass_kg=_number(values["part_mass"]),
-            accepted_command=integer(values["command_accepted"]),
-            cycle=integer(values["command_cycle"]),
-        )
-    return StatusBlock(
-        state=_code_name(registers["state"], values["state"]),
-        session=integer(values["session"]),
-        cycle_counter=integer(values["cycle_counter"]),
-        ring=tuple(int(cycle) for cycle in np.atleast_1d(np.asarray(values["ring_cycle"]))),
-        batch=batch,
-        positioning=positioning,
-    )
-
 
 def sample_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, int]:
-    """Return how many samples of each array are used: what the header says, at most what the map has."""
-    return {
-        name: min(integer(header.get(f"{name}_count", 0)), registers[name].count)
-        for name in ("force", "position", "actuator")
-        if name in registers
-    }
+    """Return how many samples of each array are used: what the header says, at most what the map has.
+
+    Where nothing says it, all of an array is used.
+    """
+    return {name: min(_count(registers, header, name)[1], registers[name].count) for name in registers.arrays}
 
 
-def excessive_counts(registers: RegisterMap, header: Mapping[str, Value]) -> list[str]:
-    """Return a fault for each count that is more than the map has room for."""
-    return [
-        f"register {name}_count ({registers[f'{name}_count'].address}): {header[f'{name}_count']} samples, "
-        f"but the map has room for {registers[name].count}"
-        for name in ("force", "position", "actuator")
-        if name in registers and integer(header.get(f"{name}_count", 0)) > registers[name].count
-    ]
+def _count(registers: RegisterMap, header: Mapping[str, Value], name: str) -> tuple[str, int]:
+    """Which register says how many samples of an array are used, and what it says."""
+    for register in (f"{name}_count", "sample_count"):
+        if register in registers:
+            return register, integer(header.get(register, 0))
+    return name, registers[name].count
+
+
+def excessive_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, str]:
+    """Return a fault for each array of which more is said to be used than the map has room for."""
+    faults = {}
+    for name in registers.arrays:
+        register, count = _count(registers, header, name)
+        if count > registers[name].count:
+            where = f"register {register} ({registers[register].address})"
+            faults[name] = f"{where}: {count} samples, but the map has room for {registers[name].count}"
+    return faults
 
 
 def empty_capture(cycle: int) -> Capture:
@@ -156,15 +66,16 @@ def capture_from_words(
     list of str
         What is wrong with it, register by register.
     """
-    faults = excessive_counts(registers, header)
-    excessive = {fault.split("_count", 1)[0].removeprefix("register ") for fault in faults}
+    header = {**registers.constants, **header}
+    excessive = excessive_counts(registers, header)
+    faults = list(excessive.values())
     checked = _CheckedHeader(registers, header, faults)
     velocity = checked.positive("velocity", math.nan)
     mass = checked.positive("mass", math.nan, also=math.isnan)
     if not math.isnan(mass) and not LIGHTEST_KG <= mass <= HEAVIEST_KG:
-        faults.append(f"register mass ({registers['mass'].address}): {mass:g} kg cannot be")
+        faults.append(f"{_where(registers, 'mass')}: {mass:g} kg cannot be")
         mass = math.nan
-    time_ns = integer(header["cycle_time"])
+    time_ns = _time_ns(header.get("cycle_time", 0))
     if time_ns > LATEST_NS:
         faults.append(f"register cycle_time ({registers['cycle_time'].address}): {time_ns} ns is no date")
         time_ns = 0
@@ -172,24 +83,18 @@ def capture_from_words(
     dwell = checked.positive("dwell", math.nan, also=lambda value: value == 0.0 or math.isnan(value))
     direction = integer(header.get("direction", 1))
     if direction not in (-1, 1):
-        faults.append(
-            f"register direction ({registers['direction'].address}): {direction} instead of 1 or -1"
-        )
+        faults.append(f"{_where(registers, 'direction')}: {direction} instead of 1 or -1")
         direction = 1
     channels = {
         name: None if name in excessive else _channel(registers, header, name, words, faults)
         for name, words in samples.items()
     }
-    summary = None
-    if "peak_force" in header and "sliding_distance" in header:
-        summary = Summary(_number(header["peak_force"]), _number(header["sliding_distance"]))
-        for name in ("peak_force", "sliding_distance"):
-            if not math.isfinite(_number(header[name])):
-                faults.append(f"register {name} ({registers[name].address}): not a number")
+    summary = _summary(registers, header, faults)
+    if summary is not None:
         faults += _scale_faults(registers, summary, channels)
-    start = _number(header.get("start_position", 0.0))
+    start = number(header.get("start_position", 0.0))
     return Capture(
-        cycle=integer(header["window_cycle"]),
+        cycle=integer(header["window_cycle" if "window_cycle" in header else "cycle_counter"]),
         velocity_m_s=velocity,
         mass_kg=mass,
         force=channels.get("force"),
@@ -203,6 +108,37 @@ def capture_from_words(
         start_m=start,
         summary=summary,
     ), faults
+
+
+def _summary(registers: RegisterMap, header: Mapping[str, Value], faults: list[str]) -> Summary | None:
+    """Take the module's own figures, None where it has none; one that it does not have is nan."""
+    names = [name for name in ("peak_force", "sliding_distance") if name in header]
+    if not names:
+        return None
+    faults += [
+        f"register {name} ({registers[name].address}): not a number"
+        for name in names
+        if not math.isfinite(number(header[name]))
+    ]
+    values = [number(header.get(name, math.nan)) for name in ("peak_force", "sliding_distance")]
+    stds = [
+        registers[name].si_std if name in registers else math.nan
+        for name in ("peak_force", "sliding_distance")
+    ]
+    return Summary(*values, *stds)
+
+
+def _where(registers: RegisterMap, name: str) -> str:
+    """Where the map has a value: at an address, or as a constant."""
+    place = registers[name].address if name in registers else "a constant of the map"
+    return f"register {name} ({place})"
+
+
+def _time_ns(value: Value) -> int:
+    """Nanoseconds since 1970 of a time: a plain code is one, a time with a unit is in seconds."""
+    if isinstance(value, float) and math.isfinite(value) and value > 0.0:
+        return round(1e9 * value)
+    return integer(value)
 
 
 def _scale_faults(
@@ -242,12 +178,14 @@ class _CheckedHeader:
         """Return a value; `absent` where there is none, nan where it is neither above 0 nor `also`."""
         if name not in self.header:
             return absent
-        value = _number(self.header[name])
+        value = number(self.header[name])
         if also(value) or (math.isfinite(value) and value > 0.0):
             return value
-        register = self.registers[name]
-        raw = value / register.si_factor
-        self.faults.append(f"register {name} ({register.address}): {raw:g} {register.unit} cannot be")
+        shown = f"{value:g}"
+        if name in self.registers:
+            register = self.registers[name]
+            shown = f"{value / register.si_factor:g} {register.unit}"
+        self.faults.append(f"{_where(self.registers, name)}: {shown} cannot be")
         return math.nan
 
 
@@ -256,8 +194,8 @@ def _channel(
 ) -> Channel | None:
     register = registers[name]
     where = f"register {name} ({register.address})"
-    rate_hz = _number(header.get(f"{name}_rate", math.nan))
-    start_s = _number(header.get(f"{name}_start", math.nan))
+    rate_hz = number(header.get(f"{name}_rate", header.get("sample_rate", math.nan)))
+    start_s = number(header.get(f"{name}_start", header.get("sample_start", 0.0)))
     if not words.size:
         if name != "actuator":  # most modules have none
             faults.append(f"{where}: no samples, {name}_count is 0")

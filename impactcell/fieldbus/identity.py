@@ -3,9 +3,9 @@
 from typing import Final
 
 from impactcell.errors import ModbusExceptionError, WrongDeviceError
-from impactcell.fieldbus.decoding import StatusBlock
 from impactcell.fieldbus.plausibility import wrong_word_order
 from impactcell.fieldbus.register_client import RegisterClient
+from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.status_reader import StatusReader
 from impactcell.records import CycleId
 

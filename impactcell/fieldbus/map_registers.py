@@ -1,71 +1,87 @@
-"""The names that a register map can use: what is required and why, what is optional and for what. Pure."""
+"""The names that a register map can use: what is required and why, and what needs what. Pure."""
 
 import difflib
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Final
 
 REQUIRED: Final = {
-    "module_name": "who answers is proved with each connection",
-    "map_version": "the layout is proved with each connection",
-    "state": "the status block begins with it",
-    "session": "a restart of the module is told from a cycle that is asked for again",
     "cycle_counter": "there is a new cycle",
-    "ring_cycle": "where each cycle is, and which are lost",
-    "slot_select": "a cycle of the ring is put into the window",
-    "window_sequence": "the window was at rest when it was read",
-    "window_slot": "the window shows the slot that was asked for",
-    "window_session": "the window shows a cycle of this session",
-    "window_cycle": "the window shows the cycle that was asked for",
-    "cycle_time": "when the cycle was made",
     "velocity": "equations (4) and (5) need it",
-    "force_rate": "time of the force samples",
-    "force_start": "time of the first force sample",
-    "force_count": "how many of the force samples are of this cycle",
-    "force": "the contact force",
-    "position_rate": "time of the position samples",
-    "position_start": "time of the first position sample",
-    "position_count": "how many of the position samples are of this cycle",
-    "position": "the motion of the part",
-    "window_sequence_after": "the window did not change while it was read",
 }
-"""Registers without which no cycle can be read consistently, and what each proves or gives."""
+"""Registers without which nothing can be made of any module, and what each gives."""
 
-_WITHOUT: Final = {
-    "status_crc32": "a wrong bit in the status block is noticed only as news are read twice",
-    "capture_crc32": "a wrong bit in header or samples is not noticed, "
-    "and a reading that the link interrupts begins anew",
-    "acknowledge_cycle": "the module is not told which cycles are stored",
-    "peak_force": "the scale of force is not proved, and there is no force without samples",
-    "sliding_distance": "the scale of position is not proved, and there is no distance without samples",
-    "batch_id": "batches are told from friction alone, or by StartBatch",
-    "mass": "the mass is the cell file's",
-    "stroke": "the stroke is the cell file's",
+NEEDED_BY: Final[Mapping[str, tuple[tuple[tuple[str, ...], str], ...]]] = {
+    "ring_cycle": (
+        (("slot_select",), "a cycle of the ring is put into the window"),
+        (("window_cycle",), "the window shows the cycle that was asked for"),
+    ),
+    "slot_select": ((("ring_cycle",), "where each cycle is, and which are lost"),),
+    "window_sequence": ((("window_sequence_after",), "the window did not change while it was read"),),
+    "window_sequence_after": ((("window_sequence",), "the window was at rest when it was read"),),
+    "capture_crc32": ((("window_cycle",), "the CRC covers which cycle it is"),),
+    "status_crc32": ((("state",), "the status block, and what its CRC covers, begins with it"),),
+    "acknowledge_session": ((("acknowledge_cycle",), "which cycles of the session are stored"),),
+    "force": ((("force_rate", "sample_rate"), "time of the force samples"),),
+    "position": ((("position_rate", "sample_rate"), "time of the position samples"),),
+    "actuator": ((("actuator_rate", "sample_rate"), "time of the actuator samples"),),
 }
-"""Optional registers, and what is not promised without them."""
+"""What else a map with a register has to have: one of some names, and what that proves or gives."""
 
-_OTHERS: Final = (
-    "serial_number", "firmware_version", "newest_slot", "acknowledged_cycle", "overwritten_count",
-    "acknowledge_session", "direction", "dwell", "start_position",
-    "actuator_rate", "actuator_start", "actuator_count", "actuator",
-    "batch_sequence", "batch_from_cycle", "batch_announced",
-    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
-    "command_accepted", "command_cycle", "command_velocity", "command_stroke", "command_direction",
-    "command_abort", "command_sequence",
+MEASURED: Final = ("force", "position", "peak_force", "sliding_distance")
+"""What a tap shows of friction: a map has one of these at least."""
+
+ARRAYS: Final = ("force", "position", "actuator")
+"""The sampled channels, in the order in which a CRC covers them."""
+
+HEADER: Final = (
+    "window_sequence", "window_slot", "window_session", "window_cycle", "capture_ready", "cycle_time",
+    "direction", "velocity", "mass", "stroke", "dwell", "start_position", "peak_force", "sliding_distance",
+    "batch_id", "sample_rate", "force_rate", "position_rate", "actuator_rate",
+    "sample_start", "force_start", "position_start", "actuator_start",
+    "sample_count", "force_count", "position_count", "actuator_count", "capture_crc32",
 )  # fmt: skip
-"""Optional registers whose lack takes nothing away but themselves."""
+"""What is read with each cycle, beside its samples."""
 
-NAMES: Final = (*REQUIRED, *_WITHOUT, *_OTHERS)
+CONSTANTS: Final = (
+    "velocity", "mass", "stroke", "direction", "sample_rate", "force_rate", "position_rate", "actuator_rate",
+    "sample_start", "force_start", "position_start", "actuator_start",
+)  # fmt: skip
+"""What a map may give as a number, for a module where it is always the same."""
+
+_STATUS: Final = (
+    "module_name", "serial_number", "map_version", "firmware_version",
+    "state", "newest_slot", "session", "cycle_counter", "acknowledged_cycle", "overwritten_count",
+    "ring_cycle", "status_crc32", "batch_sequence", "batch_from_cycle", "batch_announced",
+    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
+    "command_accepted", "command_cycle",
+)  # fmt: skip
+"""What the module says of itself, of what is to come and of positioning."""
+
+_WRITTEN: Final = (
+    "slot_select", "acknowledge_session", "acknowledge_cycle", "command_velocity", "command_stroke",
+    "command_direction", "command_abort", "command_sequence",
+)  # fmt: skip
+"""What the service writes."""
+
+NAMES: Final = (*HEADER, *ARRAYS, "window_sequence_after", *_STATUS, *_WRITTEN)
 """All names that are used."""
 
 
-def not_promised(registers: Container[str]) -> tuple[str, ...]:
-    """Say what a map cannot promise, for what it lacks.
+def missing_registers(names: Container[str]) -> Iterator[str]:
+    """Say which registers a map lacks, and what each is needed for.
 
-    >>> not_promised({"capture_crc32", "acknowledge_cycle", "peak_force", "sliding_distance", "batch_id",
-    ...               "mass", "stroke"})
-    ('no register status_crc32: a wrong bit in the status block is noticed only as news are read twice',)
+    >>> list(missing_registers({"cycle_counter", "velocity", "force"}))
+    ['register force_rate or sample_rate is missing: time of the force samples']
     """
-    return tuple(f"no register {name}: {text}" for name, text in _WITHOUT.items() if name not in registers)
+    for name, why in REQUIRED.items():
+        if name not in names:
+            yield f"register {name} is missing: {why}"
+    for name, needs in NEEDED_BY.items():
+        for alternatives, why in needs if name in names else ():
+            if not any(each in names for each in alternatives):
+                yield f"register {' or '.join(alternatives)} is missing: {why}"
+    if not any(name in names for name in MEASURED):
+        yield f"register {' or '.join(MEASURED)} is missing: nothing else tells of friction"
 
 
 def unknown_names(registers: Iterable[str]) -> tuple[str, ...]:

@@ -1,10 +1,15 @@
 """What a map file may say about a register: keys, types and ranges, every fault named."""
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
-_TABLES: Final = ("holding", "input")
+from impactcell.fieldbus.map_registers import CONSTANTS
+from impactcell.fieldbus.register_types import BIT_TABLES, KINDS, SI_FACTOR, TABLES, WRITABLE_TABLES
+
 _ORDERS: Final = ("big", "little")
+MASK_WRITE, READ_WRITE = 22, 23
+"""Functions that only some modules have: mask write register, and read/write multiple registers."""
 _LARGEST: Final = 1e300
 """A scale or offset with which the largest code is still a number."""
 
@@ -35,12 +40,12 @@ def _is_saturation(value: object) -> bool:
 _KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
     "address": ("an address 0..65535", lambda value: _is_int(value) and 0 <= value < 65_536),
     "type": (
-        "u16, i16, u32, i32, u64, i64, bcd16, bcd32, f32, f64 or string",
+        "u16, i16, u32, i32, u64, i64, bcd16, bcd32, f32, f64, bit or string",
         lambda value: isinstance(value, str),
     ),
     "count": ("a whole number of at least 1", lambda value: _is_int(value) and value >= 1),
     "length": ("a whole number of registers, at least 1", lambda value: _is_int(value) and value >= 1),
-    "table": ("holding or input", lambda value: value in _TABLES),
+    "table": ("holding, input, coil or discrete", lambda value: value in TABLES),
     "writable": ("true or false", lambda value: isinstance(value, bool)),
     "word_order": ("big or little", lambda value: value in _ORDERS),
     "byte_order": ("big or little", lambda value: value in _ORDERS),
@@ -50,73 +55,144 @@ _KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
     "unit": ("text", lambda value: isinstance(value, str)),
     "not_a_number": ("a code", _is_int),
     "saturation": ("two codes, the lower first", _is_saturation),
+    "std": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
     "expect": ("a whole number or text", lambda value: _is_int(value) or isinstance(value, str)),
     "codes": ("whole numbers with their names", _is_codes),
     "description": ("text", lambda value: isinstance(value, str)),
 }
 
 
-def validate_map(
-    mapping: Mapping[str, Any], units: Container[str], kinds: Container[str]
-) -> tuple[str, dict[str, dict[str, Any]], list[str]]:
-    """Name of the map, the arguments of each register that is declared soundly, and all faults found.
+_CONSTANT_KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
+    "value": ("a number", _is_number),
+    "unit": _KEYS["unit"],
+    "description": _KEYS["description"],
+}
+"""Keys of an entry that stands for a register: the module has none, for it is always the same."""
+_TOP: Final = ("format", "name", "word_order", "functions", "registers")
 
-    Parameters
+
+@dataclass(frozen=True, slots=True)
+class ValidatedMap:
+    """What is sound in a map file, and what is not.
+
+    Attributes
     ----------
-    mapping : mapping
-        A parsed map file: `format`, `name`, `word_order` and the mapping `registers`.
-    units, kinds : container of str
-        What `unit` and `type` may be.
+    registers : dict
+        Arguments of each register that is declared soundly, by name.
+    constants : dict
+        Value of each constant that is, SI.
+    functions : tuple of int
+        Of `MASK_WRITE` and `READ_WRITE`, those that the module has.
+    faults : list of str
+        All that is wrong.
     """
-    faults = [
-        f"unknown key {key}" for key in mapping if key not in ("format", "name", "word_order", "registers")
-    ]
-    name = str(mapping.get("name", "without a name"))
+
+    name: str
+    registers: dict[str, dict[str, Any]]
+    constants: dict[str, float]
+    functions: tuple[int, ...]
+    faults: list[str]
+
+
+def validate_map(mapping: Mapping[str, Any]) -> ValidatedMap:
+    """Look through a parsed map file: `format`, `name`, `word_order`, `functions` and `registers`."""
+    faults = [f"unknown key {key}" for key in mapping if key not in _TOP]
     if mapping.get("format") != 1:
         faults.append("format must be 1")
     order = mapping.get("word_order", "big")
     if order not in _ORDERS:
         faults.append("word_order must be big or little")
-    arguments: dict[str, dict[str, Any]] = {}
+    functions = mapping.get("functions", [])
+    if not isinstance(functions, list) or any(
+        not _is_int(each) or each not in (MASK_WRITE, READ_WRITE) for each in functions
+    ):
+        faults.append(f"functions must be a list of {MASK_WRITE} and {READ_WRITE}, those that the module has")
+        functions = []
+    name = str(mapping.get("name", "without a name"))
+    validated = ValidatedMap(name, {}, {}, tuple(functions), faults)
     for key, entry in mapping["registers"].items():
-        entry_faults = list(_entry_faults(entry, units, kinds))
+        is_constant = isinstance(entry, Mapping) and "value" in entry
+        entry_faults = _constant_faults(key, entry) if is_constant else _entry_faults(entry, functions)
         faults += [f"register {key}: {fault}" for fault in entry_faults]
-        if not entry_faults:
-            arguments[str(key)] = _arguments(str(key), entry, order)
-    return name, arguments, faults
+        if entry_faults:
+            continue
+        if is_constant:
+            validated.constants[str(key)] = _constant(entry)
+        else:
+            validated.registers[str(key)] = _arguments(str(key), entry, order)
+    return validated
 
 
-def _entry_faults(entry: object, units: Container[str], kinds: Container[str]) -> list[str]:
+def _constant_faults(name: object, entry: Mapping[str, Any]) -> list[str]:
+    if name not in CONSTANTS:
+        return [f"cannot be a constant; only {', '.join(CONSTANTS)} can"]
+    faults = _key_faults(entry, _CONSTANT_KEYS)
+    if not faults and entry.get("unit") and entry["unit"] not in SI_FACTOR:
+        faults.append(f"unit {entry['unit']!r} is not known")
+    return faults
+
+
+def _constant(entry: Mapping[str, Any]) -> float:
+    value: float = entry["value"]  # a direction is a whole number and stays one
+    return value * SI_FACTOR[entry["unit"]] if entry.get("unit") else value
+
+
+def _key_faults(entry: Mapping[Any, Any], keys: Mapping[str, tuple[str, Callable[[Any], bool]]]) -> list[str]:
+    faults = []
+    for key, value in entry.items():
+        if key not in keys:
+            faults.append(f"unknown key {key}")
+        elif not keys[key][1](value):
+            faults.append(f"{key} must be {keys[key][0]}, not {value!r}")
+    return faults
+
+
+def _entry_faults(entry: object, functions: list[int]) -> list[str]:
     if not isinstance(entry, Mapping):
         return ["must be a mapping with at least address and type"]
     faults = [f"{key} is missing" for key in ("address", "type") if key not in entry]
-    for key, value in entry.items():
-        if key not in _KEYS:
-            faults.append(f"unknown key {key}")
-        elif not _KEYS[key][1](value):
-            faults.append(f"{key} must be {_KEYS[key][0]}, not {value!r}")
-    return faults or _combination_faults(entry, units, kinds)
+    faults += _key_faults(entry, _KEYS)
+    return faults or [*_combination_faults(entry), *_bit_faults(entry, functions)]
 
 
-def _combination_faults(entry: Mapping[str, Any], units: Container[str], kinds: Container[str]) -> list[str]:
+def _combination_faults(entry: Mapping[str, Any]) -> list[str]:
     """Say which keys, each of them sound, do not go together."""
     faults: list[str] = []
     kind, unit = entry["type"], entry.get("unit", "")
-    if kind != "string" and kind not in kinds:
+    if kind != "string" and kind not in KINDS:
         faults.append(f"type must be {_KEYS['type'][0]}, not {kind!r}")
     if (kind == "string") != ("length" in entry):
         faults.append("length belongs to type string, and to no other")
     if kind == "string" and "count" in entry:
         faults.append("an array of strings is not supported")
-    if unit and unit not in units:
+    if unit and unit not in SI_FACTOR:
         faults.append(f"unit {unit!r} is not known")
-    if kind == "string" and "offset" in entry:
-        faults.append("a text has no offset")
-    beside_bit = {"count", "scale", "offset", "unit", "not_a_number", "saturation", "codes"} & set(entry)
-    if "bit" in entry and (kind != "u16" or entry.get("writable") or beside_bit):
-        faults.append("a bit is one of a u16 that is only read, and has no scale, unit or codes")
+    if kind == "string" and not {"offset", "std"}.isdisjoint(entry):
+        faults.append("a text has no offset and no std")
     if kind in ("f32", "f64", "string") and ("not_a_number" in entry or "saturation" in entry):
         faults.append("not_a_number and saturation are codes of integer types")
+    table = entry.get("table", "holding")
+    if entry.get("writable") and table not in WRITABLE_TABLES:
+        faults.append(f"table {table} can only be read")
+    return faults
+
+
+def _bit_faults(entry: Mapping[str, Any], functions: list[int]) -> list[str]:
+    """Say what does not go together about single bits: of a register, or in a table of bits."""
+    in_table = entry.get("table", "holding") in BIT_TABLES
+    faults = []
+    if in_table != (entry["type"] == "bit"):
+        faults.append("coils and discrete inputs are of type bit, and nothing else is")
+    number_only = {"scale", "offset", "unit", "not_a_number", "saturation", "std"} & set(entry)
+    if in_table and ({"bit", "word_order", "byte_order"} & set(entry) or number_only):
+        faults.append("a coil or a discrete input has no order, scale or unit")
+    if "bit" in entry:
+        if entry["type"] != "u16" or {"count", "codes"} & set(entry) or number_only:
+            faults.append("a bit is one of a u16, and has no scale, unit or codes")
+        if entry.get("writable") and MASK_WRITE not in functions:
+            faults.append(
+                f"a bit of a register is written by function {MASK_WRITE}, which is not in functions"
+            )
     return faults
 
 
@@ -125,8 +201,5 @@ def _arguments(name: str, entry: Mapping[str, Any], order: str) -> dict[str, Any
     values |= {"name": name, "kind": entry["type"], "word_order": entry.get("word_order", order)}
     if "saturation" in values:
         values["saturation"] = (values["saturation"][0], values["saturation"][1])
-    if "scale" in values:
-        values["scale"] = float(values["scale"])
-    if "offset" in values:
-        values["offset"] = float(values["offset"])
+    values |= {key: float(values[key]) for key in ("scale", "offset", "std") if key in values}
     return values

@@ -1,9 +1,18 @@
 """Client of one Modbus device: blocks of registers in and out, over whatever transport it is given."""
 
-from impactcell.fieldbus.codec import write_request
+from typing import Final
+
+from impactcell.fieldbus.codec import Request, mask_write_request, read_write_request, write_request
+from impactcell.fieldbus.device_identification import OBJECTS, identification_objects, identification_request
+from impactcell.fieldbus.register_types import BIT_TABLES
 from impactcell.fieldbus.registers import Words
-from impactcell.fieldbus.request_batching import Exchange, PartialBlock, RequestBatch
+from impactcell.fieldbus.request_batching import Exchange, PartialBlock, ReplyData, RequestBatch
 from impactcell.fieldbus.transports.protocol import Transport
+
+_MOST_PARTS: Final = 8
+"""So many replies a device identification has at most: more would be a device that never ends."""
+_BITS_A_REGISTER: Final = 16
+"""Coils or discrete inputs that take the room of a register in a reply."""
 
 
 class ModbusClient:
@@ -51,9 +60,12 @@ class ModbusClient:
 
     def block(self, address: int, count: int, table: str = "holding") -> PartialBlock:
         """Give a block of registers that is still to be read, by `complete`."""
-        return PartialBlock(address, count, table, self.link.max_registers)
+        step = self.link.max_registers * (_BITS_A_REGISTER if table in BIT_TABLES else 1)
+        return PartialBlock(address, count, table, step)
 
-    async def complete(self, *blocks: PartialBlock, write: tuple[int, Words] | None = None) -> None:
+    async def complete(
+        self, *blocks: PartialBlock, write: tuple[int, Words] | None = None, at_once: bool = False
+    ) -> None:
         """Read what `blocks` still lack; after an error they keep what did arrive. Raises as `read` does.
 
         Parameters
@@ -62,18 +74,49 @@ class ModbusClient:
             What is read, in this order.
         write : tuple of int and array, optional
             Address and words of holding registers that are written right before, in one request.
+        at_once : bool
+            Whether the device can write and read in one request (function 23): then the first of the first
+            block, which is of holding registers, is read in the request that writes.
         """
         exchange = Exchange()
-        batches = [] if write is None else [RequestBatch(exchange, None, 0, (write_request(*write),))]
-        for block in blocks:
-            batches += block.batches(exchange)
+        batches = [batch for block in blocks for batch in block.batches(exchange)]
+        if write is not None and at_once and batches:
+            first = batches[0] if len(batches[0].requests) == 1 else batches[0].split(1)
+            batches = [first, *(batch for batch in batches if batch is not first)]
+            begin = blocks[0].step * first.first
+            count = min(blocks[0].step, blocks[0].count - begin)
+            first.requests = (read_write_request(blocks[0].address + begin, count, *write),)
+        elif write is not None:
+            batches.insert(0, RequestBatch(exchange, None, 0, (write_request(*write),)))
         if batches:
             self._transport.submit(batches)
             await exchange.done
 
-    async def write(self, address: int, words: Words) -> None:
-        """Write holding registers in one request, before any read that waits; raises as `read` does."""
+    async def write(self, address: int, words: Words, table: str = "holding") -> None:
+        """Write holding registers or coils in one request, before any read that waits; raises as `read`."""
+        await self._ask(write_request(address, words, table), None)
+
+    async def write_bits(self, address: int, keep: int, put: int) -> None:
+        """Change bits of a holding register (function 22), before any read that waits; raises as `read`.
+
+        Those that `keep` has stay as they are, the others become those of `put`.
+        """
+        await self._ask(mask_write_request(address, keep, put), None)
+
+    async def identification(self) -> dict[str, str]:
+        """Ask the device who made it and what it is (function 43/14), by `OBJECTS`; raises as `read` does."""
+        texts: dict[int, str] = {}
+        following: int | None = 0
+        for _ in range(_MOST_PARTS):
+            if following is None:
+                break
+            reply = ReplyData()
+            await self._ask(identification_request(following), reply)
+            objects, following = identification_objects(reply.data)
+            texts |= objects
+        return {OBJECTS[number]: text for number, text in sorted(texts.items()) if number in OBJECTS and text}
+
+    async def _ask(self, request: Request, reply: ReplyData | None) -> None:
         exchange = Exchange()
-        request = write_request(address, words)
-        self._transport.submit([RequestBatch(exchange, None, 0, (request,))], first=True)
+        self._transport.submit([RequestBatch(exchange, reply, 0, (request,))], first=True)
         await exchange.done

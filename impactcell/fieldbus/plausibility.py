@@ -56,7 +56,7 @@ def wrong_word_order(registers: RegisterMap, *images: RegisterImage) -> str | No
         return None
     return (
         f"{'; '.join(impossible)}: the word order is wrong, "
-        f"with `word_order: {swapped['window_sequence'].word_order}` all of it can be"
+        f"with `word_order: {swapped['cycle_counter'].word_order}` all of it can be"
     )
 
 
@@ -87,7 +87,7 @@ def _evidence(registers: RegisterMap, images: Sequence[RegisterImage]) -> Iterat
         yield EARLIEST_NS <= cycle_time < LATEST_NS, f"cycle_time shows {cycle_time} ns"
     for name, (least, most, also) in _RANGES.items():
         shows = value(name)
-        if isinstance(shows, int | float):
+        if isinstance(shows, int | float) and name in registers:
             possible = least <= shows <= most or shows == also or (math.isnan(also) and math.isnan(shows))
             register = registers[name]
             yield possible, f"{name} shows {shows / register.si_factor:g} {register.unit}".rstrip()

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from impactcell.errors import FieldbusError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture
-from impactcell.fieldbus.decoding import StatusBlock
 from impactcell.fieldbus.registers import Value
+from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.records import Capture, CycleId
 
@@ -24,6 +25,8 @@ class ProbeResult:
     ----------
     identity : mapping
         Of `IDENTITY`, by name.
+    identification : mapping
+        What the device says to function 43/14; empty where it does not know that.
     status : StatusBlock
     round_trip_s : float
         Of the last request.
@@ -34,6 +37,7 @@ class ProbeResult:
     """
 
     identity: Mapping[str, Value]
+    identification: Mapping[str, str]
     status: StatusBlock
     round_trip_s: float
     capture: Capture | None
@@ -55,7 +59,16 @@ async def probe(module: ModuleAcquisition) -> ProbeResult:
         faults: tuple[str, ...] = ()
         if status.cycle_counter in status.ring and status.cycle_counter:
             capture, faults = await _newest(module, status)
-        return ProbeResult(identity, status, module.status.round_trip_s, capture, faults)
+        round_trip_s = module.status.round_trip_s
+        return ProbeResult(identity, await _identification(module), status, round_trip_s, capture, faults)
+
+
+async def _identification(module: ModuleAcquisition) -> Mapping[str, str]:
+    """Ask last, for a device that does not know the function may not answer at all."""
+    try:
+        return await module.register_client.modbus.identification()
+    except FieldbusError:
+        return {}
 
 
 async def _newest(module: ModuleAcquisition, status: StatusBlock) -> tuple[Capture | None, tuple[str, ...]]:

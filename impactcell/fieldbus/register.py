@@ -15,50 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from impactcell.errors import MapError
 from impactcell.fieldbus.bcd import NO_BCD, from_bcd, to_bcd
-
-WIRE: Final = np.dtype(">u2")
-"""One register as Modbus carries it."""
+from impactcell.fieldbus.register_types import KINDS, SI_FACTOR, WIRE
 
 Words = NDArray[np.uint16]
 Value = int | float | str | NDArray[Any]
 
-SI_FACTOR: Final[Mapping[str, float]] = {
-    "1": 1.0,
-    "m": 1.0,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "nm": 1e-9,
-    "m/s": 1.0,
-    "mm/s": 1e-3,
-    "mm/min": 1e-3 / 60.0,
-    "N": 1.0,
-    "mN": 1e-3,
-    "kN": 1e3,
-    "kg": 1.0,
-    "g": 1e-3,
-    "s": 1.0,
-    "ms": 1e-3,
-    "us": 1e-6,
-    "ns": 1e-9,
-    "Hz": 1.0,
-    "kHz": 1e3,
-}
-"""Units a map may use, and how many SI units one of them is."""
-
-KINDS: Final[Mapping[str, np.dtype[Any]]] = {
-    "u16": np.dtype(">u2"),
-    "i16": np.dtype(">i2"),
-    "u32": np.dtype(">u4"),
-    "i32": np.dtype(">i4"),
-    "u64": np.dtype(">u8"),
-    "i64": np.dtype(">i8"),
-    "bcd16": np.dtype(">u2"),
-    "bcd32": np.dtype(">u4"),
-    "f32": np.dtype(">f4"),
-    "f64": np.dtype(">f8"),
-}
-"""Numeric types of a register; `string` is the other one."""
-_NUMBERS: Final = {kind: Struct(f">{code}") for kind, code in zip(KINDS, "HhIiQqHIfd", strict=True)}
+_NUMBERS: Final = {kind: Struct(f">{code}") for kind, code in zip(KINDS, "HhIiQqHIfdH", strict=True)}
 """The same for a single number, without the detour over an array."""
 
 
@@ -79,7 +41,7 @@ class Register:
     length : int
         Registers of a string; 0 for numbers.
     table : str
-        `holding` (read by function 3) or `input` (function 4).
+        `holding` (read by function 3), `input` (4), `coil` (1) or `discrete` (2).
     writable : bool
         Whether a client may write it.
     word_order : str
@@ -98,6 +60,8 @@ class Register:
         Code of a sample that was not measured.
     saturation : tuple of int, or None
         Codes at and beyond which the channel is at full scale.
+    std : float or None
+        Standard deviation of the value, in `unit`, where the module's maker tells it.
     expect : int, str or None
         What a module of this map must show here.
     codes : mapping
@@ -119,6 +83,7 @@ class Register:
     unit: str = ""
     not_a_number: int | None = None
     saturation: tuple[int, int] | None = None
+    std: float | None = None
     expect: int | str | None = None
     codes: Mapping[int, str] = field(default_factory=dict)
     description: str = ""
@@ -147,6 +112,11 @@ class Register:
     def si_offset(self) -> float:
         """Value of code 0, SI."""
         return self.offset * SI_FACTOR.get(self.unit, 1.0)
+
+    @property
+    def si_std(self) -> float:
+        """Standard deviation of the value, SI; nan where the map does not say."""
+        return math.nan if self.std is None else self.std * SI_FACTOR.get(self.unit, 1.0)
 
     @property
     def is_code(self) -> bool:
@@ -260,11 +230,23 @@ class Register:
                 raise MapError(f"register {self.name}: {len(text)} bytes do not fit {self.length} registers")
             return self._in_order(np.frombuffer(text.ljust(2 * self.length, b"\0"), dtype=WIRE).copy())
         if self.bit is not None:
-            raise MapError(f"register {self.name} is one bit of a register, which is only read")
+            raise MapError(f"register {self.name} is one bit of a register, which is not written alone")
         codes = self._codes(np.atleast_1d(np.asarray(value)))
         if codes.size > self.count:
             raise MapError(f"register {self.name}: {codes.size} values do not fit {self.count}")
         return self._in_order(codes.view(WIRE))
+
+    def bit_mask(self) -> Words:
+        """Word with a 1 where the register has its `bit`, as on the wire, shape (1,).
+
+        Raises
+        ------
+        MapError
+            If it is no single bit.
+        """
+        if self.bit is None:
+            raise MapError(f"register {self.name} is no single bit of a register")
+        return self._in_order(np.array([1 << self.bit], dtype=WIRE))
 
     def _codes(self, values: NDArray[Any]) -> NDArray[Any]:
         dtype = KINDS[self.kind]
@@ -272,6 +254,8 @@ class Register:
             return ((values.astype(np.float64) - self.si_offset) / self.si_factor).astype(dtype)
         info = np.iinfo(dtype)
         least, most = (0, 10 ** (2 * dtype.itemsize) - 1) if self._is_bcd else (info.min, info.max)
+        if self.kind == "bit":
+            most = 1
         if values.dtype.kind in "iu" and self.is_code:  # exact: u64 does not pass through a float
             if values.size and (int(values.min()) < least or int(values.max()) > most):
                 raise MapError(f"register {self.name}: value outside {least}..{most}")

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from impactcell.errors import ProtocolError
 from impactcell.fieldbus.codec import MAX_WRITE
+from impactcell.fieldbus.map_validation import READ_WRITE
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.register_image import RegisterBlock, RegisterImage, decoded_image, group_registers
 from impactcell.fieldbus.registers import Register, RegisterMap, Words
@@ -54,12 +55,16 @@ class RegisterClient:
         return partial_block.words()
 
     async def read_header(self, slot: int | None = None) -> RegisterImage:
-        """Read the window's header, from `window_sequence` to the first array.
+        """Read what stands beside the samples of a cycle.
 
-        With `slot` that is selected right before; a device that is busy meanwhile may still show another.
+        With `slot` that is selected right before, where the module has a ring; a device that is busy
+        meanwhile may still show another.
         """
-        select, blocks = self.registers["slot_select"], self._blocks(self._header)
-        write = None if slot is None else (select.address, select.encode(slot))
+        blocks = self._blocks(self._header)
+        write = None
+        if slot is not None and self.registers.has_ring:
+            select = self.registers["slot_select"]
+            write = (select.address, select.encode(slot))
         return decoded_image(blocks, [words.tobytes() for words in await self._read(blocks, write)])
 
     async def write_values(self, values: Mapping[str, ArrayLike | str]) -> None:
@@ -67,7 +72,12 @@ class RegisterClient:
         registers = [self.registers[name] for name in values]
         for block in _adjacent_runs(registers):
             words = [register.encode(values[register.name]) for register in block]
-            await self.modbus.write(block[0].address, np.concatenate(words))
+            await self.modbus.write(block[0].address, np.concatenate(words), block[0].table)
+        for register in registers:
+            if register.bit is not None:
+                (mask,) = register.bit_mask().tolist()
+                put = mask if values[register.name] else 0
+                await self.modbus.write_bits(register.address, 0xFFFF ^ mask, put)
 
     def _blocks(self, names: tuple[str, ...]) -> tuple[RegisterBlock, ...]:
         blocks = self._groups.get(names)
@@ -80,7 +90,8 @@ class RegisterClient:
         self, blocks: Iterable[RegisterBlock], write: tuple[int, Words] | None = None
     ) -> list[Words]:
         parts = [self.modbus.block(block.address, block.count, block.table) for block in blocks]
-        await self.modbus.complete(*parts, write=write)
+        at_once = READ_WRITE in self.registers.functions and bool(parts) and parts[0].table == "holding"
+        await self.modbus.complete(*parts, write=write, at_once=at_once)
         return [partial_block.words() for partial_block in parts]
 
     async def _read_until_stable(self, block: RegisterBlock, raw: bytes) -> bytes:
@@ -96,10 +107,11 @@ class RegisterClient:
 
 
 def _adjacent_runs(registers: list[Register]) -> list[list[Register]]:
-    """Group registers that lie side by side, at most as many as one request can write."""
+    """Group whole registers, or coils, that lie side by side, at most as many as one request can write."""
     runs: list[list[Register]] = []
-    for register in sorted(registers, key=lambda r: r.address):
-        last = runs[-1] if runs else None
+    whole = (register for register in registers if register.bit is None)
+    for register in sorted(whole, key=lambda r: (r.table, r.address)):
+        last = runs[-1] if runs and runs[-1][0].table == register.table else None
         if last and last[-1].end == register.address and register.end - last[0].address <= MAX_WRITE:
             last.append(register)
         else:

@@ -6,16 +6,17 @@ SI value = raw code × scale × SI factor of the unit.
 """
 
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from impactcell.errors import MapError
-from impactcell.fieldbus.map_registers import REQUIRED
+from impactcell.fieldbus.map_layout import REGISTER_SPACE, layout_faults, window_faults
+from impactcell.fieldbus.map_registers import ARRAYS, HEADER, REQUIRED, missing_registers
 from impactcell.fieldbus.map_validation import validate_map
-from impactcell.fieldbus.register import KINDS, SI_FACTOR, WIRE, Register, Value, Words
+from impactcell.fieldbus.register import Register, Value, Words
+from impactcell.fieldbus.register_types import WIRE
 
 __all__ = [
     "REGISTER_SPACE",
@@ -28,9 +29,6 @@ __all__ = [
     "registers_crc32",
 ]
 
-REGISTER_SPACE: Final = 65_536
-"""Addresses of a table: 16 bits."""
-
 
 @dataclass(frozen=True, slots=True)
 class RegisterMap:
@@ -42,10 +40,16 @@ class RegisterMap:
         The layout's name, for messages.
     registers : mapping
         Name to `Register`.
+    constants : mapping
+        What the module has no register for because it is always the same, SI, by the register's name.
+    functions : tuple of int
+        Functions that only some modules have, and this one has; see `map_validation`.
     """
 
     name: str
     registers: Mapping[str, Register]
+    constants: Mapping[str, float] = field(default_factory=dict)
+    functions: tuple[int, ...] = ()
 
     @classmethod
     def from_mapping(cls, mapping: object) -> "RegisterMap":
@@ -59,18 +63,15 @@ class RegisterMap:
         """
         if not isinstance(mapping, Mapping) or not isinstance(mapping.get("registers"), Mapping):
             raise MapError("register map: must be a mapping with format, name and registers")
-        name, declared, faults = validate_map(mapping, units=SI_FACTOR, kinds=KINDS)
-        registers = {key: Register(**values) for key, values in declared.items()}
-        faults += _layout_faults(registers.values())
-        faults += [
-            f"register {key} is missing: {why}"
-            for key, why in REQUIRED.items()
-            if key not in mapping["registers"]
-        ]
-        faults += _window_faults(registers)
+        validated = validate_map(mapping)
+        name, faults = validated.name, validated.faults
+        registers = {key: Register(**values) for key, values in validated.registers.items()}
+        faults += layout_faults(registers.values())
+        faults += missing_registers(mapping["registers"])
+        faults += window_faults(registers)
         if faults:
             raise MapError(f"register map {name}: " + "; ".join(faults), faults)
-        return cls(name, registers)
+        return cls(name, registers, validated.constants, validated.functions)
 
     def __getitem__(self, name: str) -> Register:
         """Register called `name`; MapError where the map has none."""
@@ -86,12 +87,22 @@ class RegisterMap:
     def with_word_order(self, word_order: str) -> "RegisterMap":
         """Return the same layout with every value of several registers in another word order."""
         registers = {name: replace(r, word_order=word_order) for name, r in self.registers.items()}
-        return RegisterMap(self.name, registers)
+        return replace(self, registers=registers)
+
+    @property
+    def has_ring(self) -> bool:
+        """Whether the module holds several captures; else it has one buffer."""
+        return "ring_cycle" in self
 
     @property
     def slots(self) -> int:
-        """Captures the module's ring holds."""
-        return self["ring_cycle"].count
+        """Captures that the module holds."""
+        return self["ring_cycle"].count if self.has_ring else 1
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """Names of the channels that the module samples, in the order in which a CRC covers them."""
+        return tuple(name for name in ARRAYS if name in self)
 
     def status(self) -> tuple[Register, ...]:
         """Return the registers that `status_crc32` covers, and itself; none where the map has none."""
@@ -102,12 +113,25 @@ class RegisterMap:
         return tuple(r for r in inside if first.address <= r.address <= last.address)
 
     def header(self) -> tuple[Register, ...]:
-        """Return the window's registers before its arrays, from the sequence number on, by address."""
-        first = self["window_sequence"].address
-        last = self["force"].address
-        table = self["window_sequence"].table
-        inside = (r for r in self.registers.values() if r.table == table and first <= r.address < last)
-        return tuple(sorted(inside, key=lambda register: register.address))
+        """Return what is read with each cycle beside its samples, by table and address.
+
+        Where nothing there says which cycle it is, the module's counter does.
+        """
+        names = HEADER if "window_cycle" in self else (*HEADER, "cycle_counter")
+        present = (self.registers[name] for name in names if name in self)
+        return tuple(sorted(present, key=lambda register: (register.table, register.address)))
+
+    def covered(self) -> Register:
+        """Return the register at which begins what `capture_crc32` covers of the header.
+
+        Raises
+        ------
+        MapError
+            If the map has no such CRC.
+        """
+        crc = self["capture_crc32"]
+        outside = ("window_sequence", "capture_ready", "cycle_counter")
+        return next(r for r in self.header() if r.table == crc.table and r.name not in outside)
 
 
 def registers_crc32(*blocks: Words) -> int:
@@ -121,34 +145,3 @@ def registers_crc32(*blocks: Words) -> int:
     for words in blocks:
         crc = zlib.crc32(np.ascontiguousarray(words, dtype=WIRE).data, crc)
     return crc
-
-
-def _layout_faults(registers: Iterable[Register]) -> Iterator[str]:
-    ordered = sorted(registers, key=lambda register: (register.table, register.address))
-    for register in ordered:
-        if register.end > REGISTER_SPACE:
-            yield f"register {register.name} ends at {register.end - 1}, outside 0..{REGISTER_SPACE - 1}"
-    for i, register in enumerate(ordered):
-        for other in ordered[i + 1 :]:
-            if other.table != register.table or other.address >= register.end:
-                break
-            if None not in (register.bit, other.bit) and register.bit != other.bit:
-                continue
-            yield f"registers {register.name} and {other.name} overlap at {other.address}"
-
-
-def _window_faults(registers: Mapping[str, Register]) -> Iterator[str]:
-    arrays = [registers[name] for name in ("force", "position", "actuator") if name in registers]
-    window = [registers[name] for name in ("window_sequence", "window_sequence_after") if name in registers]
-    if len({register.table for register in (*arrays, *window)}) > 1:
-        yield "the capture window must lie in one table"
-    elif (
-        len(window) == 2
-        and arrays
-        and not all(
-            window[0].end <= register.address and register.end <= window[1].address for register in arrays
-        )
-    ):
-        yield "force, position and actuator must lie between window_sequence and window_sequence_after"
-    if "ring_cycle" in registers and registers["ring_cycle"].count < 2:
-        yield "register ring_cycle must be an array with one cycle number a slot"

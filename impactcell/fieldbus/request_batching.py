@@ -13,9 +13,15 @@ import numpy as np
 
 from impactcell.errors import FieldbusError
 from impactcell.fieldbus.codec import FunctionCode, Request, read_request
-from impactcell.fieldbus.registers import WIRE, Words
+from impactcell.fieldbus.register_types import BIT_TABLES, WIRE
+from impactcell.fieldbus.registers import Words
 
-_READ_FUNCTION: Final = {"holding": FunctionCode.READ_HOLDING, "input": FunctionCode.READ_INPUT}
+_READ_FUNCTION: Final = {
+    "holding": FunctionCode.READ_HOLDING,
+    "input": FunctionCode.READ_INPUT,
+    "coil": FunctionCode.READ_COILS,
+    "discrete": FunctionCode.READ_DISCRETE,
+}
 
 
 class Exchange:
@@ -53,7 +59,10 @@ def _requests(table: str, address: int, count: int, step: int) -> tuple[Request,
 
 
 class PartialBlock:
-    """A block of registers, as far as it has been read, `step` registers a request."""
+    """A block of registers, as far as it has been read, `step` registers a request.
+
+    Of coils and discrete inputs each is a word, 0 or 1.
+    """
 
     __slots__ = ("_answered", "_data", "address", "count", "step", "table")
 
@@ -88,8 +97,30 @@ class PartialBlock:
     def fill(self, first: int, count: int, data: bytes) -> None:
         """Put in the data of the replies to `count` requests from number `first` on."""
         at = 2 * self.step * first
+        if self.table in BIT_TABLES:
+            data = self._words_of_bits(first, count, data)
         self._data[at : at + len(data)] = data
         self._answered[first : first + count] = b"\1" * count
+
+    def _words_of_bits(self, first: int, count: int, data: bytes) -> bytes:
+        """Give a word for each bit; the first is the least significant of the first byte of its reply."""
+        replies = np.frombuffer(data, np.uint8).reshape(count, -1)
+        bits = np.unpackbits(replies, axis=1, bitorder="little")
+        asked = min(self.step, self.count - self.step * first)
+        return bits[:, :asked].astype(WIRE).tobytes()
+
+
+class ReplyData:
+    """Where the data of a reply go that is no block of registers."""
+
+    __slots__ = ("data",)
+
+    def __init__(self) -> None:
+        self.data = b""
+
+    def fill(self, first: int, count: int, data: bytes) -> None:  # noqa: ARG002 - as of a block
+        """Take the data of the only request."""
+        self.data = data
 
 
 @dataclass(slots=True, eq=False)
@@ -97,7 +128,7 @@ class RequestBatch:
     """Requests alike but for their address, from number `first` of `block` on; a write has no block."""
 
     exchange: Exchange
-    block: PartialBlock | None
+    block: PartialBlock | ReplyData | None
     first: int
     requests: tuple[Request, ...]
 

@@ -3,12 +3,11 @@
 from typing import Final
 
 from impactcell.errors import ProtocolError, WrongDeviceError
-from impactcell.fieldbus import decoding
-from impactcell.fieldbus.decoding import StatusBlock
 from impactcell.fieldbus.plausibility import wrong_word_order
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import registers_crc32
+from impactcell.fieldbus.status_block import STATUS_REGISTERS, StatusBlock, decode_status
 
 _ATTEMPTS: Final = 8
 """Readings until one is proved, before the link counts as broken."""
@@ -28,7 +27,7 @@ class StatusReader:
         self._client = client
         self._registers = client.registers
         covered = (register.name for register in client.registers.status())
-        self._names = tuple(dict.fromkeys((*decoding.STATUS_REGISTERS, *covered)))
+        self._names = tuple(dict.fromkeys((*STATUS_REGISTERS, *covered)))
         self._proved: tuple[RegisterImage, StatusBlock] | None = None
 
     async def read(self) -> StatusBlock:
@@ -47,7 +46,7 @@ class StatusReader:
             if self._proved is not None and image is self._proved[0]:
                 return self._proved[1]
             if self._fits_crc(image) or (before is not None and self._agree(before, image)):
-                self._proved = image, decoding.decode_status(self._registers, image.values)
+                self._proved = image, decode_status(self._registers, image.values)
                 return self._proved[1]
             if (wrong := wrong_word_order(self._registers, image)) is not None and self._has_crc(image):
                 raise WrongDeviceError(f"{self._client.modbus.link}: {wrong}")

@@ -12,7 +12,7 @@ from typing import Final
 
 from impactcell.errors import LinkError, ModbusExceptionError, PositioningError, ProtocolError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
-from impactcell.fieldbus.decoding import PositioningStatus
+from impactcell.fieldbus.status_block import PositioningStatus
 
 _POLL_S: Final = 0.005
 """Between two looks at the outcome of a tap, seconds: a tenth of the shortest tap and slide."""

@@ -42,7 +42,11 @@ def encode_capture(capture: Capture) -> bytes:
         "covariates": dict(capture.covariates),
     }
     if capture.summary is not None:
-        header["summary"] = [capture.summary.peak_force_n, capture.summary.sliding_distance_m]
+        summary = capture.summary
+        header["summary"] = [summary.peak_force_n, summary.sliding_distance_m]
+        stds = [summary.peak_force_std_n, summary.sliding_distance_std_m]
+        if not all(math.isnan(std) for std in stds):  # else as in the captures of earlier versions
+            header["summary"] += stds
     for name in _CHANNELS:
         channel: Channel | None = getattr(capture, name)
         if channel is not None:

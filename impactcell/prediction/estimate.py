@@ -140,7 +140,7 @@ def _peak_force(features: Features) -> tuple[MeasuredFeature, str]:
     if capture.force is None and capture.summary is not None:
         reported = capture.summary.peak_force_n
         if math.isfinite(reported) and reported > 0.0:
-            return _reported(reported), "from the module's summary: no force was recorded"
+            return _reported(reported, capture.summary.peak_force_std_n, "no force was recorded")
         return NO_FEATURE, f"the module reports a peak force of {reported} N and no record"
     if isinstance(features.peak_force, Fault):
         return NO_FEATURE, str(features.peak_force)
@@ -152,9 +152,9 @@ def _slide(features: Features) -> tuple[SlideFeatures | None, MeasuredFeature, s
     summary, missing = features.capture.summary, _missing_channel(features.capture)
     if summary is not None and missing:
         reported = summary.sliding_distance_m
-        is_usable = math.isfinite(reported) and reported > 0.0
-        distance = _reported(reported) if is_usable else NO_FEATURE
-        return None, distance, f"from the module's summary: {missing}"
+        if not (math.isfinite(reported) and reported > 0.0):
+            return None, NO_FEATURE, f"{missing}, and the module reports a sliding distance of {reported} m"
+        return None, *_reported(reported, summary.sliding_distance_std_m, missing)
     if isinstance(features.slide, Fault):
         return None, NO_FEATURE, str(features.slide)
     return features.slide, features.slide.distance, ""
@@ -167,8 +167,11 @@ def _missing_channel(capture: Capture) -> str:
     return "no force was recorded" if capture.force is None else ""
 
 
-def _reported(value: float) -> MeasuredFeature:
-    return MeasuredFeature(value, SUMMARY_RELATIVE_STD * value)
+def _reported(value: float, std: float, missing: str) -> tuple[MeasuredFeature, str]:
+    """Figure of the module, and what is wrong with it: nothing where the module's map tells its error."""
+    if std > 0.0:
+        return MeasuredFeature(value, std), ""
+    return MeasuredFeature(value, SUMMARY_RELATIVE_STD * value), f"from the module's summary: {missing}"
 
 
 def _with_warnings(coefficient: Coefficient, *warnings: str) -> Coefficient:

@@ -94,7 +94,12 @@ class Capture:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The module's own figures: peak force over all contacts, distance slid since the last of them."""
+    """The module's own figures: peak force over all contacts, distance slid since the last of them.
+
+    nan where it does not have one, and for a standard deviation that it does not tell.
+    """
 
     peak_force_n: float
     sliding_distance_m: float
+    peak_force_std_n: float = float("nan")
+    sliding_distance_std_m: float = float("nan")

@@ -12,7 +12,7 @@ from impactcell.alarms import RuleResult
 from impactcell.alarms.rules import journal_fault, module_connection, positioning_fault
 from impactcell.errors import ImpactCellError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
-from impactcell.fieldbus.map_registers import not_promised
+from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports import Transport, transport_for
 from impactcell.journal.audit_entries import AuditEntry
@@ -80,7 +80,7 @@ class CellTask:
             cell.register_map,
             self._link_changes.put_nowait,
         )
-        for text in not_promised(cell.register_map.registers):
+        for text in not_promised(cell.register_map):
             self.log.info("register map %s: %s", cell.register_map.name, text)
         self._positioning_change = asyncio.Event()
         self._positioning: PositioningTask | None = None

@@ -10,7 +10,7 @@ from dataclasses import replace
 from impactcell.cell import CellDesign
 from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
-from impactcell.fieldbus.decoding import PositioningStatus
+from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
 from impactcell.positioning import PlannerPosterior, SafetyLimits, TapPlanner, task_state_machine
 from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, TaskState

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from impactcell.fieldbus.map_registers import not_promised, unknown_names
+from impactcell.fieldbus.map_promises import not_promised
+from impactcell.fieldbus.map_registers import unknown_names
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
 from impactcell.settings.cells import CellConfig
@@ -114,9 +115,9 @@ def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:
 
 
 def _of_map(cell: CellConfig) -> Iterator[_Remark]:
-    registers = cell.register_map.registers
-    for text in (*unknown_names(registers), *not_promised(registers)):
-        yield _Remark(("module", "register_map"), f"{cell.register_map.name}: {text}", is_fault=False)
+    registers = cell.register_map
+    for text in (*unknown_names(registers.registers), *not_promised(registers)):
+        yield _Remark(("module", "register_map"), f"{registers.name}: {text}", is_fault=False)
 
 
 def _of_service(cell: CellConfig) -> Iterator[_Remark]:

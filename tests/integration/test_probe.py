@@ -27,6 +27,7 @@ async def test_identity_status_and_one_tap_are_shown(tmp_path: Path) -> None:
     assert (code, err) == (0, "")
     for said in (
         "identity    module_name IMPACT-FPGA, serial_number SIM-0001, map_version 1, firmware_version 256",
+        "made by     vendor impactcell, product code SIM, revision 1.0, product Simulated measuring module",
         "status      ready, session ",
         "tap         cycle 20, 20",
         "4200 mm/min, 18.9 kg, stroke 1.5 mm, direction +1",

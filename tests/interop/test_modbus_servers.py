@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 
 import numpy as np
 import pytest
+from pymodbus import ModbusDeviceIdentification
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -54,6 +55,49 @@ async def test_pymodbus_server_one_at_a_time() -> None:
             await client.read(64_990, 20)
 
 
+BITS = [bool(bit) for bit in np.random.default_rng(4).integers(0, 2, 4_000)]
+
+
+@asynccontextmanager
+async def pymodbus_server_with_bits() -> AsyncIterator[int]:
+    """Coils, discrete inputs, holding and input registers, each table with values of its own."""
+    data = (
+        [SimData(0, values=BITS, datatype=DataType.BITS)],
+        [SimData(0, values=BITS[::-1], datatype=DataType.BITS)],
+        [SimData(0, values=list(range(1000)), datatype=DataType.REGISTERS)],
+        [SimData(0, values=list(range(1000, 2000)), datatype=DataType.REGISTERS)],
+    )
+    identity = ModbusDeviceIdentification(info={0x00: "Others", 0x01: "PM", 0x02: "3", 0x04: "Server"})
+    server = ModbusTcpServer(SimDevice(1, simdata=data), address=("127.0.0.1", 0), identity=identity)
+    await server.serve_forever(background=True)
+    try:
+        yield server.transport.sockets[0].getsockname()[1]
+    finally:
+        await server.shutdown()
+
+
+async def test_bits_and_other_functions_of_pymodbus_server() -> None:
+    async with pymodbus_server_with_bits() as port, connected(port) as client:
+        await bits_and_other_functions(client)
+        identification = await client.identification()
+        assert (identification["vendor"], identification["product"]) == ("Others", "Server")
+
+
+async def bits_and_other_functions(client: ModbusClient) -> None:
+    assert (await client.read(3, 3_500, "coil")).tolist() == BITS[3:3503]
+    assert (await client.read(3, 3_500, "discrete")).tolist() == BITS[::-1][3:3503]
+    await client.write(5, np.array([not BITS[5]], dtype=WIRE), "coil")
+    await client.write(11, np.array([1, 0, 1, 1, 0, 0, 0, 1, 1, 1], dtype=WIRE), "coil")
+    assert (await client.read(4, 18, "coil")).tolist() == [
+        BITS[4], not BITS[5], *BITS[6:11], 1, 0, 1, 1, 0, 0, 0, 1, 1, 1, BITS[21]
+    ]  # fmt: skip
+    await client.write_bits(0x0034, keep=0xFFFF ^ 0x0830, put=0x0820)
+    assert (await client.read(0x33, 3)).tolist() == [0x33, 0x0824, 0x35]
+    block = client.block(100, 10)
+    await client.complete(block, write=(102, np.array([7, 8], dtype=WIRE)), at_once=True)
+    assert block.words().tolist() == [100, 101, 7, 8, *range(104, 110)]
+
+
 async def test_pymodbus_server_that_goes_away() -> None:
     async with contextlib.AsyncExitStack() as stack:
         async with pymodbus_server() as port:
@@ -72,6 +116,26 @@ async def test_libmodbus_server(libmodbus_port: int, window: int) -> None:
         await client.write(7, np.array([1], dtype=WIRE))
         await client.write(8, np.array([2, 3], dtype=WIRE))
         assert (await client.read(6, 5)).tolist() == [6, 1, 2, 3, 10]
+
+
+@pytest.mark.parametrize("window", [1, 16])
+async def test_bits_and_other_functions_of_libmodbus_server(libmodbus_port: int, window: int) -> None:
+    coils = [address % 3 == 0 or address % 7 == 0 for address in range(30_000)]
+    async with connected(libmodbus_port, window) as client:
+        assert (await client.read(3, 20_000, "coil")).tolist() == coils[3:20_003]
+        assert (await client.read(1, 2_500, "discrete")).tolist() == [not i % 5 for i in range(1, 2_501)]
+        await client.write(5, np.array([1], dtype=WIRE), "coil")
+        await client.write(11, np.array([1, 1, 0, 0, 1, 0, 1, 0, 1], dtype=WIRE), "coil")
+        coils[5], coils[11:20] = True, [bool(int(digit)) for digit in "110010101"]
+        assert (await client.read(0, 40, "coil")).tolist() == coils[:40]
+        await client.write_bits(0x0034, keep=0xFFFF ^ 0x0830, put=0x0820)
+        assert (await client.read(0x33, 3)).tolist() == [0x33, 0x0824, 0x35]
+        block = client.block(100, 10)
+        await client.complete(block, write=(102, np.array([7, 8], dtype=WIRE)), at_once=True)
+        assert block.words().tolist() == [100, 101, 7, 8, *range(104, 110)]
+        with pytest.raises(ModbusExceptionError, match="illegal function"):
+            await client.identification()
+        assert (await client.read(2, 2)).tolist() == [2, 3]
 
 
 async def test_libmodbus_server_with_any_device_id(libmodbus_port: int) -> None:

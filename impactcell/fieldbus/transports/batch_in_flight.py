@@ -55,6 +55,8 @@ class BatchInFlight:
             Their data.
         """
         request = self.batch.requests[0]
+        if request.measure is not None:
+            return 0, at, b""
         head, data_length = _reply_head(self.unit, request.reply_length, request.reply_prefix)
         size = 2 + len(head) + data_length
         count = min(len(self.transactions), (len(stream) - at) // size)

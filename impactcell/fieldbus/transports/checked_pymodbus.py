@@ -149,7 +149,7 @@ class CheckedPymodbus:
             transaction, datagram = client.ctx.next_tid + 1, link.transport == "udp"
             self._watch = MbapWatch(transaction, device_id, request, datagram=datagram)
         self._reply, self._in_step = None, False
-        timeout_s = link.timeout_s + self._on_line_s(len(request.pdu) + request.reply_length)
+        timeout_s = link.timeout_s + self._on_line_s(len(request.pdu) + request.longest_reply)
         try:
             async with asyncio.timeout(timeout_s):
                 await client.execute(False, _RawRequest(request.pdu, device_id))  # noqa: FBT003 - pymodbus's

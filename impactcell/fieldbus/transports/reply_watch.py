@@ -93,7 +93,9 @@ class RtuWatch:
         refused = received[1] == self._request.pdu[0] | 0x80
         if not refused:
             check_function(self._request, received[1])
-        pdu_length = _EXCEPTION_LENGTH if refused else self._request.reply_length
+        pdu_length = _EXCEPTION_LENGTH if refused else self._request.length_of(received[1:])
+        if pdu_length is None:
+            return None
         size = 1 + pdu_length + _CRC_LENGTH
         if len(received) > size:
             raise ProtocolError("more bytes than were asked for")

@@ -1,4 +1,5 @@
-/* A Modbus TCP server by libmodbus: 65 536 holding registers with their own address in them.
+/* A Modbus TCP server by libmodbus: 65 536 holding registers with their own address in them, and as many coils and
+ * discrete inputs: a coil is on where its address divides by 3 or by 7, a discrete input where by 5.
  *
  * Prints its port, then serves one client after another until standard input closes.
  */
@@ -14,7 +15,7 @@
 int main(void)
 {
     modbus_t *ctx = modbus_new_tcp("127.0.0.1", 0);
-    modbus_mapping_t *map = modbus_mapping_new(0, 0, 65536, 65536);
+    modbus_mapping_t *map = modbus_mapping_new(65536, 65536, 65536, 65536);
     struct sockaddr_in address;
     socklen_t size = sizeof address;
     uint8_t query[MODBUS_TCP_MAX_ADU_LENGTH];
@@ -25,6 +26,8 @@ int main(void)
     for (i = 0; i < 65536; i++) {
         map->tab_registers[i] = (uint16_t) i;
         map->tab_input_registers[i] = (uint16_t) (65535 - i);
+        map->tab_bits[i] = i % 3 == 0 || i % 7 == 0;
+        map->tab_input_bits[i] = i % 5 == 0;
     }
     listening = modbus_tcp_listen(ctx, 4);
     if (listening < 0 || getsockname(listening, (struct sockaddr *) &address, &size) < 0) {

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from impactcell.fieldbus import decoding
+from impactcell.fieldbus import decoding, status_block
 from impactcell.fieldbus.registers import WIRE, RegisterMap, Words
 from impactcell.records import Channel
 
@@ -59,14 +59,14 @@ def test_arbitrary_window_words_become_a_sound_capture(fpga: RegisterMap, data: 
 @settings(max_examples=200)
 @given(data=st.data())
 def test_arbitrary_status_words_become_a_report(fpga: RegisterMap, data: st.DataObject) -> None:
-    registers = [fpga[name] for name in decoding.STATUS_REGISTERS]
+    registers = [fpga[name] for name in status_block.STATUS_REGISTERS]
     words = {
         register.name: words_of(
             data.draw(st.binary(min_size=2 * register.words, max_size=2 * register.words))
         )
         for register in registers
     }
-    report = decoding.decode_status(fpga, {name: fpga[name].decode(each) for name, each in words.items()})
+    report = status_block.decode_status(fpga, {name: fpga[name].decode(each) for name, each in words.items()})
     assert len(report.ring) == fpga.slots
     assert report.batch is not None
     assert report.positioning is not None

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MapError
 from impactcell.fieldbus.map_validation import validate_map
-from impactcell.fieldbus.register import KINDS, SI_FACTOR
+from impactcell.fieldbus.register_types import KINDS
 from impactcell.fieldbus.registers import WIRE, Register
 
 INTEGERS = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q"}
@@ -126,10 +126,11 @@ ENTRY = st.dictionaries(
 @given(st.dictionaries(st.text(max_size=5), st.one_of(ENTRY, st.integers(), st.none()), max_size=4))
 @settings(max_examples=400)
 def test_any_map_is_registers_or_faults(registers: dict[str, Any]) -> None:
-    _, arguments, faults = validate_map({"format": 1, "registers": registers}, SI_FACTOR, KINDS)
+    validated = validate_map({"format": 1, "registers": registers})
     for name in registers:
-        assert name in arguments or any(fault.startswith(f"register {name}: ") for fault in faults)
-    for values in arguments.values():
+        told = any(fault.startswith(f"register {name}: ") for fault in validated.faults)
+        assert name in validated.registers or name in validated.constants or told
+    for values in validated.registers.values():
         register = Register(**values)
         if register.words <= 200 and register.bit is None:
             try:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
 from impactcell.errors import MapError
-from impactcell.fieldbus.register import SI_FACTOR
+from impactcell.fieldbus.register_types import SI_FACTOR
 from impactcell.fieldbus.registers import REQUIRED, WIRE, Register, RegisterMap, registers_crc32
 
 FORMATS = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q", "f32": "f", "f64": "d"}
@@ -188,7 +188,7 @@ def changed(declaration: dict[str, Any], name: str, **entry: Any) -> dict[str, A
         ("velocity", {"colour": "red"}, "velocity: unknown key colour"),
         ("velocity", {"length": 2}, "velocity: length belongs to type string"),
         ("force", {"saturation": [5, 1]}, "force: saturation must be two codes, the lower first"),
-        ("force", {"table": "coils"}, "force: table must be holding or input"),
+        ("force", {"table": "coils"}, "force: table must be holding, input, coil or discrete"),
         ("force", {"table": "input"}, "the capture window must lie in one table"),
         (
             "window_sequence_after",

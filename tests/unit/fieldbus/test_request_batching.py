@@ -82,9 +82,9 @@ def test_what_is_missing_of_a_block_is_asked_for_in_batches_alike(
     assert block.missing == number - len(answered)
     asked = []
     for batch in block.batches(EXCHANGE):
-        assert len({request.data_length for request in batch.requests}) == 1
-        first = 2 * step * batch.first
-        size = sum(request.data_length for request in batch.requests)
+        sizes = [request.reply_length - len(request.reply_prefix) for request in batch.requests]
+        assert len(set(sizes)) == 1
+        first, size = 2 * step * batch.first, sum(sizes)
         block.fill(batch.first, len(batch.requests), wire[first : first + size])
         asked += range(batch.first, batch.first + len(batch.requests))
     assert sorted(asked) == sorted(set(range(number)) - answered)

@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from impactcell.errors import SettingsError
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.map_registers import NAMES, not_promised
+from impactcell.fieldbus.map_promises import not_promised
+from impactcell.fieldbus.map_registers import NAMES
 from impactcell.fieldbus.map_validation import validate_map
-from impactcell.fieldbus.register import KINDS, SI_FACTOR
 from impactcell.fieldbus.registers import Register
 from impactcell.service.factory import module_link
 from impactcell.settings import read_cell, read_cells
@@ -64,10 +64,12 @@ def test_the_page_has_every_transport_but_the_plain_one() -> None:
 
 
 def test_the_registers_of_the_page_are_registers() -> None:
-    (entries,) = [block for block in BLOCKS if "module" not in block]
-    _, registers, faults = validate_map({"format": 1, "registers": entries}, SI_FACTOR, KINDS)
-    assert not faults
-    force = Register(**registers["peak_force"])
+    poorer, entries = [block for block in BLOCKS if "module" not in block]
+    validated = validate_map({"format": 1, "registers": poorer})
+    assert (validated.faults, set(validated.constants)) == ([], {"velocity", "sample_rate"})
+    validated = validate_map({"format": 1, "registers": entries})
+    assert not validated.faults
+    force = Register(**validated.registers["peak_force"])
     assert force.decode(force.encode(20.5)) == 20.5
 
 
@@ -101,7 +103,7 @@ def test_cells_of_one_line_agree_about_it(tmp_path: Path) -> None:
 
 def test_faults_of_a_map_have_line_and_column(tmp_path: Path) -> None:
     text = SHIPPED.read_text().replace("{address: 36, type: u32,", "{address: 36, type: u33,")
-    text = text.replace("  window_session:", "  window_sesion:")
+    text = text.replace("  window_cycle:", "  window_cicle:")
     path = tmp_path / "wrong.yaml"
     path.write_text(text)
     with pytest.raises(SettingsError) as caught:
@@ -111,7 +113,7 @@ def test_faults_of_a_map_have_line_and_column(tmp_path: Path) -> None:
     said = str(caught.value).splitlines()
     assert any(line.startswith(f"{path}:{at}:3: register cycle_counter: type must be") for line in said)
     at = lines.index("registers:") + 1
-    missing = "register window_session is missing: the window shows a cycle of this session"
+    missing = "register window_cycle is missing: the window shows the cycle that was asked for"
     assert any(line.startswith(f"{path}:{at}:1: {missing}") for line in said)
 
 
@@ -129,6 +131,6 @@ def test_what_a_map_does_not_promise_and_what_nothing_uses_is_told(tmp_path: Pat
 
 
 def test_the_shipped_map_promises_all_and_has_no_name_that_nothing_uses() -> None:
-    registers = read_register_map(SHIPPED).registers
-    assert not_promised(registers) == ()
-    assert set(registers) == set(NAMES)
+    assert not_promised(read_register_map(SHIPPED)) == ()
+    maps = [read_register_map(file) for file in SHIPPED.parent.glob("*.yaml")]
+    assert {name for each in maps for name in (*each.registers, *each.constants)} == set(NAMES)

@@ -23,6 +23,8 @@ class Image:
         self.words = np.arange(65_536).astype(WIRE)
 
     def read(self, table: str, address: int, count: int) -> Words:
+        if table in ("coil", "discrete"):
+            raise NotImplementedError(table)
         if address + count > 60_000:
             raise LookupError(address)
         return self.words[address : address + count]
@@ -82,7 +84,14 @@ async def connected(server: ModbusServer) -> AsyncIterator[Socket]:
         ("06 003c 0001", "86 06"),
         ("06 0064", "86 03"),
         ("01 0000 0001", "81 01"),
-        ("17 0000 0001 0000 0001 02 0000", "97 01"),
+        ("05 0000 ff00", "85 01"),
+        ("0f 0000 0001 01 01", "8f 01"),
+        ("16 0004 00f2 0025", "16 0004 00f2 0025"),
+        ("17 0064 0002 0070 0001 02 1234", "17 04 0064 0065"),
+        ("17 0064 0000 0070 0001 02 1234", "97 03"),
+        ("17 0064 0002 0070 0002 02 1234", "97 03"),
+        ("17 ffff 0002 0070 0001 02 1234", "97 02"),
+        ("14 06 06 0004 0001 0000 0002", "94 01"),
         ("2b 0e 01 00", "ab 01"),
     ],
 )

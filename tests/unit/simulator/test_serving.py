@@ -112,7 +112,7 @@ def test_missing_files_end_with_code_2(tmp_path: Path, capsys: pytest.CaptureFix
     assert "m.yaml: cannot be read" in capsys.readouterr().err
     (tmp_path / "m.yaml").write_text("format: 1\nname: x\nregisters: {}\n")
     assert main(["serve", str(file)]) == 2
-    assert "register module_name is missing" in capsys.readouterr().err
+    assert "register cycle_counter is missing" in capsys.readouterr().err
 
 
 def read_registers(port: int, address: int, count: int) -> bytes:

@@ -1,0 +1,85 @@
+"""Whether the registers of a map can lie where it says, in their tables and beside each other. Pure."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from impactcell.fieldbus.map_registers import ARRAYS, HEADER
+from impactcell.fieldbus.register import Register
+
+REGISTER_SPACE: Final = 65_536
+"""Addresses of a table: 16 bits."""
+_OUTSIDE_CRC: Final = ("window_sequence", "capture_ready", "capture_crc32")
+"""What is read with a header and may lie outside of what its CRC covers."""
+_COUNTERS: Final = ("cycle_counter", "ring_cycle", "window_cycle", "session", "window_session")
+"""What counts, or tells one start of the module from another."""
+_UNSIGNED: Final = ("u16", "u32", "u64", "bcd16", "bcd32")
+"""Types that count from 0 up."""
+_WHOLE: Final = (
+    "slot_select", "newest_slot", "window_slot", "window_sequence", "window_sequence_after", "direction",
+    "sample_count", "force_count", "position_count", "actuator_count", "capture_crc32", "status_crc32",
+    "acknowledge_session", "acknowledge_cycle", "batch_sequence", "batch_from_cycle", "command_sequence",
+)  # fmt: skip
+"""What is compared or counted with, and so has no scale."""
+
+
+def layout_faults(registers: Iterable[Register]) -> Iterator[str]:
+    """Say which registers leave their table, or overlap."""
+    ordered = sorted(registers, key=lambda register: (register.table, register.address))
+    for register in ordered:
+        if register.end > REGISTER_SPACE:
+            yield f"register {register.name} ends at {register.end - 1}, outside 0..{REGISTER_SPACE - 1}"
+    for i, register in enumerate(ordered):
+        for other in ordered[i + 1 :]:
+            if other.table != register.table or other.address >= register.end:
+                break
+            if None not in (register.bit, other.bit) and register.bit != other.bit:
+                continue
+            yield f"registers {register.name} and {other.name} overlap at {other.address}"
+
+
+def window_faults(registers: Mapping[str, Register]) -> Iterator[str]:
+    """Say what cannot be read as one capture, or is no number where one is counted with."""
+    for name in _WHOLE:
+        if name in registers and not registers[name].is_code:
+            yield f"register {name} must be a whole number, without scale, offset or unit"
+    for name in _COUNTERS:
+        if name in registers and not (registers[name].is_code and registers[name].kind in _UNSIGNED):
+            yield f"register {name} must be u16, u32, u64, bcd16 or bcd32, without scale: it counts"
+    arrays = [registers[name] for name in ARRAYS if name in registers]
+    for register in arrays:
+        if register.kind in ("string", "bit") or register.bit is not None:
+            yield f"register {register.name} must be an array of numbers"
+    if "ring_cycle" in registers and registers["ring_cycle"].count < 2:
+        yield "register ring_cycle must be an array with one cycle number a slot"
+    yield from _sequence_faults(registers, arrays)
+    yield from _crc_faults(registers)
+
+
+def _header_of(registers: Mapping[str, Register]) -> list[Register]:
+    return [registers[name] for name in HEADER if name in registers]
+
+
+def _sequence_faults(registers: Mapping[str, Register], arrays: list[Register]) -> Iterator[str]:
+    """Between the two sequence numbers lies all that they watch over, for it is read from the first on."""
+    window = [registers[name] for name in ("window_sequence", "window_sequence_after") if name in registers]
+    if len(window) < 2:
+        return
+    first, last = window
+    if len({register.table for register in (*arrays, first, last)}) > 1:
+        yield "the capture window must lie in one table"
+    elif not all(first.end <= register.address and register.end <= last.address for register in arrays):
+        yield "force, position and actuator must lie between window_sequence and window_sequence_after"
+    for register in _header_of(registers):
+        if register.table == first.table and not first.address <= register.address < last.address:
+            yield f"register {register.name} must lie between window_sequence and window_sequence_after"
+
+
+def _crc_faults(registers: Mapping[str, Register]) -> Iterator[str]:
+    """Say what is not covered by the CRC: it covers one piece of a table, right before itself."""
+    crc = registers.get("capture_crc32")
+    if crc is None:
+        return
+    for register in _header_of(registers):
+        inside = register.table == crc.table and register.end <= crc.address
+        if not inside and register.name not in _OUTSIDE_CRC:
+            yield f"register {register.name} must lie before capture_crc32, which covers it"

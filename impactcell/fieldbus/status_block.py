@@ -1,0 +1,111 @@
+"""Words of the module's status block become a `StatusBlock`. Pure, never fails."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.fieldbus.registers import Register, RegisterMap, Value
+from impactcell.records import BatchAnnouncement
+
+
+@dataclass(frozen=True, slots=True)
+class PositioningStatus:
+    """What the module says of positioning; see the map for the codes.
+
+    Attributes
+    ----------
+    state, result : str
+        Names of the codes of `positioning_state` and `command_result`.
+    position_m, target_m : float
+        Where the part lies, and where the PLC wants it.
+    target_sequence : int
+        Raised by the PLC with each new target.
+    mass_kg : float
+        nan where the PLC does not know it.
+    accepted_command : int
+        Sequence number of the last command that the module looked at.
+    cycle : int
+        Cycle made by that command, 0 for none.
+    """
+
+    state: str
+    result: str
+    position_m: float
+    target_m: float
+    target_sequence: int
+    mass_kg: float
+    accepted_command: int
+    cycle: int
+
+
+@dataclass(frozen=True, slots=True)
+class StatusBlock:
+    """The status block of one poll; the ring of a module with one buffer is its last cycle."""
+
+    state: str
+    session: int
+    cycle_counter: int
+    ring: tuple[int, ...]
+    batch: BatchAnnouncement | None
+    positioning: PositioningStatus | None
+
+
+STATUS_REGISTERS = (
+    "state", "session", "cycle_counter", "ring_cycle",
+    "batch_sequence", "batch_from_cycle", "batch_announced",
+    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
+    "command_accepted", "command_cycle", "status_crc32",
+)  # fmt: skip
+"""Registers of a poll, where the map has them."""
+
+_BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
+_POSITIONING = STATUS_REGISTERS[7:-1]
+"""Those of a positioning cell."""
+
+
+def _code_name(register: Register, value: Value) -> str:
+    code = int(value) if isinstance(value, int | float) else -1
+    return register.codes.get(code, f"unknown ({code})")
+
+
+def integer(value: Value) -> int:
+    """Give a value that is an integer; 0 for any other."""
+    return value if isinstance(value, int) else 0
+
+
+def number(value: Value) -> float:
+    """Give a value that is a number; nan for any other."""
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> StatusBlock:
+    """Put the decoded registers of `STATUS_REGISTERS` together."""
+    batch = positioning = None
+    if all(name in values for name in _BATCH):
+        batch = BatchAnnouncement(
+            integer(values["batch_sequence"]),
+            integer(values["batch_from_cycle"]),
+            str(values["batch_announced"]),
+        )
+    if all(name in values for name in _POSITIONING):
+        positioning = PositioningStatus(
+            state=_code_name(registers["positioning_state"], values["positioning_state"]),
+            result=_code_name(registers["command_result"], values["command_result"]),
+            position_m=number(values["part_position"]),
+            target_m=number(values["target_position"]),
+            target_sequence=integer(values["target_sequence"]),
+            mass_kg=number(values["part_mass"]),
+            accepted_command=integer(values["command_accepted"]),
+            cycle=integer(values["command_cycle"]),
+        )
+    ring = np.atleast_1d(np.asarray(values.get("ring_cycle", values["cycle_counter"])))
+    return StatusBlock(
+        state=_code_name(registers["state"], values["state"]) if "state" in values else "not told",
+        session=integer(values.get("session", 0)),
+        cycle_counter=integer(values["cycle_counter"]),
+        ring=tuple(int(cycle) for cycle in ring),
+        batch=batch,
+        positioning=positioning,
+    )
