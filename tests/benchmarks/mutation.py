@@ -104,41 +104,46 @@ def attempt(room: str, number: int, seconds: float, *, again: bool) -> None:
     order = [key for key in (survived if again else every) if key in every and (again or key not in rows)]
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload(list(LIBRARIES))
-    profile = _profile(room, processes)
+    profile = _profile(room, processes.Process)
     for key in order[:number]:
         if time.monotonic() - begin > seconds:
             break
-        killed = _is_noticed(every[key], key[0], profile, again, processes.Process)
+        noticed = _is_noticed(every[key], key[0], profile, again, processes.Process)
         row = dict(zip(("file", "function", "before", "after", "number"), key, strict=True))
-        first = {"at first": False} if key in rows and killed else {}
-        rows[key] = {"room": room, "line": every[key].line, **row, "killed": killed, **first}
+        more = {"at first": False} if key in rows and noticed else {}
+        more |= {"hangs": True} if noticed == "hangs" else {}
+        rows[key] = {"room": room, "line": every[key].line, **row, "killed": bool(noticed), **more}
         RESULTS.write_text("".join(json.dumps(row) + "\n" for row in rows.values()))
-        said = f"{time.monotonic() - begin:.0f} s: {'killed' if killed else 'SURVIVED'}"
+        said = f"{time.monotonic() - begin:.0f} s: {noticed or 'SURVIVED'}"
         print(f"{said} line {every[key].line} {key}", file=sys.stderr, flush=True)
 
 
-def _profile(room: str, processes: Any) -> dict[str, dict[str, Any]]:
-    """Tests of a room with their duration and what they go through; kept while neither changes."""
-    _, tests = ROOMS[room]
-    sources = [ROOT / file for file in files_of(room)]
-    sources += [
-        f for t in tests for f in ([ROOT / t] if t.endswith(".py") else sorted((ROOT / t).rglob("*.py")))
-    ]
-    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
-    path = Path(tempfile.gettempdir()) / f"impactcell-mutation-{digest}.json"
-    if not path.exists():
-        process = processes.Process(target=as_it_is, args=(tests, files_of(room), path))
-        process.start()
-        process.join()
-        if not path.exists():
-            sys.exit(f"the tests of {room} do not pass as they are")
-    profile: dict[str, dict[str, Any]] = json.loads(path.read_text())
-    return profile
+def _profile(room: str, start: Start) -> dict[str, dict[str, Any]]:
+    """Tests of a room, the quickest first, with their duration and what they go through.
+
+    What a file of tests goes through is kept while neither it nor the room changes.
+    """
+    profile: dict[str, dict[str, Any]] = {}
+    room_text = b"".join((ROOT / file).read_bytes() for file in files_of(room))
+    for tests in ROOMS[room][1]:
+        for file in [ROOT / tests] if tests.endswith(".py") else sorted((ROOT / tests).rglob("test_*.py")):
+            digest = hashlib.sha256(room_text + file.read_bytes()).hexdigest()
+            path = Path(tempfile.gettempdir()) / f"impactcell-mutation-{digest}.json"
+            if not path.exists():
+                name = str(file.relative_to(ROOT))
+                process = start(target=as_it_is, args=((name,), files_of(room), path))
+                process.start()
+                process.join()
+                if not path.exists():
+                    sys.exit(f"the tests of {name} do not pass as they are")
+            profile |= json.loads(path.read_text())
+    return dict(sorted(profile.items(), key=lambda item: item[1]["s"]))
 
 
 def _is_noticed(
     mutant: Mutant, file: str, profile: dict[str, dict[str, Any]], all_tests: bool, start: Start
-) -> bool:
+) -> str:
+    """Say how tests notice a mutant; empty if they do not."""
     source = (ROOT / file).read_text(encoding="utf-8")
     product = [path.read_text(encoding="utf-8") for path in (ROOT / "impactcell").rglob("*.py")]
     changed = compiled_with(source, mutant.line)
@@ -154,14 +159,14 @@ def _is_noticed(
 
     tests = tuple(name for name, test in profile.items() if all_tests or goes_through(test))
     if not tests:
-        return False
+        return ""
     process = start(target=with_fault, args=(tests, file, mutant.applied(source), users))
     process.start()
     process.join(LONGEST_S + LONGER * sum(profile[name]["s"] for name in tests))
     code = process.exitcode
     process.kill()
     process.join()
-    return bool(code != 0)
+    return {0: "", None: "hangs"}.get(code, "fails")
 
 
 def interval(killed: int, tried: int) -> str:
