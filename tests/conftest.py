@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import logging
+import sys
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
@@ -28,6 +29,21 @@ providers.is_local_module_file = lambda path: settings.default.derandomize is Fa
 def pytest_collection_finish() -> None:
     """Keep the garbage collector from looking through all modules again and again: a third of the time."""
     gc.freeze()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def standard_nodes_once() -> Iterator[None]:
+    """Build the standard nodes of OPC UA once, and not for each server."""
+    if "asyncua" not in sys.modules:  # no test of this run needs it
+        yield
+        return
+    from asyncua.server.internal_server import InternalServer
+
+    from tests import standard_nodes
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(InternalServer, "load_standard_address_space", standard_nodes.load)
+        yield
 
 
 @pytest.fixture(scope="session")

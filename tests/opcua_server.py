@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from argon2 import PasswordHasher
 from asyncua import Client, ua
 from asyncua.crypto import security_policies
 
@@ -30,7 +31,7 @@ from impactcell.scada import (
     ServerSettings,
     ValuePage,
 )
-from impactcell.scada.users import User, with_password, write_users
+from impactcell.scada.users import User, write_users
 from tests.snapshots import make_capture, make_snapshot
 
 CELL = "press-1"
@@ -216,13 +217,15 @@ def _pair(name: str, uri: str):
 
 
 _USERS: dict[str, User] = {}
+QUICK = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1)
+"""How the service hashes takes long, as it must; `tests/unit/opcua/test_trust_list.py` tries that one."""
 
 
 def users() -> dict[str, User]:
     if not _USERS:
         for role in Role:
             name = role.name.lower()
-            _USERS[name] = with_password(User(name, role), PASSWORDS[name])
+            _USERS[name] = User(name, role, QUICK.hash(PASSWORDS[name]))
     return dict(_USERS)
 
 

@@ -59,8 +59,9 @@ def test_workers_know_an_effect_of_the_users_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("default")
-def test_no_scheduler_is_said(tmp_path: Path) -> None:
+def test_no_scheduler_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr("impactcell.cli.cluster.ANSWER_S", 0.5)
     campaigns.write(make(shots=12), tmp_path / "campaign")
     with pytest.raises(DiscrepancyError, match="no dask scheduler"):
         discrepancy(tmp_path / "campaign", tmp_path / "out", scheduler="tcp://127.0.0.1:1")

@@ -14,9 +14,9 @@ from impactcell.discrepancy.report.page import (
 )
 from impactcell.discrepancy.report.sentences import headline, phrase
 from impactcell.discrepancy.search.conclusion import Place, Remaining
-from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
+from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import LIBRARY
-from tests.discrepancy.test_workflow import make
+from tests.discrepancy.test_workflow import investigated
 
 SECTIONS = ["Where they disagree", "Held-out shots", "Evidence for every candidate", "Parameters"]
 VOID = {"meta", "br", "path", "use"}
@@ -68,12 +68,12 @@ def page_of(found: DiscrepancyResult, directory: Path) -> Page:
 
 @pytest.fixture(scope="module")
 def tied() -> DiscrepancyResult:
-    return investigate(make("mass_error", shots=18))
+    return investigated("mass_error", shots=18)
 
 
 @pytest.fixture(scope="module")
 def unknown() -> DiscrepancyResult:
-    return investigate(make("actuator_vibration", shots=18))
+    return investigated("actuator_vibration", shots=18)
 
 
 def test_the_page_is_whole_and_fetches_nothing(tied: DiscrepancyResult, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from impactcell.discrepancy.search.validation import GapMeasure, Part, confirmed
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture, Channel
 from tests.benchmarks._discrepancy_driven import Job, record
-from tests.discrepancy.test_workflow import make
+from tests.discrepancy.test_workflow import investigated, make
 
 
 def part_of_record(hidden: str, seconds: float) -> Campaign:
@@ -35,7 +35,7 @@ def part_of_record(hidden: str, seconds: float) -> Campaign:
 
 @pytest.fixture(scope="module")
 def viscous() -> DiscrepancyResult:
-    return investigate(make("viscous_friction", shots=24))
+    return investigated("viscous_friction", shots=24)
 
 
 def test_too_few_blocks_are_untested_and_what_is_missing_is_said() -> None:
@@ -49,7 +49,7 @@ def test_too_few_blocks_are_untested_and_what_is_missing_is_said() -> None:
 
 
 def test_no_gap_is_never_said_beside_one() -> None:
-    outcome = result_document(investigate(part_of_record("machine_vibration", 12.0)))
+    outcome = result_document(investigate(part_of_record("machine_vibration", 6.0)))
     held_out = outcome["gap"]["held_out"]
     assert held_out["before"] > 10.0 > held_out["expected_without_gap"][1]
     assert outcome["verdict"] == "unknown"

@@ -1,5 +1,6 @@
 """The discrepancy workflow from campaign to verdict, on effects hidden by the simulator's own plant."""
 
+import functools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -36,6 +37,12 @@ def make(*hidden: str, seed: int = 3, shots: int = 36) -> Campaign:
         return study.campaign(study.Job("single", hidden, seed, STRENGTH, shots=shots))
     finally:
         study.RATE_HZ = study_rate
+
+
+@functools.cache
+def investigated(*hidden: str, shots: int = 36) -> DiscrepancyResult:
+    """What comes of a campaign, once for all tests that look at it."""
+    return investigate(make(*hidden, shots=shots))
 
 
 def answer(found: DiscrepancyResult) -> tuple[str, set[str]]:
@@ -81,7 +88,7 @@ def test_a_jump_at_one_sample_is_no_slope() -> None:
 
 
 def test_likelihood_out_of_shot_is_that_of_a_fit_without_the_shot() -> None:
-    found = investigate(make(shots=20))
+    found = investigated(shots=20)
     problem, model = found.problem, found.nominal
     inside = model.log_likelihood(problem.shots)
     outside = evaluate_out_of_shot(problem, model).each
@@ -110,7 +117,7 @@ def test_likelihood_out_of_shot_is_that_of_a_fit_without_the_shot() -> None:
 
 
 def test_few_shots_that_decide_are_no_tie() -> None:
-    found = investigate(make(shots=20))
+    found = investigated(shots=20)
     best = evaluate_out_of_shot(found.problem, found.nominal)
     each = best.each.copy()
     each[:2] -= 400.0
@@ -120,7 +127,7 @@ def test_few_shots_that_decide_are_no_tie() -> None:
 
 
 def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
-    found = investigate(make("mass_error"))
+    found = investigated("mass_error", shots=18)
     assert found.verdict == "tied"
     assert answer(found)[1] == {"mass_error", "force_sensor_gain"}
     assert "weigh the part" in found.experiments[0].setting
@@ -143,7 +150,7 @@ def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
 
 
 def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
-    found = investigate(make("actuator_vibration"))
+    found = investigated("actuator_vibration", shots=18)
     outcome = result_document(found)
     assert outcome["verdict"] == "unknown"
     assert outcome["effects"] == []
