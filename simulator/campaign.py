@@ -38,6 +38,7 @@ class PlannedShot:
     dwell_s: float
     factor: float
     ratio_factor: float
+    columns: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +53,11 @@ class MadeShot:
 
 def make(scenario: CampaignScenario) -> tuple[Plant, tuple[MadeShot, ...]]:
     """Strike every shot of a scenario; the base plant, before scatter, and the shots in order."""
-    design, noise = (np.random.default_rng(seed) for seed in np.random.SeedSequence(scenario.seed).spawn(2))
+    design, noise, columns = (
+        np.random.default_rng(seed) for seed in np.random.SeedSequence(scenario.seed).spawn(3)
+    )
     base = _base_plant(scenario, design)
-    plans = tuple(_plan(scenario, design))
+    plans = tuple(_with_columns(scenario, plan, columns) for plan in _plan(scenario, design))
     return base, tuple(_shot(scenario, base, plan, len(plans), noise) for plan in plans)
 
 
@@ -100,7 +103,21 @@ def _plan(scenario: CampaignScenario, random: np.random.Generator) -> Iterator[P
             dwell_s=round(float(np.exp(random.uniform(np.log(low), np.log(high)))), 1),
             factor=float(1.0 + scenario.friction_scatter * random.standard_normal()),
             ratio_factor=float(1.0 + scenario.ratio_scatter * random.standard_normal()),
+            columns={},
         )
+
+
+def _with_columns(scenario: CampaignScenario, plan: PlannedShot, random: np.random.Generator) -> PlannedShot:
+    """Draw the further columns of a shot; friction goes with them as the scenario says."""
+    values = {
+        name: float(random.uniform(column.low, column.high)) for name, column in scenario.columns.items()
+    }
+    factor = plan.factor
+    for name, column in scenario.columns.items():
+        if column.friction:
+            at, factors = zip(*column.friction, strict=True)
+            factor *= float(np.interp(values[name], at, factors))
+    return replace(plan, factor=factor, columns=values)
 
 
 def _shot(
@@ -241,13 +258,14 @@ def _table(scenario: CampaignScenario, shots: Sequence[MadeShot]) -> str:
     is_tap = scenario.excitation == "tap"
     names = ["shot", *(["velocity_mm_per_min"] if is_tap else []), "mass_kg", "direction", "batch", "dwell_s"]
     starts = any(start != 0.0 for start in scenario.starts_m)
-    rows = [names + (["start_m"] if starts else [])]
+    rows = [names + (["start_m"] if starts else []) + list(scenario.columns)]
     for shot in shots:
         plan = shot.plan
         row = [str(plan.number)] + ([f"{plan.velocity:.9g}"] if is_tap else [])
         row += [f"{plan.mass_kg:.9g}" if scenario.mass_stated else "", str(plan.direction)]
         row += [scenario.batches[plan.batch], f"{plan.dwell_s:.9g}"]
-        rows.append(row + ([f"{plan.start_m:.9g}"] if starts else []))
+        row += [f"{plan.start_m:.9g}"] if starts else []
+        rows.append(row + [f"{value:.9g}" for value in plan.columns.values()])
     return "".join(",".join(row) + "\n" for row in rows)
 
 

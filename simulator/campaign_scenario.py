@@ -62,6 +62,35 @@ class DriveScenario(ScenarioModel):
         return tuple(value) if isinstance(value, list) else value
 
 
+class ColumnScenario(ScenarioModel):
+    """A further column of `shots.csv`, drawn for each shot, and what friction does with it.
+
+    `friction` lists [value, factor of both coefficients] in ascending order, linear between; empty where it
+    does nothing.
+    """
+
+    low: float
+    high: float
+    friction: list[tuple[float, Positive]] = Field([])
+
+    @field_validator("friction", mode="before")
+    @classmethod
+    def _as_pairs(cls, value: object) -> object:
+        return (
+            [tuple(pair) if isinstance(pair, list) else pair for pair in value]
+            if isinstance(value, list)
+            else value
+        )
+
+    @model_validator(mode="after")
+    def _ascending(self) -> Self:
+        values = [value for value, _ in self.friction]
+        if not self.low < self.high or values != sorted(set(values)):
+            message = "low has to be below high, and the values of friction have to ascend"
+            raise ValueError(message)
+        return self
+
+
 class CampaignScenario(ScenarioModel):
     """A whole campaign; see config/sim/campaign.yaml for every key with its meaning."""
 
@@ -84,6 +113,7 @@ class CampaignScenario(ScenarioModel):
     batches: list[Annotated[str, Field(min_length=1)]] = Field(["A"])
     dwell_s: tuple[Positive, Positive] = (1.0, 150.0)
     friction_scatter: NotNegative = 0.012
+    columns: dict[str, ColumnScenario] = Field({})
     ratio_scatter: NotNegative = 0.0
     sensors: SensorsScenario
     noise: NoiseScenario = NoiseScenario()

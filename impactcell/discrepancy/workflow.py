@@ -255,6 +255,7 @@ def _coarse(problem: Problem) -> Problem:
 def _nameable(prepared: PreparedCampaign, library: Sequence[str] | None) -> tuple[str, ...]:
     """Effects that may be named: of the library, those that such shots can test."""
     names = tuple(LIBRARY) if library is None else tuple(library)
+    names = tuple(name for name in names if set(LIBRARY[name].columns) <= set(prepared.covariates))
     if prepared.excitation.tests_between_shots:
         return names
     return tuple(name for name in names if LIBRARY[name].kind is not Kind.BETWEEN_SHOTS)

@@ -3,6 +3,7 @@
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -109,13 +110,21 @@ class Parameter:
 
 
 class Covariates(NamedTuple):
-    """What distinguishes shots, one entry a shot."""
+    """What distinguishes shots, one entry a shot.
+
+    Attributes
+    ----------
+    columns : mapping
+        The further columns of `shots.csv` that the effect asks for, each of shape (shots,); nan where a
+        shot does not say.
+    """
 
     dwell_s: Samples
     shot: Samples
     shots: Samples
     batch: Samples
     direction: Samples
+    columns: Mapping[str, Samples] = MappingProxyType({})
 
 
 class Factors(NamedTuple):
@@ -144,6 +153,9 @@ class Effect:
     between : callable or None
         The part that acts between shots: parameters (each of shape (shots,), those of a `per_batch`
         parameter (shots, batches - 1)) and covariates in, factors out.
+    columns : mapping of str to (float, float)
+        Further columns of `shots.csv` that `between` reads, and the range of each in which the law is known;
+        its factors are 1 where one of them is nan.
     dissipates : bool
         Claims to take energy from the part, never to give any.
     order : int
@@ -158,5 +170,6 @@ class Effect:
     parameters: tuple[Parameter, ...]
     laws: Mapping[LawKind, Law] = field(default_factory=dict)
     between: Callable[[Sequence[Samples], Covariates], Factors] | None = None
+    columns: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     dissipates: bool = False
     order: int = 0

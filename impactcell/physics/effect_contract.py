@@ -6,7 +6,8 @@ The same promises are tested of the library in `tests/contract`; here an effect 
 import inspect
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,7 +65,10 @@ def contract_faults(effect: Effect) -> list[str]:
     if is_new:
         offer_effect(effect)
     try:
-        return [*_vanishing(effect), *_range(effect), *_smoothness(effect), *_energy(effect)]
+        return [
+            *_vanishing(effect), *_unknown_columns(effect), *_range(effect), *_smoothness(effect),
+            *_energy(effect),
+        ]  # fmt: skip
     except PhysicsError as error:
         return [f"a tap with it cannot be simulated: {error}"]
     finally:
@@ -83,6 +87,11 @@ def _statement(effect: Effect) -> list[str]:
             "it names no phase in which it shows",
         ),
         (bool(effect.laws) != between, "it needs either laws or between=, not both"),
+        (not effect.columns or between, "columns of shots.csv are read by between= only"),
+        (
+            all(low < high and np.isfinite([low, high]).all() for low, high in effect.columns.values()),
+            "a column's range has to be two ascending numbers",
+        ),
         (effect.kind is not Kind.BETWEEN_SHOTS or between, "what acts between shots needs between="),
         (bool(effect.parameters), "it has no parameter"),
         (
@@ -150,9 +159,14 @@ def _values(effect: Effect, choose: Callable[[Parameter], float]) -> list[float]
     return values
 
 
-def _ensemble(*identifiers: str) -> Ensemble:
+def _ensemble(*identifiers: str, columns: Mapping[str, tuple[float, float]] | None = None) -> Ensemble:
     times = [TIMES] * len(TAPS)
-    return Ensemble(TAPS, identifiers, force_time_s=times, position_time_s=times, actuator_time_s=times)
+    given = {name: np.linspace(*ends, len(TAPS)).tolist() for name, ends in (columns or {}).items()}
+    taps = [
+        replace(tap, columns=tuple((name, values[i]) for name, values in given.items()))
+        for i, tap in enumerate(TAPS)
+    ]
+    return Ensemble(taps, identifiers, force_time_s=times, position_time_s=times, actuator_time_s=times)
 
 
 def _traces(model: Ensemble, values: list[float]) -> Samples:
@@ -161,8 +175,22 @@ def _traces(model: Ensemble, values: list[float]) -> Samples:
     return np.concatenate([channel / scale for channel, scale in zip(channels, SCALES, strict=True)])
 
 
+def _with(effect: Effect) -> Ensemble:
+    """Taps with an effect, its columns gone through."""
+    return _ensemble(effect.identifier, columns=effect.columns)
+
+
+def _unknown_columns(effect: Effect) -> list[str]:
+    if not effect.columns:
+        return []
+    unknown = _traces(_ensemble(effect.identifier), _values(effect, lambda p: p.typical))
+    if not np.abs(unknown - _traces(_ensemble(), [])).max() <= VANISHING:
+        return [f"its factors are not 1 where {' and '.join(effect.columns)} is not known (nan)"]
+    return []
+
+
 def _vanishing(effect: Effect) -> list[str]:
-    without, model = _traces(_ensemble(), []), _ensemble(effect.identifier)
+    without, model = _traces(_ensemble(), []), _with(effect)
     null = _traces(model, _values(effect, lambda p: p.typical if math.isnan(p.null) else p.null))
     typical = _traces(model, _values(effect, lambda p: p.typical))
     faults = []
@@ -180,7 +208,7 @@ def _vanishing(effect: Effect) -> list[str]:
 
 
 def _range(effect: Effect) -> list[str]:
-    rng, model = np.random.default_rng(3), _ensemble(effect.identifier)
+    rng, model = np.random.default_rng(3), _with(effect)
 
     def draw(p: Parameter) -> float:
         low = max(p.lower, p.typical / WIDEST if p.lower >= 0.0 else p.lower)
@@ -205,7 +233,7 @@ def _range(effect: Effect) -> list[str]:
 
 
 def _smoothness(effect: Effect) -> list[str]:
-    model = _ensemble(effect.identifier)
+    model = _with(effect)
     theta = np.concatenate([NOMINAL, _values(effect, lambda p: p.typical)])
     coarse, fine = (
         np.concatenate(

@@ -12,13 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from impactcell.numerics.jit import FloatPointer, Law, compiled
+from impactcell.numerics.jit import FloatPointer, Law
+from impactcell.physics.bspline import spline
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 from impactcell.physics.effects import add_effect
-from impactcell.records import Samples
 
 SPANS = 7
 """Polynomial pieces of a spline: an S with a fold is followed, a single sample is not. Own choice."""
@@ -26,24 +23,6 @@ SPANS_OF_TABLE = 24
 """The same over the position on the table, where a surface may have waves and spots: a wave takes three."""
 LOWER, UPPER = "lower", "upper"
 """Names of the parameters that say where the knots lie."""
-
-
-@compiled
-def spline(u: float, p: FloatPointer, spans: int) -> float:
-    """Cubic B-spline at u; knots from p[0] to p[1], coefficients from p[2] on; straight beyond."""
-    width = (p[1] - p[0]) / spans
-    w = (u - p[0]) / width
-    inside = min(max(w, 0.0), float(spans))
-    i = min(int(inside), spans - 1)
-    t = inside - i
-    a, b, c, d = p[2 + i], p[3 + i], p[4 + i], p[5 + i]
-    s = 1.0 - t
-    value = (
-        a * s * s * s + b * (3.0 * t * t * t - 6.0 * t * t + 4.0)
-        + c * (1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t * t * t) + d * t * t * t
-    ) / 6.0  # fmt: skip
-    slope = (-a * s * s + b * (3.0 * t * t - 4.0 * t) + c * (1.0 + 2.0 * t - 3.0 * t * t) + d * t * t) / 2.0
-    return value + slope * (w - inside)
 
 
 def _friction_over_speed(speed: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -112,7 +91,8 @@ class FreeForm:
     covariate : str
         `speed`, `position`, `indentation`, `indentation_rate`, `gap`, `time` or `force`.
     covariate_unit : str
-    law_kind : LawKind
+    law_kind : LawKind or None
+        None where the term acts between shots.
     around : str
         How the function s of the covariate u enters, as Python of the law's own four numbers a, b, c and d,
         e.g. `-b * s`.
@@ -129,7 +109,7 @@ class FreeForm:
     effect: Effect
     covariate: str
     covariate_unit: str
-    law_kind: LawKind
+    law_kind: LawKind | None
     around: str
     argument: str
     constant_is: str = ""
@@ -144,6 +124,16 @@ class FreeForm:
     def spans(self) -> int:
         """Polynomial pieces of its spline."""
         return len(self.coefficients) - 3
+
+    @property
+    def is_factor(self) -> bool:
+        """Whether 1 + s multiplies the friction, so that s has no unit."""
+        return self.law_kind is LawKind.SCALE or self.is_between_shots
+
+    @property
+    def is_between_shots(self) -> bool:
+        """Whether it acts between shots, so that it shows in their friction factors only."""
+        return self.law_kind is None
 
     @property
     def unit(self) -> str:
@@ -280,19 +270,3 @@ _DECLARED = (
 
 FREE_FORMS: Mapping[str, FreeForm] = MappingProxyType({form.effect.identifier: form for form in _DECLARED})
 """Every place by the identifier of its effect."""
-
-
-def spline_basis(u: ArrayLike, lower: float, upper: float, spans: int = SPANS) -> Samples:
-    """Values of the B-splines, shape (n, spans + 3), at u of shape (n,); straight beyond the knots."""
-    points = np.atleast_1d(np.asarray(u, dtype=np.float64))
-    w = (points - lower) * (spans / (upper - lower))
-    inside = np.clip(w, 0.0, float(spans))
-    i = np.minimum(inside.astype(np.int64), spans - 1)
-    t = inside - i
-    beyond = w - inside
-    value = np.stack([(1.0 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, 1 + 3 * t + 3 * t**2 - 3 * t**3, t**3]) / 6.0
-    slope = np.stack([-((1.0 - t) ** 2), 3 * t**2 - 4 * t, 1 + 2 * t - 3 * t**2, t**2]) / 2.0
-    basis = np.zeros((len(points), spans + 3))
-    for k in range(4):
-        basis[np.arange(len(points)), i + k] += value[k] + slope[k] * beyond
-    return basis

@@ -65,12 +65,16 @@ class LawTable:
             if effect.between is None:
                 continue
             if shots is None:
-                shots = Covariates(*(taps[name] for name in Covariates._fields))
+                shots = Covariates(
+                    taps["dwell_s"], taps["shot"], taps["shots"], taps["batch"], taps["direction"]
+                )
+            unknown = np.full(n, np.nan)
+            further = {name: taps.get(column_key(name), unknown) for name in effect.columns}
             columns = [
                 values[:, begin:end] if parameter.per_batch else values[:, begin]
                 for (begin, end), parameter in zip(spans, effect.parameters, strict=True)
             ]
-            factors = effect.between(columns, shots)
+            factors = effect.between(columns, shots._replace(columns=further))
             parameters[:, at.MU_S] *= factors.mu_s
             parameters[:, at.MU_K] *= factors.mu_k
             parameters[:, at.MASS] *= factors.mass
@@ -180,7 +184,15 @@ def tap_columns(taps: Sequence[TapInput]) -> dict[str, Samples]:
         )
     }
     columns["initial_speed_m_s"] = np.full(len(taps), np.nan)
+    further = [dict(tap.columns) for tap in taps]
+    for name in dict.fromkeys(name for known in further for name in known):
+        columns[column_key(name)] = np.array([known.get(name, np.nan) for known in further])
     return columns
+
+
+def column_key(name: str) -> str:
+    """Name of a further column of `shots.csv` among the columns of taps: it cannot be one of theirs."""
+    return f"shots.csv/{name}"
 
 
 def parameter_range(name: str) -> tuple[float, float, float]:

@@ -65,6 +65,8 @@ class TapInput:
         Number of this shot, from 1, and how many there are, in file order.
     batch : int
         Number of the batch in order of appearance, 0 for the reference.
+    columns : tuple of (str, float)
+        What else is known of the shot, by the name of its column of `shots.csv`.
     """
 
     velocity_m_s: float
@@ -77,6 +79,7 @@ class TapInput:
     shot: int = 1
     shots: int = 1
     batch: int = 0
+    columns: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a tap that cannot be commanded."""

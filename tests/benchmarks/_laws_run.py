@@ -17,8 +17,8 @@ import numpy as np
 
 from impactcell.discrepancy.laws import LawFinding
 from impactcell.discrepancy.workflow import investigate
+from impactcell.physics.bspline import spline_basis
 from impactcell.physics.effects import LIBRARY
-from impactcell.physics.free_forms import spline_basis
 from impactcell.records import Samples
 from tests.discrepancy.study import Job, campaign, hidden
 

@@ -5,7 +5,7 @@ hidden are drawn from its seed; how strong it is, is given, or calibrated to a g
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -142,6 +142,14 @@ def campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:
     return recorded(plan, make(plan)[1])
 
 
+def with_column(job: Job, name: str, low: float, high: float, law: Callable[[float], float]) -> Campaign:
+    """Make the campaign of a job with a further column, and a law of it that friction is multiplied with."""
+    values = np.linspace(low, high, 400).tolist()
+    column = {"low": low, "high": high, "friction": [[value, law(value)] for value in values]}
+    plan = CampaignScenario.model_validate(scenario(job).model_dump() | {"columns": {name: column}})
+    return recorded(plan, make(plan)[1])
+
+
 def recorded(plan: CampaignScenario, made: Sequence[MadeShot]) -> Campaign:
     """The taps made of a scenario as a campaign, as reading their files would give it."""
     shots = []
@@ -163,6 +171,7 @@ def recorded(plan: CampaignScenario, made: Sequence[MadeShot]) -> Campaign:
                 batch_id=plan.batches[shot.plan.batch],
                 dwell_s=shot.plan.dwell_s,
                 start_m=shot.plan.start_m,
+                covariates=dict(shot.plan.columns),
             )
         )
     sensors = {name: getattr(plan.sensors, name) for name in NOISE}

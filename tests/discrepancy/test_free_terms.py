@@ -14,7 +14,7 @@ from impactcell.discrepancy.model import (
     fit_nominal,
     refit_shot_parameters,
 )
-from impactcell.physics.free_forms import spline_basis
+from impactcell.physics.bspline import spline_basis
 from tests.discrepancy.study import Job, campaign
 
 
@@ -63,7 +63,7 @@ def test_quadratic_drag_is_found_as_a_straight_line_over_speed() -> None:
     assert best.form.effect.identifier == "free_drag_over_speed"
     assert _held_rms(best, held) < 1.05
     u = np.linspace(0.3, 1.0, 8) * best.visited.upper
-    drag = spline_basis(u, best.visited.lower, best.visited.upper) @ best.coefficients
+    drag = spline_basis(u, best.visited.lower, best.visited.upper, best.form.spans) @ best.coefficients
     np.testing.assert_allclose(drag, 250.0 * u, rtol=0.05)
 
 

@@ -13,6 +13,8 @@ from impactcell.records import Samples
 
 NOISE_UNIT_FACTOR = 30.0
 """Ratio of estimated and stated noise which only a wrong unit can explain."""
+COLUMN_DEGREE = 3
+"""Degree of the polynomial of a further column that is no pure error: a bend and its turn. Own choice."""
 MIN_DEGREES_OF_FREEDOM = 3
 """Fewer degrees of freedom give no spread of replicates: it would be uncertain by half."""
 MIN_REPLICATE_SPREAD = 1e-9
@@ -113,8 +115,9 @@ class ReplicateSpread:
 def replicate_spread(shots: tuple[PreparedShot, ...], log_factor: Samples, batches: int) -> ReplicateSpread:
     """Spread of friction factors between shots of the same settings.
 
-    Replicates still differ in when they were taken, in batch and in dwell; these act between shots and
-    are no pure error, so that they are regressed out within the groups.
+    Replicates still differ in when they were taken, in batch, in dwell and in further columns of `shots.csv`;
+    these act between shots and are no pure error, so that they are regressed out within the groups, the
+    further columns by a polynomial of degree COLUMN_DEGREE.
 
     Parameters
     ----------
@@ -133,6 +136,11 @@ def replicate_spread(shots: tuple[PreparedShot, ...], log_factor: Samples, batch
     dwell = np.array([shot.covariates["dwell"] for shot in shots])
     if np.isfinite(dwell).all():
         columns.append(dwell)
+    for name, _ in shots[0].columns:
+        column = np.array([shot.covariates.get(name, math.nan) for shot in shots])
+        if np.isfinite(column).all() and np.ptp(column) > 0.0:
+            centred = 2.0 * (column - column.min()) / np.ptp(column) - 1.0
+            columns += [centred**degree for degree in range(1, COLUMN_DEGREE + 1)]
     X = np.column_stack(columns)[inside]
     y = log_factor[inside]
     member = member[inside]

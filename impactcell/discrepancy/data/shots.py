@@ -16,6 +16,9 @@ CHANNELS = ("force", "position", "actuator")
 # Their numbers.
 FORCE, POSITION, ACTUATOR = range(3)
 
+OWN_COVARIATES = ("shot", "velocity", "mass", "direction", "batch", "dwell", "start", "time", "initial_speed")
+"""Covariates that every shot or block has; any other is a further column of `shots.csv`."""
+
 IndexArray = NDArray[np.int64]
 
 
@@ -60,6 +63,11 @@ class PreparedShot:
     drive: Samples
     covariates: dict[str, float]
     whitener: Samples = field(default_factory=lambda: np.empty((0, 0)))
+
+    @property
+    def columns(self) -> tuple[tuple[str, float], ...]:
+        """Further columns of `shots.csv` that are numbers, by name."""
+        return tuple((name, value) for name, value in self.covariates.items() if name not in OWN_COVARIATES)
 
     @property
     def size(self) -> int:

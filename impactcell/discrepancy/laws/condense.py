@@ -14,7 +14,7 @@ from scipy.optimize import fmin
 
 from impactcell.discrepancy.laws.free_term import FreeTerm, equations
 from impactcell.discrepancy.laws.grammar import WAVES, Form, Shaped, name, shaped_terms
-from impactcell.physics.free_forms import spline_basis
+from impactcell.physics.bspline import spline_basis
 from impactcell.records import Samples
 
 GRID = 80

@@ -17,6 +17,8 @@ AFTER = frozenset({"free_slide"})
 """Phase in which a pull over the gap may act."""
 FEWEST_SAMPLES = 50
 """Samples below which a covariate has not been gone through: five a coefficient of a spline."""
+FEWEST_VALUES = 8
+"""Different values of a column of `shots.csv` below which a bend of its function is a guess. Own choice."""
 LEAST_VARIETY = 0.2
 """Share of its largest magnitude over which a covariate has to vary: a function of what hardly changes is a
 number, and what it does elsewhere is unknown. Own choice."""
@@ -31,7 +33,7 @@ class Visited:
     lower, upper : float
         Range in which it was met.
     values : ndarray, shape (n,)
-        At the samples at which the term acts.
+        At the samples at which the term acts; of a column of `shots.csv` a value a shot.
     """
 
     lower: float
@@ -41,6 +43,8 @@ class Visited:
 
 def visited(problem: Problem, model: Fit, form: FreeForm) -> Visited | None:
     """Range of a form's covariate under a fitted model; None where it was not, or hardly, gone through."""
+    if form.is_between_shots:
+        return _of_shots(problem, form)
     trajectory = trajectory_of(problem, model)
     phases = np.array(PHASES)[sample_phases(problem, trajectory)]
     items, sizes = problem.shots.items, problem.sizes
@@ -68,6 +72,14 @@ def visited(problem: Problem, model: Fit, form: FreeForm) -> Visited | None:
     else:
         values = problem.shots.times
     return _range(values[acts], form)
+
+
+def _of_shots(problem: Problem, form: FreeForm) -> Visited | None:
+    """Range of a column of `shots.csv`; None where it is not known of every shot, or hardly varies."""
+    values = np.array([shot.covariates.get(form.covariate, np.nan) for shot in problem.shots.items])
+    if not np.isfinite(values).all() or np.unique(values).size < FEWEST_VALUES:
+        return None
+    return Visited(float(values.min()), float(values.max()), values)
 
 
 def _range(values: Samples, form: FreeForm) -> Visited | None:

@@ -12,7 +12,7 @@ from impactcell.discrepancy.laws.refit import FittedLaw, refit_forms, tied_with
 from impactcell.discrepancy.model import Fit, Problem, fit, parameter_name, refit_shot_parameters
 from impactcell.discrepancy.search import GapChange, GapMeasure, Part
 from impactcell.errors import DiscrepancyError
-from impactcell.physics.free_forms import spline_basis
+from impactcell.physics.bspline import spline_basis
 from impactcell.records import Samples
 
 DRAWN = 60
@@ -20,7 +20,7 @@ DRAWN = 60
 BAND = 1.96
 """Standard deviations of a 95 % band."""
 STRAIGHT = frozenset({"1", "u", "1 + u"})
-"""Forms that a spline at its smoothest bound can still tell."""
+"""Forms without a bend: what a spline at its smoothest bound is."""
 TIED_PLACES = 2.2
 """Standard deviations over shots within which two places predict alike, as for named effects."""
 MOST_LEFT = 1.2
@@ -117,11 +117,13 @@ def find_law(
         return None
     best = terms[0]
     laws = refit_forms(rough, best, rank_forms(tangent(best)))
+    if best.smoothness == SMOOTHNESS[-1]:
+        laws = _straight_first(laws)
     law = laws[0] if laws and not _spline_is_better(best, laws[0]) else None
     source = best if law is None else law
     model, fitted = _with_all_samples(problem, source.problem, source.fit)
     held = refit_shot_parameters(measure.problem.constrained(fitted.effects, model.constraints), fitted)
-    change = measure.change(held_base, held, (Part.TRACES,))
+    change = measure.change(held_base, held, (_part(best),))
     return LawFinding(
         best,
         _fitted_function(best),
@@ -132,8 +134,23 @@ def find_law(
         model,
         fitted,
         held,
-        _refusal(best, law, change),
+        _refusal(
+            best, law, change, MOST_LEFT if _part(best) is Part.TRACES else measure.expected(held)[1].factor
+        ),
     )
+
+
+def _straight_first(laws: list[FittedLaw]) -> list[FittedLaw]:
+    """Put a straight form first where it is tied with the best: then the data tell nothing of a bend."""
+    for law in laws:
+        if law.law.functional_form in STRAIGHT and tied_with(laws[0], law):
+            return [law, *(item for item in laws if item is not law)]
+    return laws
+
+
+def _part(term: FreeTerm) -> Part:
+    """In what a term shows: what acts between shots in their friction factors only."""
+    return Part.FACTORS if term.form.is_between_shots else Part.TRACES
 
 
 def _with_all_samples(problem: Problem, coarse: Problem, fitted: Fit) -> tuple[Problem, Fit]:
@@ -199,13 +216,14 @@ def _fitted_function(term: FreeTerm) -> FittedFunction:
     return FittedFunction(u, value, value - BAND * std, value + BAND * std)
 
 
-def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange) -> str:
-    """Why nothing is proposed, if so."""
+def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange, most_left: float) -> str:
+    """Why nothing is proposed, if so; `most_left` is the gap that it may leave."""
     if not change.is_real():
         return "on held-out shots the gap does not fall by more than chance"
-    if change.after.trace > MOST_LEFT:
+    left = change.after.of(change.parts)
+    if left > most_left:
         return (
-            f"the best term, {term.form.effect.equation}, leaves {change.after.trace:.3g} noise floors: what "
+            f"the best term, {term.form.effect.equation}, leaves {left:.3g} noise floors: what "
             f"is missing is no function of {term.form.covariate.replace('_', ' ')} alone"
         )
     if gives_energy(term):
@@ -213,8 +231,7 @@ def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange) -> str:
             f"the term would give energy: {term.form.effect.equation} becomes negative in the range that was "
             "gone through, so that something else is missing"
         )
-    straight = law is not None and law.law.functional_form in STRAIGHT
-    if term.smoothness == SMOOTHNESS[-1] and not straight:
+    if term.smoothness == SMOOTHNESS[-1] and law is None:
         return (
             "the smoothest spline predicts best, so that the data tell nothing of how the term bends; "
             f"shots over a wider range of {term.form.covariate} would"

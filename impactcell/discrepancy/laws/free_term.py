@@ -18,6 +18,7 @@ from impactcell.discrepancy.model import (
     refit_shot_parameters,
 )
 from impactcell.errors import DiscrepancyError
+from impactcell.physics.free_column_forms import column_form
 from impactcell.physics.free_forms import FREE_FORMS, LOWER, UPPER, FreeForm
 from impactcell.records import Samples
 
@@ -49,7 +50,8 @@ class FreeTerm:
     smoothness : float
         Weight of the roughness that was chosen.
     check_per_shot : ndarray, shape (n,)
-        Mean squared residual, 1 at the noise floor, of each training shot on which it was chosen.
+        Mean squared residual, 1 at the noise floor, of each training shot on which it was chosen; the
+        deviation of its friction factor is one of them.
     """
 
     form: FreeForm
@@ -79,22 +81,28 @@ class FreeTerm:
         return np.array([items[i].value(float(self.fit.theta[i])) for i in self.columns.tolist()])
 
 
-def candidate_terms(problem: Problem, base: Fit, places: Sequence[str] = tuple(FREE_FORMS)) -> list[str]:
-    """Places at which a free-form term promises most, to first order, the best first.
+def free_forms_of(problem: Problem) -> list[FreeForm]:
+    """Every place at which a free-form term may act: those of any plant, and each column of `shots.csv`."""
+    columns = problem.shots.items[0].columns if problem.shots.excitation.tests_between_shots else ()
+    return [*FREE_FORMS.values(), *(column_form(name) for name, _ in columns)]
+
+
+def candidate_terms(problem: Problem, base: Fit, forms: Sequence[FreeForm] = ()) -> list[FreeForm]:
+    """Places at which a free-form term promises most, to first order, the best first; all without `forms`.
 
     The promise is the fall of the squared residuals over one step of all parameters, half of g' H⁺ g.
     """
-    promise: dict[str, float] = {}
-    for place in places:
-        form = FREE_FORMS[place]
+    promise: list[tuple[float, FreeForm]] = []
+    for form in forms or free_forms_of(problem):
         span = visited(problem, base, form)
         if span is None or not _may_act(problem, base, form):
             continue
         extended, state = _start(problem, base, form, span, FIRST_TRY)
         H, g = equations(extended, state)
         if np.isfinite(H).all() and np.isfinite(g).all():
-            promise[place] = float(g @ np.linalg.lstsq(H + extended.penalty_matrix, g, rcond=1e-12)[0])
-    return sorted(promise, key=lambda place: -promise[place])
+            gain = float(g @ np.linalg.lstsq(H + extended.penalty_matrix, g, rcond=1e-12)[0])
+            promise.append((gain, form))
+    return [form for _, form in sorted(promise, key=lambda entry: -entry[0])]
 
 
 def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
@@ -103,8 +111,7 @@ def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
     parts = problem.select(inner), problem.select(check)
     inner_base = _of_shots(base, inner, parts[0])
     first: list[tuple[FreeForm, Visited, dict[float, Samples]]] = []
-    for place in candidate_terms(problem, base)[:PLACES]:
-        form = FREE_FORMS[place]
+    for form in candidate_terms(problem, base)[:PLACES]:
         span = visited(problem, base, form)
         if span is not None:
             first.append((form, span, {FIRST_TRY: _check(parts, inner_base, form, span, FIRST_TRY)}))
@@ -125,13 +132,15 @@ def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
 def _check(
     parts: tuple[Problem, Problem], base: Fit, form: FreeForm, span: Visited, smoothness: float
 ) -> Samples:
-    """Mean squared residual of each shot of the second part, a term fitted to the first; inf without."""
+    """Mean squared residual, and factor, of each shot of the second part after a fit to the first; or inf."""
     try:
         extended, fitted = _fit(parts[0], base, form, span, smoothness)
     except DiscrepancyError:
         return np.full(parts[1].count, np.inf)
     held = refit_shot_parameters(parts[1].constrained(extended.effects, extended.constraints), fitted)
-    return held.misfit(parts[1].shots) / parts[1].sizes
+    factors = (held.shot_parameters.log_factor / base.spread) ** 2
+    errors: Samples = (held.misfit(parts[1].shots) + factors) / (parts[1].sizes + 1)
+    return errors
 
 
 def _may_act(problem: Problem, base: Fit, form: FreeForm) -> bool:

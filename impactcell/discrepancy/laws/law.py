@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from functools import cache
 
 from impactcell.discrepancy.laws.condense import RankedForm
+from impactcell.discrepancy.laws.effect_file import effect_file
 from impactcell.discrepancy.laws.grammar import WAVES, Shape, evaluate, name
 from impactcell.physics import Effect, LawKind
 from impactcell.physics.effects import add_effect
+from impactcell.physics.free_column_forms import printed
 from impactcell.physics.free_forms import FreeForm
 from impactcell.records import Samples
 
@@ -20,17 +22,6 @@ SUFFIX = {
 """How a parameter's name ends for each unit."""
 MANY = 1e3
 """Times its first value: how far an amplitude or scale may be looked for."""
-
-_SIGNATURES = {
-    LawKind.KINETIC: "a: float, _b: float, _c: float, _d: float",
-    LawKind.SCALE: "a: float, _b: float, _c: float, _d: float",
-    LawKind.PULL: "a: float, _b: float, _c: float, _d: float",
-    LawKind.SPEED: "a: float, _b: float, _c: float, _d: float",
-    LawKind.READING: "a: float, _b: float, _c: float, _d: float",
-    LawKind.BODY: "a: float, b: float, _c: float, _d: float",
-    LawKind.CONTACT: "a: float, b: float, _c: float, _d: float",
-}
-"""Arguments of a law of each kind, those that no free form reads with a line before them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +57,8 @@ class Law:
         Name of the form, of u.
     expression : str
         Python of the function of u, its parameters by name.
+    tested : tuple of float
+        Range of the covariate that was gone through.
     """
 
     identifier: str
@@ -73,6 +66,12 @@ class Law:
     functional_form: str
     expression: str
     parameters: tuple[LawParameter, ...]
+    tested: tuple[float, float]
+
+    @property
+    def covariate(self) -> str:
+        """What u is, in words."""
+        return _WORDS.get(self.place.covariate, f"column {printed(self.place.covariate)}")
 
     @property
     def is_wave(self) -> bool:
@@ -87,63 +86,11 @@ class Law:
         )
         for parameter in self.parameters:
             function = re.sub(rf"\b{re.escape(parameter.name)}\b", _short(parameter.name), function)
-        return f"{self.place.effect.equation} with s(u) = {function}, u the {_WORDS[self.place.covariate]}"
+        return f"{self.place.effect.equation} with s(u) = {function}, u the {self.covariate}"
 
     def text(self) -> str:
         """Text of the effect file."""
-        kind, reach = self.place.law_kind, self.place.law_kind is LawKind.PULL
-        lines = [f"    {item.name} = p[{i}]" for i, item in enumerate(self.parameters)]
-        declared = [
-            f'        Parameter("{item.name}", "{item.unit}", null={_python(item.null)}, '
-            f"lower={_python(item.lower)}, upper={_python(item.upper)}, typical={_python(abs(item.first))}"
-            + (f", kind=ParameterKind.{item.kind}" if item.kind != "VALUE" else "")
-            + "),"
-            for item in self.parameters
-        ]
-        laws = f"LawKind.{kind.name}: law" + (", LawKind.REACH: reach" if reach else "")
-        end = (
-            "\n\ndef reach(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:\n"
-            f'    """Gap at which the pull ends."""\n    return p[{len(self.parameters) - 1}]\n'
-            if reach
-            else ""
-        )
-        imports = "Effect, Kind, LawKind, Parameter, Phase"
-        if any(item.kind != "VALUE" for item in self.parameters):
-            imports = "Effect, Kind, LawKind, Parameter, ParameterKind, Phase"
-        phases = ", ".join(f"Phase.{phase.name}" for phase in self.place.effect.phases)
-        return "\n".join(
-            [
-                f'"""Found in data: {self.functional_form} over {_WORDS[self.place.covariate]}."""',
-                "",
-                "import math",
-                "",
-                "from impactcell.numerics.jit import FloatPointer",
-                f"from impactcell.physics.effect import {imports}",
-                "",
-                "",
-                f"def law({_SIGNATURES[kind]}, p: FloatPointer) -> float:",
-                f'    """{self.place.effect.equation}."""',
-                *lines,
-                f"    u = {self.place.argument}",
-                f"    s = {self.expression}",
-                f"    return {self.place.around}",
-                end,
-                "",
-                "EFFECT = Effect(",
-                f'    identifier="{self.identifier}",',
-                f"    kind=Kind.{self.place.effect.kind.name},",
-                f'    equation="{self.equation}",',
-                '    reference="Found by the discrepancy workflow",',
-                f"    phases=({phases},),",
-                "    parameters=(",
-                *declared,
-                "    ),",
-                f"    laws={{{laws}}},",
-                ")",
-                '"""Where it was tested, and with which values, says `result.json` beside it."""',
-                "",
-            ]
-        )
+        return effect_file(self)
 
     def values(self, u: Samples) -> Samples:
         """Values of the function at u, shape (n,), its parameters as they stand."""
@@ -187,12 +134,9 @@ def _short(parameter: str) -> str:
     return parameter
 
 
-def _python(value: float) -> str:
-    return "math.nan" if math.isnan(value) else repr(float(value))
-
-
-def write_law(place: FreeForm, ranked: RankedForm, reference: float) -> Law:
-    """Give a ranked form's numbers names, units and ranges."""
+def write_law(place: FreeForm, ranked: RankedForm, tested: tuple[float, float]) -> Law:
+    """Give a ranked form's numbers names, units and ranges; `tested` is that of the covariate."""
+    reference = max(map(abs, tested))
     form_name = name(ranked.form)
     parameters: list[LawParameter] = []
     pieces: list[str] = []
@@ -224,7 +168,7 @@ def write_law(place: FreeForm, ranked: RankedForm, reference: float) -> Law:
         )
     digest = hashlib.sha256(f"{form_name} {parameters}".encode()).hexdigest()[:8]
     identifier = f"{place.effect.identifier.replace('free_', 'law_of_', 1)}_{digest}"
-    return Law(identifier, place, form_name, " + ".join(pieces), tuple(parameters))
+    return Law(identifier, place, form_name, " + ".join(pieces), tuple(parameters), tested)
 
 
 def _shape_name(shape: Shape, place: FreeForm, taken: set[str]) -> str:

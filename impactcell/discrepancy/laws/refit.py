@@ -115,15 +115,14 @@ def _taken_up(term: FreeTerm, fitted: FittedLaw, constant: float) -> Samples:
     for place, coordinate in enumerate(fitted.fit.coordinates):
         if not coordinate.effect and coordinate.parameter == term.form.constant_is:
             value = coordinate.value(float(theta[place]))
-            is_factor = term.form.law_kind is LawKind.SCALE
-            moved = value * (1.0 + constant) if is_factor else value + constant
+            moved = value * (1.0 + constant) if term.form.is_factor else value + constant
             ends = coordinate.value(coordinate.lower), coordinate.value(coordinate.upper)
             theta[place] = coordinate.coordinate(min(max(moved, ends[0]), ends[1]))
     return theta
 
 
 def _refit(base: Fit, term: FreeTerm, entry: RankedForm) -> FittedLaw:
-    law = write_law(term.form, entry, max(abs(term.visited.lower), abs(term.visited.upper)))
+    law = write_law(term.form, entry, (term.visited.lower, term.visited.upper))
     law.effect()
     held = {name: value for name, value in term.problem.constraints.held.items() if not _of(term, name)}
     problem = term.problem.constrained((*base.effects, law.identifier), Constraints(held))

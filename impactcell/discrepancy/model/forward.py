@@ -80,6 +80,7 @@ class ForwardModel:
                 shot=shot.place,
                 shots=shot.shots,
                 batch=shot.batch,
+                columns=shot.columns,
             )
             for shot in self.shots.items
         ]

@@ -18,13 +18,16 @@ def headline(result: DiscrepancyResult) -> str:
     finding = result.law
     if finding is None or finding.refused:
         return _conclusion(result)
-    fall = f"from {finding.change.before.trace:.2f} to {finding.change.after.trace:.2f} noise floors"
+    change = finding.change
+    before, after = change.before.of(change.parts), change.after.of(change.parts)
+    falling = "friction factors' spread falls" if finding.term.form.is_between_shots else "traces fall"
+    fall = f"{falling} from {before:.2f} to {after:.2f} noise floors"
     form = finding.term.form
     u = form.covariate.replace("_", " ")
     what = f"a free-form function of u, the {u}"
     if finding.proposed is not None:
         what = f"{finding.proposed.functional_form} of u, the {u}, a law that no library has"
-    return f"{_conclusion(result)} With s in {form.effect.equation} as {what}, the traces fall {fall}."
+    return f"{_conclusion(result)} With s in {form.effect.equation} as {what}, the {fall}."
 
 
 def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
@@ -39,8 +42,9 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
         "refused": finding.refused,
         "equation": form.effect.equation if law is None else law.equation,
         "spline_only": law is None,
-        "before": finding.change.before.trace,
-        "after": finding.change.after.trace,
+        "subject": "spread of the friction factors" if form.is_between_shots else "traces",
+        "before": finding.change.before.of(finding.change.parts),
+        "after": finding.change.after.of(finding.change.parts),
         "p": finding.change.p_value,
         "equivalents": [item.law.functional_form for item in finding.equivalents],
         "rivals": [find_effect(place).equation for place in finding.rival_places],

@@ -165,6 +165,10 @@ def between_shot_factors(problem: Problem, identifier: str, point: GridPoint) ->
             shots=np.array([float(shot.shots) for shot in items]),
             batch=np.array([float(shot.batch) for shot in items]),
             direction=np.array([float(shot.direction) for shot in items]),
+            columns={
+                name: np.array([shot.covariates.get(name, np.nan) for shot in items])
+                for name in effect.columns
+            },
         ),
     )
     mu_s, mu_k, mass = (np.broadcast_to(coordinate, len(items)) for coordinate in factors)

@@ -10,8 +10,9 @@ from scipy.interpolate import BSpline
 
 from impactcell.errors import PhysicsError
 from impactcell.physics import Plant, TapInput, simulate_tap
+from impactcell.physics.bspline import spline, spline_basis
 from impactcell.physics.effects import LIBRARY, add_effect, find_effect
-from impactcell.physics.free_forms import FREE_FORMS, SPANS, SPANS_OF_TABLE, spline, spline_basis
+from impactcell.physics.free_forms import FREE_FORMS, SPANS, SPANS_OF_TABLE
 
 TAP = TapInput(velocity_m_s=0.075, mass_kg=12.0, stroke_m=0.004, start_m=0.01)
 LOWER, UPPER = 0.0, 0.2
@@ -45,10 +46,14 @@ def test_spline_is_scipys_inside_and_its_tangent_beyond(
     p = np.array([lower, upper, *coefficients])
     u = lower + share * (upper - lower)
     assert spline(u, p, SPANS) == pytest.approx(float(reference(u)), abs=1e-12)
-    assert float((spline_basis(u, lower, upper) @ p[2:])[0]) == pytest.approx(float(reference(u)), abs=1e-12)
+    assert float((spline_basis(u, lower, upper, SPANS) @ p[2:])[0]) == pytest.approx(
+        float(reference(u)), abs=1e-12
+    )
     tangent = float(reference(upper) + beyond * reference.derivative()(upper))
     assert spline(upper + beyond, p, SPANS) == pytest.approx(tangent, abs=1e-9)
-    assert float((spline_basis(upper + beyond, lower, upper) @ p[2:])[0]) == pytest.approx(tangent, abs=1e-9)
+    assert float((spline_basis(upper + beyond, lower, upper, SPANS) @ p[2:])[0]) == pytest.approx(
+        tangent, abs=1e-9
+    )
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,7 @@ def test_what_the_records_hold() -> None:
         "shot",
         "shots",
         "batch",
+        "columns",
     )
     assert fields(Parameter) == ("name", "unit", "null", "lower", "upper", "typical", "per_batch", "kind")
     assert {"identifier", "kind", "equation", "reference", "phases", "parameters", "dissipates"} <= set(
