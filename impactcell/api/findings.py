@@ -4,7 +4,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -146,26 +146,39 @@ def discrepancy(
 def write_findings(
     result: DiscrepancyResult, data: Campaign, output: Path, source: str, nominal: str
 ) -> None:
-    """Write all files beside the directory and move them in together at the end."""
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=f".{output.name}.", dir=output.parent))
-    except OSError as error:
-        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
-    try:
+    """Write result.json, the extended model, the report, and the law where one is proposed."""
+
+    def write(beside: Path) -> None:
         (beside / "result.json").write_text(json_text(result_document(result)), encoding="utf-8")
         write_model(extended_model(result, data, source, nominal), beside / "model.extended.yaml")
         write_report(result, source, beside / "report.html")
         law = result.law.proposed if result.law else None
         if law is not None:
             (beside / f"{law.identifier}.py").write_text(law.text(), encoding="utf-8")
+
+    write_files(output, write)
+
+
+def write_files(output: Path, write: Callable[[Path], None]) -> None:
+    """Have all files written beside the directory and move them in together at the end.
+
+    Raises
+    ------
+    CampaignError
+        The directory cannot be written.
+    """
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        beside = Path(tempfile.mkdtemp(prefix=f".{output.name}.", dir=output.parent))
+    except OSError as error:
+        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
+    try:
+        write(beside)
         output.mkdir(exist_ok=True)
         for stale in output.glob(LAW_FILES):
             stale.unlink()
-        if law is not None:
-            (beside / f"{law.identifier}.py").replace(output / f"{law.identifier}.py")
-        for name in FILES:
-            (beside / name).replace(output / name)
+        for file in [*beside.glob(LAW_FILES), *(beside / name for name in FILES)]:
+            file.replace(output / file.name)
     except OSError as error:
         raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
     finally:

@@ -216,12 +216,30 @@ def discrepancy(
     effects: Annotated[
         list[Path] | None, typer.Option(metavar="PATH", help="A file or folder of effects of your own.")
     ] = None,
+    base: Annotated[
+        Path | None, typer.Option(metavar="MODEL.yaml", help="Base model of a machine that is no cell.")
+    ] = None,
+    train: Annotated[
+        str | None, typer.Option(metavar="GLOB", help="With --base: shots or batches that fit.")
+    ] = None,
+    test: Annotated[
+        str | None, typer.Option(metavar="GLOB", help="With --base: shots or batches that are held out.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Find where model and measurement disagree, name the missing effect, prove it."""
     from impactcell.cli.discrepancy import discrepancy as run_discrepancy
+    from impactcell.cli.discrepancy import discrepancy_of_machine
     from impactcell.cli.effects import offer
+    from impactcell.errors import CampaignError
 
+    if base is not None:
+        if campaign is None or cell is not None or scheduler is not None or effects:
+            raise CampaignError("--base goes with a campaign, --train, --test and --seed alone")
+        discrepancy_of_machine(campaign, output, base, patterns=(train, test), seed=seed, as_json=as_json)
+        return
+    if train is not None or test is not None:
+        raise CampaignError("--train and --test go with --base; without it the seed divides the shots")
     offer(effects or ())
     run_discrepancy(
         campaign, output, cell=cell, journal=journal, seed=seed, scheduler=scheduler, as_json=as_json

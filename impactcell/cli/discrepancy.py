@@ -8,10 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from impactcell.api.findings import write_findings
+from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
 from impactcell.cli.paths import note_damage, open_journal
-from impactcell.discrepancy.report import headline
+from impactcell.discrepancy.machine import investigate_machine
+from impactcell.discrepancy.report import headline, machine_headline
 from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError, DiscrepancyError
@@ -81,6 +83,54 @@ def discrepancy(
         sys.stdout.write((output / "result.json").read_text(encoding="utf-8"))
     else:
         print_result(f"{headline(result)}\n{output / 'report.html'}")
+
+
+def discrepancy_of_machine(
+    campaign: Path,
+    output: Path,
+    base: Path,
+    *,
+    patterns: tuple[str | None, str | None] = (None, None),
+    seed: int = 0,
+    as_json: bool = False,
+) -> None:
+    """Run the workflow with a base model, on a machine that is no cell.
+
+    Parameters
+    ----------
+    campaign, output, base : Path
+        Campaign directory, directory for the results, and the base model's YAML.
+    patterns : tuple of str or None
+        Shots that fit and shots that test, by number or batch.
+    seed : int
+    as_json : bool
+        Print result.json instead of its verdict.
+
+    Raises
+    ------
+    CampaignError, SettingsError
+        What was given cannot be read or used.
+    """
+    from impactcell.settings.base_model import read_base_model
+
+    if output.exists() and not output.is_dir():
+        raise CampaignError(f"{output}: is a file; name a directory")
+    model, excitation = read_base_model(base)
+    data = read(campaign)
+    if data.excitation is not excitation:
+        raise CampaignError(
+            f"{base}: is of excitation {excitation}, the campaign of {data.excitation}; change one of them"
+        )
+    train, test = patterns
+    with named_steps() as report_step:
+        report_step("naming what the base model lacks")
+        finding = investigate_machine(data, model, train=train, test=test, seed=seed)
+        report_step("writing the report")
+        write_machine_findings(finding, data, output, str(campaign.name))
+    if as_json:
+        sys.stdout.write((output / "result.json").read_text(encoding="utf-8"))
+    else:
+        print_result(f"{machine_headline(finding)}\n{output / 'report.html'}")
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:

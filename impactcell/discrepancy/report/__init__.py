@@ -1,5 +1,7 @@
 """What the workflow hands over: `result.json`, figures and one page."""
 
+from impactcell.discrepancy.report.machine_page import write_machine_report
+from impactcell.discrepancy.report.machine_result import machine_document, machine_headline
 from impactcell.discrepancy.report.page import write_report
 from impactcell.discrepancy.report.result import json_text, result_document
 from impactcell.discrepancy.report.sentences import headline
@@ -7,6 +9,9 @@ from impactcell.discrepancy.report.sentences import headline
 __all__ = [
     "headline",
     "json_text",
+    "machine_document",
+    "machine_headline",
     "result_document",
+    "write_machine_report",
     "write_report",
 ]

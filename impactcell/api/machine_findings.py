@@ -1,0 +1,40 @@
+"""The workflow with a base model: its findings and the files that it leaves."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from impactcell.api.findings import write_files
+from impactcell.campaign import Campaign
+from impactcell.discrepancy.machine import MachineFinding
+from impactcell.discrepancy.report import json_text, machine_document, write_machine_report
+from impactcell.settings.base_model import base_model_text
+
+
+def write_machine_findings(finding: MachineFinding, data: Campaign, output: Path, source: str) -> None:
+    """Write result.json, the extended base model and the report.
+
+    Raises
+    ------
+    CampaignError
+        The directory cannot be written.
+    """
+    terms = tuple(term.choice for term in finding.final.terms)
+    extended = replace(finding.base, terms=terms)
+    provenance = {
+        "made by": "impactcell discrepancy",
+        "from": source,
+        "seed": str(finding.seed),
+        "verdict": finding.verdict,
+        "held-out gap before": f"{finding.fall.before:.4g}",
+        "held-out gap after": f"{finding.fall.after:.4g}",
+    }
+
+    document = machine_document(finding)
+
+    def write(beside: Path) -> None:
+        (beside / "result.json").write_text(json_text(document), encoding="utf-8")
+        text = base_model_text(extended, data.excitation, provenance)
+        (beside / "model.extended.yaml").write_text(text, encoding="utf-8")
+        write_machine_report(finding, document, source, beside / "report.html")
+
+    write_files(output, write)

@@ -1,0 +1,200 @@
+"""Records as rows of a linear regression: the equation of motion in its weak form.
+
+With a test function w of compact support, `int w q'' dt = int w'' q dt`: no measured position is
+differentiated, and what is sampled fast and slowly averages in the same way. Each row is one place of w; two
+of them overlap by half.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
+from impactcell.discrepancy.machine.free_forms import free_columns
+from impactcell.discrepancy.machine.terms import CATALOGUE, Motion, Term
+from impactcell.discrepancy.machine.uniform_records import (
+    MIN_HALF_SUPPORT,
+    MotionScale,
+    UniformRecord,
+    carried_force,
+    motion_scale,
+)
+from impactcell.records import Samples
+
+IndexArray = np.ndarray[tuple[int], np.dtype[np.int64]]
+Column = tuple[str, float, int]
+"""A column of the regression: its term or nuisance, the value of its shape, and which strength it is."""
+
+PERIODS_PER_SUPPORT = 0.25
+"""Support of a test function over the period of the motion: a half swing has four rows [1]."""
+SPEED_SUPPORT_SHARE = 0.25
+"""Support by which a speed is smoothed, over that of a test function: direction turns fast [1]."""
+TURNING_SPEED_SHARE = 0.005
+"""Speed below which the direction of motion counts as between -1 and 1, over the largest [1]."""
+TURNING_NOISES = 2.0
+"""And at least this many standard deviations of the speed's noise [1]."""
+MAX_RESTING_SHARE = 0.5
+"""Share of a row's support at rest beyond which it says nothing of friction: the part may stick [1]."""
+TEST_FUNCTION_POWER = 4
+"""w = (1 - s²)^4: three derivatives vanish at its ends [1]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Rows of the regression.
+
+    Attributes
+    ----------
+    target : ndarray, shape (n,)
+        I q'' - F + G sin q at the values of the base model.
+    columns : mapping
+        Generalised force per unit of each strength and nuisance, shape (n,).
+    record, time_s : ndarray, shape (n,)
+        Place of the record, and centre of the test function in it.
+    variance : ndarray, shape (n,)
+        Of the target by the sensors' noise alone.
+    """
+
+    target: Samples
+    columns: Mapping[Column, Samples]
+    record: Samples
+    time_s: Samples
+    variance: Samples
+
+
+def build_rows(
+    records: Sequence[UniformRecord],
+    base: BaseModel,
+    candidates: Sequence[TermChoice],
+    gravity: float,
+    delay_s: float,
+) -> Rows:
+    """Rows of all records with a column for every term, shape and nuisance.
+
+    Parameters
+    ----------
+    records : sequence of UniformRecord
+    base : BaseModel
+    candidates : sequence of TermChoice
+        Terms beside those of the base model.
+    gravity : float
+        G as it is known so far; the load and the zero of the position go by it.
+    delay_s : float
+        By which the force was recorded late.
+    """
+    scale = motion_scale(records, base.response, gravity)
+    parts = [_record_rows(record, base, candidates, (gravity, delay_s), scale) for record in records]
+    return Rows(
+        np.concatenate([part.target for part in parts]),
+        {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns},
+        np.concatenate([np.full(part.target.size, place) for place, part in enumerate(parts)]),
+        np.concatenate([part.time_s for part in parts]),
+        np.concatenate([part.variance for part in parts]),
+    )
+
+
+def _record_rows(
+    record: UniformRecord,
+    base: BaseModel,
+    candidates: Sequence[TermChoice],
+    gravity_and_delay: tuple[float, float],
+    scale: MotionScale,
+) -> Rows:
+    gravity, delay_s = gravity_and_delay
+    step = record.step_s
+    half, narrow = half_supports(record, scale)
+    weight, curvature = _test_function(half, step)
+    velocity, speed_noise = smoothed_speed(record.position, narrow, step)
+    force = record.force
+    if delay_s:
+        force = np.interp(record.time_s + delay_s, record.time_s, force)
+    load = np.abs(carried_force(base.response, force, gravity * np.sin(record.position)))
+    centres: IndexArray = np.arange(half + narrow, len(force) - half - narrow, half, dtype=np.int64)
+    direction = direction_of_motion(velocity, scale, record.noise[0] * speed_noise)
+    resting = _averaged((np.abs(direction) < 1.0).astype(np.float64), weight, centres)
+    centres = centres[resting <= MAX_RESTING_SHARE]
+    accelerating = record.inertia * _averaged(record.position, curvature, centres)
+    one = np.ones(len(force))
+    raw: dict[Column, Samples] = {
+        ("force_gain", 0.0, 0): force,
+        ("force_offset", 0.0, 0): one,
+        ("gravity_torque", 0.0, 0): -np.sin(record.position),
+        ("position_offset", 0.0, 0): gravity * np.cos(record.position),
+    }
+    for choice in (*base.terms, *candidates):
+        term = CATALOGUE[choice.identifier]
+        value = record.covariates.get(choice.covariate, 0.0)
+        motion = Motion(record.position, velocity, load, value * one)
+        for shape in shape_grid(term, scale):
+            for number, feature in enumerate(term.features(motion, shape)):
+                raw[choice.name, shape, number] = -direction * feature if term.is_friction else feature
+    motion = Motion(record.position, velocity, load, one)
+    raw |= free_columns(motion, direction, (scale.speed, scale.load), (scale.low, scale.high))
+    columns = {name: _averaged(values, weight, centres) for name, values in raw.items()}
+    columns["inertia", 0.0, 0] = -accelerating
+    if base.response is Response.FORCE:
+        # What is measured is the gain times what a rigid machine would need, and friction in its own unit.
+        columns["force_gain", 0.0, 0] = gravity * columns["gravity_torque", 0.0, 0] - accelerating
+    target = accelerating - _averaged(
+        force - base.gravity_torque.value * np.sin(record.position), weight, centres
+    )
+    sensors = (record.inertia * record.noise[0]) ** 2 * float(curvature @ curvature)
+    sensors += record.noise[1] ** 2 * float(weight @ weight)
+    return Rows(target, columns, np.zeros(target.size), record.time_s[centres], np.full(target.size, sensors))
+
+
+def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
+    """Half support of a test function and of the smoothing of speeds [samples]."""
+    half = max(int(0.5 * PERIODS_PER_SUPPORT * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
+    half = min(half, len(record.position) // 8)
+    return half, max(int(SPEED_SUPPORT_SHARE * half), 3)
+
+
+def direction_of_motion(velocity: Samples, scale: MotionScale, speed_noise: float) -> Samples:
+    """-1 or 1, and between them where the part turns or rests, shape (n,)."""
+    turning = max(TURNING_SPEED_SHARE * scale.speed, TURNING_NOISES * speed_noise)
+    direction: Samples = np.clip(velocity / turning, -1.0, 1.0)
+    return direction
+
+
+def shape_grid(term: Term, scale: MotionScale) -> tuple[float, ...]:
+    """Values of a term's shape that are tried; (0,) where it has none."""
+    if term.shape is None:
+        return (0.0,)
+    size = scale.speed if term.shape.covariate == "speed" else scale.high - scale.low
+    return tuple(share * size for share in term.shape.shares)
+
+
+def smoothed_speed(position: Samples, half: int, step: float) -> tuple[Samples, float]:
+    """Differentiate by weighted slopes over `2 half + 1` samples: shape (n,), and noise per noise of one."""
+    # A cubic's slope in its middle: a parabola of the speed within the support leaves no error.
+    lever = np.arange(-half, half + 1.0)
+    second, fourth, sixth = (float(np.sum(lever**power)) for power in (2, 4, 6))
+    weight = (sixth * lever - fourth * lever**3) / (second * sixth - fourth**2)
+    padded = np.pad(position, half, mode="reflect", reflect_type="odd")
+    weight /= step
+    return np.convolve(padded, weight[::-1], "valid"), float(np.sqrt(weight @ weight))
+
+
+def smoothed_acceleration(position: Samples, half: int, step: float) -> Samples:
+    """Second derivative as the rows of the regression have it, shape (n,)."""
+    _, curvature = _test_function(half, step)
+    padded = np.pad(position, half + 1, mode="reflect", reflect_type="odd")
+    return np.convolve(padded, curvature, "valid")
+
+
+def _test_function(half: int, step: float) -> tuple[Samples, Samples]:
+    """Weights of a mean, and of the mean second derivative by second differences, shape (2 half + 3,)."""
+    place = np.arange(-half - 1, half + 2) / (half + 1.0)
+    weight = np.maximum(1.0 - place**2, 0.0) ** TEST_FUNCTION_POWER
+    weight /= weight.sum()
+    curvature = np.convolve(weight, [1.0, -2.0, 1.0], "same") / step**2
+    return weight, curvature
+
+
+def _averaged(values: Samples, weight: Samples, centres: IndexArray) -> Samples:
+    half = len(weight) // 2
+    windows = np.lib.stride_tricks.sliding_window_view(values, len(weight))
+    averaged: Samples = windows[centres - half] @ weight
+    return averaged

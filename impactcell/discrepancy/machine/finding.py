@@ -1,0 +1,162 @@
+"""What an investigation with a base model found: models before and after, and the proof."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from impactcell.discrepancy.machine.base_model import BaseModel
+from impactcell.discrepancy.machine.equations import Column
+from impactcell.discrepancy.machine.regression import Blocks, LinearFit
+from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep
+from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord
+
+MIN_TRAINING, MIN_HELD_OUT = 9, 5
+"""Blocks to fit and blocks held out that any test needs, as in the workflow of shots [1]."""
+MAX_EXPECTED_GAP = 1.3
+"""Gap beyond which no scatter between blocks excuses a model, as in the workflow of shots [1]."""
+MAX_P, MIN_CLOSED = 0.1, 0.02
+"""Held-out test of a term beside an interval above 0, as in the workflow of shots [1]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FallOfGap:
+    """Held-out gap with and without a term, 1 = noise floor.
+
+    Attributes
+    ----------
+    before, after : float
+    closed, low, high : float
+        Share of the gap above the floor that is closed, and its 95 % interval over blocks.
+    p_value : float
+    """
+
+    before: float
+    after: float
+    closed: float
+    low: float
+    high: float
+    p_value: float
+
+    @property
+    def is_real(self) -> bool:
+        """Whether held-out blocks confirm it."""
+        return self.low > 0.0 and self.closed >= MIN_CLOSED and self.p_value <= MAX_P
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """A fitted model of a machine.
+
+    Attributes
+    ----------
+    base : BaseModel
+        With what its data cannot tell held.
+    terms : tuple of ChosenTerm
+        Those of the base model first.
+    fit : LinearFit
+    delay_s : float
+    gravity : float
+        G.
+    """
+
+    base: BaseModel
+    terms: tuple[ChosenTerm, ...]
+    fit: LinearFit
+    delay_s: float
+    gravity: float
+
+    def value(self, column: Column) -> float:
+        """Coefficient of a column; 0 where the model does not have it."""
+        if column not in self.fit.columns:
+            return 0.0
+        return float(self.fit.coefficients[self.fit.columns.index(column)])
+
+    def nuisance(self, name: str) -> float:
+        """Coefficient of a nuisance."""
+        return self.value((name, 0.0, 0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MachineFinding:
+    """Outcome of an investigation with a base model.
+
+    Attributes
+    ----------
+    base : BaseModel
+    records : tuple of UniformRecord
+    steps : tuple of SelectionStep
+    established : tuple of str
+        Names of the terms that joined, in their order.
+    unconfirmed : tuple of str
+    falls : mapping
+        Of each established term.
+    nominal, final : Model
+    training, held_out : Blocks
+    train_gaps : (float, float)
+        Of the nominal and the final model.
+    expected : (float, float)
+        Range of the held-out gap where nothing is left.
+    fall : FallOfGap
+        From the nominal to the final model.
+    held_spans : tuple of (int, float, float)
+        Record and time of each stretch that was held out.
+    correlation_s : float
+        Time over which what remains stays alike.
+    block_s : float
+    scale : MotionScale
+    notes : tuple of str
+    seed : int
+    """
+
+    base: BaseModel
+    records: tuple[UniformRecord, ...]
+    steps: tuple[SelectionStep, ...]
+    established: tuple[str, ...]
+    unconfirmed: tuple[str, ...]
+    falls: Mapping[str, FallOfGap]
+    nominal: Model
+    final: Model
+    training: Blocks
+    held_out: Blocks
+    train_gaps: tuple[float, float]
+    expected: tuple[float, float]
+    fall: FallOfGap
+    held_spans: tuple[tuple[int, float, float], ...]
+    correlation_s: float
+    block_s: float
+    scale: MotionScale
+    notes: tuple[str, ...]
+    seed: int
+
+    @staticmethod
+    def enough(training: Blocks, held_out: Blocks) -> bool:
+        """Whether there are blocks enough for any test."""
+        return len(training) >= MIN_TRAINING and len(held_out) >= MIN_HELD_OUT
+
+    @property
+    def missing_blocks(self) -> int:
+        """How many blocks more any test needs."""
+        return max(MIN_TRAINING - len(self.training), 0) + max(MIN_HELD_OUT - len(self.held_out), 0)
+
+    @property
+    def is_at_floor(self) -> bool:
+        """Whether the final model leaves nothing."""
+        return self.fall.after <= self.expected[1] and self.train_gaps[1] <= MAX_EXPECTED_GAP
+
+    @property
+    def tied_with(self) -> dict[str, tuple[str, ...]]:
+        """Rivals of each established term that the data cannot tell from it."""
+        accepted = (step for step in self.steps if step.accepted is not None)
+        return {
+            step.accepted.term.choice.name: step.tied_with
+            for step in accepted
+            if step.accepted is not None and step.accepted.term.choice.name in self.established
+        }
+
+    @property
+    def verdict(self) -> str:
+        """`no_gap`, `named`, `tied`, `unknown` or `untested`."""
+        if self.missing_blocks:
+            return "untested"
+        if self.established:
+            return "tied" if any(self.tied_with.values()) else "named"
+        return "no_gap" if self.is_at_floor else "unknown"

@@ -1,0 +1,151 @@
+"""The whole way from records and a base model to a finding: fit, name, prove on held-out blocks."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from impactcell.campaign import Campaign
+from impactcell.discrepancy.machine.base_model import BaseModel, Prior, Response, TermChoice
+from impactcell.discrepancy.machine.finding import MachineFinding
+from impactcell.discrepancy.machine.study import Study
+from impactcell.discrepancy.machine.terms import CATALOGUE
+from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
+from impactcell.errors import CampaignError
+
+MANY_RECORDS = 8
+"""Records from which on whole ones are held out; of fewer, the last third of each [1]."""
+
+
+def investigate_machine(
+    campaign: Campaign,
+    base: BaseModel,
+    *,
+    train: str | None = None,
+    test: str | None = None,
+    seed: int = 0,
+) -> MachineFinding:
+    """Find what a base model lacks.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    base : BaseModel
+    train, test : str, optional
+        Patterns of shot numbers or batches that fit and that are held out; one alone leaves the rest to the
+        other.
+    seed : int
+        Of the resampling.
+
+    Raises
+    ------
+    CampaignError
+        The records cannot be used with the base model; the message says why and what to do.
+    """
+    records = uniform_records(campaign, base)
+    if base.coordinate is not campaign.coordinate:
+        raise CampaignError(
+            f"the base model is of a {base.coordinate}, the campaign of a {campaign.coordinate}; "
+            "one of them has to change its `coordinate`"
+        )
+    base, notes = hold_what_cannot_be_seen(base, records)
+    candidates = _candidates(base, records)
+    study = Study(records, base, candidates, _held_records(records, train, test))
+    return study.investigate(notes, seed)
+
+
+def hold_what_cannot_be_seen(
+    base: BaseModel, records: Sequence[UniformRecord]
+) -> tuple[BaseModel, list[str]]:
+    """Hold numbers of a base model that its records say nothing of, and say so."""
+    notes = []
+    spikes = sum(record.spikes for record in records)
+    if spikes:
+        samples = sum(2 * len(record.position) for record in records)
+        notes.append(f"{spikes} of {samples} samples stood far from their neighbours and were replaced.")
+    is_driven = any(np.ptp(record.force) > 0.0 for record in records)
+    if not is_driven:
+        notes += [
+            f"Nothing drives: {name} cannot be seen and is held at its stated value."
+            for name in ("force_gain", "delay_s")
+            if not getattr(base, name).is_held
+        ]
+        base = replace(base, force_gain=Prior(), delay_s=Prior(base.delay_s.value))
+        if not base.inertia.is_held:
+            notes.append(
+                "A free motion shows accelerations only: the inertia is held at its stated value, "
+                "and every force counts in units that go with it."
+            )
+            base = replace(base, inertia=Prior(base.inertia.value))
+    anchors = [base.inertia, base.force_gain, *([base.gravity_torque] if base.gravity_torque.value else [])]
+    if is_driven and base.response is Response.POSITION and all(math.isinf(one.std) for one in anchors):
+        notes.append(
+            "Inertia, gravity and gain of the force are all free: the inertia is held, as the unit of all."
+        )
+        base = replace(base, inertia=Prior(base.inertia.value))
+    return base, notes
+
+
+def _candidates(base: BaseModel, records: Sequence[UniformRecord]) -> tuple[TermChoice, ...]:
+    """Terms that may be named: of the catalogue, those that such records can test."""
+    columns = sorted({name for record in records for name in record.covariates})
+    varying = [name for name in columns if len({record.covariates.get(name) for record in records}) > 1]
+    own = {choice.name for choice in base.terms}
+    choices = []
+    for identifier, term in CATALOGUE.items():
+        if term.needs_covariate:
+            choices += [TermChoice(identifier, name) for name in varying]
+        elif identifier == "load_dependent_friction" and not _has_load(base):
+            continue
+        elif term.has_memory and base.response is Response.POSITION:
+            continue  # the path is what is predicted
+        else:
+            choices.append(TermChoice(identifier))
+    return tuple(choice for choice in choices if choice.name not in own)
+
+
+def _has_load(base: BaseModel) -> bool:
+    """Whether what gear or guide carries is known otherwise than by the force that is predicted."""
+    gravity = base.gravity_torque
+    return base.response is Response.POSITION or gravity.value != 0.0 or not gravity.is_held
+
+
+def _held_records(records: Sequence[UniformRecord], train: str | None, test: str | None) -> set[int] | None:
+    """Places of the records that are held out; None where the last third of each is.
+
+    Raises
+    ------
+    CampaignError
+        A pattern fits no shot, or a shot is in both.
+    """
+    if train is None and test is None:
+        if len(records) < MANY_RECORDS:
+            return None
+        return set(range(2, len(records), 3))
+
+    def fitting(pattern: str, option: str) -> set[int]:
+        places = {
+            place
+            for place, record in enumerate(records)
+            if any(
+                fnmatchcase(text, pattern) for text in (str(record.shot), f"{record.shot}.csv", record.label)
+            )
+        }
+        if not places:
+            raise CampaignError(f"{option} {pattern!r} fits neither the number nor the batch of any shot")
+        return places
+
+    every = set(range(len(records)))
+    held = fitting(test, "--test") if test is not None else every - fitting(train or "*", "--train")
+    fitted = fitting(train, "--train") if train is not None else every - held
+    if held & fitted:
+        both = ", ".join(str(records[place].shot) for place in sorted(held & fitted))
+        raise CampaignError(f"shots {both} are in --train and in --test; what fits a model cannot test it")
+    if not held or not fitted:
+        raise CampaignError("--train and --test leave no shot to the other")
+    if every - held - fitted:
+        left = ", ".join(str(records[place].shot) for place in sorted(every - held - fitted))
+        raise CampaignError(f"shots {left} are in neither --train nor --test")
+    return held

@@ -1,0 +1,53 @@
+"""Gaps of models on blocks, and whether they fall where no model was fitted."""
+
+import math
+
+import numpy as np
+from scipy.stats import t as student
+
+from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FallOfGap, Model
+from impactcell.discrepancy.machine.regression import Blocks
+from impactcell.discrepancy.machine.selection import sign_flip_p
+
+CLOSED_RESAMPLES = 999
+"""Draws of the held-out blocks for the interval of the share that is closed [1]."""
+MIN_OPEN_GAP = 1.05
+"""Gap above which there is something to close, as in the workflow of shots [1]."""
+
+
+def gap(blocks: Blocks, model: Model) -> float:
+    """RMS of a model's residuals over the sensors' noise."""
+    losses = blocks.losses(model.fit.columns, model.fit.coefficients)
+    return math.sqrt(float(losses.sum()) / max(float(blocks.noise.sum()), 1e-300))
+
+
+def fall_of_gap(blocks: Blocks, before: Model, after: Model, seed: int) -> FallOfGap:
+    """How the held-out gap falls from one model to the next, blocks drawn with replacement."""
+    losses = [blocks.losses(model.fit.columns, model.fit.coefficients) for model in (before, after)]
+    gap_before, gap_after = gap(blocks, before), gap(blocks, after)
+    closed = low = high = math.nan
+    if gap_before > MIN_OPEN_GAP:
+        closed = (gap_before - gap_after) / (gap_before - 1.0)
+        rng = np.random.default_rng([seed, 7])
+        shares = []
+        for _ in range(CLOSED_RESAMPLES):
+            drawn = rng.integers(0, len(blocks), len(blocks))
+            noise = max(float(blocks.noise[drawn].sum()), 1e-300)
+            one, two = (math.sqrt(float(loss[drawn].sum()) / noise) for loss in losses)
+            if one > MIN_OPEN_GAP:
+                shares.append((one - two) / (one - 1.0))
+        if shares:
+            low, high = (float(value) for value in np.quantile(shares, [0.025, 0.975]))
+            low, high = min(low, closed), max(high, closed)
+    return FallOfGap(gap_before, gap_after, closed, low, high, sign_flip_p(losses[0] - losses[1], seed))
+
+
+def expected_gap(blocks: Blocks, model: Model) -> tuple[float, float]:
+    """Range of the gap where nothing is left: about one, by the scatter between blocks."""
+    losses = blocks.losses(model.fit.columns, model.fit.coefficients)
+    ratio = losses / np.maximum(blocks.noise, 1e-300)
+    if len(ratio) < 2:
+        return 0.0, MAX_EXPECTED_GAP
+    error = float(ratio.std(ddof=1) / max(ratio.mean(), 1e-300)) / math.sqrt(len(ratio))
+    half = float(student.ppf(0.975, len(ratio) - 1)) * error
+    return math.sqrt(max(1.0 - half, 0.0)) / 1.05, min(math.sqrt(1.0 + half) * 1.05, MAX_EXPECTED_GAP)

@@ -1,0 +1,205 @@
+"""Least squares over blocks: every model is a small system made of the blocks' own sums."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from impactcell.discrepancy.machine.base_model import Prior
+from impactcell.discrepancy.machine.equations import Column, IndexArray, Rows
+from impactcell.records import Samples
+
+RIDGE = 1e-9
+"""Relative ridge of the normal equations: of columns that cannot be told apart neither runs away [1]."""
+PIECES_PER_BLOCK = 4.0
+"""Independent pieces that a block counts for where a prior is weighed against it [1]."""
+BLOCKS_OF_RECORD = 100_000
+"""Numbers of blocks that a record may have: a day of seconds [1]."""
+PRIOR_REACH = 2.0
+"""Standard deviations of its prior that a nuisance may go: no misfit talks a scale away [1]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blocks:
+    """Sums of products over each block's rows.
+
+    Attributes
+    ----------
+    names : tuple of Column
+        Columns, in the order of the matrices; the target comes last.
+    products : ndarray, shape (b, p + 1, p + 1)
+    rows : ndarray, shape (b,)
+    noise : ndarray, shape (b,)
+        Sum of the rows' variances by the sensors' noise.
+    fold : ndarray of int, shape (b,)
+        Cross-validation leaves out one fold at a time.
+    """
+
+    names: tuple[Column, ...]
+    products: Samples
+    rows: Samples
+    noise: Samples
+    fold: IndexArray
+
+    def __len__(self) -> int:
+        """Count the blocks."""
+        return len(self.rows)
+
+    def places(self, columns: Iterable[Column]) -> list[int]:
+        """Where columns stand in the matrices."""
+        return [self.names.index(column) for column in columns]
+
+    def losses(self, columns: Sequence[Column], coefficients: Samples) -> Samples:
+        """Squared residual of every block, shape (b,)."""
+        places = [*self.places(columns), len(self.names)]
+        vector = np.append(-coefficients, 1.0)
+        losses: Samples = np.einsum(
+            "i,bij,j->b", vector, self.products[np.ix_(range(len(self)), places, places)], vector
+        )
+        return np.maximum(losses, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearFit:
+    """A fitted model.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+    coefficients, low, high : ndarray, shape (p,)
+        Values, and their 95 % intervals by the scatter between blocks.
+    at_bound : ndarray of bool, shape (p,)
+        A strength that would have been negative, or a nuisance beyond what its prior allows.
+    """
+
+    columns: tuple[Column, ...]
+    coefficients: Samples
+    low: Samples
+    high: Samples
+    at_bound: Samples
+
+
+def blocks_of(rows: Rows, number: IndexArray, fold: Mapping[int, int]) -> Blocks:
+    """Sum up each block's rows.
+
+    Parameters
+    ----------
+    rows : Rows
+    number : ndarray of int, shape (n,)
+        Block of each row, with its record as the multiple of `BLOCKS_OF_RECORD`.
+    fold : mapping
+        Fold of each block that is wanted.
+    """
+    names = tuple(rows.columns)
+    matrix = np.stack([*rows.columns.values(), rows.target], axis=1)
+    products, counts, noise = [], [], []
+    for block in fold:
+        inside = number == block
+        part = matrix[inside]
+        products.append(part.T @ part)
+        counts.append(float(inside.sum()))
+        noise.append(float(rows.variance[inside].sum()))
+    size = len(names) + 1
+    stacked = np.array(products).reshape(-1, size, size)
+    return Blocks(
+        names, stacked, np.array(counts), np.array(noise), np.array([*fold.values()], dtype=np.int64)
+    )
+
+
+def fit_blocks(
+    blocks: Blocks,
+    columns: Sequence[Column],
+    priors: Mapping[Column, Prior],
+    nonnegative: frozenset[Column],
+) -> LinearFit:
+    """Fit a model to blocks, with 95 % intervals by the scatter between them (sandwich over blocks)."""
+    coefficients, at_bound = _solve(blocks, np.arange(len(blocks)), columns, priors, nonnegative)
+    places = blocks.places(columns)
+    last = len(blocks.names)
+    scores = blocks.products[:, places, last] - np.einsum(
+        "bij,j->bi", blocks.products[np.ix_(range(len(blocks)), places, places)], coefficients
+    )
+    matrix = blocks.products.sum(axis=0)[np.ix_(places, places)] + np.diag(
+        _prior_weight(blocks, columns, coefficients, priors)
+    )
+    matrix += RIDGE * np.diag(np.diag(matrix))
+    inverse = np.linalg.pinv(matrix, hermitian=True)
+    freedom = max(len(blocks) - len(columns), 1)
+    spread = inverse @ (scores.T @ scores) @ inverse * len(blocks) / freedom
+    half = student.ppf(0.975, freedom) * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return LinearFit(tuple(columns), coefficients, coefficients - half, coefficients + half, at_bound)
+
+
+def out_of_fold_losses(
+    blocks: Blocks,
+    columns: Sequence[Column],
+    priors: Mapping[Column, Prior],
+    nonnegative: frozenset[Column],
+) -> Samples:
+    """Squared residual of each block under coefficients fitted without its fold, shape (b,)."""
+    losses = np.empty(len(blocks))
+    for fold in np.unique(blocks.fold):
+        outside = np.flatnonzero(blocks.fold != fold)
+        coefficients, _ = _solve(blocks, outside, columns, priors, nonnegative)
+        inside = blocks.fold == fold
+        losses[inside] = blocks.losses(columns, coefficients)[inside]
+    return losses
+
+
+def _solve(
+    blocks: Blocks,
+    chosen: IndexArray,
+    columns: Sequence[Column],
+    priors: Mapping[Column, Prior],
+    nonnegative: frozenset[Column],
+) -> tuple[Samples, Samples]:
+    """Coefficients on some blocks, and which of them stand at the end of what they may be."""
+    places = blocks.places(columns)
+    total = blocks.products[chosen].sum(axis=0)
+    gram, right = total[np.ix_(places, places)], total[places, -1]
+    lower = np.array([0.0 if column in nonnegative else -_reach(column, priors) for column in columns])
+    upper = np.array([_reach(column, priors) for column in columns])
+    held = np.zeros(len(columns), dtype=bool)
+    coefficients = np.zeros(len(columns))
+    for _ in range(len(columns) + 1):
+        weight = np.zeros(len(columns))
+        free = np.flatnonzero(~held)
+        for _ in range(2):
+            # The prior's weight goes by the scatter of what is left, known after a first fit.
+            matrix = gram + np.diag(weight)
+            matrix = matrix + RIDGE * np.diag(np.diag(matrix))
+            beside = right[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ coefficients[held]
+            coefficients[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], beside, rcond=None)[0]
+            left = max(total[-1, -1] - 2.0 * coefficients @ right + coefficients @ gram @ coefficients, 0.0)
+            weight = _weight(left / (PIECES_PER_BLOCK * len(chosen)), columns, priors)
+        beyond = ~held & ((coefficients < lower) | (coefficients > upper))
+        if not beyond.any():
+            break
+        held |= beyond
+        coefficients = np.where(held, np.clip(coefficients, lower, upper), coefficients)
+    return coefficients, held
+
+
+def _reach(column: Column, priors: Mapping[Column, Prior]) -> float:
+    """How far a coefficient may go: a nuisance to two standard deviations of its prior."""
+    return PRIOR_REACH * priors[column].std if column in priors else math.inf
+
+
+def _weight(variance_per_piece: float, columns: Sequence[Column], priors: Mapping[Column, Prior]) -> Samples:
+    return np.array(
+        [
+            variance_per_piece / priors[column].std ** 2
+            if column in priors and math.isfinite(priors[column].std)
+            else 0.0
+            for column in columns
+        ]
+    )
+
+
+def _prior_weight(
+    blocks: Blocks, columns: Sequence[Column], coefficients: Samples, priors: Mapping[Column, Prior]
+) -> Samples:
+    left = float(blocks.losses(columns, coefficients).sum())
+    return _weight(left / (PIECES_PER_BLOCK * len(blocks)), columns, priors)

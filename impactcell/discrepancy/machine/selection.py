@@ -1,0 +1,252 @@
+"""Which term is missing: forward selection by blocks that a model was not fitted to.
+
+A term is taken if it closes more than half of what any model of the catalogue can close, if its gain holds
+from block to block, and if it does about as well as a free form in the same place. At most two are taken.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import Prior, TermChoice
+from impactcell.discrepancy.machine.equations import Column
+from impactcell.discrepancy.machine.free_forms import FREE_FORMS, KNOTS, PLACES
+from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.terms import CATALOGUE
+from impactcell.records import Samples
+
+MIN_GAIN_Z = 3.0
+"""Mean gain of a block over its standard error that a term needs: one of fourteen passes by chance about once
+in fifty runs [1]."""
+MIN_SHARE = 0.2
+"""Share of the squared gap above the floor that a term has to close [1]."""
+MIN_SHARE_OF_ALL = 0.5
+"""Share of what all terms together close that a term has to close: beside a model error it stands out [1]."""
+MIN_SHARE_OF_FREE = 0.8
+"""Share of what a free form in the same place closes that a named term has to close [1]."""
+TIE_Z = 2.2
+"""Difference of two terms over its standard error up to which they are tied [1]."""
+MIN_TIED_SHARE = 0.8
+"""Share of the best term's gain below which another one is not tied whatever the scatter [1]."""
+EQUAL_SHARE = 0.97
+"""Share of the best term's gain from which on another one is tied whatever the scatter [1]."""
+MAX_TERMS = 2
+"""Terms that one run takes, the second only if nothing is left then: any other is likelier to be a patch on
+what the catalogue lacks [1]."""
+MAX_FLOOR = 1.3
+"""Gap in noise floors up to which a model leaves nothing, as in the workflow of shots [1]."""
+MAX_ALIKE = 0.95
+"""Squared correlation with inertia, gravity or drive from which on a term cannot be told from it [1]."""
+MACHINE: tuple[Column, ...] = tuple(
+    (name, 0.0, 0) for name in ("inertia", "gravity_torque", "force_gain", "force_offset")
+)
+"""Columns of the machine itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenTerm:
+    """A term at a value of its shape."""
+
+    choice: TermChoice
+    shape: float
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Its columns of the regression."""
+        strengths = CATALOGUE[self.choice.identifier].strengths
+        return tuple((self.choice.name, self.shape, number) for number in range(len(strengths)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """One candidate beside a model.
+
+    Attributes
+    ----------
+    term : ChosenTerm
+    gains : ndarray, shape (b,)
+        Fall of each block's squared residual out of fold.
+    at_end : bool
+        Its shape came to the end of its grid.
+    """
+
+    term: ChosenTerm
+    gains: Samples
+    at_end: bool
+
+    @property
+    def gain(self) -> float:
+        """Fall of the squared residual over all blocks."""
+        return float(self.gains.sum())
+
+    @property
+    def z(self) -> float:
+        """Mean gain over its standard error."""
+        return mean_over_error(self.gains)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SelectionStep:
+    """What one step of the selection saw.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+        By gain, the largest first.
+    free_gains : mapping
+        Gain of each free form.
+    gain_of_all : float
+        Of all terms together.
+    excess : float
+        Squared residual above the sensors' noise, before the step.
+    accepted : Trial or None
+    tied_with : tuple of str
+    reason : str
+        Why nothing was accepted; empty where something was.
+    """
+
+    trials: tuple[Trial, ...]
+    free_gains: Mapping[str, float]
+    gain_of_all: float
+    excess: float
+    accepted: Trial | None
+    tied_with: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TermSearch:
+    """What a selection works with.
+
+    Attributes
+    ----------
+    blocks : Blocks
+        Of the training records.
+    candidates : sequence of TermChoice
+    shapes : mapping
+        Grid of each candidate by its name.
+    priors : mapping
+    nonnegative : frozenset of Column
+    """
+
+    blocks: Blocks
+    candidates: Sequence[TermChoice]
+    shapes: Mapping[str, tuple[float, ...]]
+    priors: Mapping[Column, Prior]
+    nonnegative: frozenset[Column]
+
+    def losses(self, columns: Sequence[Column]) -> Samples:
+        """Out-of-fold squared residual of every block, shape (b,)."""
+        return out_of_fold_losses(self.blocks, columns, self.priors, self.nonnegative)
+
+    def reaches_floor(self, columns: Sequence[Column], trial: Trial) -> bool:
+        """Whether a model with one more term leaves no more than noise."""
+        losses = self.losses([*columns, *trial.term.columns])
+        return float(losses.sum()) <= MAX_FLOOR**2 * float(self.blocks.noise.sum())
+
+    def best_shape(self, choice: TermChoice, columns: Sequence[Column], before: Samples) -> Trial:
+        """Try a candidate at every value of its shape."""
+        grid = self.shapes[choice.name]
+        trials = []
+        for shape in grid:
+            term = ChosenTerm(choice, shape)
+            gains = before - self.losses([*columns, *term.columns])
+            trials.append(Trial(term, gains, len(grid) > 1 and shape in (grid[0], grid[-1])))
+        return max(trials, key=lambda trial: trial.gain)
+
+
+def select_terms(search: TermSearch, columns: Sequence[Column]) -> list[SelectionStep]:
+    """Add terms one by one to the base model's columns; the last step says why it ended."""
+    steps: list[SelectionStep] = []
+    columns = list(columns)
+    remaining = list(search.candidates)
+    while True:
+        step = _step(search, columns, remaining)
+        if steps and step.accepted is not None and not search.reaches_floor(columns, step.accepted):
+            step = replace(
+                step, accepted=None, tied_with=(), reason="beside a remainder one term is named at most"
+            )
+        steps.append(step)
+        if step.accepted is None or len(steps) == MAX_TERMS:
+            return steps
+        columns += step.accepted.term.columns
+        remaining.remove(step.accepted.term.choice)
+
+
+def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermChoice]) -> SelectionStep:
+    before = search.losses(columns)
+    excess = max(float(before.sum() - search.blocks.noise.sum()), 0.0)
+    trials = sorted(
+        (search.best_shape(choice, columns, before) for choice in candidates), key=lambda one: -one.gain
+    )
+    free_gains = {
+        form: float((before - search.losses([*columns, *_free_columns(form)])).sum()) for form in FREE_FORMS
+    }
+    every = [column for trial in trials if trial.gain > 0.0 for column in trial.term.columns]
+    gain_of_all = float((before - search.losses([*columns, *every])).sum())
+    best = trials[0]
+    reason = _refusal(best, free_gains, max(gain_of_all, best.gain), excess)
+    tied: tuple[str, ...] = ()
+    if not reason:
+        tied = tuple(trial.term.choice.name for trial in trials[1:] if _is_tied(best, trial))
+    return SelectionStep(
+        tuple(trials), free_gains, gain_of_all, excess, None if reason else best, tied, reason
+    )
+
+
+def _refusal(best: Trial, free_gains: Mapping[str, float], gain_of_all: float, excess: float) -> str:
+    """Say why a term is not taken; empty if it is."""
+    if best.gain <= 0.0 or best.z < MIN_GAIN_Z:
+        return "no term does better in block after block that it was not fitted to"
+    if best.gain < MIN_SHARE * excess:
+        return "no term closes a fifth of the gap"
+    if best.gain < MIN_SHARE_OF_ALL * gain_of_all:
+        return "no term stands out from what all of them close together"
+    if best.at_end:
+        return "the shape of the best term came to the end of its range"
+    free = free_gains.get(PLACES.get(best.term.choice.identifier, ""), -math.inf)
+    if best.gain < MIN_SHARE_OF_FREE * free:
+        return "a free form in the same place does much better than any named term"
+    return ""
+
+
+def _is_tied(best: Trial, rival: Trial) -> bool:
+    if rival.gain < MIN_TIED_SHARE * best.gain or rival.at_end:
+        return False
+    return rival.gain >= EQUAL_SHARE * best.gain or mean_over_error(best.gains - rival.gains) < TIE_Z
+
+
+def mean_over_error(values: Samples) -> float:
+    """Mean over its standard error; inf where nothing scatters."""
+    error = float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else math.inf
+    return float(values.mean()) / error if error > 0.0 else math.inf
+
+
+def _free_columns(form: str) -> list[Column]:
+    return [(form, 0.0, number) for number in range(KNOTS)]
+
+
+def free_form_columns(form: str) -> tuple[Column, ...]:
+    """Columns of a free form."""
+    return tuple(_free_columns(form))
+
+
+def sign_flip_p(differences: Samples, seed: int, draws: int = 1999) -> float:
+    """One-sided p-value that the sum of differences is above zero, signs of the blocks drawn at random."""
+    rng = np.random.default_rng([seed, 8])
+    signs = 2.0 * rng.integers(0, 2, (draws, len(differences))) - 1.0
+    least = differences.sum() - 1e-12 * np.abs(differences).sum()
+    return float(1 + np.sum(signs @ differences >= least)) / (1 + draws)
+
+
+def like_the_machine(blocks: Blocks, term: ChosenTerm) -> bool:
+    """Whether a term looks like inertia, gravity or drive: what is wrong with those would be named by it."""
+    own = blocks.places(MACHINE)
+    places = blocks.places(term.columns)
+    total = blocks.products.sum(axis=0)
+    tiny = np.finfo(float).tiny
+    size = np.outer(np.diag(total)[own], np.diag(total)[places]) + tiny
+    alike = total[np.ix_(own, places)] ** 2 / size
+    return bool(np.all(alike.max(axis=0) >= MAX_ALIKE))

@@ -1,0 +1,185 @@
+"""Open-loop simulation of held-out stretches: a model runs by itself, from the first state of each.
+
+Steps are Moreau's: position at the half step, all forces but friction at once, and friction as an impulse
+that may stop the part and never turns it. Where the force is predicted, the measured motion is the input.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import Response
+from impactcell.discrepancy.machine.equations import (
+    direction_of_motion,
+    half_supports,
+    smoothed_acceleration,
+    smoothed_speed,
+)
+from impactcell.discrepancy.machine.finding import MachineFinding, Model
+from impactcell.discrepancy.machine.terms import CATALOGUE, Motion
+from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
+from impactcell.records import Samples
+
+STEPS_PER_PERIOD = 200
+"""Least steps in a period of the motion: second order, a step errs by (2 pi / 200)² / 24 of its force [1]."""
+START_SAMPLES = 5
+"""Samples at either side by which the first speed is found [samples]."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationError:
+    """Error of a simulation over all held-out stretches.
+
+    Attributes
+    ----------
+    rmse : float
+        [m, rad, N or N m].
+    fit_percent : float
+        100 (1 - rmse / standard deviation of what was measured).
+    relative_force : float
+        rmse over the RMS of the measured force; nan where the position is predicted.
+    """
+
+    rmse: float
+    fit_percent: float
+    relative_force: float
+
+
+def simulate_held_out(finding: MachineFinding, model: Model) -> SimulationError:
+    """Simulate a model on what was held out."""
+    stretches = []
+    for place, begin_s, end_s in finding.held_spans:
+        record = finding.records[place]
+        first, last = np.searchsorted(record.time_s, [begin_s, end_s])
+        stretches.append((record, slice(int(first), int(last) + 1)))
+    if model.base.response is Response.FORCE:
+        # At rest friction takes whatever balances the drive; no model says what.
+        simulated = [_forces(model, record, stretch, finding.scale) for record, stretch in stretches]
+        measured = [record.force[stretch] for record, stretch in stretches]
+    else:
+        simulated = _positions(model, stretches, finding.scale.period_s)
+        measured = [record.position[stretch] for record, stretch in stretches]
+    counted = [np.isfinite(values) for values in simulated]
+    value = np.concatenate([values[mask] for values, mask in zip(measured, counted, strict=True)])
+    error = np.concatenate([values[mask] for values, mask in zip(simulated, counted, strict=True)]) - value
+    rmse = float(np.sqrt(np.mean(error**2)))
+    relative = rmse / float(np.sqrt(np.mean(value**2))) if model.base.response is Response.FORCE else math.nan
+    return SimulationError(rmse, 100.0 * (1.0 - rmse / float(value.std())), relative)
+
+
+def _forces(model: Model, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
+    """Force that the measured motion needs; nan where the part rests or turns."""
+    half, narrow = half_supports(record, scale)
+    velocity, noise = smoothed_speed(record.position, narrow, record.step_s)
+    acceleration = smoothed_acceleration(record.position, half, record.step_s)
+    direction = direction_of_motion(velocity, scale, noise * record.noise[0])
+    carried = carried_force(Response.FORCE, record.force, model.gravity * np.sin(record.position))
+    covariates = {
+        term.choice.covariate: np.full(velocity.shape, record.covariates.get(term.choice.covariate, 0.0))
+        for term in model.terms
+    }
+    smooth, friction = _terms(model, covariates, record.position, velocity, np.abs(carried))
+    needed = (record.inertia * acceleration + model.base.gravity_torque.value * np.sin(record.position)) * (
+        1.0 + model.nuisance("force_gain")
+    )
+    needed += record.inertia * model.nuisance("inertia") * acceleration
+    force: Samples = needed - smooth - model.nuisance("force_offset") + direction * friction
+    force -= _gravity_deviation(model, record.position)
+    delayed = np.interp(record.time_s - model.delay_s, record.time_s, force)
+    return np.where(np.abs(direction) < 1.0, np.nan, delayed)[stretch]
+
+
+def _positions(
+    model: Model, stretches: Sequence[tuple[UniformRecord, slice]], period_s: float
+) -> list[Samples]:
+    """Positions that the measured forces lead to, all stretches at once."""
+    records = [record for record, _ in stretches]
+    parts = max(math.ceil(STEPS_PER_PERIOD * max(record.step_s for record in records) / period_s), 1)
+    step = np.array([record.step_s for record in records]) / parts
+    sizes = [stretch.stop - stretch.start for _, stretch in stretches]
+    drive = np.zeros((max(sizes) + 1, len(records)))
+    start = np.empty((2, len(records)))
+    for lane, (record, stretch) in enumerate(stretches):
+        force = np.interp(record.time_s[stretch] + model.delay_s, record.time_s, record.force)
+        drive[: len(force), lane] = force
+        drive[len(force) :, lane] = force[-1]
+        start[:, lane] = _first_state(record.position[stretch], record.step_s)
+    drive = drive * (1.0 + model.nuisance("force_gain")) + model.nuisance("force_offset")
+    machine = _Lanes(
+        np.array([record.inertia for record in records]) * (1.0 + model.nuisance("inertia")),
+        {
+            term.choice.covariate: np.array(
+                [record.covariates.get(term.choice.covariate, 0.0) for record in records]
+            )
+            for term in model.terms
+        },
+    )
+    q, v = start
+    out = np.empty((max(sizes), len(records)))
+    for place in range(max(sizes)):
+        out[place] = q
+        for part in range(parts):
+            share = (part + 0.5) / parts
+            q, v = _advance(
+                model, machine, (q, v), (1.0 - share) * drive[place] + share * drive[place + 1], step
+            )
+    return [out[: len(record.position[stretch]), lane] for lane, (record, stretch) in enumerate(stretches)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lanes:
+    """What differs from stretch to stretch: inertia, and each column of `shots.csv`, shape (lanes,)."""
+
+    inertia: Samples
+    covariates: Mapping[str, Samples]
+
+
+def _advance(
+    model: Model, machine: _Lanes, state: tuple[Samples, Samples], drive: Samples, step: Samples
+) -> tuple[Samples, Samples]:
+    """One step of Moreau's scheme, its speeds at the middle of the step."""
+    q, v = state
+    middle = q + 0.5 * step * v
+    ahead = v
+    gravity = model.base.gravity_torque.value * np.sin(middle)
+    load = np.abs(drive + model.gravity * np.sin(middle))
+    for _ in range(2):
+        smooth, friction = _terms(model, machine.covariates, middle, 0.5 * (v + ahead), load)
+        total = drive - gravity + smooth + _gravity_deviation(model, middle)
+        freely = v + step * total / machine.inertia
+        held = step * np.maximum(friction, 0.0) / machine.inertia
+        ahead = np.sign(freely) * np.maximum(np.abs(freely) - held, 0.0)
+    return middle + 0.5 * step * ahead, ahead
+
+
+def _terms(
+    model: Model, covariates: Mapping[str, Samples], position: Samples, velocity: Samples, load: Samples
+) -> tuple[Samples, Samples]:
+    """Sum of all smooth forces, and level of friction, shape (n,) each."""
+    smooth, friction = np.zeros(position.shape), np.zeros(position.shape)
+    for chosen in model.terms:
+        term = CATALOGUE[chosen.choice.identifier]
+        covariate = covariates[chosen.choice.covariate]
+        features = term.features(Motion(position, velocity, load, covariate), chosen.shape)
+        for column, feature in zip(chosen.columns, features, strict=True):
+            value = model.value(column) * feature
+            if term.is_friction:
+                friction += value
+            else:
+                smooth += value
+    return smooth, friction
+
+
+def _gravity_deviation(model: Model, position: Samples) -> Samples:
+    """Torque of gravity beyond its stated value, and by the zero of the position sensor."""
+    deviation: Samples = model.gravity * model.nuisance("position_offset") * np.cos(position)
+    return deviation - model.nuisance("gravity_torque") * np.sin(position)
+
+
+def _first_state(position: Samples, step: float) -> tuple[float, float]:
+    """Position and speed at the first sample, by a parabola."""
+    time = step * np.arange(4 * START_SAMPLES + 1)
+    curve = np.polynomial.Polynomial.fit(time, position[: len(time)], 3)
+    return float(curve(0.0)), float(curve.deriv()(0.0))

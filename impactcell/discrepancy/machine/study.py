@@ -1,0 +1,283 @@
+"""Fits of one base model to one set of records, by training and held-out blocks."""
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import BaseModel, Prior, TermChoice
+from impactcell.discrepancy.machine.equations import (
+    Column,
+    IndexArray,
+    Rows,
+    build_rows,
+    shape_grid,
+)
+from impactcell.discrepancy.machine.finding import FallOfGap, MachineFinding, Model
+from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
+from impactcell.discrepancy.machine.regression import BLOCKS_OF_RECORD, Blocks, blocks_of, fit_blocks
+from impactcell.discrepancy.machine.selection import (
+    ChosenTerm,
+    SelectionStep,
+    TermSearch,
+    like_the_machine,
+    select_terms,
+)
+from impactcell.discrepancy.machine.terms import CATALOGUE
+from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
+
+RECORDS_FOR_FOLDS = 4
+"""Training records from which on a fold of the cross-validation is a record [1]."""
+FOLDS = 5
+"""Folds of blocks in a row where there are fewer records [1]."""
+DELAY_STEPS = 13
+"""Delays that are tried, evenly over three standard deviations of its prior to either side [1]."""
+NUISANCES = ("force_gain", "force_offset", "gravity_torque", "position_offset", "inertia")
+"""Numbers of a base model that are columns of the regression."""
+
+
+class Study:
+    """Records of one machine, its base model and what may be named.
+
+    Parameters
+    ----------
+    records : sequence of UniformRecord
+    base : BaseModel
+        What the records cannot tell is held in it.
+    candidates : sequence of TermChoice
+    held : set of int or None
+        Places of the records that are held out; None for the last third of each.
+    """
+
+    def __init__(
+        self,
+        records: Sequence[UniformRecord],
+        base: BaseModel,
+        candidates: Sequence[TermChoice],
+        held: set[int] | None,
+    ) -> None:
+        self.records = tuple(records)
+        self.base = base
+        self.candidates = tuple(candidates)
+        self.held = held
+        self.scale = motion_scale(records, base.response, base.gravity_torque.value)
+        self.block_s = base.block_s if math.isfinite(base.block_s) else self.scale.period_s
+        self.gravity = base.gravity_torque.value
+        self.delay_s = base.delay_s.value
+        self.priors: dict[Column, Prior] = {}
+        self._set_priors()
+        self._rows = lru_cache(maxsize=4)(self._build)
+        self.shapes = {
+            choice.name: shape_grid(CATALOGUE[choice.identifier], self.scale)
+            for choice in (*base.terms, *self.candidates)
+        }
+
+    def _set_priors(self) -> None:
+        for name in NUISANCES:
+            prior: Prior = getattr(self.base, name)
+            if prior.is_held or (name == "position_offset" and self.gravity == 0.0):
+                continue
+            # The columns are deviations from the stated value, that of the inertia relative to it.
+            std = prior.std / prior.value if name == "inertia" and math.isfinite(prior.value) else prior.std
+            self.priors[name, 0.0, 0] = Prior(0.0, std)
+
+    def _build(self, gravity: float, delay_s: float) -> Rows:
+        return build_rows(self.records, self.base, self.candidates, gravity, delay_s)
+
+    def rows(self) -> Rows:
+        """Rows at the gravity and delay of now."""
+        return self._rows(self.gravity, self.delay_s)
+
+    @property
+    def nonnegative(self) -> frozenset[Column]:
+        """Strengths that may not give energy."""
+        return frozenset(
+            column
+            for choice in (*self.base.terms, *self.candidates)
+            if CATALOGUE[choice.identifier].nonnegative
+            for shape in self.shapes[choice.name]
+            for column in ChosenTerm(choice, shape).columns
+        )
+
+    def blocks(self) -> tuple[Blocks, Blocks, IndexArray]:
+        """Training and held-out blocks, and the block of each row."""
+        rows = self.rows()
+        number: IndexArray = (rows.record * BLOCKS_OF_RECORD + np.floor(rows.time_s / self.block_s)).astype(
+            np.int64
+        )
+        sizes = {
+            int(block): int(count)
+            for block, count in zip(*np.unique(number, return_counts=True), strict=True)
+        }
+        usual = float(np.median([*sizes.values()]))
+        whole = [block for block, count in sizes.items() if count >= 0.5 * usual]
+        held = [block for block in whole if self._is_held(block, whole)]
+        fitted = [block for block in whole if block not in set(held)]
+        records = sorted({block // BLOCKS_OF_RECORD for block in fitted})
+        if len(records) >= RECORDS_FOR_FOLDS:
+            fold = {block: records.index(block // BLOCKS_OF_RECORD) for block in fitted}
+        else:
+            fold = {block: place * FOLDS // len(fitted) for place, block in enumerate(fitted)}
+        return (
+            blocks_of(rows, number, fold),
+            blocks_of(rows, number, dict.fromkeys(held, 0)),
+            number,
+        )
+
+    def _is_held(self, block: int, whole: list[int]) -> bool:
+        record = block // BLOCKS_OF_RECORD
+        if self.held is not None:
+            return record in self.held
+        members = [other for other in whole if other // BLOCKS_OF_RECORD == record]
+        return members.index(block) >= len(members) - len(members) // 3
+
+    def columns(self, terms: Iterable[ChosenTerm]) -> list[Column]:
+        """Columns of a model: its free nuisances and its terms."""
+        return [*self.priors, *(column for term in terms for column in term.columns)]
+
+    def fit(self, terms: tuple[ChosenTerm, ...], *, settle: bool) -> Model:
+        """Fit a model to the training blocks; with `settle` gravity and delay are found with it."""
+        if settle:
+            self._settle(terms)
+        training, _, _ = self.blocks()
+        fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
+        return Model(self.base, terms, fit, self.delay_s, self.gravity)
+
+    def _settle(self, terms: tuple[ChosenTerm, ...]) -> None:
+        free_gravity = not self.base.gravity_torque.is_held
+        for _ in range(2 if free_gravity else 1):
+            if not self.base.delay_s.is_held:
+                self._settle_delay(terms)
+            if free_gravity:
+                training, _, _ = self.blocks()
+                fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
+                place = fit.columns.index(("gravity_torque", 0.0, 0))
+                self.gravity = self.base.gravity_torque.value + float(fit.coefficients[place])
+                self._set_priors()
+
+    def _settle_delay(self, terms: tuple[ChosenTerm, ...]) -> None:
+        """Take the delay of least squares on the training blocks, with its prior."""
+        prior = self.base.delay_s
+        tried = []
+        delays = prior.value + prior.std * np.linspace(-3.0, 3.0, DELAY_STEPS)
+        for delay in delays:
+            self.delay_s = float(delay)
+            training, _, _ = self.blocks()
+            fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
+            loss = float(training.losses(fit.columns, fit.coefficients).sum())
+            piece = loss / (4.0 * len(training))
+            tried.append((loss + piece * ((delay - prior.value) / prior.std) ** 2, float(delay)))
+        self.delay_s = min(tried)[1]
+
+    def investigate(self, notes: list[str], seed: int) -> MachineFinding:
+        """Select on training blocks, prove on held-out ones."""
+        base_terms = tuple(ChosenTerm(choice, self.shapes[choice.name][0]) for choice in self.base.terms)
+        base_terms = self._with_best_shapes(base_terms)
+        nominal = self.fit(base_terms, settle=True)
+        training, held_out, _ = self.blocks()
+        steps: list[SelectionStep] = []
+        enough = MachineFinding.enough(training, held_out)
+        if enough:
+            candidates = [
+                choice for choice in self.candidates if not self._is_like_the_machine(training, choice)
+            ]
+            notes = [*notes, *_alike(self.candidates, candidates)]
+            search = TermSearch(training, candidates, self.shapes, self.priors, self.nonnegative)
+            steps = select_terms(search, self.columns(base_terms))
+        proposed = [step.accepted.term for step in steps if step.accepted is not None]
+        before = nominal
+        falls: dict[str, FallOfGap] = {}
+        for place, term in enumerate(proposed):
+            after = self.fit((*base_terms, *proposed[: place + 1]), settle=False)
+            fall = fall_of_gap(held_out, before, after, seed)
+            if not fall.is_real:
+                break
+            falls[term.choice.name] = fall
+            before = after
+        final = before
+        if falls and not self.base.delay_s.is_held:
+            nominal_blocks = (training, held_out)
+            final = self.fit(final.terms, settle=True)
+            training, held_out = nominal_blocks
+        established = tuple(falls)
+        return MachineFinding(
+            base=self.base,
+            records=self.records,
+            steps=tuple(steps),
+            established=established,
+            unconfirmed=tuple(term.choice.name for term in proposed if term.choice.name not in falls),
+            falls=falls,
+            nominal=nominal,
+            final=final,
+            training=training,
+            held_out=held_out,
+            train_gaps=(gap(training, nominal), gap(training, before)),
+            expected=expected_gap(held_out, before),
+            fall=fall_of_gap(held_out, nominal, before, seed),
+            held_spans=self._held_spans(),
+            correlation_s=self._correlation_time(final),
+            block_s=self.block_s,
+            scale=self.scale,
+            notes=tuple(notes),
+            seed=seed,
+        )
+
+    def _is_like_the_machine(self, training: Blocks, choice: TermChoice) -> bool:
+        """Whether a candidate at every value of its shape looks like inertia, gravity or drive."""
+        terms = [ChosenTerm(choice, shape) for shape in self.shapes[choice.name]]
+        return all(like_the_machine(training, term) for term in terms)
+
+    def _with_best_shapes(self, terms: tuple[ChosenTerm, ...]) -> tuple[ChosenTerm, ...]:
+        """Give each term of the base model the shape of least squares, one after the other."""
+        for place, term in enumerate(terms):
+            tried = []
+            for shape in self.shapes[term.choice.name]:
+                other = (*terms[:place], ChosenTerm(term.choice, shape), *terms[place + 1 :])
+                training, _, _ = self.blocks()
+                fit = fit_blocks(training, self.columns(other), self.priors, self.nonnegative)
+                tried.append((float(training.losses(fit.columns, fit.coefficients).sum()), other))
+            terms = min(tried, key=lambda pair: pair[0])[1]
+        return terms
+
+    def _held_spans(self) -> tuple[tuple[int, float, float], ...]:
+        """Record, begin and end of each stretch of held-out blocks."""
+        rows = self.rows()
+        number = (rows.record * BLOCKS_OF_RECORD + np.floor(rows.time_s / self.block_s)).astype(np.int64)
+        whole = [int(block) for block in np.unique(number)]
+        spans = []
+        for place, record in enumerate(self.records):
+            held = [
+                block for block in whole if block // BLOCKS_OF_RECORD == place and self._is_held(block, whole)
+            ]
+            if held:
+                begin = (held[0] % BLOCKS_OF_RECORD) * self.block_s if self.held is None else 0.0
+                spans.append((place, begin, float(record.time_s[-1])))
+        return tuple(spans)
+
+    def _correlation_time(self, model: Model) -> float:
+        """Time over which residuals stay alike: the sum of their correlations to the first below 0."""
+        rows = self.rows()
+        residual = rows.target - sum(
+            value * rows.columns[column]
+            for column, value in zip(model.fit.columns, model.fit.coefficients, strict=True)
+        )
+        total, steps = 0.0, []
+        for place in range(len(self.records)):
+            inside = rows.record == place
+            part, time = residual[inside], rows.time_s[inside]
+            if len(part) < 4 or not part.any():
+                continue
+            steps.append(float(np.median(np.diff(time))))
+            correlation = np.correlate(part, part, "full")[len(part) - 1 :] / float(part @ part)
+            below = np.flatnonzero(correlation <= 0.0)
+            total += float(correlation[: below[0] if len(below) else len(correlation)].sum())
+        return total / max(len(steps), 1) * float(np.median(steps)) if steps else math.nan
+
+
+def _alike(candidates: Sequence[TermChoice], kept: Sequence[TermChoice]) -> list[str]:
+    """Say which terms are not looked for."""
+    names = [choice.name.replace("_", " ") for choice in candidates if choice not in kept]
+    if not names:
+        return []
+    return [f"{', '.join(names)}: on these records like inertia, gravity or drive, and so not looked for."]

@@ -1,0 +1,183 @@
+"""Records of a machine at equal steps, without spikes, and the sizes of their motion."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from impactcell.campaign import Campaign
+from impactcell.discrepancy.machine.base_model import BaseModel, Response
+from impactcell.errors import CampaignError
+from impactcell.features import white_noise_std
+from impactcell.records import Capture, Channel, Samples
+
+MIN_HALF_SUPPORT = 5
+"""Least half support of a test function [samples]: fewer do not average the noise of a sensor."""
+LARGEST = 0.995
+"""Share of the samples below what counts as the largest: one faulty sample does not set a range [1]."""
+SPIKE_WINDOW = 9
+"""Samples of the running median that a spike is held against."""
+SPIKE_FACTOR = 8.0
+"""A spike differs from the running median this many times more than 95 % of the samples do [1]."""
+MIN_SPIKE_SHARE = 0.05
+"""And by at least this share of the channel's range [1]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UniformRecord:
+    """One record at equal steps, without its spikes.
+
+    Attributes
+    ----------
+    shot : int
+    label : str
+        Batch of the shot.
+    time_s, position, force : ndarray, shape (n,)
+        `force` is zero where nothing drives.
+    inertia : float
+    covariates : mapping
+    spikes : int
+        Samples that were replaced.
+    noise : tuple of float
+        Standard deviation of position and force: as stated, else from third differences.
+    """
+
+    shot: int
+    label: str
+    time_s: Samples
+    position: Samples
+    force: Samples
+    inertia: float
+    covariates: Mapping[str, float]
+    spikes: int
+    noise: tuple[float, float]
+
+    @property
+    def step_s(self) -> float:
+        """Time from sample to sample."""
+        return float(self.time_s[1] - self.time_s[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionScale:
+    """Sizes of the motion over all records.
+
+    Attributes
+    ----------
+    period_s : float
+        2 pi std(q) / std(q').
+    speed, load : float
+        Largest speed and load.
+    low, high : float
+        Range of positions.
+    """
+
+    period_s: float
+    speed: float
+    load: float
+    low: float
+    high: float
+
+
+def uniform_records(campaign: Campaign, base: BaseModel) -> tuple[UniformRecord, ...]:
+    """Lay all shots out at equal steps.
+
+    Raises
+    ------
+    CampaignError
+        A shot lacks a channel or its inertia.
+    """
+    driven = any(shot.force is not None for shot in campaign.shots)
+    return tuple(_uniform(shot, base, driven=driven) for shot in campaign.shots)
+
+
+def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
+    if shot.position is None:
+        raise CampaignError(f"shot {shot.cycle}: has no position; a base model is about how the part moves")
+    if driven and shot.force is None:
+        raise CampaignError(f"shot {shot.cycle}: has no force where other shots have one")
+    inertia = base.inertia.value if math.isfinite(base.inertia.value) else shot.mass_kg
+    if not math.isfinite(inertia):
+        raise CampaignError(f"shot {shot.cycle}: neither it nor the base model states an inertia or mass")
+    channels = [shot.position] if shot.force is None else [shot.position, shot.force]
+    begin = max(channel.time_s[0] for channel in channels)
+    end = min(channel.time_s[-1] for channel in channels)
+    step = float(np.median(np.diff(shot.position.time_s)))
+    count = int((end - begin) / step + 1e-6) + 1 if end > begin else 0
+    if count < 8 * MIN_HALF_SUPPORT:
+        raise CampaignError(
+            f"shot {shot.cycle}: {count} samples in common are too few; at least {8 * MIN_HALF_SUPPORT}"
+        )
+    time = begin + step * np.arange(count)
+    cleaned = [_without_spikes(channel.values) for channel in channels]
+    values = [
+        np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
+    ]
+    noise = [_noise(channel, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)]
+    covariates = {name: value for name, value in shot.covariates.items() if isinstance(value, float)}
+    return UniformRecord(
+        shot=shot.cycle,
+        label=shot.batch_id or "",
+        time_s=time - begin,
+        position=values[0],
+        force=values[1] if len(values) > 1 else np.zeros(count),
+        inertia=inertia,
+        covariates=covariates,
+        spikes=sum(spikes for _, spikes in cleaned),
+        noise=(noise[0], noise[1] if len(noise) > 1 else 0.0),
+    )
+
+
+def _noise(channel: Channel, values: Samples) -> float:
+    return channel.noise_std if channel.noise_std is not None else white_noise_std(values)
+
+
+def _without_spikes(values: Samples) -> tuple[Samples, int]:
+    """Replace samples far from the running median by it."""
+    middle = median_filter(values, SPIKE_WINDOW, mode="nearest")
+    distance = np.abs(values - middle)
+    usual = float(np.quantile(distance, 0.95))
+    span = float(np.subtract(*np.quantile(values, [LARGEST, 1.0 - LARGEST])))
+    spikes = distance > max(SPIKE_FACTOR * usual, MIN_SPIKE_SHARE * span, np.finfo(float).tiny)
+    return np.where(spikes, middle, values), int(spikes.sum())
+
+
+def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: float) -> MotionScale:
+    """Sizes of the motion over all records, where gravity's torque is about `gravity`.
+
+    Raises
+    ------
+    CampaignError
+        Nothing moves.
+    """
+    moving = [record for record in records if np.ptp(record.position) > 0.0]
+    if not moving:
+        raise CampaignError("no record shows any motion")
+    # Coarse speeds: over a twentieth of a record's samples at most, so that quantised positions do not count.
+    speeds, places = [], []
+    for record in moving:
+        width = max(len(record.position) // 200, 1)
+        speeds.append((record.position[width:] - record.position[:-width]) / (width * record.step_s))
+        places.append(record.position - record.position.mean())
+    speed = np.concatenate(speeds)
+    period = 2.0 * math.pi * float(np.concatenate(places).std()) / float(np.sqrt(np.mean(speed**2)))
+    position = np.concatenate([record.position for record in records])
+    force = np.concatenate([record.force for record in records])
+    load = np.abs(carried_force(response, force, gravity * np.sin(position)))
+    return MotionScale(
+        period,
+        float(np.quantile(np.abs(speed), LARGEST)),
+        float(np.quantile(load, LARGEST)),
+        float(position.min()),
+        float(position.max()),
+    )
+
+
+def carried_force(response: Response, force: Samples, gravity_torque: Samples) -> Samples:
+    """Return what gear or guide carries: drive and gravity, or gravity alone where the drive is predicted.
+
+    A measured force holds the friction itself; friction that goes by it would explain any friction.
+    """
+    return gravity_torque if response is Response.FORCE else force + gravity_torque

@@ -1,0 +1,229 @@
+"""`result.json` and headline of an investigation with a base model: the format of the workflow of shots."""
+
+import math
+from typing import Any
+
+from impactcell.campaign import Coordinate
+from impactcell.discrepancy.machine import (
+    CATALOGUE,
+    ChosenTerm,
+    FallOfGap,
+    MachineFinding,
+    Model,
+    SimulationError,
+    simulate_held_out,
+)
+from impactcell.discrepancy.report.result import FORMAT, round_digits
+
+SYMBOLS = {
+    Coordinate.TRANSLATION: {"force": "N", "F": "n", "q": "m"},
+    Coordinate.ROTATION: {"force": "N m", "F": "n_m", "q": "rad"},
+}
+"""Units of force and coordinate, as they are shown and as they end a parameter's name."""
+SLUGS = {
+    "{F}": "{F}",
+    "{F} s/{q}": "{F}_s_per_{q}",
+    "{F} s²/{q}²": "{F}_s2_per_{q}2",
+    "{F}/{q}": "{F}_per_{q}",
+    "{F}/{q}³": "{F}_per_{q}3",
+    "{F}/u": "{F}_per_unit",
+    "1": "",
+}
+"""How a unit ends a parameter's name."""
+
+
+def parameter_name(name: str, unit: str, coordinate: Coordinate) -> str:
+    """Name of a strength with its SI unit, as `drag_coefficient_n_s2_per_m2`."""
+    slug = SLUGS[unit].format(F=SYMBOLS[coordinate]["F"], q=SYMBOLS[coordinate]["q"])
+    return f"{name}_{slug}" if slug else name
+
+
+def phrase(name: str) -> str:
+    """Name of a term as one would say it."""
+    identifier, _, column = name.partition("(")
+    return identifier.replace("_", " ") + (f" by {column.rstrip(')')}" if column else "")
+
+
+def machine_headline(finding: MachineFinding) -> str:
+    """Say what is established and what remains."""
+    before, after = finding.fall.before, finding.fall.after
+    if finding.verdict == "untested":
+        counts = f"{len(finding.training)} to fit and {len(finding.held_out)} held out"
+        return (
+            f"Too few blocks to say: {counts}, about {finding.missing_blocks} more are needed. The held-out "
+            f"gap of the base model is {before:.2f} noise floors."
+        )
+    if finding.verdict == "no_gap":
+        return f"The base model explains these records: the held-out gap is {before:.2f} noise floors."
+    if finding.verdict == "unknown":
+        said = f"No known term explains a held-out gap of {before:.2f} noise floors"
+        if finding.unconfirmed:
+            names = " and ".join(map(phrase, finding.unconfirmed))
+            said = f"{names.capitalize()} would explain what fitted, but held-out records do not confirm it"
+        reason = finding.steps[0].reason if finding.steps else ""
+        return f"{said}: {reason}." if reason else f"{said}."
+    groups = [
+        " or ".join(map(phrase, (name, *finding.tied_with.get(name, ())))) for name in finding.established
+    ]
+    tied = any(finding.tied_with.values())
+    missing = " and ".join(groups) + (", which these records cannot tell apart" if tied else "")
+    said = f"Missing: {missing}; the held-out gap falls from {before:.2f} to {after:.2f} noise floors."
+    return said if finding.is_at_floor else f"{said} Something remains that it does not explain."
+
+
+def machine_document(finding: MachineFinding) -> dict[str, Any]:
+    """Outcome as `result.json` has it."""
+    errors = simulate_held_out(finding, finding.nominal), simulate_held_out(finding, finding.final)
+    fall = finding.fall
+    level = math.sqrt(max(fall.after**2 - 1.0, 0.0))
+    nominal = tuple(term for term in finding.final.terms if term.choice.name not in finding.established)
+    return {
+        "format": FORMAT,
+        "verdict": finding.verdict,
+        "headline": machine_headline(finding),
+        "effects": [
+            _effect(finding, term) for term in finding.final.terms if term.choice.name in finding.established
+        ],
+        "unconfirmed": list(finding.unconfirmed),
+        "remaining": {
+            "explained": finding.is_at_floor,
+            "share": round_digits(
+                0.0 if finding.is_at_floor else (fall.after - 1.0) / max(fall.before - 1.0, 1e-9)
+            ),
+            "where": [] if finding.is_at_floor else [{"phase": _phase(finding), "depends_on": []}],
+            "model_error": {
+                "level": round_digits(level),
+                "unit": "1 = noise floor",
+                "correlation_s": round_digits(finding.correlation_s),
+            },
+        },
+        "unexplained": None,
+        "gap": {
+            "unit": "1 = noise floor",
+            "train": {
+                "before": round_digits(finding.train_gaps[0]),
+                "after": round_digits(finding.train_gaps[1]),
+            },
+            "held_out": {
+                **_fall(fall),
+                "closed": round_digits(fall.closed),
+                "expected_without_gap": [round_digits(bound) for bound in finding.expected],
+            },
+        },
+        "simulation": _simulation(finding, errors),
+        "law": None,
+        "law_refused": finding.steps[-1].reason if finding.steps and not finding.is_at_floor else None,
+        "next_experiment": [],
+        "nominal": _nuisances(finding.final)
+        | {
+            name: value
+            for term in nominal
+            for name, value in _parameters(finding, term, in_full=True).items()
+        },
+        "noise_floor": {
+            "noise_std": [
+                round_digits(max(record.noise[channel] for record in finding.records)) for channel in (1, 0)
+            ],
+            "channels": ["force", "position"],
+        },
+        "blocks": {
+            "seconds": round_digits(finding.block_s),
+            "training": len(finding.training),
+            "held_out": len(finding.held_out),
+        },
+        "notes": list(finding.notes),
+        "seed": finding.seed,
+        "model": "model.extended.yaml",
+        "report": "report.html",
+    }
+
+
+def _phase(finding: MachineFinding) -> str:
+    return "driven" if any(record.force.any() for record in finding.records) else "free_slide"
+
+
+def _fall(fall: FallOfGap) -> dict[str, Any]:
+    closed = None if math.isnan(fall.closed) else [round_digits(fall.low), round_digits(fall.high)]
+    return {"before": round_digits(fall.before), "after": round_digits(fall.after), "closed_ci95": closed}
+
+
+def _simulation(finding: MachineFinding, errors: tuple[SimulationError, SimulationError]) -> dict[str, Any]:
+    channel = str(finding.base.response)
+    symbols = SYMBOLS[finding.base.coordinate]
+    when = dict(zip(("before", "after"), errors, strict=True))
+    return {
+        "channel": channel,
+        "unit": symbols["force"] if channel == "force" else symbols["q"],
+        "rmse": {name: round_digits(error.rmse) for name, error in when.items()},
+        "fit_percent": {name: round_digits(error.fit_percent) for name, error in when.items()},
+        "relative_force_error": {name: round_digits(error.relative_force) for name, error in when.items()},
+    }
+
+
+def _effect(finding: MachineFinding, term: ChosenTerm) -> dict[str, Any]:
+    name = term.choice.name
+    fall = finding.falls[name]
+    trial = next(
+        step.accepted for step in finding.steps if step.accepted is not None and step.accepted.term == term
+    )
+    document = {
+        "effect": term.choice.identifier,
+        "tied_with": list(finding.tied_with[name]),
+        "p_value": round_digits(fall.p_value),
+        "gain_over_its_error": round_digits(trial.z),
+        "held_out": _fall(fall),
+        "where": {
+            "phase": _phase(finding),
+            "depends_on": [term.choice.covariate] if term.choice.covariate else [],
+        },
+        "parameters": _parameters(finding, term),
+    }
+    return document | ({"covariate": term.choice.covariate} if term.choice.covariate else {})
+
+
+def _parameters(finding: MachineFinding, chosen: ChosenTerm, *, in_full: bool = False) -> dict[str, Any]:
+    """Strengths with their intervals, and the shape where there is one; `in_full` names the term too."""
+    term, fit = CATALOGUE[chosen.choice.identifier], finding.final.fit
+    prefix = f"{chosen.choice.name}." if in_full else ""
+    document: dict[str, Any] = {}
+    for (name, unit), column in zip(term.strengths, chosen.columns, strict=True):
+        place = fit.columns.index(column)
+        document[prefix + parameter_name(name, unit, finding.base.coordinate)] = _estimate(
+            finding.final, place
+        )
+    if term.shape is not None:
+        per_s = "_per_s" if term.shape.covariate == "speed" else ""
+        name = f"{term.shape.name}_{SYMBOLS[finding.base.coordinate]['q']}{per_s}"
+        document[prefix + name] = {"value": round_digits(chosen.shape), "ci95": None, "at_bound": False}
+    return document
+
+
+def _nuisances(model: Model) -> dict[str, Any]:
+    document = {
+        column[0]: _estimate(model, place)
+        for place, column in enumerate(model.fit.columns)
+        if column[0] in ("force_gain", "force_offset", "position_offset")
+    }
+    scaled = {"inertia": (model.base.inertia.value, model.base.inertia.value), "gravity_torque": (
+        model.base.gravity_torque.value, 1.0)}  # fmt: skip
+    for name, (value, unit) in scaled.items():
+        if (name, 0.0, 0) in model.fit.columns:
+            place = model.fit.columns.index((name, 0.0, 0))
+            ends = [value + unit * float(end[place]) for end in (model.fit.low, model.fit.high)]
+            document[name] = {
+                "value": round_digits(value + unit * float(model.fit.coefficients[place])),
+                "ci95": [round_digits(end) for end in ends],
+                "at_bound": bool(model.fit.at_bound[place]),
+            }
+    if not model.base.delay_s.is_held:
+        document["delay_s"] = {"value": round_digits(model.delay_s), "ci95": None, "at_bound": False}
+    return document
+
+
+def _estimate(model: Model, place: int) -> dict[str, Any]:
+    fit = model.fit
+    return {
+        "value": round_digits(float(fit.coefficients[place])),
+        "ci95": [round_digits(float(fit.low[place])), round_digits(float(fit.high[place]))],
+        "at_bound": bool(fit.at_bound[place]),
+    }

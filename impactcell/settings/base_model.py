@@ -1,0 +1,182 @@
+"""Base models: a machine without a cell, in a short YAML, every fault with line and column."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from impactcell.campaign import Coordinate, Excitation
+from impactcell.discrepancy.machine import CATALOGUE, Prior, Response, TermChoice
+from impactcell.discrepancy.machine import BaseModel as MachineModel
+from impactcell.errors import SettingsError
+from impactcell.process import yaml_loader
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+"""A finite number above 0."""
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+"""A finite number of at least 0."""
+HEADER = "# A base model of impactcell: a machine with one coordinate, for `impactcell discrepancy --base`.\n"
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class UncertainNumber(_Part):
+    """A number and how well it is known; `std: free` leaves it to the data."""
+
+    value: FiniteFloat = 0.0
+    std: NotNegative | Literal["free"]
+
+    def prior(self) -> Prior:
+        """Return it as the workflow takes it."""
+        return Prior(self.value, math.inf if self.std == "free" else self.std)
+
+
+Number = FiniteFloat | UncertainNumber
+"""A number that is exact, or `{value: ..., std: ...}`."""
+
+
+class TermOfColumn(_Part):
+    """A term that goes by a column of `shots.csv`."""
+
+    term: str
+    covariate: Annotated[str, Field(min_length=1)]
+
+
+class Nuisances(_Part):
+    """What a measurement may be off by; each is 0 and exact where it is not named."""
+
+    position_offset: Number = 0.0
+    force_offset: Number = 0.0
+    force_gain: Number = 0.0
+    delay_s: Number = 0.0
+
+
+class BaseModelFile(_Part):
+    """A whole base model."""
+
+    format: Literal[1]
+    name: Annotated[str, Field(min_length=1)] = "base"
+    coordinate: Literal["translation", "rotation"]
+    excitation: Literal["free", "driven", "tap"]
+    predicts: Literal["position", "force"] = "position"
+    mass_kg: Number | None = None
+    inertia_kg_m2: Number | None = None
+    gravity_torque_n_m: Number = 0.0
+    terms: list[str | TermOfColumn] = ["coulomb_friction"]
+    nuisances: Nuisances = Nuisances()
+    block_s: Positive | None = None
+    provenance: dict[str, str] = {}
+
+    @model_validator(mode="after")
+    def _fits_its_coordinate(self) -> Self:
+        if self.excitation == "tap":
+            raise ValueError("the base model of a tap is a cell's model: name the cell with --cell instead")
+        turns = self.coordinate == "rotation"
+        if turns and self.mass_kg is not None:
+            raise ValueError("a rotation has inertia_kg_m2 in place of mass_kg")
+        if not turns and self.inertia_kg_m2 is not None:
+            raise ValueError("a translation has mass_kg in place of inertia_kg_m2")
+        if not turns and self.gravity_torque_n_m != 0.0:
+            raise ValueError("gravity_torque_n_m, m g l, belongs to a rotation")
+        if self.excitation == "free" and self.predicts == "force":
+            raise ValueError("where nothing drives, predicts is position")
+        return self
+
+
+def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
+    """Read a base model, and the excitation that its records have to have.
+
+    Raises
+    ------
+    SettingsError
+        Listing every fault as `file:line:column: message`.
+    """
+    file, positions = yaml_loader.read(path, BaseModelFile)
+    faults, choices = [], []
+    for number, item in enumerate(file.terms):
+        identifier = item if isinstance(item, str) else item.term
+        covariate = "" if isinstance(item, str) else item.covariate
+        fault = _fault_of_term(identifier, covariate, file.predicts)
+        if fault:
+            faults.append(yaml_loader.format_error(path, positions.value(("terms", number)), fault))
+        elif TermChoice(identifier, covariate) in choices:
+            faults.append(
+                yaml_loader.format_error(
+                    path, positions.value(("terms", number)), f"{identifier} appears twice"
+                )
+            )
+        choices.append(TermChoice(identifier, covariate))
+    if faults:
+        raise SettingsError("\n".join(faults))
+    inertia = file.inertia_kg_m2 if file.coordinate == "rotation" else file.mass_kg
+    nuisances = file.nuisances
+    model = MachineModel(
+        coordinate=Coordinate(file.coordinate),
+        response=Response(file.predicts),
+        inertia=Prior(math.nan) if inertia is None else _prior(inertia),
+        gravity_torque=_prior(file.gravity_torque_n_m),
+        terms=tuple(choices),
+        position_offset=_prior(nuisances.position_offset),
+        force_offset=_prior(nuisances.force_offset),
+        force_gain=_prior(nuisances.force_gain),
+        delay_s=_prior(nuisances.delay_s),
+        block_s=math.nan if file.block_s is None else file.block_s,
+        name=file.name,
+    )
+    return model, Excitation.FREE_SLIDE if file.excitation == "free" else Excitation.DRIVEN
+
+
+def base_model_text(model: MachineModel, excitation: Excitation, provenance: dict[str, str]) -> str:
+    """Write a base model as YAML, so that it can be named with `--base` again."""
+    mapping: dict[str, Any] = {
+        "format": 1,
+        "name": model.name,
+        "coordinate": str(model.coordinate),
+        "excitation": "free" if excitation is Excitation.FREE_SLIDE else "driven",
+        "predicts": str(model.response),
+    }
+    inertia = "inertia_kg_m2" if model.coordinate is Coordinate.ROTATION else "mass_kg"
+    if math.isfinite(model.inertia.value):
+        mapping[inertia] = _number(model.inertia)
+    if model.coordinate is Coordinate.ROTATION:
+        mapping["gravity_torque_n_m"] = _number(model.gravity_torque)
+    mapping["terms"] = [
+        {"term": choice.identifier, "covariate": choice.covariate} if choice.covariate else choice.identifier
+        for choice in model.terms
+    ]
+    mapping["nuisances"] = {
+        name: _number(getattr(model, name))
+        for name in ("position_offset", "force_offset", "force_gain", "delay_s")
+    }
+    if math.isfinite(model.block_s):
+        mapping["block_s"] = model.block_s
+    mapping["provenance"] = provenance
+    return HEADER + yaml.safe_dump(mapping, sort_keys=False, allow_unicode=True, width=110)
+
+
+def _prior(number: float | UncertainNumber) -> Prior:
+    return number.prior() if isinstance(number, UncertainNumber) else Prior(number)
+
+
+def _number(prior: Prior) -> float | dict[str, float | str]:
+    if prior.is_held:
+        return prior.value
+    return {"value": prior.value, "std": "free" if math.isinf(prior.std) else prior.std}
+
+
+def _fault_of_term(identifier: str, covariate: str, predicts: str) -> str:
+    """Say what is wrong with a term; empty if nothing is."""
+    if identifier not in CATALOGUE:
+        return f"no term {identifier!r}; {yaml_loader.suggest(identifier, CATALOGUE)}"
+    term = CATALOGUE[identifier]
+    if term.needs_covariate and not covariate:
+        return f"{identifier} goes by a column of shots.csv: write {{term: {identifier}, covariate: COLUMN}}"
+    if covariate and not term.needs_covariate:
+        return f"{identifier} goes by no column of shots.csv; take covariate away"
+    if term.has_memory and predicts == "position":
+        return f"{identifier} follows from the path, and needs predicts: force"
+    return ""
