@@ -143,9 +143,7 @@ class CellWorker:
         faults: tuple[str, ...] = (),
     ) -> CycleResult:
         """Take one cycle through the pipeline and store it."""
-        processed = await self.run(
-            lambda: self._store(capture, self._step(capture, positioning, announcement, faults))
-        )
+        processed = await self.run(lambda: self._process(capture, positioning, announcement, faults))
         if self._journal_writer.maintenance_due:
             self._thread.submit(self._maintain, capture.time_ns)  # what is shown need not wait for it
         return processed
@@ -238,7 +236,14 @@ class CellWorker:
     ) -> StepResult:
         return guarded_step(self.log, self._design, self._state, capture, positioning, announcement, faults)
 
-    def _store(self, capture: Capture, step_result: StepResult) -> CycleResult:
+    def _process(
+        self,
+        capture: Capture,
+        positioning: PositioningState,
+        announcement: BatchAnnouncement | None,
+        faults: tuple[str, ...],
+    ) -> CycleResult:
+        step_result = self._step(capture, positioning, announcement, faults)
         self.last = CycleId(capture.session, capture.cycle)
         self._state, self._snapshot = step_result.state, step_result.snapshot
         if self._journal_writer.journal is None:

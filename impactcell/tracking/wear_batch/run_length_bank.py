@@ -81,9 +81,9 @@ def outlier_probability(prior: float, seen: float, cycles: float) -> float:
 
 
 @compiled
-def update(
+def take(
     bank: Bank, count: int, model: BankModel, measurement: Measurement, outliers: Samples, accepted: float
-) -> BankResult:
+) -> tuple[int, float, float]:
     """Take one measurement into the first `count` hypotheses of `bank`, in place.
 
     Parameters
@@ -95,6 +95,12 @@ def update(
         Outliers seen so far, in how many cycles; changed in place.
     accepted : float
         Changes up to this cycle have been reported.
+
+    Returns
+    -------
+    hypotheses : int
+    log_density, outlier_share : float
+        As in `BankResult`.
     """
     cycles, announced = measurement.cycles, measurement.announced
     if cycles > 0.0:
@@ -109,9 +115,17 @@ def update(
     density, outlier_share = run_length_update.update(bank, count, measurement, probability)
     kept = 1.0 - 1.0 / MEMORY
     outliers[0], outliers[1] = kept * outliers[0] + outlier_share, kept * outliers[1] + 1.0
-    newest = measurement.cycle + measurement.lag
-    count = run_length_update.prune(bank, count, newest, accepted)
-    since = max(accepted, newest - WINDOW)
+    count = run_length_update.prune(bank, count, measurement.cycle + measurement.lag, accepted)
+    return count, density, outlier_share
+
+
+@compiled
+def update(
+    bank: Bank, count: int, model: BankModel, measurement: Measurement, outliers: Samples, accepted: float
+) -> BankResult:
+    """Take one measurement as `take`, and say what it makes of a change after the last that was accepted."""
+    count, density, outlier_share = take(bank, count, model, measurement, outliers, accepted)
+    since = max(accepted, measurement.cycle + measurement.lag - WINDOW)
     statistic = run_length_update.shiryaev_roberts(bank, count, since, model.hazard, model.slope_prior)
     return BankResult(count, density, statistic, outlier_share)
 
@@ -124,7 +138,7 @@ def update_series(
     total = 0.0
     for row in series[1:]:
         measurement = Measurement(row[0], row[1], row[2], row[3], row[4], row[5])
-        count, log_density, _, _ = update(bank, count, model, measurement, outliers, accepted)
+        count, log_density, _ = take(bank, count, model, measurement, outliers, accepted)
         total += log_density
     return count, total
 

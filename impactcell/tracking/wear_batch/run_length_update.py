@@ -106,8 +106,9 @@ def spawn(bank: Bank, count: int, cycle: float, hazard: float, step_variance: fl
     before = np.empty(1, bank.dtype)
     merge(bank, 0, count, before)
     if hazard < 1.0:
+        log_same = math.log1p(-hazard)
         for i in range(count):
-            bank[i].log_weight += math.log1p(-hazard)
+            bank[i].log_weight += log_same
         before[0].log_weight += math.log(hazard)
     else:
         count = 0
@@ -155,6 +156,8 @@ def update(bank: Bank, count: int, measurement: Measurement, outliers: float) ->
     variance, lag = measurement.variance, measurement.lag
     before = log_sum_exp(bank, 0, count)
     gain, good_share = np.empty(STATES), np.empty(count)
+    log_good = math.log1p(-outliers)
+    log_outlying = math.log(outliers) if outliers > 0.0 else -np.inf
     for i in range(count):
         mean, covariance = bank[i].mean, bank[i].covariance
         earlier = 1.0 if bank[i].change_cycle > measurement.cycle else 0.0
@@ -164,9 +167,8 @@ def update(bank: Bank, count: int, measurement: Measurement, outliers: float) ->
         innovation = measurement.value - (mean[TOTAL] - lag * mean[SLOPE] - earlier * mean[SHIFT])
         narrow = predicted + variance
         wide = predicted + OUTLIER_SCALE**2 * variance
-        good = math.log1p(-outliers) - 0.5 * (innovation**2 / narrow + math.log(2.0 * math.pi * narrow))
-        outlying = math.log(outliers) if outliers > 0.0 else -np.inf
-        outlying -= 0.5 * (innovation**2 / wide + math.log(2.0 * math.pi * wide))
+        good = log_good - 0.5 * (innovation**2 / narrow + math.log(2.0 * math.pi * narrow))
+        outlying = log_outlying - 0.5 * (innovation**2 / wide + math.log(2.0 * math.pi * wide))
         top = max(good, outlying)
         likelihood = top + math.log(math.exp(good - top) + math.exp(outlying - top))
         share = math.exp(good - likelihood)
