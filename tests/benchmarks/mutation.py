@@ -4,7 +4,8 @@ Mutants are drawn with a seed. Each runs in a process of its own, forked off one
 loaded, and only with the tests of its room that go through the function it is in, the quickest first, until
 one fails. A mutant is a place in a function, and is not tried twice.
 `python -m tests.benchmarks.mutation ROOM NUMBER [SECONDS]` tries so many of a room, and begins none after
-SECONDS; with `--again` those that survived, with all tests of the room. The topic prints what is on file.
+SECONDS; with `--again` those that survived, with all tests of the room. ROOM `named` tries the faults of
+`_named_faults` that are not on file as noticed. The topic prints what is on file.
 """
 
 import argparse
@@ -23,9 +24,13 @@ from typing import Any, Final
 
 from tests.benchmarks._mutants import Mutant, compiled_with, mutants, users_of
 from tests.benchmarks._mutation_run import LIBRARIES, ROOT, as_it_is, with_fault
+from tests.benchmarks._named_faults import NAMED_FAULTS, faulty_source
 from tests.benchmarks.table import Table
 
 RESULTS = ROOT / "bench-results" / "mutation.jsonl"
+NAMED, NAMED_RESULTS = "named", ROOT / "bench-results" / "mutation-named.jsonl"
+TESTS_FAILED = 1
+"""Exit code of pytest when all could be collected and a test failed."""
 SEED = 20261122
 BAR = 0.9
 """Share of the faults that is to be noticed."""
@@ -33,7 +38,14 @@ LONGEST_S, LONGER = 60.0, 5.0
 """A mutant whose tests take LONGEST_S and LONGER times as long as without it hangs, and counts as noticed."""
 ROOMS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "cell": (("impactcell/cell/*.py",), ("tests/unit/cell", "tests/unit/service/test_worker.py")),
-    "journal": (("impactcell/journal/*.py",), ("tests/unit/journal",)),
+    "journal": (
+        ("impactcell/journal/*.py",),
+        (
+            "tests/unit/journal",
+            "tests/unit/service/test_journal_damaged.py",
+            "tests/unit/service/test_journal_gone.py",
+        ),
+    ),
     "intake": (
         ("impactcell/service/worker.py", "impactcell/service/journal_writer.py"),
         ("tests/unit/service", "tests/unit/journal"),
@@ -169,6 +181,23 @@ def _is_noticed(
     return {0: "", None: "hangs"}.get(code, "fails")
 
 
+def attempt_named() -> None:
+    """Try every fault that has a name, with the tests that have to notice it."""
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload(list(LIBRARIES))
+    rows = [row for row in _named_on_file() if row["killed"]]
+    for fault in NAMED_FAULTS:
+        if any(row["what"] == fault.what for row in rows):
+            continue
+        source = faulty_source(fault, (ROOT / fault.file).read_text(encoding="utf-8"))
+        process = processes.Process(target=with_fault, args=(fault.tests, fault.file, source, frozenset()))
+        process.start()
+        process.join()
+        rows.append({"what": fault.what, "tests": fault.tests, "killed": process.exitcode == TESTS_FAILED})
+        print(f"exit code {process.exitcode}: {fault.what}", file=sys.stderr, flush=True)
+        NAMED_RESULTS.write_text("".join(json.dumps(row) + "\n" for row in rows))
+
+
 def interval(killed: int, tried: int) -> str:
     """Wilson's interval of a share, 95 %."""
     share, z2 = killed / tried, 1.96**2
@@ -205,14 +234,33 @@ def tables() -> list[Table]:
             "are listed below with the reason, and do not count.",
         ),
         Table("Faults that no test notices", ("room", "where", "fault", "why"), survivors),
+        _named_table(),
     ]
+
+
+def _named_on_file() -> list[dict[str, Any]]:
+    lines = NAMED_RESULTS.read_text().splitlines() if NAMED_RESULTS.exists() else []
+    return [json.loads(line) for line in lines]
+
+
+def _named_table() -> Table:
+    killed = {row["what"]: row["killed"] for row in _named_on_file()}
+    said = {True: "yes", False: "**no**", None: "**not tried**"}
+    rows = [
+        (fault.what, ", ".join(f"`{test}`" for test in fault.tests), said[killed.get(fault.what)])
+        for fault in NAMED_FAULTS
+    ]
+    return Table("Faults that had survived once", ("fault", "tests", "noticed"), rows)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.mutation", description=__doc__)
-    parser.add_argument("room", choices=ROOMS)
-    parser.add_argument("number", type=int)
+    parser.add_argument("room", choices=(*ROOMS, NAMED))
+    parser.add_argument("number", type=int, nargs="?", default=1)
     parser.add_argument("seconds", type=float, nargs="?", default=math.inf)
     parser.add_argument("--again", action="store_true", help="those that survived")
     arguments = parser.parse_args()
-    attempt(arguments.room, arguments.number, arguments.seconds, again=arguments.again)
+    if arguments.room == NAMED:
+        attempt_named()
+    else:
+        attempt(arguments.room, arguments.number, arguments.seconds, again=arguments.again)

@@ -44,6 +44,7 @@ OUTAGE: dict[int, str | None] = {5: "A", 6: "B", 7: "B", 8: "C", 9: "C", 10: "D"
         (6, BatchAnnouncement(7, 10), [10]),
         (7, BatchAnnouncement(7, 10), []),
         (0, BatchAnnouncement(7, 10), [10]),
+        (1, BatchAnnouncement(3, 10), [6, 10]),
         (9, BatchAnnouncement(1, 10), [10]),
     ],
 )

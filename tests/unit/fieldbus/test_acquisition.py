@@ -301,6 +301,33 @@ async def test_a_window_that_changes_while_it_is_read_is_read_again_also_without
         assert module.status.discarded == 1
 
 
+async def test_a_window_that_is_being_changed_is_not_read(fpga: RegisterMap) -> None:
+    """An odd sequence number, the same before and after, is all that tells."""
+    registers = {name: register for name, register in fpga.registers.items() if name != "capture_crc32"}
+    layout = RegisterMap(fpga.name, registers)
+    device = ScriptedDevice(layout)
+    make(device)
+    first, looks = layout["window_sequence"].address, 0
+
+    def look() -> None:
+        nonlocal looks
+        looks += 1
+        device._show()
+        if looks > 3:
+            return
+        odd = int(device.get("window_sequence")) | 1
+        device.put("window_sequence", odd)
+        device.put("window_sequence_after", odd)
+        device.image[layout["force"].address + 100 :][:500] = 0
+        device.on_read.append((first, look))
+
+    device.on_read.append((first, look))
+    async with running(layout, device) as (_, _module, receptions):
+        [received] = await take(receptions, 1)
+        assert_whole(received)
+    assert looks == 4
+
+
 async def test_a_capture_that_never_fits_its_crc_is_passed_on_empty_and_the_next_is_good(
     fpga: RegisterMap,
 ) -> None:

@@ -187,7 +187,7 @@ def test_users_file_round_trip_and_permissions(tmp_path: Path) -> None:
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
     assert "correct horse" not in file.read_text()
     assert anna.password is not None
-    assert anna.password.startswith("$argon2id$")
+    assert anna.password.startswith("$argon2id$v=19$m=19456,t=2,p=1$"), "OWASP's first recommendation"
     assert verify(anna, "correct horse")
     assert not verify(anna, "correct hors")
     assert not verify(None, "")

@@ -1,17 +1,26 @@
 """The plant of a campaign: found from the simulator's taps, with and without a law that the model lacks."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from impactcell.errors import PredictionError
 from impactcell.features import extract
-from impactcell.prediction.joint_plant_fit import contact_constants, estimate_mass, fit_plant
+from impactcell.physics import Plant
+from impactcell.prediction import Model, Prior, printed_predictor
+from impactcell.prediction.joint_plant_fit import contact_constants, estimate_mass, fit_plant, ratio_scatter
 from impactcell.records import Capture
 from tests.taps import Tap
 
 DRAG = {"quadratic_drag": {"drag_coefficient_n_s2_per_m2": 45.0}}
+
+
+def printed_model() -> Model:
+    plant = Plant(6.5e5, 465.0, 0.2, 0.152)
+    return Model("printed", plant, Prior(6500.0, 9.3, 0.0228), (printed_predictor(),))
 
 
 def campaign(seed: int, effects: dict[str, dict[str, float]]) -> list[Capture]:
@@ -67,3 +76,25 @@ def test_bad_shots_are_left_out_and_a_campaign_of_them_is_refused() -> None:
         fit_plant([extract(tap) for tap in [captures[2]]], 9.81)
     with pytest.raises(PredictionError, match="there is none"):
         fit_plant([], 9.81)
+
+
+@pytest.mark.parametrize("error", [0.004, 0.01, 0.05])
+def test_scatter_of_the_ratio_is_what_its_errors_leave(error: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With equal errors the moment estimate is the sample variance less theirs (DerSimonian, Laird 1986)."""
+    ratios = [0.74, 0.77, 0.76, 0.78, 0.75, 0.79, 0.76]
+    shown = [
+        SimpleNamespace(mu_s=0.2, mu_k=0.2 * ratio, mu_s_std=0.2 * error / ratio, immediate=0.0)
+        for ratio in ratios
+    ]
+    hidden = SimpleNamespace(mu_s=0.2, mu_k=0.02, mu_s_std=0.001, immediate=0.5)
+    vague = SimpleNamespace(mu_s=0.2, mu_k=0.02, mu_s_std=0.012, immediate=0.0)
+
+    def scatter(fits: list[SimpleNamespace]) -> float:
+        monkeypatch.setattr("impactcell.prediction.joint_plant_fit.fit", lambda tap, _: fits[tap])
+        return ratio_scatter(range(len(fits)), fit_model)  # type: ignore[arg-type]
+
+    fit_model = printed_model()
+    between = np.var(ratios, ddof=1) - error**2
+    expected = math.sqrt(max(between, 0.0))
+    assert scatter([hidden, *shown, vague]) == pytest.approx(expected if error < 0.03 else 0.0, rel=1e-9)
+    assert scatter([*shown[:4], hidden]) == 0.0, "too few"

@@ -78,6 +78,9 @@ def test_free_slides_give_mu_k_in_either_direction() -> None:
             position = Channel(times, sign * x + rng.normal(0.0, 1e-4, 60), 1e-4)
             found = free_slide_friction(Capture(1, float("nan"), 1.0, None, position), 9.81)
             assert abs(found.value - 2.1 / 9.81) < 4.0 * found.std
+            elsewhere = replace(position, values=position.values - 3.0 * sign * position.values[-1])
+            moved = free_slide_friction(Capture(1, float("nan"), 1.0, None, elsewhere), 9.81)
+            assert moved.value == pytest.approx(found.value, rel=1e-6)
     with pytest.raises(CaptureError, match="did not slide"):
         free_slide_friction(
             Capture(1, float("nan"), 1.0, None, Channel(times, rng.normal(0, 1e-4, 60), 1e-4)), 9.81

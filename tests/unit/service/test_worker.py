@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from impactcell import cell as core
+from impactcell.alarms import AlarmEvent, EventKind
 from impactcell.errors import ForeignJournalError, JournalFullError
+from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
-from impactcell.records import Capture, Channel, CycleId, PositioningState, Quality
+from impactcell.records import Capture, Channel, CycleId, PositioningState, Quality, Shelving
 from impactcell.serialization.message_pack import pack_tree, unpack_tree
 from impactcell.service.factory import cell_design
 from impactcell.service.journal_writer import JournalWriter
@@ -280,3 +282,42 @@ async def test_no_more_cells_compute_at_a_time_than_there_are_cores(
     for cell in cells:
         await cell.close()
     assert most <= 2
+
+
+async def test_shelving_ends_when_its_time_is_over(tmp_path: Path, design: core.CellDesign) -> None:
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
+    audit = AuditEntry(10, "anna", "TimedShelve", "{}", "Good")
+    shelve = AlarmEvent(EventKind.SHELVE_TIMED, time_ns=10, user="anna", shelve_ns=100)
+
+    def shelving() -> Shelving:
+        return next(alarm.shelving for alarm in worker.alarms if alarm.name == "WearLimit")
+
+    await worker.apply_event("WearLimit", shelve, audit)
+    await worker.expire_shelving(109)
+    assert shelving() is Shelving.TIMED
+    await worker.expire_shelving(111)
+    assert shelving() is Shelving.UNSHELVED
+    await worker.close()
+
+
+async def test_the_journal_is_asked_where_there_is_one(tmp_path: Path, design: core.CellDesign) -> None:
+    with_journal = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
+    without = CellWorker(design, None, Retention())
+    for worker in (with_journal, without):
+        await worker.process(make_capture(1), PositioningState(), None)
+    assert await with_journal.query_journal(lambda journal: journal.count()) == 1
+    assert await without.query_journal(lambda journal: journal.count()) is None
+    for worker in (with_journal, without):
+        await worker.close()
+
+
+async def test_the_time_between_cycles_is_known_from_the_second_on(
+    tmp_path: Path, design: core.CellDesign
+) -> None:
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
+    periods = []
+    for cycle in range(1, 4):
+        await process(worker, replace(make_capture(cycle), time_ns=10**18 + cycle * 1_500_000_000))
+        periods.append(worker.period_s)
+    await worker.close()
+    assert periods == [0.0, pytest.approx(1.5), pytest.approx(1.5)]
