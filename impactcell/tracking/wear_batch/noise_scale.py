@@ -9,6 +9,7 @@ How much wider or narrower than usual an estimate is, it declares itself, as far
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -105,25 +106,32 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
     else:
         std = usual = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
         weight, guessed = 0.0, True
-    identical = identical_run(noise, value)
-    updated = replace(noise, weight=weight, usual_std=usual, guessed=guessed, identical=identical)
+    updated: dict[str, Any] = {
+        "usual_std": usual,
+        "guessed": guessed,
+        "identical": identical_run(noise, value),
+    }
     if late:
-        return updated, std
-    updated = replace(updated, last_value=value, last_std=std)
-    return (updated if math.isnan(noise.last_value) else _update_factor(updated, noise)), std
+        return replace(noise, weight=weight, **updated), std
+    updated |= {"last_value": value, "last_std": std}
+    if math.isnan(noise.last_value):
+        return replace(noise, weight=weight, **updated), std
+    learned = _learned_factor(noise, value, (std, noise.last_std), usual, (weight, guessed))
+    return replace(noise, **updated, **learned), std
 
 
-def _update_factor(noise: NoiseScale, before: NoiseScale) -> NoiseScale:
-    """Learn from the difference of the last estimate from the one before."""
-    square, weight = (noise.last_value - before.last_value) ** 2, min(noise.weight + 1.0, MEMORY)
-    stds, usual = (noise.last_std, before.last_std), noise.usual_std
+def _learned_factor(
+    noise: NoiseScale, value: float, stds: tuple[float, float], usual: float, rests_on: tuple[float, bool]
+) -> dict[str, Any]:
+    """Learn from the difference of an estimate from the one before; the fields that change."""
+    square, weight = (value - noise.last_value) ** 2, min(rests_on[0] + 1.0, MEMORY)
     squared = square / sum(
         declared_std_calibration.calibrated_std(noise.exponent_posterior, std, usual) ** 2 for std in stds
     )
-    if noise.guessed and weight <= UNSCALED:
+    if rests_on[1] and weight <= UNSCALED:
         # nothing to judge outliers by yet: the plain mean
         factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
-        return replace(noise, factor=factor, winsorised_factor=factor, weight=weight)
+        return {"factor": factor, "winsorised_factor": factor, "weight": weight}
     clipped = min(squared, CLIP**2 * noise.winsorised_factor) / CONSISTENCY
     winsorised_factor = max(
         noise.winsorised_factor + (clipped - noise.winsorised_factor) / weight, SMALLEST_FACTOR
@@ -136,13 +144,12 @@ def _update_factor(noise: NoiseScale, before: NoiseScale) -> NoiseScale:
     exponent_posterior = declared_std_calibration.update(
         noise.exponent_posterior, usual_square, *stds, usual, weight
     )
-    return replace(
-        noise,
-        factor=factor,
-        winsorised_factor=winsorised_factor,
-        weight=weight,
-        exponent_posterior=exponent_posterior,
-    )
+    return {
+        "factor": factor,
+        "winsorised_factor": winsorised_factor,
+        "weight": weight,
+        "exponent_posterior": exponent_posterior,
+    }
 
 
 def variance(noise: NoiseScale, std: float) -> float:

@@ -26,7 +26,6 @@ from impactcell.tracking.wear_batch.run_length_model import (
     OUTLIER_SCALE,
     SHIFT,
     SLOPE,
-    STATES,
     STEPS,
     Bank,
     BankModel,
@@ -36,8 +35,6 @@ from impactcell.tracking.wear_batch.run_length_update import CAPACITY
 
 WIDTH = HYPOTHESIS.itemsize // 8
 """Numbers of one hypothesis."""
-MEAN, COVARIANCE = slice(2, 2 + STATES), slice(2 + STATES, WIDTH)
-"""Columns of a stored hypothesis."""
 ROWS = CAPACITY + len(STEPS) + 1
 """Hypotheses that there can be within a cycle, before the bank is pruned."""
 CALIBRATION = 0.60
@@ -172,9 +169,13 @@ def initial_bank(value: float, variance: float, slope_std: float, cycle: int, ou
 
 def moments(rows: Samples) -> tuple[Samples, Samples]:
     """Mean, shape (4,), and covariance, shape (4, 4), of the whole mixture."""
-    mixture = np.empty((1, WIDTH))
-    run_length_update.merge(_records(rows), 0, len(rows), _records(mixture))
-    return mixture[0, MEAN], mixture[0, COVARIANCE].reshape(STATES, STATES)
+    return _merged(_records(rows))
+
+
+def _merged(bank: Bank) -> tuple[Samples, Samples]:
+    mixture = np.empty(1, HYPOTHESIS)
+    run_length_update.merge(bank, 0, len(bank), mixture)
+    return mixture["mean"][0], mixture["covariance"][0]
 
 
 def threshold(false_alarm_cycles: float) -> float:
@@ -188,13 +189,13 @@ def threshold(false_alarm_cycles: float) -> float:
 
 def locate_change_point(rows: Samples, after: float, until: float) -> tuple[int, float, float]:
     """Most probable first cycle of the change in (after, until], its size and standard deviation."""
-    cycles = _records(rows)["change_cycle"]
+    bank = _records(rows)
+    cycles = bank["change_cycle"]
     within = (cycles > after) & (cycles <= until)
     if np.any(within):
-        rows = rows[within]
-    bank = _records(rows)
+        bank = _records(rows[within])
     likeliest = int(bank["change_cycle"][int(np.argmax(bank["log_weight"]))])
-    mean, covariance = moments(rows)
+    mean, covariance = _merged(bank)
     return likeliest, float(mean[SHIFT]), math.sqrt(max(float(covariance[SHIFT, SHIFT]), 0.0))
 
 

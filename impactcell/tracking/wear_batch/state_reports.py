@@ -71,9 +71,7 @@ def tracking_result(
             probability = wear_blocks.probability_above(blocks, index, settings.wear_limit)
     state = _refine_change_point(state)
     walks = (state.level_variance, state.slope_variance)
-    wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes))
-    if probability is not None:
-        wear = replace(wear, probability_above_limit=probability)
+    wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes), probability)
     change = state.change_point
     not_ready = batch_filter.reason_not_ready(state)
     batch = BatchState(

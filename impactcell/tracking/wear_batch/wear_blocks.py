@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import ndtr
 
+from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch.block_filter import (
     BLOCK,
@@ -156,16 +157,22 @@ def update(wear: WearBlocks, model: BlockModel) -> WearBlocks:
 
 def moments(wear: WearBlocks, index: int) -> WearMoments:
     """Level and slope at a cycle, by the last posterior."""
-    slope, share, level, variance = wear.slopes.T
-    level = level + slope * (index - wear.origin)
-    mean, centre = float(share @ level), float(share @ slope)
-    return WearMoments(
-        mean,
-        centre,
-        float(share @ (variance + (level - mean) ** 2)),
-        float(share @ ((level - mean) * (slope - centre))),
-        float(share @ (slope - centre) ** 2),
-    )
+    return WearMoments(*_moments_after(wear.slopes, index - wear.origin))
+
+
+@compiled
+def _moments_after(slopes: Samples, passed: float) -> tuple[float, float, float, float, float]:
+    """Moments of the mixture over the slopes, after so many cycles; as `WearMoments`."""
+    mean = centre = variance = covariance = slope_variance = 0.0
+    for row in slopes:
+        mean += row[1] * (row[2] + row[0] * passed)
+        centre += row[1] * row[0]
+    for row in slopes:
+        apart, beside = row[2] + row[0] * passed - mean, row[0] - centre
+        variance += row[1] * (row[3] + apart**2)
+        covariance += row[1] * apart * beside
+        slope_variance += row[1] * beside**2
+    return mean, centre, variance, covariance, slope_variance
 
 
 def probability_above(wear: WearBlocks, index: int, limit: float) -> float:

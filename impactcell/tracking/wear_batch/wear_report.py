@@ -47,6 +47,7 @@ def forecast(
     limit: float,
     quality: Quality = Quality.GOOD,
     reason: str = "",
+    probability_above: float | None = None,
 ) -> WearState:
     """Say how level and slope stand to the limit.
 
@@ -54,13 +55,15 @@ def forecast(
     ----------
     walks : tuple of float
         Process variances of level and slope a cycle: they widen what is to come.
+    probability_above : float, optional
+        That the level is above the limit, where a normal distribution is not all that is known of it.
     """
     level_variance, slope_variance = max(moments.level_variance, 0.0), max(moments.slope_variance, 0.0)
     std, excess = math.sqrt(level_variance), moments.level - limit
     if not math.isfinite(limit):
-        probability_above, cycles, low, high = 0.0, math.inf, math.inf, math.inf
+        above, cycles, low, high = 0.0, math.inf, math.inf, math.inf
     else:
-        probability_above = float(ndtr(excess / std)) if std > 0.0 else float(excess > 0.0)
+        above = float(ndtr(excess / std)) if std > 0.0 else float(excess > 0.0)
         ahead = Extrapolation(
             excess,
             moments.slope,
@@ -78,7 +81,7 @@ def forecast(
         moments.slope,
         slope_std,
         limit,
-        probability_above,
+        above if probability_above is None else probability_above,
         cycles,
         low,
         high,
