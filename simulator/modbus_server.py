@@ -48,6 +48,8 @@ class ModbusServer:
         Unit id to device; more than one make it a gateway.
     """
 
+    is_line = False
+    """Whether there is but one connection, for good."""
     connection: type[ClientConnection] = ClientConnection
     """What each client is served by."""
 

@@ -119,6 +119,8 @@ class SerialServer(ModbusServer):
     A device that there is not says nothing.
     """
 
+    is_line = True
+
     def __init__(
         self,
         device: RegisterDevice,

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from impactcell.fieldbus.map_registers import ARRAYS, HEADER
+from impactcell.fieldbus.map_registers import ARRAYS, HEADER, NAMES, TEXTS, WRITTEN
 from impactcell.fieldbus.register import Register
 
 REGISTER_SPACE: Final = 65_536
@@ -12,12 +12,24 @@ _OUTSIDE_CRC: Final = ("window_sequence", "capture_ready", "capture_crc32")
 """What is read with a header and may lie outside of what its CRC covers."""
 _COUNTERS: Final = ("cycle_counter", "ring_cycle", "window_cycle", "session", "window_session")
 """What counts, or tells one start of the module from another."""
-_UNSIGNED: Final = ("u16", "u32", "u64", "bcd16", "bcd32")
-"""Types that count from 0 up."""
+_LARGEST: Final[Mapping[str, int]] = {
+    "u16": 2**16 - 1,
+    "bcd16": 10**4 - 1,
+    "bcd32": 10**8 - 1,
+    "u32": 2**32 - 1,
+}
+"""Types that count from 0 up, to what; over OPC UA a cycle has 32 bits."""
+_ECHOED: Final = {
+    "acknowledge_cycle": "cycle_counter",
+    "acknowledge_session": "session",
+    "command_sequence": "command_accepted",
+}
+"""What is written of what was read, or counted on from it."""
 _WHOLE: Final = (
     "slot_select", "newest_slot", "window_slot", "window_sequence", "window_sequence_after", "direction",
     "sample_count", "force_count", "position_count", "actuator_count", "capture_crc32", "status_crc32",
-    "acknowledge_session", "acknowledge_cycle", "batch_sequence", "batch_from_cycle", "command_sequence",
+    "acknowledge_session", "acknowledge_cycle", "batch_sequence", "batch_from_cycle",
+    "command_sequence", "command_accepted", "command_cycle",
 )  # fmt: skip
 """What is compared or counted with, and so has no scale."""
 
@@ -39,12 +51,17 @@ def layout_faults(registers: Iterable[Register]) -> Iterator[str]:
 
 def window_faults(registers: Mapping[str, Register]) -> Iterator[str]:
     """Say what cannot be read as one capture, or is no number where one is counted with."""
+    yield from _kind_faults(registers)
     for name in _WHOLE:
         if name in registers and not registers[name].is_code:
             yield f"register {name} must be a whole number, without scale, offset or unit"
     for name in _COUNTERS:
-        if name in registers and not (registers[name].is_code and registers[name].kind in _UNSIGNED):
-            yield f"register {name} must be u16, u32, u64, bcd16 or bcd32, without scale: it counts"
+        if name in registers and not (registers[name].is_code and registers[name].kind in _LARGEST):
+            yield f"register {name} must be u16, u32, bcd16 or bcd32, without scale: it counts"
+    for written, read in _ECHOED.items():
+        most = [_LARGEST.get(registers[name].kind, 0) for name in (written, read) if name in registers]
+        if len(most) > 1 and most[0] < most[1]:
+            yield f"register {written} must hold what {read} can show"
     arrays = [registers[name] for name in ARRAYS if name in registers]
     for register in arrays:
         if register.kind in ("string", "bit") or register.bit is not None:
@@ -53,6 +70,22 @@ def window_faults(registers: Mapping[str, Register]) -> Iterator[str]:
         yield "register ring_cycle must be an array with one cycle number a slot"
     yield from _sequence_faults(registers, arrays)
     yield from _crc_faults(registers)
+
+
+def _kind_faults(registers: Mapping[str, Register]) -> Iterator[str]:
+    """Say what has to be a single number, a text, or writable."""
+    for name in NAMES:
+        register = registers.get(name)
+        if register is None or name in ARRAYS:
+            continue
+        if register.count > 1 and name != "ring_cycle":
+            yield f"register {name} must be a single value"
+        if register.kind == "string" and name not in TEXTS:
+            yield f"register {name} must be a number"
+        if name in WRITTEN and not register.writable:
+            yield f"register {name} must be writable: the service writes it"
+        if name in _WHOLE and (register.kind == "bit" or register.bit is not None):
+            yield f"register {name} must be a whole number, not a bit"
 
 
 def _header_of(registers: Mapping[str, Register]) -> list[Register]:

@@ -57,13 +57,18 @@ _STATUS: Final = (
 )  # fmt: skip
 """What the module says of itself, of what is to come and of positioning."""
 
-_WRITTEN: Final = (
+WRITTEN: Final = (
     "slot_select", "acknowledge_session", "acknowledge_cycle", "command_velocity", "command_stroke",
     "command_direction", "command_abort", "command_sequence",
 )  # fmt: skip
 """What the service writes."""
 
-NAMES: Final = (*HEADER, *ARRAYS, "window_sequence_after", *_STATUS, *_WRITTEN)
+TEXTS: Final = (
+    "module_name", "serial_number", "map_version", "firmware_version", "batch_id", "batch_announced"
+)  # fmt: skip
+"""What may be a text; all else is a number."""
+
+NAMES: Final = (*HEADER, *ARRAYS, "window_sequence_after", *_STATUS, *WRITTEN)
 """All names that are used."""
 
 

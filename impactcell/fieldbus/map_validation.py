@@ -68,7 +68,7 @@ _CONSTANT_KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
     "description": _KEYS["description"],
 }
 """Keys of an entry that stands for a register: the module has none, for it is always the same."""
-_TOP: Final = ("format", "name", "word_order", "functions", "registers")
+_TOP: Final = ("format", "name", "word_order", "functions", "gaps", "registers")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +83,8 @@ class ValidatedMap:
         Value of each constant that is, SI.
     functions : tuple of int
         Of `MASK_WRITE` and `READ_WRITE`, those that the module has.
+    gaps : bool
+        Whether addresses between its registers can be read.
     faults : list of str
         All that is wrong.
     """
@@ -91,11 +93,12 @@ class ValidatedMap:
     registers: dict[str, dict[str, Any]]
     constants: dict[str, float]
     functions: tuple[int, ...]
+    gaps: bool
     faults: list[str]
 
 
 def validate_map(mapping: Mapping[str, Any]) -> ValidatedMap:
-    """Look through a parsed map file: `format`, `name`, `word_order`, `functions` and `registers`."""
+    """Look through a parsed map file: `format`, `name`, `registers` and the like, `_TOP`."""
     faults = [f"unknown key {key}" for key in mapping if key not in _TOP]
     if mapping.get("format") != 1:
         faults.append("format must be 1")
@@ -108,8 +111,11 @@ def validate_map(mapping: Mapping[str, Any]) -> ValidatedMap:
     ):
         faults.append(f"functions must be a list of {MASK_WRITE} and {READ_WRITE}, those that the module has")
         functions = []
+    gaps = mapping.get("gaps", True)
+    if not isinstance(gaps, bool):
+        faults.append("gaps must be true or false: whether addresses between the registers can be read")
     name = str(mapping.get("name", "without a name"))
-    validated = ValidatedMap(name, {}, {}, tuple(functions), faults)
+    validated = ValidatedMap(name, {}, {}, tuple(functions), bool(gaps), faults)
     for key, entry in mapping["registers"].items():
         is_constant = isinstance(entry, Mapping) and "value" in entry
         entry_faults = _constant_faults(key, entry) if is_constant else _entry_faults(entry, functions)
@@ -129,6 +135,10 @@ def _constant_faults(name: object, entry: Mapping[str, Any]) -> list[str]:
     faults = _key_faults(entry, _CONSTANT_KEYS)
     if not faults and entry.get("unit") and entry["unit"] not in SI_FACTOR:
         faults.append(f"unit {entry['unit']!r} is not known")
+    if not faults and name == "direction" and entry["value"] not in (-1, 1):
+        faults.append("value must be 1 or -1")
+    elif not faults and not (name == "direction" or str(name).endswith("_start") or entry["value"] > 0.0):
+        faults.append("value must be above 0")
     return faults
 
 

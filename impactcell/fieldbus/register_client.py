@@ -83,7 +83,9 @@ class RegisterClient:
         blocks = self._groups.get(names)
         if blocks is None:
             present = [self.registers[name] for name in names if name in self.registers]
-            blocks = self._groups[names] = group_registers(present, self.modbus.link.max_registers)
+            blocks = self._groups[names] = group_registers(
+                present, self.modbus.link.max_registers, gaps=self.registers.gaps
+            )
         return blocks
 
     async def _read(

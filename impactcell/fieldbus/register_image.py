@@ -35,15 +35,19 @@ class RegisterBlock:
         return {register.name: register.decode(words[where]) for register, where in self.fields}
 
 
-def group_registers(registers: Iterable[Register], max_registers: int) -> tuple[RegisterBlock, ...]:
+def group_registers(
+    registers: Iterable[Register], max_registers: int, *, gaps: bool = True
+) -> tuple[RegisterBlock, ...]:
     """Group registers into blocks of at most `max_registers`, cut only between values.
 
-    A value that is larger than that is a block of its own.
+    A value that is larger than that is a block of its own. Without `gaps` the values of a block lie side by
+    side.
     """
     blocks: list[list[Register]] = []
     for register in sorted(registers, key=lambda r: (r.table, r.address)):
-        last = blocks[-1] if blocks else None
-        if last and last[0].table == register.table and register.end - last[0].address <= max_registers:
+        last = blocks[-1] if blocks and blocks[-1][0].table == register.table else None
+        near = last is not None and (gaps or register.address <= last[-1].end)
+        if last and near and register.end - last[0].address <= max_registers:
             last.append(register)
         else:
             blocks.append([register])

@@ -44,12 +44,15 @@ class RegisterMap:
         What the module has no register for because it is always the same, SI, by the register's name.
     functions : tuple of int
         Functions that only some modules have, and this one has; see `map_validation`.
+    gaps : bool
+        Whether addresses between the registers of the map may be read with them.
     """
 
     name: str
     registers: Mapping[str, Register]
     constants: Mapping[str, float] = field(default_factory=dict)
     functions: tuple[int, ...] = ()
+    gaps: bool = True
 
     @classmethod
     def from_mapping(cls, mapping: object) -> "RegisterMap":
@@ -71,7 +74,7 @@ class RegisterMap:
         faults += window_faults(registers)
         if faults:
             raise MapError(f"register map {name}: " + "; ".join(faults), faults)
-        return cls(name, registers, validated.constants, validated.functions)
+        return cls(name, registers, validated.constants, validated.functions, validated.gaps)
 
     def __getitem__(self, name: str) -> Register:
         """Register called `name`; MapError where the map has none."""

@@ -15,6 +15,10 @@ _FEWEST_HEADERS: Final = 16
 """So many cycles are remembered at least, also of a module with one buffer: what a gateway may still show."""
 
 
+_SESSIONS: Final = 16
+"""So many sessions are remembered that the module has left."""
+
+
 class TakenCycles:
     """The last cycle taken, and what the headers of those before it looked like.
 
@@ -34,9 +38,15 @@ class TakenCycles:
         self._slots = slots
         self._headers: OrderedDict[CycleId, bytes] = OrderedDict()
         self._first_behind: CycleId | None = None
+        self._sessions_left: OrderedDict[int, None] = OrderedDict()
 
     def add(self, cycle_id: CycleId, header: bytes, time_ns: int) -> None:
         """Take note of a cycle that has been taken, its header as it stands on the wire, and its own time."""
+        if self.last is not None and self.last.session != cycle_id.session:
+            self._sessions_left[self.last.session] = None
+            while len(self._sessions_left) > _SESSIONS:
+                self._sessions_left.popitem(last=False)
+        self._sessions_left.pop(cycle_id.session, None)
         self.last, self._last_time_ns, self._first_behind = cycle_id, time_ns, None
         self._headers.pop(cycle_id, None)
         self._headers[cycle_id] = header
@@ -44,9 +54,9 @@ class TakenCycles:
             self._headers.popitem(last=False)
 
     def is_behind(self, cycle_id: CycleId) -> bool:
-        """Whether it lies before the last one, if the module was not started anew without a new session."""
+        """Whether it lies before the last one, unless the module has gone back to a session of before."""
         if self.last is None or cycle_id.session != self.last.session:
-            return False
+            return cycle_id.session in self._sessions_left
         return not is_after(cycle_id.cycle, self.last.cycle)
 
     def holds(self, shown: CycleId, header: bytes, time_ns: int, target: NextCapture) -> bool:

@@ -15,20 +15,16 @@ import numpy as np
 import yaml
 
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
-from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.transports import transport_for
 from simulator.faults import Fault, FaultInjector, FaultKind
-from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
-from tests.benchmarks._chaos_faults import KINDS, REBOOTS, FaultPlan, FaultyDevice, FaultyWire
+from tests.benchmarks._chaos_faults import KINDS, REBOOTS, FaultPlan, FaultyDevice
+from tests.benchmarks._chaos_links import Reached, over_faulty_tcp
 from tests.benchmarks._fieldbus_faults import MAP, RESULTS, outages
 from tests.benchmarks.table import Table
 
 CELLS, FAULTS_A_CELL = 10, 50
 """At a time, and faulty exchanges of each in a run."""
-WINDOWS = (1, 4, 16)
 PROBABILITY = 0.001
 """Of each fault of the server in a reply; of all of memory and wire together it is `MEMORY_AND_WIRE`."""
 MEMORY_AND_WIRE = 0.04
@@ -36,7 +32,10 @@ MEMORY_AND_WIRE = 0.04
 SAMPLES = 600
 EPOCH_NS = 1_795_255_128_000_000_000
 """Time of the cycle before the first; each is a second later, so that its time tells which it is."""
-TIMEOUT_S = 0.15
+LATE_S = 0.2
+"""How late a late reply is: beyond the timeout, and within twice of it."""
+MOST_UNSEEN = 5
+"""So many cycles are made at most before the next poll, where counter or session outlive a restart."""
 PATIENCE_S = 30.0
 """So long nothing new may come before a run counts as stuck."""
 
@@ -117,25 +116,26 @@ def reboot(kind: str, device: ScriptedDevice, account: Account, plan: FaultPlan)
     account.made_in_life = 0
 
 
-async def cell(seed: int, faults: int) -> dict[str, int]:
-    """Let one cell run until so many faults have happened, then in peace until all is there."""
+async def cell(seed: int, faults: int, reached: Reached = over_faulty_tcp) -> dict[str, int]:
+    """Let one cell run until so many faults have happened, then in peace until all is there.
+
+    `reached` is how its module is.
+    """
     registers = RegisterMap.from_mapping(yaml.safe_load(MAP.read_text(encoding="utf-8")))
     plan, account = FaultPlan(seed, MEMORY_AND_WIRE), Account()
     device = FaultyDevice(ScriptedDevice(registers, session=7), plan)
-    link = {"window": WINDOWS[seed % len(WINDOWS)], "timeout_s": TIMEOUT_S}
-    server = ModbusServer(device, faults=FaultInjector(seed))
-    await server.start()
-    wire = FaultyWire(server.port, plan)
-    await wire.start()
+    injector = FaultInjector(seed)
     for kind in FaultKind:
-        server.faults.inject(Fault(kind, probability=PROBABILITY, seconds=0.2))
-    client = ModbusClient(transport_for(ModuleLink(port=wire.port, **link)))
+        injector.inject(Fault(kind, probability=PROBABILITY, seconds=LATE_S))
     stuck = goes_on = False
 
     def happened() -> int:
-        return sum(plan.happened.values()) + sum(server.faults.happened.values())
+        return sum(plan.happened.values()) + sum(injector.happened.values())
 
-    async with ModuleAcquisition(f"cell-{seed}", client, registers) as module:
+    async with (
+        reached(seed, device, plan, injector) as (server, client),
+        ModuleAcquisition(f"cell-{seed}", client, registers) as module,
+    ):
 
         async def follow() -> None:
             async with contextlib.aclosing(module.captures()) as cycles:
@@ -148,22 +148,29 @@ async def cell(seed: int, faults: int) -> dict[str, int]:
             while not account.came:  # what was overwritten before the first contact is nobody's loss
                 await asyncio.sleep(0.002)
             while happened() < faults:
+                for each in server.links:  # what was half open for good is a line that somebody has repaired
+                    each._mute = each._mute and not server.is_line
                 unread = account.made - account.told
                 if plan.random.random() < 0.3 and account.made_in_life:
                     kind = plan.random.choice(REBOOTS)
-                    if kind == "reboot_unread" or (not unread and account.made_in_life > 5):
+                    if (
+                        kind == "reboot_same_session"
+                        and int(device.device.get("cycle_counter")) <= MOST_UNSEEN
+                    ):
+                        kind = "reboot_new_session"  # else nothing would show that the counter went back
+                    if kind == "reboot_unread" or (not unread and account.made_in_life > MOST_UNSEEN):
                         plan.happened[kind] += 1
                         goes_on = kind not in ("reboot_new_session", "reboot_unread")
                         reboot(kind, device.device, account, plan)
                         if plan.random.random() < 0.5:
                             server.drop_clients()
                 # Where session or counter go on, nobody can know of cycles that left the ring before a poll.
-                most = 5 if goes_on and account.made_in_life < registers.slots else 20
+                most = MOST_UNSEEN if goes_on and account.made_in_life < registers.slots else 20
                 make(device, account, min(most, plan.random.choice((1, 1, 1, 2, 5, 20))))
                 if plan.random.random() < 0.9:
                     await until(lambda: account.told >= account.made or happened() >= faults, 5.0)
             plan.quiet = True
-            server.faults.clear()
+            injector.clear()
             make(device, account, 1)
             last = account.made
             stuck = not await until(lambda: last in account.came and account.told >= account.made, PATIENCE_S)
@@ -171,15 +178,13 @@ async def cell(seed: int, faults: int) -> dict[str, int]:
         finally:
             following.cancel()
             await asyncio.gather(following, return_exceptions=True)
-    await wire.close()
-    await server.close()
     return {
         "made": account.made, "right": len(account.came), "wrong": account.wrong,
         "twice": sum(account.came.values()) - len(account.came),
         "untold": max(0, account.made - account.told), "falsely_missed": max(0, account.told - account.made),
         "stuck": stuck, "missed": account.missed, "unreadable": account.unreadable,
         "at_reboot": len(account.at_reboot), "restarts": account.restarts, "faults": happened(),
-        **{f"fault {kind}": n for kind, n in (plan.happened + Counter(server.faults.happened)).items()},
+        **{f"fault {kind}": n for kind, n in (plan.happened + Counter(injector.happened)).items()},
     }  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from impactcell.errors import MapError
+from impactcell.errors import MapError, ModbusExceptionError
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.registers import RegisterMap
@@ -229,6 +229,19 @@ def test_the_smallest_map_is_one_and_says_what_it_lacks() -> None:
         ("velocity", {"value": 1, "unit": "furlong"}, "velocity: unit 'furlong' is not known"),
         ("velocity", {"value": 1, "address": 3}, "velocity: unknown key address"),
         ("session", {"value": 1}, "session: cannot be a constant"),
+        ("velocity", {"value": 0}, "velocity: value must be above 0"),
+        ("direction", {"value": 2}, "direction: value must be 1 or -1"),
+        ("cycle_counter", {"address": 0, "type": "u64"}, "cycle_counter must be u16, u32, bcd16 or bcd32"),
+        ("cycle_counter", {"address": 3, "type": "u16", "count": 2}, "cycle_counter must be a single value"),
+        ("mass", {"address": 9, "type": "string", "length": 2}, "mass must be a number"),
+        ("acknowledge_cycle", {"address": 9, "type": "u16"}, "acknowledge_cycle must be writable"),
+        (
+            "acknowledge_cycle",
+            {"address": 9, "type": "bcd16", "writable": True},
+            "acknowledge_cycle must hold what cycle_counter can show",
+        ),
+        ("direction", {"address": 9, "type": "bit", "table": "discrete"}, "direction must be a whole number"),
+        ("direction", {"address": 9, "type": "u16", "bit": 3}, "direction must be a whole number, not a bit"),
         ("cycle_counter", {"address": 0, "type": "i16"}, "cycle_counter must be u16, u32"),
         ("cycle_counter", {"address": 0, "type": "f32"}, "cycle_counter must be u16, u32"),
         ("cycle_counter", {"address": 0, "type": "u16", "scale": 2}, "cycle_counter must be"),
@@ -271,6 +284,40 @@ def test_a_bad_map_of_a_poorer_module_is_refused(name: str, entry: dict[str, Any
 def test_functions_are_those_that_only_some_modules_have(functions: Any) -> None:
     with pytest.raises(MapError, match="functions must be a list of 22 and 23"):
         RegisterMap.from_mapping({"format": 1, "name": "x", "functions": functions, "registers": SMALLEST})
+
+
+@pytest.mark.parametrize("gaps", [True, False])
+async def test_a_module_that_refuses_what_lies_between_its_registers(gaps: bool) -> None:
+    """As many do: reading over a gap is exception 2."""
+    content = {**declared("fpga-v1"), "gaps": gaps}
+    layout = RegisterMap.from_mapping(content)
+    used = {a for r in layout.registers.values() for a in range(r.address, r.end)}
+
+    class Strict(ScriptedDevice):
+        def read(self, table: str, address: int, count: int) -> np.ndarray:
+            if not used.issuperset(range(address, address + count)):
+                raise LookupError(address)
+            return super().read(table, address, count)
+
+    device = Strict(layout)
+    device.complete(samples_of(1), velocity=0.05, force_rate=1e6, position_rate=1e5)
+    async with running(layout, device) as (_, module, receptions):
+        if gaps:
+            await module.register_client.modbus.connect()
+            with pytest.raises(ModbusExceptionError, match="illegal data address"):
+                await module.register_client.read_image(
+                    ("window_sequence", "actuator_count", "capture_crc32")
+                )
+            return
+        (received,) = await take(receptions, 1)
+        assert received.capture.force is not None
+        np.testing.assert_allclose(received.capture.force.values, samples_of(1)["force"], atol=0.0126)
+
+
+@pytest.mark.parametrize("gaps", ["no", 1, None])
+def test_gaps_are_there_or_not(gaps: Any) -> None:
+    with pytest.raises(MapError, match="gaps must be true or false"):
+        RegisterMap.from_mapping({"format": 1, "name": "x", "gaps": gaps, "registers": SMALLEST})
 
 
 def test_what_a_crc_covers_lies_before_it() -> None:

@@ -11,7 +11,7 @@ from impactcell.errors import ProtocolError
 from impactcell.fieldbus.registers import RegisterMap, Words
 from impactcell.records import CycleId
 from simulator.scripted import ScriptedDevice
-from tests.unit.fieldbus.test_acquisition import assert_whole, make, running
+from tests.unit.fieldbus.test_acquisition import HEADER, assert_whole, make, running
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -242,3 +242,41 @@ async def test_a_part_that_moves_does_not_keep_the_status_block_from_being_read(
         positioning = (await module.read_status()).positioning
         assert positioning is not None
         assert positioning.position_m == pytest.approx(1e-9 * mangler.polls)
+
+
+async def test_an_old_status_block_after_a_restart_is_no_restart_back(layout: RegisterMap) -> None:
+    """It is of the session before, and what it tells of has gone: the slots that it names are empty now."""
+    device = ScriptedDevice(layout, session=7)
+    make(device, 24)
+    old = device.image.copy()
+    async with running(layout, device, after=CycleId(7, 23)) as (_, module, receptions):
+        await anext(receptions)
+        device.start(session=8)
+        make(device, 2)
+        for cycle in (1, 2):
+            assert (await anext(receptions)).cycle_id == CycleId(8, cycle)
+        mangler = Mangler(device, "state", last_of(device))
+        mangler.change = lambda words, poll: old[mangler.first :][: words.size] if poll < 20 else words
+        coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
+        while mangler.polls < 40 and not coming.done():
+            await asyncio.sleep(0)
+        assert not coming.done()
+        make(device)
+        received = await coming
+        assert_whole(received)
+        assert (received.cycle_id, received.missed, received.restarted) == (CycleId(8, 3), 0, False)
+        assert (module.status.restarts, module.status.unreadable, module.status.missed) == (1, 0, 0)
+
+
+async def test_a_session_of_before_that_is_one_again_is_taken(fpga: RegisterMap) -> None:
+    """A module whose sessions begin anew after a few: header and clock decide."""
+    device = ScriptedDevice(fpga, session=1)
+    make(device)
+    async with running(fpga, device) as (_, module, receptions):
+        for life in range(6):
+            received = await anext(receptions)
+            assert_whole(received)
+            assert received.cycle_id == CycleId(1 + life % 2, 1)
+            device.start(session=1 + (life + 1) % 2)
+            make(device, cycle_time=HEADER["cycle_time"] + 10**9 * (life + 1))
+        assert (module.status.restarts, module.status.missed) == (5, 0)

@@ -1,0 +1,145 @@
+"""Poorer modules that lie: a wrong bit, odd layouts, replies too short. Truth: what the device was given."""
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from impactcell.errors import MapError
+from impactcell.fieldbus.map_promises import not_promised
+from impactcell.fieldbus.registers import RegisterMap
+from simulator.faults import Fault, FaultKind
+from simulator.scripted import ScriptedDevice
+from tests.unit.fieldbus.test_acquisition import running, take
+from tests.unit.fieldbus.test_poorer_modules import (
+    ONE_BUFFER,
+    SUMMARY,
+    declared,
+    figures_of,
+    make_buffer,
+    make_summary,
+    samples_of,
+)
+from tests.unit.fieldbus.test_wrong_header import flipping
+
+SHIPPED = declared("fpga-v1")
+
+
+async def test_every_bit_of_a_summary_wrong_once() -> None:
+    """There is neither CRC nor sequence number: the second reading tells."""
+    device = ScriptedDevice(SUMMARY)
+    registers = [SUMMARY[name] for name in ("cycle_counter", "velocity", "peak_force", "sliding_distance")]
+    bits = [(address, bit) for r in registers for address in range(r.address, r.end) for bit in range(16)]
+    async with running(SUMMARY, device) as (_, module, receptions):
+        for cycle, (address, bit) in enumerate(bits, 1):
+            make_summary(device)
+            seen = flipping(device, address, bit, times=1)
+            (received,) = await take(receptions, 1)
+            del device.read  # type: ignore[method-assign]
+            assert seen, (address, bit)
+            assert (received.cycle_id.cycle, received.missed, received.faults) == (cycle, 0, ())
+            summary = received.capture.summary
+            assert summary is not None
+            assert summary.peak_force_n == pytest.approx(figures_of(cycle)["peak_force"], abs=0.051)
+            assert summary.sliding_distance_m == pytest.approx(
+                figures_of(cycle)["sliding_distance"], abs=1.01e-6
+            )
+            assert received.capture.velocity_m_s == pytest.approx(0.05)
+        assert (module.status.unreadable, module.status.restarts, module.status.missed) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    "name", ["force", "position", "window_cycle", "sample_rate", "sample_count", "velocity"]
+)
+async def test_one_bit_of_a_buffer_wrong_once(name: str) -> None:
+    device = ScriptedDevice(ONE_BUFFER)
+    draw = np.random.default_rng(8)
+    register = ONE_BUFFER[name]
+    async with running(ONE_BUFFER, device) as (_, module, receptions):
+        for cycle in range(1, 7):
+            make_buffer(device)
+            words = 2 * len(samples_of(1)["force"]) if register.count > 1 else register.words
+            address = register.address + int(draw.integers(0, min(words, 700)))
+            seen = flipping(device, address, int(draw.integers(0, 16)), times=1)
+            (received,) = await take(receptions, 1)
+            del device.read  # type: ignore[method-assign]
+            assert seen
+            assert (received.cycle_id.cycle, received.missed) == (cycle, 0)
+            for channel in ("force", "position"):
+                recorded = getattr(received.capture, channel)
+                np.testing.assert_allclose(recorded.values, samples_of(cycle)[channel], atol=0.0126)
+                assert recorded.time_s[-1] == pytest.approx(2e-5 + 699 / 5e4)
+        assert module.status.unreadable == 0
+
+
+@pytest.mark.parametrize(
+    "kind", [FaultKind.TRUNCATED, FaultKind.WRONG_LENGTH, FaultKind.EXCEPTION, FaultKind.BUSY]
+)
+async def test_flags_in_discrete_inputs_under_faults(kind: FaultKind) -> None:
+    """Replies of bits are short, and a cut one looks like another that is whole."""
+    device = ScriptedDevice(ONE_BUFFER)
+    async with running(ONE_BUFFER, device, timeout_s=0.3) as (server, module, receptions):
+        server.faults.inject(Fault(kind, probability=0.1, remaining=3))
+        for cycle in range(1, 4):
+            make_buffer(device)
+            (received,) = await take(receptions, 1)
+            assert (received.cycle_id.cycle, received.missed, received.restarted) == (cycle, 0, False)
+            assert received.capture.force is not None
+            np.testing.assert_allclose(received.capture.force.values, samples_of(cycle)["force"], atol=0.0126)
+        assert module.status.unreadable == 0
+
+
+@st.composite
+def layouts(draw: st.DrawFn) -> dict[str, Any]:
+    """The shipped map with registers left out, moved, made narrower or put into another table."""
+    content = copy.deepcopy(SHIPPED)
+    registers = content["registers"]
+    for name in draw(st.sets(st.sampled_from(sorted(registers)), max_size=12)):
+        del registers[name]
+    for name in draw(st.sets(st.sampled_from(sorted(registers)), max_size=3)):
+        change = draw(
+            st.sampled_from(
+                [
+                    {"table": "input"}, {"table": "discrete", "type": "bit"}, {"type": "u16"},
+                    {"type": "bcd32"},
+                    {"word_order": "little"}, {"byte_order": "little"}, {"address": 50_000}, {"count": 2},
+                    {"type": "u16", "bit": 5}, {"offset": 1.0}, {"scale": 2.0},
+                ]
+            )
+        )  # fmt: skip
+        registers[name] = {**registers[name], **change}
+    content["gaps"] = draw(st.booleans())
+    content["functions"] = draw(st.sampled_from([[], [22], [23], [22, 23]]))
+    return content
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(content=layouts(), max_registers=st.sampled_from([125, 40]))
+async def test_any_layout_that_is_taken_gives_right_cycles(
+    content: dict[str, Any], max_registers: int
+) -> None:
+    try:
+        layout = RegisterMap.from_mapping(content)
+    except MapError:
+        return
+    assert all(text.startswith("no register") or "`" in text for text in not_promised(layout))
+    device = ScriptedDevice(layout, session=5)
+    values = {
+        "velocity": 0.05, "stroke": 0.0015, "force_rate": 1e6, "position_rate": 1e5, "peak_force": 120.0,
+        "sliding_distance": 3e-3, "mass": 18.9,
+    }  # fmt: skip
+    header = {name: value for name, value in values.items() if name in layout}
+    async with running(layout, device, max_registers=max_registers) as (_, module, receptions):
+        for cycle in (1, 2):
+            samples = {name: each for name, each in samples_of(cycle).items() if name in layout}
+            device.complete(samples, **header)
+            (received,) = await take(receptions, 1)
+            assert (received.cycle_id.cycle, received.missed, received.restarted) == (cycle, 0, False)
+            for name, recorded in samples.items():
+                channel, register = getattr(received.capture, name), layout[name]
+                if channel is not None and register.scale < 1.0 and not register.offset:
+                    np.testing.assert_allclose(channel.values, recorded, atol=register.si_factor)
+        assert module.status.unreadable == 0
