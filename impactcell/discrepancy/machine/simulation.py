@@ -73,7 +73,7 @@ def _forces(model: Model, record: UniformRecord, stretch: slice, scale: MotionSc
     """Force that the measured motion needs; nan where the part rests or turns."""
     half, narrow = half_supports(record, scale)
     velocity, noise = smoothed_speed(record.position, narrow, record.step_s)
-    acceleration = smoothed_acceleration(record.position, half, record.step_s)
+    acceleration = smoothed_acceleration(record.position, max(half // 2, narrow), record.step_s)
     direction = direction_of_motion(velocity, scale, noise * record.noise[0])
     carried = carried_force(Response.FORCE, record.force, model.gravity * np.sin(record.position))
     covariates = {
