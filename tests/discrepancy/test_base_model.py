@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -198,6 +199,19 @@ def test_patterns_that_divide_nothing_are_refused(
         investigate_machine(
             pendulum(swings(0.0)), base_of(tmp_path, PENDULUM), train=patterns[0], test=patterns[1]
         )
+
+
+def test_a_column_that_no_shot_states_and_a_part_at_rest_are_refused() -> None:
+    base = replace(SEAL, terms=(TermChoice("covariate_friction", "temperature_c"),))
+    with pytest.raises(CampaignError, match=r"'temperature_c' of shots.csv, which shots 1, 2, 3, 4 do not"):
+        investigate_machine(seal(0.8), base)
+    at_rest = tuple(
+        replace(shot, position=Channel(shot.position.time_s, np.zeros(shot.position.time_s.size), None))
+        for shot in seal(0.8).shots
+        if shot.position is not None
+    )
+    with pytest.raises(CampaignError):
+        investigate_machine(replace(seal(0.8), shots=at_rest), SEAL)
 
 
 def test_base_model_is_written_as_it_was_read(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from impactcell.discrepancy.machine.study import Study
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.errors import CampaignError
+from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 
 MANY_RECORDS = 8
 """Records from which on whole ones are held out; of fewer, the last third of each [1]."""
@@ -44,7 +45,10 @@ def investigate_machine(
     CampaignError
         The records cannot be used with the base model; the message says why and what to do.
     """
+    data_faults = inspect_campaign(campaign)
+    refuse_unusable(campaign, data_faults)
     records = uniform_records(campaign, base)
+    _check_columns(base, records)
     if base.coordinate is not campaign.coordinate:
         raise CampaignError(
             f"the base model is of a {base.coordinate}, the campaign of a {campaign.coordinate}; "
@@ -53,7 +57,24 @@ def investigate_machine(
     base, notes = hold_what_cannot_be_seen(base, records)
     candidates = _candidates(base, records)
     study = Study(records, base, candidates, _held_records(records, train, test))
-    return study.investigate(notes, seed)
+    return study.investigate([*notes_of(data_faults), *notes], seed)
+
+
+def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:
+    """See that every shot has the columns of `shots.csv` that the base model goes by.
+
+    Raises
+    ------
+    CampaignError
+        One lacks one.
+    """
+    for choice in base.terms:
+        lacking = [str(record.shot) for record in records if choice.covariate not in record.covariates]
+        if choice.covariate and lacking:
+            raise CampaignError(
+                f"{choice.identifier} goes by the column {choice.covariate!r} of shots.csv, which shots "
+                f"{', '.join(lacking)} do not state"
+            )
 
 
 def hold_what_cannot_be_seen(

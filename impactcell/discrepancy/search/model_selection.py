@@ -18,6 +18,7 @@ from impactcell.discrepancy.search.acceptance import (
     accept_single,
     reject,
 )
+from impactcell.discrepancy.search.between_shots import accept_between_shots
 from impactcell.discrepancy.search.candidate_fits import (
     finalists,
     fit_all_samples,
@@ -90,7 +91,7 @@ def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
 
 
 def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionResult:
-    """Accept what stands out where nothing suffices, else nothing."""
+    """Accept what stands out in the traces or between shots where nothing suffices, else nothing."""
     if state.result is None:
         raise AssertionError("only a search that has ended")
     dominant = accept_dominant(
@@ -101,7 +102,7 @@ def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionRe
         state.pairs,
         state.unconverged,
     )
-    return dominant or state.result
+    return dominant or accept_between_shots(context, state.evidence) or state.result
 
 
 def only_test(context: SearchContext, nominal: Fit) -> SelectionResult:
