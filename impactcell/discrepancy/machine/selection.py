@@ -37,6 +37,8 @@ MAX_TERMS = 2
 what the catalogue lacks [1]."""
 MAX_FLOOR = 1.3
 """Gap in noise floors up to which a model leaves nothing, as in the workflow of shots [1]."""
+MIN_SECOND_GAP = 2.0
+"""Gap in noise floors beside the first term from which on a second one is named [1]."""
 MAX_ALIKE = 0.95
 """Squared correlation with inertia, gravity or drive from which on a term cannot be told from it [1]."""
 MACHINE: tuple[Column, ...] = tuple(
@@ -141,10 +143,9 @@ class TermSearch:
         """Out-of-fold squared residual of every block, shape (b,)."""
         return out_of_fold_losses(self.blocks, columns, self.priors, self.nonnegative)
 
-    def reaches_floor(self, columns: Sequence[Column], trial: Trial) -> bool:
-        """Whether a model with one more term leaves no more than noise."""
-        losses = self.losses([*columns, *trial.term.columns])
-        return float(losses.sum()) <= MAX_FLOOR**2 * float(self.blocks.noise.sum())
+    def gap(self, columns: Sequence[Column]) -> float:
+        """Gap of a model out of fold [1 = noise floor]."""
+        return math.sqrt(float(self.losses(columns).sum()) / max(float(self.blocks.noise.sum()), 1e-300))
 
     def best_shape(self, choice: TermChoice, columns: Sequence[Column], before: Samples) -> Trial:
         """Try a candidate at every value of its shape."""
@@ -164,15 +165,20 @@ def select_terms(search: TermSearch, columns: Sequence[Column]) -> list[Selectio
     remaining = list(search.candidates)
     while True:
         step = _step(search, columns, remaining)
-        if steps and step.accepted is not None and not search.reaches_floor(columns, step.accepted):
-            step = replace(
-                step, accepted=None, tied_with=(), reason="beside a remainder one term is named at most"
-            )
+        if steps and step.accepted is not None and not _is_second(search, columns, step.accepted):
+            refused = "beside a remainder one term is named at most"
+            step = replace(step, accepted=None, tied_with=(), reason=refused)
         steps.append(step)
         if step.accepted is None or len(steps) == MAX_TERMS:
             return steps
         columns += step.accepted.term.columns
         remaining.remove(step.accepted.term.choice)
+
+
+def _is_second(search: TermSearch, columns: Sequence[Column], trial: Trial) -> bool:
+    """Whether a second term takes a gap of its own to the floor, and is no patch on a small remainder."""
+    is_closed = search.gap([*columns, *trial.term.columns]) <= MAX_FLOOR
+    return is_closed and search.gap(columns) >= MIN_SECOND_GAP
 
 
 def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermChoice]) -> SelectionStep:
