@@ -90,7 +90,6 @@ def run_tests(copy: Path, *which: str) -> str:
     return run(copy, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *which)
 
 
-@pytest.mark.timeout(300)
 def test_an_effect_is_one_file_and_one_independent_law(copy: Path) -> None:
     (copy / "impactcell" / "physics" / "effects" / "constant_pull.py").write_text(EFFECT, encoding="utf-8")
     contract = "tests/contract/test_effects.py"
@@ -102,7 +101,6 @@ def test_an_effect_is_one_file_and_one_independent_law(copy: Path) -> None:
     run_tests(copy, "tests/unit/simulator/test_effects.py", "-k", "every_effect or null")
 
 
-@pytest.mark.timeout(300)
 def test_a_published_value_is_one_row(copy: Path) -> None:
     table = copy / "impactcell" / "quantities.py"
     text = table.read_text(encoding="utf-8")

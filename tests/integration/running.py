@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Protocol
 
-START_S = 90.0
+START_S = 400.0
 """The first start on a machine compiles."""
 
 

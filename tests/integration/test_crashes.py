@@ -2,12 +2,9 @@
 
 from pathlib import Path
 
-import pytest
-
 from tests.integration.crashes import crash
 
 
-@pytest.mark.timeout(300)
 async def test_ten_kills(tmp_path: Path) -> None:
     outcome = await crash(tmp_path, kills=10, seed=20261121, period_s=0.2)
     assert outcome.cycles == sorted(set(outcome.cycles))

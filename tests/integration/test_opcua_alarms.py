@@ -34,7 +34,7 @@ class Events:
         self.queue.put_nowait(event)
 
     async def next(self) -> object:
-        return await asyncio.wait_for(self.queue.get(), 20)
+        return await asyncio.wait_for(self.queue.get(), 120)
 
 
 async def listening(here: Site, client: Client) -> Events:

@@ -334,5 +334,5 @@ async def test_a_role_that_is_lowered_holds_for_sessions_that_live(here: Site) -
                 pass
             return code
 
-        assert await asyncio.wait_for(refused(), 20) == codes.BadUserAccessDenied
+        assert await asyncio.wait_for(refused(), 120) == codes.BadUserAccessDenied
         assert client.application_uri == CLIENT_URI

@@ -8,8 +8,6 @@ import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import AsyncIterator
 
-import pytest
-
 from impactcell.opcua.connection_table import MAX_UNFINISHED_BYTES_PER_ADDRESS
 from impactcell.opcua.tcp_connection import MAX_QUEUED_BYTES
 from tests.integration.processes import ROOT
@@ -56,7 +54,6 @@ async def hold(port: int) -> asyncio.StreamWriter:
     return writer
 
 
-@pytest.mark.timeout(120)
 async def test_unfinished_messages_of_many_connections() -> None:
     async with server() as (process, port):
         for writer in await asyncio.gather(*(hold(port) for _ in range(5))):

@@ -86,7 +86,7 @@ async def write(hand: Hand) -> int:
 async def subscribe(hand: Hand) -> int:
     subscription = await hand.client.create_subscription(20, hand.events)
     await subscription.subscribe_data_change(await hand.here.node(hand.client, "Wear/Level"))
-    await asyncio.wait_for(hand.events.queue.get(), 5)
+    await asyncio.wait_for(hand.events.queue.get(), 120)
     await subscription.delete()
     return 0
 
@@ -102,7 +102,7 @@ async def events(hand: Hand) -> int:
     node = await hand.here.node(hand.client, "")
     await subscription.subscribe_events(node, ua.ObjectIds.ConditionType, where_clause_generation=False)
     _fresh(hand)
-    await asyncio.wait_for(hand.events.queue.get(), 5)
+    await asyncio.wait_for(hand.events.queue.get(), 120)
     await subscription.delete()
     return 0
 

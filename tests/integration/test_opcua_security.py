@@ -171,7 +171,7 @@ async def test_users_file_is_read_without_a_restart() -> None:
                     await node.read_data_value(raise_on_bad_status=False)
 
             with pytest.raises(ua.UaStatusCodeError) as refused:
-                await asyncio.wait_for(read_for_ever(), 10)
+                await asyncio.wait_for(read_for_ever(), 120)
             assert refused.value.code == codes.BadSessionIdInvalid, "the session of a removed user goes on"
 
 

@@ -86,7 +86,7 @@ class Changes:
         self.queue.put_nowait(data.monitored_item.Value)
 
     async def next(self) -> ua.DataValue:
-        return await asyncio.wait_for(self.queue.get(), 10)
+        return await asyncio.wait_for(self.queue.get(), 120)
 
 
 async def test_the_interface_is_there_with_units_and_descriptions() -> None:

@@ -38,7 +38,6 @@ async def status_of(client: Client, path: str) -> ua.StatusCode:
     return value.StatusCode
 
 
-@pytest.mark.timeout(240)
 @pytest.mark.parametrize("kind", ["summary", "one-buffer"])
 async def test_a_cell_runs_on_a_module_that_has_less(kind: str, tmp_path: Path) -> None:
     register_map = str(CONFIG / "maps" / f"{kind}.yaml")
@@ -53,7 +52,7 @@ async def test_a_cell_runs_on_a_module_that_has_less(kind: str, tmp_path: Path) 
         cell = write_cell(tmp_path, told["port"], module={"register_map": register_map})
         async with started("impactcell", "run", str(cell)) as service:
             endpoint = (await service.line(r"cell=press-1 at (\S+)"))[1]
-            async with asyncio.timeout(150):
+            async with asyncio.timeout(400):
                 while len(stored(tmp_path)) < CYCLES:
                     await asyncio.sleep(0.1)
             async with engineer(endpoint, "integration") as client:

@@ -9,9 +9,8 @@ import pytest
 from impactcell.errors import PositioningError
 from impactcell.journal.audit_entries import AuditEntry
 from tests.integration.processes import simulator, told, write_cell
-from tests.integration.watched import Watched, serving
+from tests.integration.watched import PATIENCE_S, Watched, serving
 
-pytestmark = pytest.mark.timeout(240)
 TASKS = [
     {"target_m": 0.008, "mass_kg": 12.0},
     {"target_m": 0.015, "mass_kg": 30.0},
@@ -25,12 +24,12 @@ CELL: dict[str, Any] = {
 
 
 def scenario(tasks: list[dict[str, float]]) -> dict[str, Any]:
-    return {"base": "positioning", "positioning": {"tasks": tasks, "pause_s": 0.1}}
+    return {"base": "positioning", "acceleration": 8, "positioning": {"tasks": tasks, "pause_s": 0.1}}
 
 
 async def outcomes(truth: Path, count: int) -> list[dict[str, Any]]:
     """Wait until so many tasks have ended in the simulator."""
-    async with asyncio.timeout(150):
+    async with asyncio.timeout(PATIENCE_S):
         while True:
             ended = [entry for entry in told(truth) if "inside" in entry]
             if len(ended) >= count:

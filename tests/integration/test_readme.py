@@ -47,7 +47,6 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-@pytest.mark.timeout(400)
 def test_the_commands_in_their_order(checkout: Path, tmp_path: Path) -> None:
     lines = [line for block in blocks() for line in block.splitlines() if line.strip() not in ELSEWHERE]
     script = "set -eu\ntrap 'kill $(jobs -p) 2>/dev/null || true' EXIT\n" + "\n".join(lines)
@@ -97,7 +96,6 @@ def test_every_link_leads_somewhere() -> None:
         assert (ROOT / target).exists(), target
 
 
-@pytest.mark.timeout(240)
 def test_the_demo_sums_up(checkout: Path) -> None:
     # As from a shell: a make within a make would add lines of its own.
     plain = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}

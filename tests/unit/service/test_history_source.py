@@ -96,7 +96,7 @@ async def test_the_process_ends_with_its_service(history: JournalHistory) -> Non
     assert process is not None
     assert process.stdin is not None
     process.stdin.close()  # as the system does it for a service that was killed
-    assert await asyncio.wait_for(process.wait(), 30.0) == 0
+    assert await asyncio.wait_for(process.wait(), 120.0) == 0
 
 
 async def test_what_has_no_past(history: JournalHistory) -> None:

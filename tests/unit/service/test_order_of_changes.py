@@ -177,7 +177,7 @@ async def test_positioning_is_shown_as_it_is_then(
         if world.taps:
             assert world.taps == [number]
             break
-    await asyncio.wait_for(cycle, 1.0)
+    await asyncio.wait_for(cycle, 60.0)
 
 
 async def test_an_answer_to_an_activation_does_not_reach_the_next(cell: CellConfig) -> None:
