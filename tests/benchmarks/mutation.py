@@ -110,13 +110,13 @@ def on_file() -> list[dict[str, Any]]:
 
 def attempt(room: str, number: int, seconds: float, *, again: bool) -> None:
     """Try the next mutants of a room, so many; or those that survived."""
-    begin, every = time.monotonic(), drawn(room)
+    every = drawn(room)
     rows = {key_of(row): row for row in on_file()}
     survived = [key for key, row in rows.items() if not row["killed"] and "equivalent" not in row]
     order = [key for key in (survived if again else every) if key in every and (again or key not in rows)]
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload(list(LIBRARIES))
-    profile = _profile(room, processes.Process)
+    profile, begin = _profile(room, processes.Process), time.monotonic()
     for key in order[:number]:
         if time.monotonic() - begin > seconds:
             break
