@@ -21,6 +21,15 @@ COPIED = (
     "README.md",
     "docs",
 )
+UNTIL_CONNECTED = """
+: > {log}
+{service} 2> {log} & service=$!
+until grep -q "connected to" {log}; do kill -0 $service || {{ cat {log} >&2; exit 1; }}; sleep 0.1; done
+kill -TERM $service
+wait $service || {{ cat {log} >&2; exit 1; }}
+cat {log} >&2
+"""
+"""The service runs until it is told to stop: it is told once it has shown itself."""
 ELSEWHERE = {
     "make demo": "tried below with its own arguments; without an end it runs until Ctrl-C",
     "make test": "is what runs this test",
@@ -51,11 +60,9 @@ def test_the_commands_in_their_order(checkout: Path, tmp_path: Path) -> None:
     lines = [line for block in blocks() for line in block.splitlines() if line.strip() not in ELSEWHERE]
     script = "set -eu\ntrap 'kill $(jobs -p) 2>/dev/null || true' EXIT\n" + "\n".join(lines)
     script = script.replace("/tmp/", f"{tmp_path}/")
-    # The service runs until it is told to stop: tell it once it has shown itself.
-    script = script.replace(
-        ".venv/bin/impactcell run config/cells/prototype.yaml",
-        "timeout --preserve-status -s TERM 20 .venv/bin/impactcell run config/cells/prototype.yaml",
-    )
+    service = ".venv/bin/impactcell run config/cells/prototype.yaml"
+    assert script.count(service) == 1
+    script = script.replace(service, UNTIL_CONNECTED.format(service=service, log=tmp_path / "run.log"))
     done = subprocess.run(
         ["bash", "-c", script],
         cwd=checkout,
