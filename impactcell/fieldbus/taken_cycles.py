@@ -11,7 +11,7 @@ from typing import Final
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
 from impactcell.records import CycleId
 
-_FEWEST_HEADERS: Final = 16
+_FEWEST_HEADERS: Final = 256
 """So many cycles are remembered at least, also of a module with one buffer: what a gateway may still show."""
 
 
@@ -80,7 +80,7 @@ class TakenCycles:
         if time_ns > self._last_time_ns > 0:
             return False
         # Nobody knows this cycle, and no clock tells. One that goes on and on behind the last cycle is no old
-        # reply any more; the ring still holds what came meanwhile.
+        # reply any more; a ring still holds what came meanwhile, of one buffer a cycle is lost.
         if self._first_behind is None or self._first_behind.session != shown.session:
             self._first_behind = CycleId(shown.session, target.counter)
-        return cycles_after(self._first_behind.cycle, target.counter) < self._slots // 2
+        return cycles_after(self._first_behind.cycle, target.counter) < max(1, self._slots // 2)

@@ -169,13 +169,57 @@ async def test_a_counter_of_16_bits_goes_on_after_its_end() -> None:
 async def test_a_restart_that_only_the_counter_tells() -> None:
     device = ScriptedDevice(SUMMARY)
     make_summary(device, 40)
-    async with running(SUMMARY, device, after=CycleId(0, 39)) as (_, module, receptions):
+    async with running(SUMMARY, device, after=CycleId(0, 39)) as (server, module, receptions):
         await take(receptions, 1)
         device.start(session=1)
         make_summary(device, 2)
-        (received,) = await take(receptions, 1)
-        assert (received.cycle_id.cycle, received.restarted, received.missed) == (2, True, 1)
+        coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
+        asked = server.requests
+        while server.requests < asked + 20:
+            await asyncio.sleep(0)
+        assert not coming.done()  # it could be an old reply
+        make_summary(device)
+        received = await coming
+        assert (received.cycle_id.cycle, received.restarted, received.missed) == (3, True, 2)
         assert module.status.restarts == 1
+
+
+@pytest.mark.parametrize("age", [1, 30])
+@pytest.mark.parametrize("after_start", [True, False])
+async def test_what_a_gateway_shows_once_more_is_not_taken_twice(age: int, after_start: bool) -> None:
+    """No session, no clock, no ring: only what was taken, and that a restarted module counts on."""
+    device = ScriptedDevice(SUMMARY)
+    images = []
+    for _ in range(40):
+        make_summary(device)
+        images.append(device.image.copy())
+    async with running(SUMMARY, device, after=CycleId(0, 40 if after_start else 0)) as (
+        server,
+        module,
+        receptions,
+    ):
+        if not after_start:
+            device.start(session=1)
+            for cycle in range(1, 41):
+                make_summary(device)
+                (received,) = await take(receptions, 1)
+                assert received.cycle_id.cycle == cycle
+        real, old = device.read, images[-1 - age]
+        polls = itertools.count()
+
+        def stale(table: str, address: int, count: int) -> np.ndarray:
+            return old[address : address + count] if next(polls) < 12 else real(table, address, count)
+
+        device.read = stale  # type: ignore[method-assign]
+        coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
+        asked = server.requests
+        while server.requests < asked + 24:
+            await asyncio.sleep(0)
+        assert not coming.done()
+        make_summary(device)
+        received = await coming
+        assert (received.cycle_id.cycle, received.missed, received.restarted) == (41, 0, False)
+        assert module.status.restarts == 0
 
 
 @pytest.mark.parametrize("kind", ["u16", "bcd16", "bcd32", "u32"])

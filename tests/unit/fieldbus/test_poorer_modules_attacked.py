@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from impactcell.errors import MapError
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.registers import RegisterMap
-from simulator.faults import Fault, FaultKind
+from simulator.faults import Fault, FaultInjector, FaultKind
 from simulator.scripted import ScriptedDevice
 from tests.unit.fieldbus.test_acquisition import running, take
 from tests.unit.fieldbus.test_poorer_modules import (
@@ -24,6 +24,7 @@ from tests.unit.fieldbus.test_poorer_modules import (
     samples_of,
 )
 from tests.unit.fieldbus.test_wrong_header import flipping
+from tests.virtual_time import run_virtually
 
 SHIPPED = declared("fpga-v1")
 
@@ -143,3 +144,41 @@ async def test_any_layout_that_is_taken_gives_right_cycles(
                 if channel is not None and register.scale < 1.0 and not register.offset:
                     np.testing.assert_allclose(channel.values, recorded, atol=register.si_factor)
         assert module.status.unreadable == 0
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("layout", [SUMMARY, ONE_BUFFER], ids=["summary", "one-buffer"])
+def test_faults_of_every_kind_give_nothing_wrong_twice_or_untold(layout: RegisterMap, seed: int) -> None:
+    """In virtual time; a cycle is made as soon as the one before is there, or gone."""
+    device, injector = ScriptedDevice(layout), FaultInjector(seed)
+    for kind in FaultKind:
+        injector.inject(Fault(kind, probability=0.006, seconds=0.2))
+    make = make_summary if layout is SUMMARY else make_buffer
+    came: list[int] = []
+    told = 0
+
+    async def cell() -> None:
+        nonlocal told
+        async with running(layout, device, timeout_s=0.15, window=4) as (server, module, receptions):
+            server.faults = injector
+            make(device)
+            async for received in receptions:
+                cycle, capture = received.cycle_id.cycle, received.capture
+                told += received.missed if came else 0
+                came.append(cycle)
+                if layout is SUMMARY and capture.summary is not None:
+                    expected = figures_of(cycle)["peak_force"]
+                    assert capture.summary.peak_force_n == pytest.approx(expected, abs=0.051)
+                elif capture.force is not None:
+                    np.testing.assert_allclose(capture.force.values, samples_of(cycle)["force"], atol=0.0126)
+                else:
+                    assert received.faults, "a cycle without content says why"
+                if cycle >= 25:
+                    break
+                make(device, 1 + cycle % 3)
+            assert module.status.restarts == 0
+
+    run_virtually(cell(), grace_s=0.002)
+    assert came == sorted(set(came))
+    assert len(came) + told == came[-1] - came[0] + 1
+    assert sum(injector.happened.values()) > 5
