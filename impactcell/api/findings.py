@@ -2,8 +2,6 @@
 
 import math
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -19,6 +17,7 @@ from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.physics import Plant
 from impactcell.prediction import Model
 from impactcell.prediction.model import Prior
+from impactcell.process.whole_files import directory_beside
 from impactcell.settings.model_file import read_model, write_model
 
 FILES = ("result.json", "model.extended.yaml", "report.html")
@@ -168,21 +167,15 @@ def write_files(output: Path, write: Callable[[Path], None]) -> None:
         The directory cannot be written.
     """
     try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=f".{output.name}.", dir=output.parent))
+        with directory_beside(output) as beside:
+            write(beside)
+            output.mkdir(exist_ok=True)
+            for stale in output.glob(LAW_FILES):
+                stale.unlink()
+            for file in [*beside.glob(LAW_FILES), *(beside / name for name in FILES)]:
+                file.replace(output / file.name)
     except OSError as error:
         raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
-    try:
-        write(beside)
-        output.mkdir(exist_ok=True)
-        for stale in output.glob(LAW_FILES):
-            stale.unlink()
-        for file in [*beside.glob(LAW_FILES), *(beside / name for name in FILES)]:
-            file.replace(output / file.name)
-    except OSError as error:
-        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
 
 
 def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nominal: str) -> Model:

@@ -3,9 +3,6 @@
 import csv
 import io
 import math
-import os
-import shutil
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +11,7 @@ from impactcell.campaign.contents import CHANNELS, COLUMNS, Campaign, Coordinate
 from impactcell.campaign.header import FORMAT
 from impactcell.campaign.shots import MM_PER_MIN
 from impactcell.errors import CampaignError
+from impactcell.process.whole_files import directory_beside
 from impactcell.records import Capture, Channel
 
 
@@ -35,33 +33,19 @@ def write(campaign: Campaign, directory: Path) -> None:
         message = f"{directory}: exists already; choose another name or remove it"
         raise CampaignError(message)
     try:
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=f".{directory.name}.", dir=directory.parent))
+        with directory_beside(directory) as beside:
+            (beside / "campaign.yaml").write_text(_header(campaign), encoding="utf-8")
+            (beside / "shots.csv").write_text(_shots(campaign), encoding="utf-8")
+            traces = beside / "traces"
+            traces.mkdir()
+            for shot in campaign.shots:
+                (traces / f"{shot.cycle}.csv").write_text(_trace(shot, campaign.coordinate), encoding="utf-8")
+            if directory.is_dir():
+                directory.rmdir()
+            beside.rename(directory)
     except OSError as error:
         message = f"{directory}: cannot be written: {error.strerror}"
         raise CampaignError(message) from error
-    try:
-        beside.chmod(0o777 & ~_umask())
-        (beside / "campaign.yaml").write_text(_header(campaign), encoding="utf-8")
-        (beside / "shots.csv").write_text(_shots(campaign), encoding="utf-8")
-        traces = beside / "traces"
-        traces.mkdir()
-        for shot in campaign.shots:
-            (traces / f"{shot.cycle}.csv").write_text(_trace(shot, campaign.coordinate), encoding="utf-8")
-        if directory.is_dir():
-            directory.rmdir()
-        beside.rename(directory)
-    except OSError as error:
-        message = f"{directory}: cannot be written: {error.strerror}"
-        raise CampaignError(message) from error
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _header(campaign: Campaign) -> str:

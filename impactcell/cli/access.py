@@ -7,7 +7,14 @@ from pathlib import Path
 from impactcell.errors import AccessError
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.host_interface import Role
-from impactcell.opcua.trust_list import FOLDERS, der, fingerprint, read_certificate, thumbprint
+from impactcell.opcua.trust_list import (
+    FOLDERS,
+    der,
+    fingerprint,
+    make_folders,
+    read_certificate,
+    thumbprint,
+)
 from impactcell.process.console import print_result
 from impactcell.scada.interface import default_application_uri
 from impactcell.scada.rights import matrix_table
@@ -103,11 +110,7 @@ def make_certs(pki: Path, application_uri: str | None = None, hosts: list[str] |
     """
     uri = application_uri or default_application_uri()
     certificate, key = make_certificate("impactcell", uri, [*(hosts or []), *own_hosts()])
-    for folder in FOLDERS:
-        try:
-            (pki / folder).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise AccessError(f"{pki / folder}: {error.strerror}") from error
+    make_folders(pki)
     path, _ = write_pair(pki / "own", certificate, key)
     print_result(f"{path}: certificate of {uri}, valid until {certificate.not_valid_after_utc:%Y-%m-%d}")
     print_result(f"SHA-1 {thumbprint(der(certificate))}")

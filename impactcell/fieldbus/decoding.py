@@ -91,7 +91,7 @@ def capture_from_words(
     }
     summary = _summary(registers, header, faults)
     if summary is not None:
-        faults += _scale_faults(registers, summary, channels)
+        faults += _scale_faults(registers, summary, channels, stroke)
     start = number(header.get("start_position", 0.0))
     return Capture(
         cycle=integer(header["window_cycle" if "window_cycle" in header else "cycle_counter"]),
@@ -142,19 +142,25 @@ def _time_ns(value: Value) -> int:
 
 
 def _scale_faults(
-    registers: RegisterMap, summary: Summary, channels: Mapping[str, Channel | None]
+    registers: RegisterMap, summary: Summary, channels: Mapping[str, Channel | None], stroke: float
 ) -> Iterator[str]:
-    """Compare the module's own figures with the samples: a wrong scale or unit puts them far apart."""
-    for name, figure, unit, value in (
-        ("force", "peak_force", "N", summary.peak_force_n),
-        ("position", "sliding_distance", "m", summary.sliding_distance_m),
+    """Compare the module's own figures with the samples: a wrong scale or unit puts them far apart.
+
+    A part slides by itself only after it was pushed, along a part of the stroke or along all of it.
+    """
+    pushed = stroke if math.isfinite(stroke) else 0.0
+    for name, figure, unit, value, beside in (
+        ("force", "peak_force", "N", summary.peak_force_n, 0.0),
+        ("position", "sliding_distance", "m", summary.sliding_distance_m, pushed),
     ):
         channel = channels.get(name)
         if channel is None or not (math.isfinite(value) and value > 0.0):
             continue
         least, most = channel.values.min(), channel.values.max()
         largest = most if name == "force" else most - least
-        if largest > 0.0 and least != most and not 1.0 / OUT_OF_SCALE < value / largest < OUT_OF_SCALE:
+        if least == most or largest <= 0.0:
+            continue
+        if not (largest - beside) / OUT_OF_SCALE < value < OUT_OF_SCALE * largest:
             where = f"register {figure} ({registers[figure].address})"
             yield (
                 f"{where}: {value:.3g} {unit}, but the samples of {name} show {largest:.3g} {unit}: "

@@ -11,9 +11,10 @@ from impactcell.campaign import COLUMNS, Campaign, Coordinate, Excitation, Senso
 from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.captures import channel_of, described
+from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given, Mapping
 from impactcell.measurements.recognition import CHANNELS, Quantity
-from impactcell.measurements.recorded import MAX_FAULTS_TOLD, Record, records_of
+from impactcell.measurements.recorded import Record, records_of
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
 from impactcell.measurements.units import Dimension
@@ -131,14 +132,13 @@ def _check_channels(records: Sequence[Record], excitation: Excitation) -> None:
         Excitation.FREE_SLIDE: {Quantity.POSITION},
         Excitation.DRIVEN: {Quantity.FORCE, Quantity.POSITION},
     }[excitation]
-    faults = [
+    lacking = [
         f"{record.place}: has no {' and no '.join(sorted(needed - set(record.values)))}, which a campaign of "
         f"excitation {excitation} needs"
         for record in records
         if needed - set(record.values)
     ]
-    if faults:
-        raise MeasurementError("\n".join(faults[:MAX_FAULTS_TOLD]))
+    raise_faults(lacking)
 
 
 def _whole(number: int, record: Record, given: Given) -> Capture:

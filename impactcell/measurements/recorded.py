@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from impactcell.errors import MeasurementError
+from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Mapping, sampling_step_s
 from impactcell.measurements.numbers import parse_number
 from impactcell.measurements.recognition import (
@@ -25,8 +26,6 @@ SCALARS = (
     Quantity.VELOCITY, Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
 )  # fmt: skip
 """Quantities of which a shot has one value."""
-MAX_FAULTS_TOLD = 10
-"""Faults told of one import."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,10 +70,7 @@ def records_of(tables: Sequence[Table], mapping: Mapping) -> list[Record]:
                 records[-1] = (table.source, _together(before[1], record))
             elif record.values:
                 records.append((table.source, record))
-    if faults:
-        rest = len(faults) - MAX_FAULTS_TOLD
-        more = [f"and {rest} more faults"] if rest > 0 else []
-        raise MeasurementError("\n".join(faults[:MAX_FAULTS_TOLD] + more))
+    raise_faults(faults)
     if not records:
         raise MeasurementError("no table holds a channel")
     return [record for _, record in records]

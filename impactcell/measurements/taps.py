@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.campaign import contacts
-from impactcell.errors import MeasurementError
 from impactcell.measurements.captures import channel_of, described, scalar
+from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given
 from impactcell.measurements.recognition import CHANNELS, Quantity
-from impactcell.measurements.recorded import MAX_FAULTS_TOLD, Record
+from impactcell.measurements.recorded import Record
 from impactcell.records import Capture, Channel, Samples
 
 START_STD = 10.0
@@ -47,10 +47,7 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
     taps: list[_TapRecord] = []
     for record in signed:
         taps += _taps(record, given, faults)
-    if faults:
-        rest = len(faults) - MAX_FAULTS_TOLD
-        more = [f"and {rest} more faults"] if rest > 0 else []
-        raise MeasurementError("\n".join(faults[:MAX_FAULTS_TOLD] + more))
+    raise_faults(faults)
     if len(taps) > len(records):
         notes.append(f"{len(records)} records cut into {len(taps)} taps where the force begins anew")
     starts = _contact_times(taps, notes)

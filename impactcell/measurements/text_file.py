@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
+from impactcell.measurements.faults import MAX_FAULTS_TOLD
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.numbers import parse_number
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
@@ -17,8 +18,6 @@ from impactcell.records import Samples
 
 CHUNK_ROWS = 20_000
 """Rows whose cells are held as text at a time: some 10 MB."""
-MAX_FAULTS_TOLD = 10
-"""Faults told of one file."""
 
 
 def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:

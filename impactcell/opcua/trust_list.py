@@ -119,6 +119,15 @@ def der(certificate: x509.Certificate) -> bytes:
     return certificate.public_bytes(serialization.Encoding.DER)
 
 
+def make_folders(directory: Path) -> None:
+    """Make the folders of a pki directory, those that are not there; raises `AccessError` if it cannot."""
+    for folder in FOLDERS:
+        try:
+            (directory / folder).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise AccessError(f"{directory / folder}: {error.strerror}") from error
+
+
 class TrustList:
     """The folders of a pki directory; made with a new certificate where there is none.
 
@@ -130,11 +139,7 @@ class TrustList:
 
     def __init__(self, directory: Path, application_uri: str) -> None:
         self._directory = directory
-        for folder in FOLDERS:
-            try:
-                (directory / folder).mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise AccessError(f"{directory / folder}: {error.strerror}") from error
+        make_folders(directory)
         certificate_path = directory / "own" / "cert.der"
         key_path = directory / "own" / "key.pem"
         if not certificate_path.exists() and not key_path.exists():

@@ -11,10 +11,7 @@ A YAML file that only its owner can read::
       certificate: 5F2D...          # SHA-256 fingerprint of the user's certificate
 """
 
-import contextlib
 import logging
-import os
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -25,6 +22,7 @@ from argon2.exceptions import Argon2Error, InvalidHashError
 
 from impactcell.errors import AccessError
 from impactcell.opcua.host_interface import RegisteredUser, Role
+from impactcell.process.whole_files import write_whole
 
 _log = logging.getLogger(__name__)
 
@@ -116,13 +114,8 @@ def write_users(path: Path, users: dict[str, User]) -> None:
     ]
     text = yaml.safe_dump({"users": entries}, sort_keys=False, allow_unicode=True)
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(name).replace(path)
+        write_whole(path, text, private=True)
     except OSError as error:
-        with contextlib.suppress(OSError, UnboundLocalError):
-            Path(name).unlink()
         raise AccessError(f"{path}: cannot be written: {error.strerror}") from error
 
 

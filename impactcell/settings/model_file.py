@@ -15,6 +15,7 @@ from impactcell.physics.effects import LIBRARY
 from impactcell.physics.outside_effects import offer_effects, offer_installed, source_of
 from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predictor, Prior, Sensitivity
 from impactcell.process import yaml_loader
+from impactcell.process.whole_files import write_whole
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 """A finite number above 0."""
@@ -175,12 +176,9 @@ def write_model(model: Model, path: Path) -> None:
         The file cannot be written.
     """
     text = HEADER + yaml.safe_dump(_to_mapping(model), sort_keys=False, allow_unicode=True, width=110)
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        write_whole(path, text)
     except OSError as fault:
-        part.unlink(missing_ok=True)
         raise SettingsError(f"{path}: cannot be written: {fault.strerror}") from fault
 
 

@@ -95,6 +95,18 @@ def test_the_right_word_order_is_never_refused(
         assert told is None or "word_order: big" in told
 
 
+async def test_a_part_that_is_only_pushed_has_no_wrong_scale(fpga: RegisterMap) -> None:
+    """0.25 mm after most of the 1.5 mm of the stroke: so short a slide is no fault of the map."""
+    device = ScriptedDevice(fpga)
+    samples = {"force": np.linspace(0.0, 30.0, 50), "position": np.linspace(0.0, 1.7e-3, 50)}
+    device.complete(samples, **(HEADER | {"stroke": 1.5e-3, "peak_force": 30.0, "sliding_distance": 0.25e-3}))
+    device.complete(samples, **(HEADER | {"stroke": 1.0e-4, "peak_force": 30.0, "sliding_distance": 0.25e-3}))
+    async with running(fpga, device) as (_, _, receptions):
+        pushed, struck = await anext(receptions), await anext(receptions)
+    assert pushed.faults == ()
+    assert any("sliding_distance" in fault for fault in struck.faults), struck.faults
+
+
 @pytest.mark.parametrize(
     ("register", "change", "told"),
     [
