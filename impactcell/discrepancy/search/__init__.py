@@ -1,6 +1,7 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
 from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged
+from impactcell.discrepancy.search.between_shots import chance_of_narrowing
 from impactcell.discrepancy.search.conclusion import (
     NAMED,
     NO_GAP,
@@ -59,6 +60,7 @@ __all__ = [
     "SimulationError",
     "UnexplainedGap",
     "Validation",
+    "chance_of_narrowing",
     "conclude",
     "describe_gap",
     "estimate_model_error",

@@ -28,8 +28,10 @@ def accept_between_shots(context: SearchContext, evidence: ModelEvidence) -> Sel
     best = fits[0]
     effect = best.effects[-1]
     number = sum(LIBRARY[name].kind is Kind.BETWEEN_SHOTS for name in context.library)
-    p_value = min(number * _p_value(context, nominal, best), 1.0)
-    if p_value > POLICY.dominance_error or best.spread > POLICY.max_spread_ratio * nominal.spread:
+    parameters = len(best.coordinates) - len(nominal.coordinates)
+    chance = chance_of_narrowing(nominal.spread, best.spread, context.problem.count, parameters)
+    p_value = min(number * chance, 1.0)
+    if p_value > POLICY.between_shots_error or best.spread > POLICY.max_spread_ratio * nominal.spread:
         return None
     shots = context.problem.count
     limit = float(fisher.ppf(POLICY.rival_probability, shots, shots))
@@ -59,9 +61,17 @@ def _fits(context: SearchContext, evidence: ModelEvidence) -> list[Fit]:
     return run_tasks(context, tasks)
 
 
-def _p_value(context: SearchContext, fewer: Fit, more: Fit) -> float:
-    """F test of the factors' variance with and without the effect, shots as observations."""
-    parameters = len(more.coordinates) - len(fewer.coordinates)
-    freedom = max(context.problem.count - parameters - 1, 1)
-    explained = max((fewer.spread / more.spread) ** 2 - 1.0, 0.0)
+def chance_of_narrowing(before: float, after: float, shots: int, parameters: int) -> float:
+    """Probability that an effect without part in them narrows the factors so, by the F test over shots.
+
+    Parameters
+    ----------
+    before, after : float
+        Standard deviation of the factors about their law without and with the effect.
+    shots : int
+    parameters : int
+        Of the effect.
+    """
+    freedom = max(shots - parameters - 1, 1)
+    explained = max((before / after) ** 2 - 1.0, 0.0)
     return float(fisher.sf(explained * freedom / parameters, parameters, freedom))

@@ -91,9 +91,15 @@ def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
 
 
 def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionResult:
-    """Accept what stands out in the traces or between shots where nothing suffices, else nothing."""
+    """Accept what stands out between shots or in the traces where nothing suffices, else nothing.
+
+    Shots are independent; what is left in the traces is not. So the friction factors are asked first.
+    """
     if state.result is None:
         raise AssertionError("only a search that has ended")
+    between = accept_between_shots(context, state.evidence)
+    if between is not None:
+        return between
     dominant = accept_dominant(
         context,
         (state.evidence, state.latest),
@@ -102,7 +108,7 @@ def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionRe
         state.pairs,
         state.unconverged,
     )
-    return dominant or accept_between_shots(context, state.evidence) or state.result
+    return dominant or state.result
 
 
 def only_test(context: SearchContext, nominal: Fit) -> SelectionResult:

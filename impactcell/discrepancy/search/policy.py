@@ -49,6 +49,9 @@ class SearchPolicy:
         neither reaches the floor.
     dominance_error : float
         Over the library, that an effect without part in a gap stands out; held-out shots are asked as well.
+    between_shots_error : float
+        Over the effects between shots, that one of them explains the friction factors by chance: small, since
+        what is found there goes before all that stands out in the traces.
     max_bound_lead : float
         Share of the gap by which a shape at the end of its range may be ahead of the effect that stands out.
     """
@@ -77,6 +80,7 @@ class SearchPolicy:
     max_rival_share: float = 0.5
     rival_probability: float = 0.9
     dominance_error: float = 0.05
+    between_shots_error: float = 0.001
     max_bound_lead: float = 0.05
 
 
