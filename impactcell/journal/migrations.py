@@ -12,7 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from impactcell.positioning import displacement_discrepancy, prediction_watch, scatter_hypotheses
+from impactcell.positioning import (
+    displacement_discrepancy,
+    model_hypotheses,
+    prediction_watch,
+    scatter_hypotheses,
+)
 from impactcell.serialization import Migration
 from impactcell.serialization.tree import Tree
 
@@ -51,24 +56,30 @@ def _state_2(content: dict[str, Tree]) -> dict[str, Tree]:
 def _planner_2(belief: dict[str, Tree]) -> dict[str, Tree]:
     """Give what the planner has learned a discrepancy, and kinds of scatter, of which it knows nothing yet.
 
-    Format 1 had the variance of friction as inverse-gamma: its probabilities are those of its density.
+    Format 1 had the variance of friction as inverse-gamma: its probabilities are those of its density. What
+    was learned of the parameters holds under each hypothesis of what the model lacks.
     """
     means, covs = np.asarray(belief["means"]), np.asarray(belief["covs"])
     count, size = means.shape
-    weights = len(displacement_discrepancy.PRIOR_STD)
-    wide = np.zeros((count, size + weights, size + weights))
-    wide[:, :size, :size] = covs
-    wide[:, size:, size:] = np.diag(displacement_discrepancy.PRIOR_STD**2)
+    lacking = model_hypotheses.WEIGHTS_STD
+    weights = displacement_discrepancy.FEATURES
+    wide = np.zeros((lacking.size, count, size + weights, size + weights))
+    wide[..., :size, :size] = covs
+    for hypothesis, std in enumerate(lacking):
+        wide[hypothesis, :, size:, size:] = np.eye(weights) * std**2
     std = scatter_hypotheses.FRICTION_STD
     logarithm = -2.0 * belief["shape"] * np.log(std) - belief["rate"] / std**2
     friction = np.exp(logarithm - logarithm.max())
     others = scatter_hypotheses.PRIOR_WEIGHTS.reshape(std.size, -1).sum(axis=0)
-    kept = {key: belief[key] for key in ("weights", "taps", "surprise")}
+    scatter = np.outer(friction / friction.sum(), others).ravel()
     return {
-        **kept,
-        "means": np.concatenate([means, np.zeros((count, weights))], axis=1),
-        "covs": wide,
-        "scatter_weights": np.outer(friction / friction.sum(), others).ravel(),
+        "weights": np.outer(model_hypotheses.PROBABILITIES, belief["weights"]).ravel(),
+        "means": np.tile(np.concatenate([means, np.zeros((count, weights))], axis=1), (lacking.size, 1)),
+        "covs": wide.reshape(-1, size + weights, size + weights),
+        "hypotheses": np.repeat(np.arange(float(lacking.size)), count),
+        "scatter_weights": np.tile(scatter, (lacking.size, 1)),
+        "taps": belief["taps"],
+        "surprise": belief["surprise"],
         "watch": {"log_sums": np.full(len(prediction_watch.BETS), -np.inf), "score": 0.0, "doubted": False},
     }
 

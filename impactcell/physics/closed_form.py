@@ -226,14 +226,14 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
 
 
 @compiled
-def displacement_of(v: float, stroke: float, rows: Samples, factor: Samples, part: Samples) -> Samples:
-    """Displacement (m) by one tap for each plant (k, b, mu_s, mu_k, k_v), friction times `factor`."""
-    strokes, out, moved = np.empty(1), np.empty(1), np.empty(factor.size)
-    strokes[0] = stroke
+def displacement_of(v: float, strokes: Samples, rows: Samples, factor: Samples, part: Samples) -> Samples:
+    """Displacement (m) for each plant (k, b, mu_s, mu_k, k_v) and stroke, friction times `factor`."""
+    stroke, out, moved = np.empty(1), np.empty(1), np.empty(factor.size)
     plant = np.empty(5)
     for n in range(factor.size):
         plant[:] = rows[n]
         plant[2:4] *= factor[n]
-        displacements(v, strokes, plant, part, out)
+        stroke[0] = strokes[n]
+        displacements(v, stroke, plant, part, out)
         moved[n] = out[0]
     return moved

@@ -29,12 +29,13 @@ class ActionSpace(NamedTuple):
 
 
 class SelectedAction(NamedTuple):
-    """A tap with what is expected of it."""
+    """A tap with what is expected of it; `median` is that of its displacement, m."""
 
     velocity_m_s: float
     stroke_m: float
     cost: float
     overshoot: float
+    median: float
 
 
 @compiled
@@ -108,8 +109,8 @@ def shortlist(
 def evaluate_actions(
     velocity: float, strokes: Samples, scenarios: Scenarios, remaining: float, nodes: Quadrature, goal: Goal,
     value: ValueFunction,
-) -> tuple[Samples, Samples]:  # fmt: skip
-    """Evaluate each stroke at one velocity by the model itself: expected cost and overshoot probability."""
+) -> tuple[Samples, Samples, Samples]:  # fmt: skip
+    """Evaluate each stroke at one velocity by the model itself: expected cost, overshoot, median (m)."""
     moved = np.empty((strokes.size, nodes.z.size))
     displacement_quantiles(velocity, strokes, scenarios, nodes.z, moved)
     costs, risks = np.empty(strokes.size), np.empty(strokes.size)
@@ -120,7 +121,7 @@ def evaluate_actions(
             costs[j], risks[j] = expected_cost(
                 remaining, moved[j], nodes, goal, value, value.cost.size, math.inf
             )
-    return costs, risks
+    return costs, risks, moved[:, nodes.z.size // 2]
 
 
 def select_action(
@@ -140,14 +141,16 @@ def select_action(
         for velocity, strokes in _neighbours(int(i), float(place), space):
             fine = strokes
             for _ in range(2):
-                costs, risks = evaluate_actions(
+                costs, risks, medians = evaluate_actions(
                     velocity, fine, scenarios, remaining, fine_nodes(), goal, value
                 )
                 least = min(least, float(risks.min()))
                 costs = np.where(risks <= bound, costs, np.inf)
                 n = int(costs.argmin())
                 if costs[n] < (best.cost if best is not None else math.inf):
-                    best = SelectedAction(float(velocity), float(fine[n]), float(costs[n]), float(risks[n]))
+                    best = SelectedAction(
+                        float(velocity), float(fine[n]), float(costs[n]), float(risks[n]), float(medians[n])
+                    )
                 if fine.size < 3 or costs[n] == math.inf:
                     break
                 fine = np.linspace(fine[max(n - 1, 0)], fine[min(n + 1, fine.size - 1)], FINE)

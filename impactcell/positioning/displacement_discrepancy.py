@@ -2,15 +2,15 @@
 
 The part moves by D instead of the model's D_0 (Kennedy and O'Hagan, 2001)::
 
-    ln D = ln D_0 + phi(tap) · w,   w ~ N(0, W)
+    D = D_0(stroke + delta psi(tap) · w) exp(phi(tap) · w) + delta beta(tap) · w,   w ~ N(0, W)
 
-and the weights w are learned with the parameters, as one Gaussian. Where the model is right they come out
-as zero, within a standard deviation that shrinks with each tap. phi takes a displacement apart into what is
-pushed, which is off by a share of the indentation delta = mu_k m g / k, and what slides freely, which is off
-by a share of itself::
+and the weights w are learned with the parameters, as one Gaussian. phi acts on what slides freely, which is
+off by a share of itself; psi on the indentation delta = mu_k m g / k, whose error is one of the stroke: it
+shows in a push as it is, in a strike not at all; beta on where the part only just moves, a stroke of about
+delta, where the model may know nothing of how friction builds up. With u = sqrt(2 mu_k g f D_0), the speed
+at which the part leaves the actuator::
 
     f = (D_0 - (stroke - delta)) / D_0     share that slides, 0 to 1
-    c = (1 - f) delta / D_0                indentation beside what is pushed
 """
 
 import math
@@ -20,20 +20,37 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
-FEATURES = 10
-"""Weights of the discrepancy: one a line of `discrepancy_features`."""
-PRIOR_STD = np.full(FEATURES, 0.03)
-"""Of a weight before the first tap: 3 % of a displacement, or of an indentation; a choice."""
+FEATURES = 14
+"""Weights of the discrepancy: one a line of phi, psi or beta."""
+BREAKAWAY = 11
+"""First weight of beta."""
 LEARNED_STD = np.full(FEATURES, 0.012)
 """Of a weight after a handful of taps, for what is to be expected of the taps to come."""
 VELOCITY_M_S = 0.03
-"""In the middle of what a tap may have: the discrepancy is told against it."""
+"""In the middle of what a tap may have: the discrepancy of the contact is told against it."""
+SPEED_M_S = 0.06
+"""In the middle of those at which parts leave the actuator: that of the slide is told against it."""
 MASS_KG = 15.0
 """In the middle of what a cell handles: the discrepancy is told against it."""
 POSITION_M = 0.02
 """Over which a discrepancy of the position grows to its weight."""
+WIDTH = 0.5
+"""Of the neighbourhood of a stroke, in its logarithm: some 50 % up and down."""
+BEYOND = 1.0
+"""Logarithm of the stroke over delta of the second neighbourhood, that of short pushes."""
+RISE = 2.0
+"""A weight of beta counts so many indentations: breakaway is what the model knows least of."""
 LOSS_M = 1e-3
 """Displacement beside which a loss of energy in the contact is told."""
+
+
+@compiled
+def sliding_share(displacement: float, stroke: float, indentation: float) -> float:
+    """Share f of a displacement (m) that slides freely; 0 where nothing moves."""
+    if not displacement > 0.0:
+        return 0.0
+    pushed = 0.0 if math.isinf(stroke) else stroke - indentation
+    return min(max((displacement - pushed) / displacement, 0.0), 1.0)
 
 
 @compiled
@@ -45,42 +62,66 @@ def discrepancy_features(
     Parameters
     ----------
     tap : ndarray, shape (3,)
-        Velocity (m/s), stroke (m) and the indentation delta (m) of the part while it is pushed.
+        Stroke (m), the indentation delta (m) of the part while it is pushed, and its friction mu_k.
     displacement : float
         Of the model without discrepancy, m.
     part : ndarray
-        Mass (kg) first.
+        Mass (kg) and gravity (m/s²) first.
     place : ndarray, shape (2,)
         Where the part lies (m, along +1) and the direction of the tap.
     """
-    if not displacement > 0.0:
-        out[:] = 0.0
+    out[:] = 0.0
+    f = sliding_share(displacement, tap[0], tap[1])
+    if f <= 0.0:
         return
-    velocity, stroke, indentation = tap
-    pushed = 0.0 if math.isinf(stroke) else stroke - indentation
-    f = min(max((displacement - pushed) / displacement, 0.0), 1.0)
-    c = (1.0 - f) * min(indentation / displacement, 1.0)
-    speed, mass = math.log(velocity / VELOCITY_M_S), math.log(part[0] / MASS_KG)
-    # friction slows what slides and deepens the indentation: halfway along the way, in its direction
-    along = (f + c) * (place[0] + 0.5 * place[1] * displacement) / POSITION_M
+    speed = math.sqrt(2.0 * tap[2] * part[1] * f * displacement) / SPEED_M_S
+    lighter = MASS_KG / part[0]
+    along = f * (place[0] + 0.5 * place[1] * displacement) / POSITION_M
     out[0] = f
-    out[1] = f * speed
-    out[2] = f * mass
+    out[1] = f * math.log(max(speed, 0.05))
+    out[2] = -f * math.log(lighter)
     out[3] = along
-    out[4] = along * MASS_KG / part[0]
-    out[5] = c
-    out[6] = c * mass
-    out[7] = c * speed
-    out[8] = f * min(LOSS_M / displacement, 1.0) * MASS_KG / part[0]
+    out[4] = along * lighter
+    out[8] = f * min(LOSS_M / displacement, 1.0) * lighter
     out[9] = f * place[1]
+    out[10] = f * speed * lighter
+
+
+@compiled
+def indentation_features(velocity: float, part: Samples, place: Samples, out: Samples) -> None:
+    """Write psi of the taps at this velocity (m/s) to `out`, shape (FEATURES,); otherwise as above.
+
+    Friction that is higher somewhere slows what slides and deepens the indentation: it has one weight.
+    """
+    out[:] = 0.0
+    lighter = MASS_KG / part[0]
+    out[3] = place[0] / POSITION_M
+    out[4] = out[3] * lighter
+    out[5] = 1.0
+    out[6] = -math.log(lighter)
+    out[7] = math.log(velocity / VELOCITY_M_S)
+    out[9] = place[1]
+
+
+@compiled
+def breakaway_features(velocity: float, stroke: float, indentation: float, out: Samples) -> None:
+    """Write beta of a tap to the weights of `out`, shape (FEATURES,), that are its own; SI."""
+    if math.isinf(stroke) or stroke <= 0.0 or indentation <= 0.0:
+        out[BREAKAWAY:] = 0.0
+        return
+    size, speed = math.log(stroke / indentation), math.log(velocity / VELOCITY_M_S)
+    near = RISE * math.exp(-((size / WIDTH) ** 2))
+    out[BREAKAWAY] = near
+    out[BREAKAWAY + 1] = near * speed
+    out[BREAKAWAY + 2] = RISE * math.exp(-(((size - BEYOND) / WIDTH) ** 2)) * speed
 
 
 DEPENDS_ON = {
     "slide": (0,),
-    "velocity": (1, 7),
+    "velocity": (1, 7, 10),
     "mass": (2, 6),
     "position": (3, 4),
-    "contact": (5, 8),
+    "contact": (5, 8, 11, 12, 13),
     "direction": (9,),
 }
 """Which weights speak of what."""
@@ -92,19 +133,3 @@ def largest_weight(mean: Samples, cov: Samples) -> tuple[str, float, float]:
     n = int(np.abs(mean / std).argmax())
     name = next(name for name, weights in DEPENDS_ON.items() if n in weights)
     return name, float(mean[n]), float(std[n])
-
-
-def log_bayes_factor(mean: Samples, cov: Samples) -> float:
-    """Evidence that something is missing: Bayes factor of free weights over zero, natural logarithm.
-
-    The Savage-Dickey ratio p(w = 0) / p(w = 0 | taps) (Dickey, 1971); with nothing missing its expectation
-    is 1 after any number of taps, so that it exceeds 1/alpha at any time with a probability of at most
-    alpha (Ville, 1939).
-
-    Parameters
-    ----------
-    mean, cov : ndarray, shapes (FEATURES,) and (FEATURES, FEATURES)
-        Of the weights.
-    """
-    _, determinant = np.linalg.slogdet(cov / np.outer(PRIOR_STD, PRIOR_STD))
-    return float(0.5 * mean @ np.linalg.solve(cov, mean) + 0.5 * determinant)

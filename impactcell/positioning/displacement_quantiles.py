@@ -12,7 +12,12 @@ import numpy as np
 
 from impactcell.numerics.jit import compiled
 from impactcell.physics.closed_form import displacements
-from impactcell.positioning.displacement_discrepancy import FEATURES, discrepancy_features
+from impactcell.positioning.displacement_discrepancy import (
+    FEATURES,
+    breakaway_features,
+    discrepancy_features,
+    indentation_features,
+)
 from impactcell.positioning.planner_posterior import FRICTION, PARAMETERS, PlannerPosterior
 from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
@@ -32,7 +37,7 @@ class Scenarios(NamedTuple):
     weights : ndarray, shape (nodes + 2 ACROSS, FEATURES)
         Of the discrepancy, with each of these.
     root : ndarray, shape (FEATURES, FEATURES)
-        phi @ root @ root.T @ phi is the variance of the discrepancy that goes with no parameter.
+        root @ root.T is the covariance of the weights that goes with no parameter.
     scatter : ndarray, shape (nodes, 2)
         Of the displacement and of the contact, at each node.
     part, place : ndarray
@@ -50,7 +55,7 @@ class Scenarios(NamedTuple):
 def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, place: Samples) -> Scenarios:
     """Draw up what a tap of this part at this place may meet, along the line at the nodes z."""
     cov = posterior.cov.copy()
-    scales = quantile_scales(posterior.scatter_weights, z)
+    scales = quantile_scales(posterior.mixed_scatter, z)
     scatter = scales[:, 0]
     known = cov[FRICTION, FRICTION]
     sigma = np.sqrt(known + scatter**2)
@@ -99,6 +104,10 @@ def plant_parameters(theta: Samples) -> Samples:
     return rows
 
 
+SHORTEST_SHIFT_M = 1e-6
+"""Least shift of a stroke over which the slope of the displacement is taken: an encoder's resolution."""
+
+
 @compiled
 def displacement_quantiles(
     velocity: float, strokes: Samples, scenarios: Scenarios, z: Samples, out: Samples
@@ -108,43 +117,60 @@ def displacement_quantiles(
     nodes, count = z.size, strokes.size
     middle = nodes // 2
     across = (rows.shape[0] - nodes) // 2
-    course = np.empty(count)
+    depth = rows[middle, 3] * part[0] * part[1] / rows[middle, 0]
+    psi = np.empty(weights.shape[1])
+    indentation_features(velocity, part, scenarios.place, psi)
+    own = psi @ scenarios.root
+    course, other = np.empty(count), np.empty(count)
     square = np.zeros(count)
-    features = np.empty((count, weights.shape[1]))
+    features, further = np.empty((count, weights.shape[1])), np.zeros((count, weights.shape[1]))
     tap = np.empty(3)
-    tap[0], tap[2] = velocity, rows[middle, 3] * part[0] * part[1] / rows[middle, 0]
-    displacements(velocity, strokes, rows[middle], part, course)
+    shift = depth * product(psi, weights[middle])
+    tap[1], tap[2] = depth, rows[middle, 3]
+    displacements(velocity, strokes + shift, rows[middle], part, course)
     for j in range(count):
-        tap[1] = strokes[j]
+        tap[0] = strokes[j] + shift
         discrepancy_features(tap, course[j], part, scenarios.place, features[j])
+        breakaway_features(velocity, strokes[j], depth, further[j])
+        further[j] *= depth
+        out[j, middle] = displaced(course[j], features[j], further[j], weights[middle])
+    farther = max(depth * math.sqrt(product(own, own)), SHORTEST_SHIFT_M)
+    displacements(velocity, strokes + shift + farther, rows[middle], part, other)
+    slope = (other - course) * (depth / farther)  # of the displacement over psi · w
     for q in range(nodes):
-        displacements(velocity, strokes, rows[q], part, course)
-        for j in range(count):
-            out[j, q] = course[j] * math.exp(product(features[j], weights[q]))
-    other = np.empty(count)
+        if q != middle:
+            displacements(velocity, strokes + depth * product(psi, weights[q]), rows[q], part, course)
+            for j in range(count):
+                out[j, q] = displaced(course[j], features[j], further[j], weights[q])
     for a in range(across):
         p, n = nodes + a, nodes + across + a
-        displacements(velocity, strokes, rows[p], part, course)
-        displacements(velocity, strokes, rows[n], part, other)
+        displacements(velocity, strokes + depth * product(psi, weights[p]), rows[p], part, course)
+        displacements(velocity, strokes + depth * product(psi, weights[n]), rows[n], part, other)
         for j in range(count):
-            above = course[j] * math.exp(product(features[j], weights[p]))
-            below = other[j] * math.exp(product(features[j], weights[n]))
+            above = displaced(course[j], features[j], further[j], weights[p])
+            below = displaced(other[j], features[j], further[j], weights[n])
             step = max(abs(above - out[j, middle]), abs(below - out[j, middle]))
             square[j] += step * step
     line = np.empty(nodes)
     root = scenarios.root
     for j in range(count):
         line[:] = out[j]
-        share = 0.0
         for a in range(root.shape[1]):
-            share += product(features[j], root[:, a]) ** 2
-        square[j] += share * line[middle] ** 2
+            step = line[middle] * product(features[j], root[:, a]) + product(further[j], root[:, a])
+            square[j] += (step + slope[j] * own[a]) ** 2
+        indented = max(abs(slope[j]), (1.0 - features[j, 0]) * min(depth, line[middle]))
         for q in range(nodes):
             if q != middle:
-                by_contact = scenarios.scatter[q, 1] * min(tap[2], line[middle])
                 by_itself = scenarios.scatter[q, 0] * line[middle]
+                by_contact = scenarios.scatter[q, 1] * indented
                 aside = math.sqrt(square[j] + by_itself**2 + by_contact**2)
                 out[j, q] = max(reach(line, z, q, middle, aside), 0.0)
+
+
+@compiled
+def displaced(course: float, features: Samples, further: Samples, weights: Samples) -> float:
+    """Displacement (m) with the discrepancy phi and delta beta, that of psi being in `course` already."""
+    return max(course * math.exp(product(features, weights)) + product(further, weights), 0.0)
 
 
 @compiled

@@ -24,6 +24,8 @@ STALL_PENALTY = 60.0  # taps that a tap which moves nothing costs: it stops a ta
 STALL_M = 2e-7  # displacement below which a tap has moved nothing: an encoder's resolution
 AIMS = np.array([-0.4, 0.0, 0.4, 0.8, 1.4, 2.2])  # short of the target, in tolerances
 WORTH_TRYING = 0.7  # taps; one whose median leaves this much more to do than the best is not evaluated
+DISTANCE_WORTH = 5.0
+"""Taps that the whole distance is worth, where nothing but coming nearer counts."""
 SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
 MOSTLY_STALLED = 0.9  # probability of no progress above which a tap is no way forward
 
@@ -280,3 +282,8 @@ def solve_value_function(table: Samples, nodes: Quadrature, goal: Goal) -> Value
     value = ValueFunction(step, np.zeros(int(grid[-1] / step)), np.zeros(int(grid[-1] / step)))
     bellman_sweep(grid, actions, nodes, goal, value)
     return value
+
+
+def nearer(remaining: float) -> ValueFunction:
+    """Value of being nearer, for a part that cannot be brought in yet: no overshoot but of the tap itself."""
+    return ValueFunction(remaining, np.array([0.0, DISTANCE_WORTH]), np.zeros(2))

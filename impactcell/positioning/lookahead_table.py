@@ -22,11 +22,18 @@ from impactcell.records import Samples
 
 SLOWEST_M_S = 0.005  # velocity of the table that hardly moves a part
 VELOCITIES = 24  # of the table; neighbours are 14 % apart
-STROKES = 60  # of the table
+NEAR_STROKES = 26
+"""Strokes of the table about the indentation of the part, where it only just moves."""
+FAR_STROKES = 38
+"""Strokes beyond, each longer by the same factor."""
+NEAR = (0.3, 2.0)
+"""Between which of its multiples a stroke is about the indentation."""
 MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
 SAME_MASS = 0.03  # relative difference of parts that share a table
 STALE = np.concatenate([[0.02, 0.04, 0.08, 0.03, 2.0], np.full(FEATURES, 0.03)])
 """Change of the posterior's mean or standard deviation, in its units, after which a table is made anew."""
+STEEPEST = 3.0
+"""Slope of the displacement over the stroke that is followed from one place to another."""
 SCATTER_Z = np.array([1.0, 3.0])
 """Nodes at which scatter is compared."""
 STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02], [6e-3, 6e-3, 0.04]])
@@ -53,14 +60,13 @@ class PlannerLimits:
         count = VELOCITIES * (8 if math.isinf(self.max_stroke_m) else 1)
         return np.geomspace(min(SLOWEST_M_S, 0.5 * self.max_velocity_m_s), self.max_velocity_m_s, count)
 
-    @property
-    def strokes(self) -> Samples:
-        """Strokes of the table, finer where the part only just moves."""
+    def strokes(self, indentation_m: float) -> Samples:
+        """Strokes of the table, finer about the indentation of the part, where it only just moves."""
         if math.isinf(self.max_stroke_m):
             return np.array([math.inf])
-        knee = 0.2 * self.max_stroke_m
-        fine = np.linspace(knee / STROKES, knee, STROKES // 2, endpoint=False)
-        return np.concatenate([fine, np.linspace(knee, self.max_stroke_m, STROKES // 2)])
+        low, high = (min(multiple * indentation_m, 0.5 * self.max_stroke_m) for multiple in NEAR)
+        near = np.linspace(0.5 * low, high, NEAR_STROKES, endpoint=False)
+        return np.concatenate([near, np.geomspace(high, self.max_stroke_m, FAR_STROKES)])
 
     def goal(self, caution: float) -> Goal:
         """Tolerance, and what an overshoot may cost."""
@@ -72,16 +78,17 @@ class PlannerLimits:
             return np.full(self.velocities.size, math.inf)
         return allowed_strokes(self.velocities, self.max_force_n, stiffest(posterior), part[0], part[1])
 
-    def space(self, posterior: PlannerPosterior, part: Samples) -> ActionSpace:
+    def space(self, posterior: PlannerPosterior, part: Samples, strokes: Samples) -> ActionSpace:
         """Taps to choose from."""
-        return ActionSpace(self.velocities, self.strokes, self.longest_strokes(posterior, part))
+        return ActionSpace(self.velocities, strokes, self.longest_strokes(posterior, part))
 
 
 class LookaheadTable(NamedTuple):
     """Taps and cost to go for parts of one mass, and the posterior they were worked out from.
 
     `table` (m), shape (velocities, strokes, nodes), holds for `place`; `sliding` is the share of each
-    displacement that friction acts on, shape (velocities, strokes).
+    displacement that slides, and `indenting` (m) what it changes by with the indentation, relative; shape
+    (velocities, strokes).
     """
 
     part: Samples
@@ -89,8 +96,10 @@ class LookaheadTable(NamedTuple):
     caution: float
     posterior: PlannerPosterior
     scatter: Samples
+    strokes: Samples
     table: Samples
     sliding: Samples
+    indenting: Samples
     value: ValueFunction
 
     @property
@@ -119,7 +128,8 @@ class LookaheadTable(NamedTuple):
         slope += direction * (place[1] - self.place[1])
         if abs(slope) < 1e-3:
             return self.table
-        moved: Samples = self.table * np.exp(self.sliding * slope)[:, :, None]
+        factor, further = np.exp(self.sliding * slope), self.indenting * slope
+        moved: Samples = np.maximum(self.table * factor[:, :, None] + further[:, :, None], 0.0)
         return moved
 
 
@@ -134,35 +144,42 @@ def build_lookahead(
     limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples, caution: float
 ) -> LookaheadTable:
     """Work out taps and cost to go; `part` and `place` as in `Scenarios`."""
-    table = _quantiles(limits, posterior, part, place)
+    indentation = indentation_of(posterior, part)
+    strokes = limits.strokes(indentation)
+    table = _quantiles(limits, strokes, posterior, part, place)
     value = ValueFunction(1.0, np.ones(1), np.ones(1))
     if np.nanmax(table[:, :, COARSE_Z.size // 2], initial=0.0) > 0.0:
         later = anticipate_learning(posterior)
         will_learn = (np.diag(posterior.cov) > 1.2 * np.diag(later.cov)).any()
-        ahead = _quantiles(limits, later, part, place) if will_learn else table
+        ahead = _quantiles(limits, strokes, later, part, place) if will_learn else table
         if math.isinf(limits.max_stroke_m):
             ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
         value = solve_value_function(ahead, coarse_nodes(), limits.goal(caution))
-    scatter = quantile_scales(posterior.scatter_weights, SCATTER_Z)
-    sliding = _sliding_share(limits, posterior, part, table[:, :, COARSE_Z.size // 2])
-    return LookaheadTable(part, place, caution, posterior, scatter, table, sliding, value)
+    scatter = quantile_scales(posterior.mixed_scatter, SCATTER_Z)
+    shares = _shares(strokes, indentation, table[:, :, COARSE_Z.size // 2])
+    return LookaheadTable(part, place, caution, posterior, scatter, strokes, table, *shares, value)
 
 
-def _sliding_share(
-    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, middle: Samples
-) -> Samples:
-    """F + c of `discrepancy_features` for each tap of a table."""
+def indentation_of(posterior: PlannerPosterior, part: Samples) -> float:
+    """Return the static indentation delta (m) of a part that is pushed."""
     plant = plant_parameters(posterior.mean[None])[0]
-    indentation = plant[3] * part[0] * part[1] / plant[0]
-    pushed = np.where(np.isfinite(limits.strokes), limits.strokes - indentation, 0.0)
-    size = np.maximum(middle, 1e-9)
-    f = np.clip((middle - pushed) / size, 0.0, 1.0)
-    share: Samples = np.nan_to_num(f + (1.0 - f) * np.minimum(indentation / size, 1.0))
-    return share
+    return float(plant[3] * part[0] * part[1] / plant[0])
 
 
-def _quantiles(limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples) -> Samples:
-    velocities, strokes = limits.velocities, limits.strokes
+def _shares(strokes: Samples, indentation: float, middle: Samples) -> tuple[Samples, Samples]:
+    """`sliding` and `indenting` of a table."""
+    pushed = np.where(np.isfinite(strokes), strokes - indentation, 0.0)
+    sliding = np.nan_to_num(np.clip((middle - pushed) / np.maximum(middle, 1e-9), 0.0, 1.0))
+    if strokes.size == 1:
+        return sliding, np.zeros_like(middle)
+    slope = np.nan_to_num(np.gradient(middle, strokes, axis=1))
+    return sliding, indentation * np.clip(slope, 0.0, STEEPEST)
+
+
+def _quantiles(
+    limits: PlannerLimits, strokes: Samples, posterior: PlannerPosterior, part: Samples, place: Samples
+) -> Samples:
+    velocities = limits.velocities
     scenarios = parameter_scenarios(posterior, COARSE_Z, part, place)
     table = quantile_table(velocities, strokes, scenarios, COARSE_Z)
     table[strokes > limits.longest_strokes(posterior, part)[:, None]] = math.nan

@@ -9,13 +9,13 @@ import numpy as np
 
 from impactcell.errors import PositioningError
 from impactcell.physics import Plant, free_motion
-from impactcell.positioning import planner_posterior
+from impactcell.positioning import model_hypotheses
 from impactcell.positioning.action_selection import select_action
 from impactcell.positioning.displacement_quantiles import (
     displacement_quantiles,
     parameter_scenarios,
 )
-from impactcell.positioning.dynamic_programming import Goal
+from impactcell.positioning.dynamic_programming import Goal, nearer
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 from impactcell.positioning.lookahead_table import (
     SCATTER_Z,
@@ -24,7 +24,8 @@ from impactcell.positioning.lookahead_table import (
     build_lookahead,
     stiffest,
 )
-from impactcell.positioning.planner_posterior import PlannerPosterior, tap_predictions, with_score
+from impactcell.positioning.model_hypotheses import tap_predictions, with_score
+from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.prediction_watch import score_of
 from impactcell.positioning.quadrature import Z
@@ -35,6 +36,10 @@ from impactcell.positioning.tap_model import model_of_tap
 from impactcell.records import Quality, Samples, Signature, TapPredictions
 
 CAUTION = (1.0, 20.0, 400.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
+SHARE_OF_A_STEP = 0.2
+"""Of the bound on overshoot, for a tap that only brings the part nearer, so that more is learned there."""
+WORTH_A_STEP = 0.2
+"""Of the remaining distance that such a tap has to come nearer by."""
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
 REMEMBERED = 64  # tables, of parts of different mass
 
@@ -99,7 +104,7 @@ class TapPlanner:
             self.overshoot_probability,
         )  # fmt: skip
         _ready()
-        self._posterior = planner_posterior.prior(
+        self._posterior = model_hypotheses.prior(
             plant.stiffness_n_per_m,
             plant.damping_n_s_per_m,
             plant.mu_s,
@@ -166,14 +171,23 @@ class TapPlanner:
                     f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
                     f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
                 )
+            space = self._limits.space(self._posterior, part, lookahead.strokes)
+            table = lookahead.at(place)
             action, safest = select_action(
-                distance, lookahead.at(place), lookahead.value, self._limits.space(self._posterior, part),
+                distance, table, lookahead.value, space,
                 scenarios, self._limits.goal(caution), self.overshoot_probability,
             )  # fmt: skip
             if action is not None:
                 break
             least = min(least, safest)
         else:
+            action, _ = select_action(
+                distance, table, nearer(distance), space,
+                scenarios, self._limits.goal(caution), SHARE_OF_A_STEP * self.overshoot_probability,
+            )  # fmt: skip
+            if action is not None and action.median < WORTH_A_STEP * distance:
+                action = None
+        if action is None:
             return Unreachable(
                 f"{distance * 1e6:.1f} µm remain, and every tap for a part of {mass_kg:.3g} kg overshoots "
                 f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
@@ -221,7 +235,7 @@ class TapPlanner:
         """
         if not (math.isfinite(mu_k) and mu_k > 0.0 and math.isfinite(std) and std >= 0.0):
             raise PositioningError(f"cannot use a friction of {mu_k} +- {std}")
-        self._posterior = planner_posterior.condition_on_friction(
+        self._posterior = model_hypotheses.condition_on_friction(
             self._posterior, mu_k, std, batch_changed=batch_changed
         )
 
@@ -259,7 +273,7 @@ class TapPlanner:
 
     def _lookahead(self, part: Samples, place: Samples, caution: float) -> LookaheadTable:
         """Outlook for this part, made anew where the posterior has moved on."""
-        scatter = quantile_scales(self._posterior.scatter_weights, SCATTER_Z)
+        scatter = quantile_scales(self._posterior.mixed_scatter, SCATTER_Z)
         for n, lookahead in enumerate(self._lookaheads):
             if lookahead.serves(part, caution, self._posterior, scatter):
                 self._lookaheads.append(self._lookaheads.pop(n))
@@ -273,13 +287,13 @@ class TapPlanner:
 @cache
 def _ready() -> None:
     """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
-    posterior = planner_posterior.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
+    posterior = model_hypotheses.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
     limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
     part = np.array([20.0, 9.81])
     place = np.array([0.0, 1.0])
     lookahead = build_lookahead(limits, posterior, part, place, 1.0)
     select_action(
-        2e-3, lookahead.table, lookahead.value, limits.space(posterior, part),
+        2e-3, lookahead.table, lookahead.value, limits.space(posterior, part, lookahead.strokes),
         parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,
     )  # fmt: skip
     tap = Tap(0.02, 2e-4)

@@ -15,12 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.positioning.displacement_discrepancy import FEATURES
+from impactcell.positioning.model_hypotheses import join, parts_of, reweighted
 from impactcell.positioning.planner_posterior import (
     BATCH_STD,
     FRICTION,
     PARAMETERS,
     STIFFNESS,
     PlannerPosterior,
+    with_single_gaussian,
 )
 from impactcell.positioning.scatter_hypotheses import mean_variances, update_weights
 from impactcell.positioning.tap_model import Response, TapModel
@@ -34,6 +36,10 @@ NARROW = {FRICTION: 0.05, STIFFNESS: 0.04}  # standard deviations that one Gauss
 NEGLIGIBLE = 1e-4  # weight of a component that is dropped
 ITERATIONS = 4  # of the linearisation; the last change is below a twentieth of a standard deviation
 CROOKED = 0.1  # of the first regression's remainder that stays, whatever the later ones leave over
+
+
+LEAST_STD = np.concatenate([np.full(PARAMETERS + 1, 1e-8), [1e-4]])
+"""Over which the displacement is made linear at least, in what is regressed; less would be numbers' noise."""
 
 
 class Step(NamedTuple):
@@ -57,8 +63,23 @@ def update_posterior(
 ) -> PlannerPosterior:
     """Posterior after a tap displaced the part by `moved_m`, `response` being the model of that tap."""
     model = response if isinstance(response, TapModel) else TapModel(response)
+    updates = [update_hypothesis(part, model, moved_m) for part in parts_of(posterior)]
+    parts = [part for part, _ in updates]
+    log_evidence = np.array([evidence for _, evidence in updates])
+    probabilities = posterior.probabilities
+    if np.isfinite(log_evidence).any():
+        probabilities = reweighted(probabilities, log_evidence)
+    surprise = float(probabilities @ np.array([part.surprise for part in parts]))
+    learned = join(parts, probabilities, posterior)
+    return replace(learned, taps=posterior.taps + 1, surprise=surprise)
+
+
+def update_hypothesis(
+    posterior: PlannerPosterior, model: TapModel, moved_m: float
+) -> tuple[PlannerPosterior, float]:
+    """Posterior under one hypothesis after a tap, and the logarithm of its density at `moved_m`."""
     posterior = split_components(posterior)
-    scatter = mean_variances(posterior.scatter_weights)
+    scatter = mean_variances(posterior.scatter_weights[0])
     steps = [
         update_component(mean, cov + np.diag(WALK**2), scatter, model, moved_m)
         for mean, cov in zip(posterior.means, posterior.covs, strict=True)
@@ -66,12 +87,12 @@ def update_posterior(
     with np.errstate(divide="ignore"):
         logarithm = np.log(posterior.weights) + [step.likelihood for step in steps]
     if not np.isfinite(logarithm).any():
-        return replace(posterior, taps=posterior.taps + 1)
+        return posterior, -math.inf
     weights = np.exp(logarithm - logarithm.max())
     weights /= weights.sum()
     possible = np.isfinite(logarithm)
-    scatter_weights = update_weights(
-        posterior.scatter_weights,
+    scatter_weights, density = update_weights(
+        posterior.scatter_weights[0],
         posterior.weights[possible],
         np.array([step.innovation for step in steps])[possible],
         np.array([step.variance for step in steps])[possible],
@@ -90,15 +111,18 @@ def update_posterior(
         weights=weights,
         means=np.array([step.mean for step in kept]),
         covs=covs,
-        scatter_weights=scatter_weights,
-        taps=posterior.taps + 1,
+        scatter_weights=scatter_weights[None],
         surprise=surprise,
+        hypotheses=np.zeros(len(kept)),
     )
-    return merge_components(learned)
+    return merge_components(learned), density
 
 
 def split_components(posterior: PlannerPosterior) -> PlannerPosterior:
-    """Sum of Gaussians, each narrow in friction, then in stiffness, with the posterior's mean and spread."""
+    """Sum of Gaussians, each narrow in friction, then in stiffness, with the posterior's mean and spread.
+
+    Of one hypothesis, as `merge_components`.
+    """
     weights, means, covs = [], [], []
     for weight, mean, cov in zip(posterior.weights, posterior.means, posterior.covs, strict=True):
         std = np.sqrt(np.diag(cov))
@@ -118,7 +142,13 @@ def split_components(posterior: PlannerPosterior) -> PlannerPosterior:
             weights.append(weight * share)
             means.append(mean + regression * node)
             covs.append(left)
-    return replace(posterior, weights=np.array(weights), means=np.array(means), covs=np.array(covs))
+    return replace(
+        posterior,
+        weights=np.array(weights),
+        means=np.array(means),
+        covs=np.array(covs),
+        hypotheses=np.zeros(len(weights)),
+    )
 
 
 def merge_components(posterior: PlannerPosterior) -> PlannerPosterior:
@@ -128,39 +158,46 @@ def merge_components(posterior: PlannerPosterior) -> PlannerPosterior:
     std = np.sqrt(np.diag(posterior.cov))
     if any(std[axis] > 1.3 * narrow for axis, narrow in NARROW.items()):
         return posterior
-    return replace(posterior, weights=np.ones(1), means=posterior.mean[None], covs=posterior.cov[None])
+    return with_single_gaussian(posterior, posterior.mean, posterior.cov)
 
 
 def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapModel, moved_m: float) -> Step:
     """One Gaussian after one displacement; `scatter` has the expected squares of the three of it.
 
-    What is regressed are the parameters and the tap's friction factor; the weights of the discrepancy act on
-    the logarithm, and their slope is known.
+    What is regressed are the parameters, the tap's friction factor and psi · w; the slope over phi · w, which
+    acts on the logarithm, is known.
     """
     size = mean.size
-    regressed = np.append(np.arange(PARAMETERS), size)
+    regressed = np.zeros((PARAMETERS + 2, size + 1))
+    regressed[np.arange(PARAMETERS), np.arange(PARAMETERS)] = 1.0
+    regressed[PARAMETERS, size] = 1.0
+    regressed[PARAMETERS + 1, PARAMETERS:size] = model.indenting
     before = np.append(mean, 0.0)
     prior = np.zeros((size + 1, size + 1))
     prior[:size, :size] = cov
     prior[size, size] = scatter[0]
-    by_itself, by_contact = moved_m, min(model.indentation_m, abs(moved_m))
-    noise = POSITION_NOISE_M**2 + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
+    floor = np.diag(LEAST_STD**2)
     point, after = before.copy(), prior
     weight, surprise, likelihood, crooked = 1.0, 0.0, -math.inf, 0.0
     foretold, rest, reaches = 0.0, 1.0, np.zeros(3)
     slope = np.zeros(size + 1)
     for iteration in range(ITERATIONS):
-        block = after[np.ix_(regressed, regressed)]
-        root = np.linalg.cholesky(block + 1e-12 * np.diag(np.diag(prior)[regressed]))
+        root = np.linalg.cholesky(regressed @ after @ regressed.T + floor)
         factor = math.exp(float(model.features @ point[PARAMETERS:size]))
-        values = factor * model.response(point[regressed] + POINTS @ root.T)
+        further = model.indentation_m * float(model.breakaway @ point[PARAMETERS:size])
+        values = np.maximum(factor * model.response(regressed @ point + POINTS @ root.T) + further, 0.0)
         if not np.isfinite(values).all():
             return Step(mean, cov, -math.inf, 0.0, 0.0, 1.0, np.zeros(3))
         centre = float(values.mean())
         white = POINTS.T @ (values - centre) / len(POINTS)
-        slope[regressed] = np.linalg.solve(root.T, white)
-        slope[PARAMETERS:size] = centre * model.features
-        bent = float(((values - centre - POINTS @ white) ** 2).sum()) / (len(POINTS) - 7)
+        along = np.linalg.solve(root.T, white)
+        slope = along @ regressed
+        slope[PARAMETERS:size] += centre * model.features + model.indentation_m * model.breakaway
+        by_itself, by_contact = abs(centre), abs(along[PARAMETERS + 1])
+        pushed = (1.0 - model.features[0]) * min(model.indentation_m, by_itself)
+        by_contact = max(by_contact, pushed)
+        noise = POSITION_NOISE_M**2 + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
+        bent = float(((values - centre - POINTS @ white) ** 2).sum()) / (len(POINTS) - PARAMETERS - 3)
         crooked = max(bent, CROOKED * crooked)
         innovation = moved_m - centre - float(slope @ (before - point))
         variance = float(slope @ prior @ slope) + noise + crooked
@@ -191,13 +228,13 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
 
 
 def _spread_evenly(count: int, seed: int) -> Samples:
-    """Points in six dimensions, symmetric, with exactly zero mean and unit covariance."""
-    half = np.random.default_rng(seed).standard_normal((count // 2, 6))
+    """Points in seven dimensions, symmetric, with exactly zero mean and unit covariance."""
+    half = np.random.default_rng(seed).standard_normal((count // 2, PARAMETERS + 2))
     points = np.vstack([half, -half])
     root = np.linalg.cholesky(points.T @ points / count)
     spread: Samples = np.linalg.solve(root, points.T).T
     return spread
 
 
-POINTS = _spread_evenly(48, 8)
+POINTS = _spread_evenly(56, 8)
 """At which the displacement is made linear: eight a dimension; the seed is any that spreads them well."""

@@ -22,6 +22,8 @@ BETS = np.array([[1.0, 1.0], [-1.0, 1.0], [2.0, 1.5], [-2.0, 1.5], [0.0, 1.6], [
 """Mean and standard deviation of s under each bet."""
 FURTHEST = 8.0
 """Standard deviations beyond which a score says no more."""
+ATOM_M = 1e-9
+"""Nearer than that, displacements are one: all taps that move nothing."""
 DOUBT = 200.0
 """Mean taps between two false doubts, at which taps become cautious."""
 CONFIDENT_AGAIN = 20.0
@@ -63,6 +65,7 @@ def score_of(moved_m: float, quantiles: Samples, z: Samples) -> float:
     """Score s of a displacement, given the displacements at the nodes z in standard deviations."""
     low, high = np.minimum(quantiles[:-1], quantiles[1:]), np.maximum(quantiles[:-1], quantiles[1:])
     below = np.clip((moved_m - low) / np.maximum(high - low, 1e-15), 0.0, 1.0)
+    below[(high - low < ATOM_M) & (np.abs(moved_m - low) < ATOM_M)] = 0.5  # of taps that move nothing
     probability = np.diff(ndtr(z))
     total = float(probability @ below) / float(probability.sum())
     if 0.0 < total < 1.0:

@@ -22,9 +22,9 @@ DISPLACEMENT_STD = np.array([0.001, 0.003, 0.006, 0.012, 0.024, 0.045, 0.085])
 """sigma_d: next to nothing where the model is right, up to 8 %."""
 DISPLACEMENT_PRIOR = np.array([0.6, 0.2, 0.1, 0.05, 0.025, 0.015, 0.01])
 """Most cells have a model that is right but for friction."""
-CONTACT_STD = np.array([0.005, 0.03, 0.08, 0.2])
+CONTACT_STD = np.array([0.005, 0.03, 0.08, 0.2, 0.4])
 """sigma_c: of the indentation."""
-CONTACT_PRIOR = np.array([0.72, 0.18, 0.07, 0.03])
+CONTACT_PRIOR = np.array([0.72, 0.17, 0.06, 0.03, 0.02])
 """As for the displacement."""
 OUTLIER = 0.02
 """Share of taps that do not belong ..."""
@@ -32,6 +32,8 @@ OUTLIER_STD = 5.0
 """... and deviate by so many times as much."""
 MEMORY = 400.0
 """Taps after which what was learned of the scatter fades."""
+LEAST_LOG_DENSITY = -700.0
+"""Of a tap that no combination could have foretold: the least number's logarithm."""
 REACH = np.concatenate([[0.0], np.geomspace(1e-4, 0.8, 120)])
 """Deviations at which the distribution of the scatter is tabulated."""
 
@@ -60,8 +62,8 @@ def mean_variances(weights: Samples) -> Samples:
 
 def update_weights(
     weights: Samples, components: Samples, innovations: Samples, variances: Samples, reaches: Samples
-) -> Samples:
-    """Probabilities after one tap.
+) -> tuple[Samples, float]:
+    """Probabilities after one tap, and the logarithm of the density with which it was foretold.
 
     Parameters
     ----------
@@ -80,9 +82,9 @@ def update_weights(
     faded = weights ** (1.0 - 1.0 / MEMORY) * PRIOR_WEIGHTS ** (1.0 / MEMORY)
     after = faded * likelihood
     if not after.sum() > 0.0:
-        return weights
+        return weights, LEAST_LOG_DENSITY
     normalised: Samples = after / after.sum()
-    return normalised
+    return normalised, float(np.log(weights @ likelihood))
 
 
 def quantile_scales(weights: Samples, z: Samples) -> Samples:

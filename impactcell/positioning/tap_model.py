@@ -6,7 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.physics.closed_form import displacement_of
-from impactcell.positioning.displacement_discrepancy import FEATURES, discrepancy_features
+from impactcell.positioning.displacement_discrepancy import (
+    FEATURES,
+    breakaway_features,
+    discrepancy_features,
+    indentation_features,
+)
 from impactcell.positioning.displacement_quantiles import plant_parameters
 from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior
 from impactcell.positioning.tap import Tap
@@ -17,30 +22,37 @@ LEAST_FACTOR = 0.05
 NO_FEATURES = np.zeros(FEATURES)
 """Of a tap whose discrepancy is not asked for."""
 Response = Callable[[Samples], Samples]
-"""Displacements (m), shape (n,), for rows of (theta, z sigma), shape (n, 6)."""
+"""Displacements (m), shape (n,), for rows of (theta, z sigma, psi · w), shape (n, 7)."""
 
 
 class TapModel(NamedTuple):
-    """Response to a tap, phi of its discrepancy, and the indentation delta (m)."""
+    """Response to a tap, phi, psi and beta of its discrepancy, and the indentation delta (m)."""
 
     response: Response
     features: Samples = NO_FEATURES
+    indenting: Samples = NO_FEATURES
+    breakaway: Samples = NO_FEATURES
     indentation_m: float = 0.0
 
 
 def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapModel:
     """Model of a tap on a part; `part` as in `impactcell.physics.closed_form.displacements`."""
+    mean = posterior.mean
+    plant = plant_parameters(mean[None, :PARAMETERS])[0]
+    indentation = float(plant[3] * part[0] * part[1] / plant[0])
 
     def response(states: Samples) -> Samples:
         factor = np.maximum(1.0 + states[:, PARAMETERS], LEAST_FACTOR)
         plants = plant_parameters(states[:, :PARAMETERS])
-        return displacement_of(tap.velocity_m_s, tap.stroke_m, plants, factor, part)
+        strokes = tap.stroke_m + indentation * states[:, PARAMETERS + 1]
+        return displacement_of(tap.velocity_m_s, strokes, plants, factor, part)
 
-    median = np.append(posterior.mean[:PARAMETERS], 0.0)[None]
-    plant = plant_parameters(median)[0]
-    indentation = float(plant[3] * part[0] * part[1] / plant[0])
-    features = np.empty(FEATURES)
+    features, indenting, breakaway = np.empty(FEATURES), np.empty(FEATURES), np.zeros(FEATURES)
+    breakaway_features(tap.velocity_m_s, tap.stroke_m, indentation, breakaway)
     place = np.array([tap.position_m, float(tap.direction)])
-    commanded = np.array([tap.velocity_m_s, tap.stroke_m, indentation])
+    indentation_features(tap.velocity_m_s, part, place, indenting)
+    shift = float(indenting @ mean[PARAMETERS:])
+    median = np.concatenate([mean[:PARAMETERS], [0.0, shift]])[None]
+    commanded = np.array([tap.stroke_m + indentation * shift, indentation, plant[3]])
     discrepancy_features(commanded, float(response(median)[0]), part, place, features)
-    return TapModel(response, features, indentation)
+    return TapModel(response, features, indenting, breakaway, indentation)

@@ -10,6 +10,7 @@ from impactcell.cell import CellState
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import StoredState, unpack_state
+from impactcell.positioning.model_hypotheses import parts_of
 from impactcell.positioning.planner_posterior import PARAMETERS
 from impactcell.records import Alarm
 from impactcell.tracking.model_gap.gap_cusum import GapState
@@ -191,8 +192,8 @@ def _alarm(alarm: Alarm) -> dict[str, Any]:
 
 
 def _planner(durable: StoredState) -> dict[str, Any]:
-    belief = durable.planner
-    assert belief is not None
+    assert durable.planner is not None
+    belief = parts_of(durable.planner)[0]
     return {
         "weights": _floats(belief.weights),
         "means": _of_parameters(belief.means[:, :PARAMETERS]),

@@ -33,8 +33,8 @@ def drawn(count: int, seed: int) -> np.ndarray:
 
 def of(row: np.ndarray, stroke: float | None = None) -> float:
     plant, (mass, velocity, end) = row[:5], row[5:]
-    part = np.array([mass, 9.81])
-    moved = displacement_of(velocity, end if stroke is None else stroke, plant[None], np.ones(1), part)
+    strokes, part = np.array([end if stroke is None else stroke]), np.array([mass, 9.81])
+    moved = displacement_of(velocity, strokes, plant[None], np.ones(1), part)
     return float(moved[0])
 
 

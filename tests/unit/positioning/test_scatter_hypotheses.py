@@ -24,7 +24,7 @@ def learned(friction: float, displacement: float, taps: int, seed: int) -> np.nd
             by_friction * friction * rng.standard_normal() + moved * displacement * rng.standard_normal()
         )
         reaches = np.array([[by_friction, moved, 40e-6]])
-        weights = update_weights(
+        weights, _ = update_weights(
             weights, np.ones(1), np.array([deviation]), np.array([(0.5e-6) ** 2]), reaches
         )
     return weights
@@ -46,7 +46,7 @@ def test_scatter_of_the_displacement_is_told_apart(displacement: float) -> None:
 def test_an_outlier_is_not_scatter() -> None:
     calm = learned(0.02, 0.0, 60, 3)
     reaches = np.array([[5e-3, 5e-3, 40e-6]])
-    after = update_weights(calm, np.ones(1), np.array([8 * 0.02 * 5e-3]), np.array([1e-12]), reaches)
+    after, _ = update_weights(calm, np.ones(1), np.array([8 * 0.02 * 5e-3]), np.array([1e-12]), reaches)
     assert mean_variances(after)[0] < 2.0 * mean_variances(calm)[0]
 
 
@@ -61,7 +61,19 @@ def test_tails_are_those_of_the_sum_of_normals() -> None:
 
 
 def test_what_no_hypothesis_explains_teaches_nothing() -> None:
-    after = update_weights(
+    after, density = update_weights(
         PRIOR_WEIGHTS, np.ones(1), np.array([1e9]), np.array([1e-12]), np.ones((1, 3)) * 1e-9
     )
     np.testing.assert_array_equal(after, PRIOR_WEIGHTS)
+    assert density < -600.0
+
+
+def test_the_density_of_a_tap_integrates_to_one() -> None:
+    moved = np.linspace(-6e-3, 6e-3, 6001)
+    reaches = np.array([[5e-3, 5e-3, 40e-6]])
+    density = [
+        update_weights(PRIOR_WEIGHTS, np.ones(1), np.array([d]), np.array([(20e-6) ** 2]), reaches)[1]
+        for d in moved
+    ]
+    total = np.trapezoid(np.exp(density), moved) / np.sqrt(2.0 * np.pi)
+    assert total == pytest.approx(1.0, abs=2e-3)

@@ -33,7 +33,7 @@ def task_of(cell: CellConfig, design: core.CellDesign, worker: CellWorker) -> Po
 
 
 def assert_same(posterior: PlannerPosterior, expected: PlannerPosterior) -> None:
-    for name in ("weights", "means", "covs", "scatter_weights"):
+    for name in ("weights", "means", "covs", "scatter_weights", "hypotheses"):
         np.testing.assert_array_equal(getattr(posterior, name), getattr(expected, name))
     assert (posterior.taps, posterior.surprise) == (expected.taps, expected.surprise)
 
@@ -50,6 +50,7 @@ async def test_the_planner_goes_on_after_a_restart(tmp_path: Path, cell: CellCon
         untaught.scatter_weights,
         taps=7,
         surprise=0.25,
+        hypotheses=untaught.hypotheses,
     )
     first.belief = learned
     await first.process(make_capture(1), PositioningState(), None)

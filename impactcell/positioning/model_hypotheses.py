@@ -1,0 +1,184 @@
+"""How much the planner's model lacks: three hypotheses, averaged, and the evidence that it lacks anything.
+
+Under each, the weights of the discrepancy have another standard deviation beforehand: the model is right
+but for a per cent; it is off by what a cell is usually off; something essential is missing. Each hypothesis
+learns parameters, weights and scatter of its own, and each tap shifts its probability by how well it foretold
+that tap (Bayesian model averaging: Hoeting et al., Statistical Science 14, 1999). So scatter and discrepancy
+are told apart, large discrepancies are believed within a few taps, and a model that is right costs none.
+
+With nothing missing the Bayes factor of the others over the first has expectation 1 after any number of taps,
+so that it exceeds 1/alpha at any time with a probability of at most alpha (Ville, 1939).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell.positioning.displacement_discrepancy import FEATURES, largest_weight
+from impactcell.positioning.planner_posterior import (
+    BATCH_STD,
+    FRICTION,
+    LEVEL_STD,
+    PARAMETERS,
+    VISCOUS,
+    PlannerPosterior,
+    prior_of_plant,
+    with_single_gaussian,
+)
+from impactcell.positioning.prediction_watch import ALARM, place_bets
+from impactcell.positioning.scatter_hypotheses import prior_weights
+from impactcell.records import Evidence, Samples, TapPredictions
+
+WEIGHTS_STD = np.array([0.008, 0.035, 0.16])
+"""Of the weights beforehand, under each hypothesis: relative to a displacement, or to an indentation."""
+PROBABILITIES = np.array([0.75, 0.17, 0.08])
+"""Of the hypotheses before the first tap: most models are right but for friction; a choice."""
+VISCOUS_N_S_PER_M = 150.0
+"""What k_v is off by where a weight of the discrepancy is 1: this the model has a parameter for."""
+LEAST_PROBABILITY = 1e-6
+"""Of a hypothesis, however long another was right: what a cell lacks may come later."""
+MOST_EVIDENCE_OF_A_TAP = math.log(1e3)
+"""ln of the factor by which one tap may tell two hypotheses apart: an outlier is no proof."""
+GAP_EVIDENCE = math.log(1e4)
+"""ln of the Bayes factor from which on the model is said to lack something: 1 in 10 000 cells is false."""
+
+
+def prior(
+    stiffness: float, damping: float, mu_s: float, mu_k: float, viscous: float, friction_std: float = 0.35
+) -> PlannerPosterior:
+    """Posterior before the first tap, under all hypotheses; arguments as in `prior_of_plant`."""
+    plant = prior_of_plant(stiffness, damping, mu_s, mu_k, viscous, friction_std)
+    parts = [_with_weights(plant, std) for std in WEIGHTS_STD]
+    return join(parts, PROBABILITIES, plant)
+
+
+def _with_weights(plant: PlannerPosterior, std: float) -> PlannerPosterior:
+    covs = plant.covs.copy()
+    weights = np.arange(PARAMETERS, PARAMETERS + FEATURES)
+    covs[:, weights, weights] = std**2
+    covs[:, VISCOUS, VISCOUS] += (std * VISCOUS_N_S_PER_M) ** 2
+    return replace(plant, covs=covs)
+
+
+def parts_of(posterior: PlannerPosterior) -> list[PlannerPosterior]:
+    """Posterior under each hypothesis, as if there were no other."""
+    parts = []
+    for n, probability in enumerate(posterior.probabilities):
+        chosen = posterior.hypotheses == n
+        part = replace(
+            posterior,
+            weights=posterior.weights[chosen] / probability,
+            means=posterior.means[chosen],
+            covs=posterior.covs[chosen],
+            scatter_weights=posterior.scatter_weights[n : n + 1],
+            hypotheses=np.zeros(int(chosen.sum())),
+        )
+        parts.append(part)
+    return parts
+
+
+def join(
+    parts: Sequence[PlannerPosterior], probabilities: Samples, posterior: PlannerPosterior
+) -> PlannerPosterior:
+    """Posterior of all hypotheses; what does not belong to one of them is that of `posterior`."""
+    floored = np.maximum(probabilities / probabilities.sum(), LEAST_PROBABILITY)
+    floored /= floored.sum()
+    return replace(
+        posterior,
+        weights=np.concatenate([p * part.weights for p, part in zip(floored, parts, strict=True)]),
+        means=np.concatenate([part.means for part in parts]),
+        covs=np.concatenate([part.covs for part in parts]),
+        scatter_weights=np.concatenate([part.scatter_weights for part in parts]),
+        hypotheses=np.repeat(np.arange(float(len(parts))), [part.weights.size for part in parts]),
+    )
+
+
+def reweighted(probabilities: Samples, log_evidence: Samples) -> Samples:
+    """Probabilities of the hypotheses after a tap that they foretold with these log densities."""
+    told = np.maximum(log_evidence, log_evidence.max() - MOST_EVIDENCE_OF_A_TAP)
+    likely = probabilities * np.exp(told - told.max())
+    after: Samples = likely / likely.sum()
+    return after
+
+
+def log_bayes_factor(posterior: PlannerPosterior) -> float:
+    """Evidence that something is missing: Bayes factor of the other hypotheses over the first, ln."""
+    probabilities = posterior.probabilities
+    if probabilities.size < WEIGHTS_STD.size:
+        return 0.0
+    right = float(probabilities[0])
+    odds = math.log((1.0 - right) / right)
+    return odds - math.log((1.0 - PROBABILITIES[0]) / PROBABILITIES[0])
+
+
+def tap_predictions(posterior: PlannerPosterior) -> TapPredictions:
+    """Say what the taps so far tell of the model: whether it lacks something, and on what that depends."""
+    gap = log_bayes_factor(posterior)
+    if gap >= GAP_EVIDENCE or not posterior.watch.alarming:
+        probabilities = posterior.probabilities
+        likeliest = parts_of(posterior)[1 + int(probabilities[1:].argmax()) if probabilities.size > 1 else 0]
+        weights = slice(PARAMETERS, None)
+        depends_on, size, std = largest_weight(likeliest.mean[weights], likeliest.cov[weights, weights])
+        evidence = Evidence(statistic=gap, threshold=GAP_EVIDENCE, size=size, size_std=std)
+        return TapPredictions(posterior.taps, gap >= GAP_EVIDENCE, depends_on, evidence)
+    off = math.log(posterior.watch.evidence)
+    size = posterior.watch.score * posterior.scatter
+    evidence = Evidence(statistic=off, threshold=math.log(ALARM), size=size, size_std=posterior.scatter)
+    return TapPredictions(posterior.taps, lacking=True, depends_on="", evidence=evidence)
+
+
+def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
+    """Posterior after one more score of its predictions; where they turn out to be off, taps become cautious.
+
+    A planner in doubt knows less of discrepancy and scatter than it thought: the probabilities of both move
+    halfway back to where they began.
+    """
+    watched = place_bets(posterior.watch, score)
+    probabilities = posterior.probabilities
+    if posterior.watch.doubted or not watched.doubted:
+        return replace(posterior, watch=watched)
+    scatter = np.sqrt(posterior.scatter_weights * prior_weights())
+    doubting = replace(posterior, scatter_weights=scatter / scatter.sum(axis=1, keepdims=True), watch=watched)
+    if probabilities.size < WEIGHTS_STD.size:
+        return doubting
+    return join(parts_of(doubting), np.sqrt(probabilities * PROBABILITIES), doubting)
+
+
+def condition_on_friction(
+    posterior: PlannerPosterior, mu_k: float, std: float, *, batch_changed: bool
+) -> PlannerPosterior:
+    """Posterior after the tracker reported its level of the kinetic coefficient, under each hypothesis.
+
+    The tracker's level is itself an average over the cycles this posterior has learned from, so the two are
+    not fused as if they were independent: the better informed replaces the other (Jeffrey's rule), and
+    the tracker prevails where they contradict each other. After a batch change friction starts afresh,
+    and what had been learned together with it keeps only its own uncertainty.
+    """
+    before = parts_of(posterior)
+    parts = [_conditioned(part, mu_k, std, batch_changed=batch_changed) for part in before]
+    if all(part is known for part, known in zip(parts, before, strict=True)):
+        return posterior
+    told = posterior if all(part.surprise for part in parts) else replace(posterior, surprise=0.0)
+    return join(parts, posterior.probabilities, told)
+
+
+def _conditioned(part: PlannerPosterior, mu_k: float, std: float, *, batch_changed: bool) -> PlannerPosterior:
+    mean, cov = part.mean, part.cov
+    level, own = math.log(mu_k), float(cov[FRICTION, FRICTION])
+    variance = (std / mu_k) ** 2 + LEVEL_STD**2
+    difference = level - float(mean[FRICTION])
+    contradicts = difference**2 > 9.0 * (own + variance)
+    if batch_changed or contradicts:
+        variance += BATCH_STD**2 if batch_changed else 0.09 * difference**2
+        mean[FRICTION] = level
+        cov[FRICTION, :] = cov[:, FRICTION] = 0.0
+        cov[FRICTION, FRICTION] = variance
+        return replace(with_single_gaussian(part, mean, cov), surprise=0.0)
+    if variance >= own:
+        return part
+    regression = cov[:, FRICTION] / own
+    mean = mean + regression * difference
+    cov = cov - np.outer(regression, regression) * (own - variance)
+    return with_single_gaussian(part, mean, cov)

@@ -1,0 +1,99 @@
+"""Hypotheses of what the model lacks: told apart by what they foretold, and never by one tap alone."""
+
+import math
+
+import numpy as np
+import pytest
+
+from impactcell.positioning.displacement_discrepancy import FEATURES
+from impactcell.positioning.model_hypotheses import (
+    GAP_EVIDENCE,
+    LEAST_PROBABILITY,
+    MOST_EVIDENCE_OF_A_TAP,
+    PROBABILITIES,
+    WEIGHTS_STD,
+    join,
+    log_bayes_factor,
+    parts_of,
+    prior,
+    reweighted,
+    tap_predictions,
+    with_score,
+)
+from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior
+from impactcell.positioning.posterior_update import update_posterior
+from impactcell.positioning.tap_model import TapModel
+
+SLIDE_M = 5e-3
+START = prior(6.5e5, 465.0, 0.2, 0.152, 0.0, friction_std=0.01)
+
+
+def slide(features: np.ndarray) -> TapModel:
+    """A tap that slides as far as friction lets it, with this phi."""
+    return TapModel(
+        lambda states: SLIDE_M * np.exp(math.log(0.152) - states[:, 0]) * (1.0 - states[:, PARAMETERS]),
+        features,
+    )
+
+
+def taught(weights: np.ndarray, taps: int, seed: int) -> tuple[PlannerPosterior, list[float]]:
+    """Posterior after taps of a cell that lacks phi · weights, and the evidence after each."""
+    rng, posterior, evidence = np.random.default_rng(seed), START, []
+    for _ in range(taps):
+        features = np.zeros(FEATURES)
+        features[:3] = rng.standard_normal(3)
+        moved = SLIDE_M * math.exp(features @ weights) * (1.0 + 0.03 * rng.standard_normal())
+        posterior = update_posterior(posterior, slide(features), moved)
+        evidence.append(log_bayes_factor(posterior))
+    return posterior, evidence
+
+
+def test_hypotheses_come_apart_and_together_again() -> None:
+    parts = parts_of(START)
+    assert [part.probabilities.size for part in parts] == [1] * WEIGHTS_STD.size
+    for part, std in zip(parts, WEIGHTS_STD, strict=True):
+        np.testing.assert_allclose(np.sqrt(np.diag(part.cov)[PARAMETERS:]), std)
+    again = join(parts, START.probabilities, START)
+    np.testing.assert_allclose(again.probabilities, PROBABILITIES)
+    np.testing.assert_allclose(again.cov, START.cov)
+    np.testing.assert_array_equal(again.hypotheses, START.hypotheses)
+    assert log_bayes_factor(START) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_with_nothing_missing_the_evidence_stays_small() -> None:
+    most = [max(taught(np.zeros(FEATURES), 15, seed)[1]) for seed in range(12)]
+    # Ville: a factor of 100 comes in one cell of a hundred at the most
+    assert sum(evidence > math.log(100.0) for evidence in most) <= 1
+    assert np.median(most) < math.log(3.0)
+
+
+def test_what_is_missing_is_learned_and_told() -> None:
+    weights = np.zeros(FEATURES)
+    weights[1] = 0.12
+    posterior, evidence = taught(weights, 25, 3)
+    assert evidence[-1] > GAP_EVIDENCE
+    predictions = tap_predictions(posterior)
+    assert predictions.lacking
+    assert predictions.depends_on == "velocity"
+    assert predictions.evidence.size == pytest.approx(0.12, abs=4.0 * predictions.evidence.size_std)
+    assert posterior.scatter < 0.05  # not taken for scatter
+
+
+def test_one_tap_is_no_proof() -> None:
+    after = reweighted(PROBABILITIES, np.array([-900.0, -10.0, 0.0]))
+    assert after[0] / after[2] == pytest.approx(
+        PROBABILITIES[0] / PROBABILITIES[2] * math.exp(-MOST_EVIDENCE_OF_A_TAP)
+    )
+
+
+def test_no_hypothesis_is_ever_given_up() -> None:
+    sure = join(parts_of(START), np.array([1.0, 0.0, 0.0]), START)
+    assert (sure.probabilities >= 0.99 * LEAST_PROBABILITY).all()
+
+
+def test_doubt_brings_the_hypotheses_back_halfway() -> None:
+    sure = join(parts_of(START), np.array([1.0, 1e-6, 1e-6]), START)
+    for _ in range(6):
+        sure = with_score(sure, 4.0)
+    assert sure.watch.doubted
+    assert sure.probabilities[2] > 1e-4
