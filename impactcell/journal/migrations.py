@@ -67,6 +67,7 @@ def _planner_2(belief: dict[str, Tree]) -> dict[str, Tree]:
     wide[..., :size, :size] = covs
     for hypothesis, std in enumerate(lacking):
         wide[hypothesis, :, size:, size:] = np.eye(weights) * std**2
+        wide[hypothesis, :, size - 1, size - 1] += model_hypotheses.VISCOUS_STD[hypothesis] ** 2
     std = scatter_hypotheses.FRICTION_STD
     logarithm = -2.0 * belief["shape"] * np.log(std) - belief["rate"] / std**2
     friction = np.exp(logarithm - logarithm.max())

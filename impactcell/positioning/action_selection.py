@@ -29,13 +29,13 @@ class ActionSpace(NamedTuple):
 
 
 class SelectedAction(NamedTuple):
-    """A tap with what is expected of it; `median` is that of its displacement, m."""
+    """A tap with what is expected of it; `mean` is that of its displacement, m."""
 
     velocity_m_s: float
     stroke_m: float
     cost: float
     overshoot: float
-    median: float
+    mean: float
 
 
 @compiled
@@ -110,7 +110,7 @@ def evaluate_actions(
     velocity: float, strokes: Samples, scenarios: Scenarios, remaining: float, nodes: Quadrature, goal: Goal,
     value: ValueFunction,
 ) -> tuple[Samples, Samples, Samples]:  # fmt: skip
-    """Evaluate each stroke at one velocity by the model itself: expected cost, overshoot, median (m)."""
+    """Evaluate strokes at one velocity by the model itself: cost, overshoot and displacement (m) expected."""
     moved = np.empty((strokes.size, nodes.z.size))
     displacement_quantiles(velocity, strokes, scenarios, nodes.z, moved)
     costs, risks = np.empty(strokes.size), np.empty(strokes.size)
@@ -121,7 +121,7 @@ def evaluate_actions(
             costs[j], risks[j] = expected_cost(
                 remaining, moved[j], nodes, goal, value, value.cost.size, math.inf
             )
-    return costs, risks, moved[:, nodes.z.size // 2]
+    return costs, risks, 0.5 * (moved[:, 1:] + moved[:, :-1]) @ nodes.probability
 
 
 def select_action(
@@ -141,7 +141,7 @@ def select_action(
         for velocity, strokes in _neighbours(int(i), float(place), space):
             fine = strokes
             for _ in range(2):
-                costs, risks, medians = evaluate_actions(
+                costs, risks, means = evaluate_actions(
                     velocity, fine, scenarios, remaining, fine_nodes(), goal, value
                 )
                 least = min(least, float(risks.min()))
@@ -149,7 +149,7 @@ def select_action(
                 n = int(costs.argmin())
                 if costs[n] < (best.cost if best is not None else math.inf):
                     best = SelectedAction(
-                        float(velocity), float(fine[n]), float(costs[n]), float(risks[n]), float(medians[n])
+                        float(velocity), float(fine[n]), float(costs[n]), float(risks[n]), float(means[n])
                     )
                 if fine.size < 3 or costs[n] == math.inf:
                     break

@@ -22,6 +22,8 @@ from impactcell.records import Samples
 
 FEATURES = 14
 """Weights of the discrepancy: one a line of phi, psi or beta."""
+INDENTATION = 5
+"""Weight by which the indentation is off."""
 BREAKAWAY = 11
 """First weight of beta."""
 LEARNED_STD = np.full(FEATURES, 0.012)
@@ -38,7 +40,7 @@ WIDTH = 0.5
 """Of the neighbourhood of a stroke, in its logarithm: some 50 % up and down."""
 BEYOND = 1.0
 """Logarithm of the stroke over delta of the second neighbourhood, that of short pushes."""
-RISE = 2.0
+RISE = 1.5
 """A weight of beta counts so many indentations: breakaway is what the model knows least of."""
 LOSS_M = 1e-3
 """Displacement beside which a loss of energy in the contact is told."""

@@ -26,6 +26,8 @@ AIMS = np.array([-0.4, 0.0, 0.4, 0.8, 1.4, 2.2])  # short of the target, in tole
 WORTH_TRYING = 0.7  # taps; one whose median leaves this much more to do than the best is not evaluated
 DISTANCE_WORTH = 5.0
 """Taps that the whole distance is worth, where nothing but coming nearer counts."""
+LEAST_TARGET_M = 1e-6
+"""Least displacement that a tap is looked for: nearer to the tolerance, less than that brings a part in."""
 SLOTS = 2  # taps kept for each displacement: least spread, least reach beyond
 MOSTLY_STALLED = 0.9  # probability of no progress above which a tap is no way forward
 
@@ -276,7 +278,7 @@ def solve_value_function(table: Samples, nodes: Quadrature, goal: Goal) -> Value
     tolerance = goal.tolerance
     step = max(0.5 * tolerance, 2.5e-4 * furthest)
     grid = graded_grid(1.25 * tolerance, 5.0 * furthest, 0.5 * tolerance, 0.03)
-    targets = graded_grid(min(0.5 * tolerance, 5e-6), furthest, 0.25 * tolerance, 0.03)
+    targets = graded_grid(min(0.5 * tolerance, LEAST_TARGET_M), furthest, 0.25 * tolerance, 0.03)
     targets = targets[targets <= furthest]
     actions = Actions(targets, taps_by_displacement(table, targets, nodes.z), AIMS)
     value = ValueFunction(step, np.zeros(int(grid[-1] / step)), np.zeros(int(grid[-1] / step)))

@@ -1,7 +1,7 @@
 """What lies ahead for parts of one mass: the taps there are, and what is still to do at each distance."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +34,8 @@ STALE = np.concatenate([[0.02, 0.04, 0.08, 0.03, 2.0], np.full(FEATURES, 0.03)])
 """Change of the posterior's mean or standard deviation, in its units, after which a table is made anew."""
 STEEPEST = 3.0
 """Slope of the displacement over the stroke that is followed from one place to another."""
+OUTLOOK_LASTS = 3.0
+"""So many times as much may have been learned before what comes later is told again."""
 SCATTER_Z = np.array([1.0, 3.0])
 """Nodes at which scatter is compared."""
 STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02], [6e-3, 6e-3, 0.04]])
@@ -72,58 +74,94 @@ class PlannerLimits:
         """Tolerance, and what an overshoot may cost."""
         return Goal(self.tolerance_m, self.penalty(caution))
 
-    def longest_strokes(self, posterior: PlannerPosterior, part: Samples) -> Samples:
+    def longest_strokes(self, velocities: Samples, posterior: PlannerPosterior, part: Samples) -> Samples:
         """Longest stroke at each velocity that the limit of force allows."""
         if math.isinf(self.max_force_n):
-            return np.full(self.velocities.size, math.inf)
-        return allowed_strokes(self.velocities, self.max_force_n, stiffest(posterior), part[0], part[1])
+            return np.full(velocities.size, math.inf)
+        return allowed_strokes(velocities, self.max_force_n, stiffest(posterior), part[0], part[1])
 
     def space(self, posterior: PlannerPosterior, part: Samples, strokes: Samples) -> ActionSpace:
         """Taps to choose from."""
-        return ActionSpace(self.velocities, strokes, self.longest_strokes(posterior, part))
+        velocities = self.velocities
+        return ActionSpace(velocities, strokes, self.longest_strokes(velocities, posterior, part))
 
 
-class LookaheadTable(NamedTuple):
-    """Taps and cost to go for parts of one mass, and the posterior they were worked out from.
+class Knowledge(NamedTuple):
+    """What a table hangs on: mean and standard deviation of the posterior, and the scatter at `SCATTER_Z`."""
 
-    `table` (m), shape (velocities, strokes, nodes), holds for `place`; `sliding` is the share of each
+    mean: Samples
+    std: Samples
+    scatter: Samples
+
+
+def knowledge_of(posterior: PlannerPosterior) -> Knowledge:
+    """Return what a table made now would hang on."""
+    scatter = quantile_scales(posterior.mixed_scatter, SCATTER_Z)
+    return Knowledge(posterior.mean, np.sqrt(np.diag(posterior.cov)), scatter)
+
+
+def near(now: Knowledge, then: Knowledge, times: float) -> bool:
+    """Whether what is known now differs by less than so many times what makes a table stale."""
+    return bool(
+        (np.abs(now.scatter - then.scatter) < times * (STALE_SCATTER + 0.1 * then.scatter)).all()
+        and (np.abs(now.mean - then.mean) < times * STALE).all()
+        and (np.abs(now.std - then.std) < times * STALE).all()
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlook:
+    """Cost to go at each distance; `ahead` (m) are the taps that come later, when more is known."""
+
+    knowledge: Knowledge
+    ahead: Samples
+    values: dict[float, ValueFunction] = field(default_factory=dict)
+
+    def value(self, limits: PlannerLimits, caution: float) -> ValueFunction:
+        """Cost to go at this caution; worked out when it is first asked for."""
+        if caution not in self.values:
+            self.values[caution] = solve_value_function(self.ahead, coarse_nodes(), limits.goal(caution))
+        return self.values[caution]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LookaheadTable:
+    """Taps for parts of one mass, what they were worked out from, and the outlook beyond them.
+
+    `table` (m), shape (velocities, strokes, nodes), holds for `place`. `sliding` is the share of each
     displacement that slides, and `indenting` (m) what it changes by with the indentation, relative; shape
     (velocities, strokes).
     """
 
     part: Samples
     place: Samples
-    caution: float
-    posterior: PlannerPosterior
-    scatter: Samples
+    knowledge: Knowledge
     strokes: Samples
     table: Samples
     sliding: Samples
     indenting: Samples
-    value: ValueFunction
+    outlook: Outlook
 
     @property
     def furthest_m(self) -> float:
         """Largest median displacement; 0 where nothing moves the part."""
         return float(np.nanmax(self.table[:, :, COARSE_Z.size // 2], initial=0.0))
 
-    def serves(self, part: Samples, caution: float, posterior: PlannerPosterior, scatter: Samples) -> bool:
-        """Whether it need not be made anew for this part, posterior, and scatter at `SCATTER_Z`."""
-        if caution != self.caution or part.size != self.part.size:
-            return False
-        if abs(part[0] / self.part[0] - 1.0) > SAME_MASS or not np.allclose(part[1:], self.part[1:], 0.02):
-            return False
-        if not (np.abs(scatter - self.scatter) < STALE_SCATTER + 0.1 * self.scatter).all():
-            return False
-        now, then = np.sqrt(np.diag(posterior.cov)), np.sqrt(np.diag(self.posterior.cov))
+    def concerns(self, part: Samples) -> bool:
+        """Whether it was made for parts like this one."""
         return bool(
-            (np.abs(posterior.mean - self.posterior.mean) < STALE).all()
-            and (np.abs(now - then) < STALE).all()
+            part.size == self.part.size
+            and abs(part[0] / self.part[0] - 1.0) <= SAME_MASS
+            and np.allclose(part[1:], self.part[1:], 0.02)
         )
+
+    def serves(self, knowledge: Knowledge) -> bool:
+        """Whether it need not be made anew for what is known now."""
+        return near(knowledge, self.knowledge, 1.0)
 
     def at(self, place: Samples) -> Samples:
         """`table` for a part that lies elsewhere: the discrepancy of the position moves with it."""
-        along, by_mass, direction = self.posterior.mean[PARAMETERS + np.array([3, 4, 9])]
+        along, by_mass, direction = self.knowledge.mean[PARAMETERS + np.array([3, 4, 9])]
         slope = (along + by_mass * MASS_KG / self.part[0]) * (place[0] - self.place[0]) / POSITION_M
         slope += direction * (place[1] - self.place[1])
         if abs(slope) < 1e-3:
@@ -141,23 +179,30 @@ def stiffest(posterior: PlannerPosterior) -> Samples:
 
 
 def build_lookahead(
-    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples, caution: float
+    limits: PlannerLimits,
+    posterior: PlannerPosterior,
+    part: Samples,
+    place: Samples,
+    before: LookaheadTable | None = None,
 ) -> LookaheadTable:
-    """Work out taps and cost to go; `part` and `place` as in `Scenarios`."""
-    indentation = indentation_of(posterior, part)
+    """Work out the taps there are; `part` and `place` as in `Scenarios`, `before` the table it replaces.
+
+    What comes later is told again only where much more is known: it has been planned with learning anyway.
+    """
+    indentation, knowledge = indentation_of(posterior, part), knowledge_of(posterior)
     strokes = limits.strokes(indentation)
     table = _quantiles(limits, strokes, posterior, part, place)
-    value = ValueFunction(1.0, np.ones(1), np.ones(1))
-    if np.nanmax(table[:, :, COARSE_Z.size // 2], initial=0.0) > 0.0:
+    if before is not None and near(knowledge, before.outlook.knowledge, OUTLOOK_LASTS):
+        outlook = before.outlook
+    else:
         later = anticipate_learning(posterior)
         will_learn = (np.diag(posterior.cov) > 1.2 * np.diag(later.cov)).any()
         ahead = _quantiles(limits, strokes, later, part, place) if will_learn else table
         if math.isinf(limits.max_stroke_m):
             ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
-        value = solve_value_function(ahead, coarse_nodes(), limits.goal(caution))
-    scatter = quantile_scales(posterior.mixed_scatter, SCATTER_Z)
+        outlook = Outlook(knowledge, ahead)
     shares = _shares(strokes, indentation, table[:, :, COARSE_Z.size // 2])
-    return LookaheadTable(part, place, caution, posterior, scatter, strokes, table, *shares, value)
+    return LookaheadTable(part, place, knowledge, strokes, table, *shares, outlook)
 
 
 def indentation_of(posterior: PlannerPosterior, part: Samples) -> float:
@@ -182,5 +227,5 @@ def _quantiles(
     velocities = limits.velocities
     scenarios = parameter_scenarios(posterior, COARSE_Z, part, place)
     table = quantile_table(velocities, strokes, scenarios, COARSE_Z)
-    table[strokes > limits.longest_strokes(posterior, part)[:, None]] = math.nan
+    table[strokes > limits.longest_strokes(velocities, posterior, part)[:, None]] = math.nan
     return table

@@ -1,10 +1,11 @@
-"""How much the planner's model lacks: three hypotheses, averaged, and the evidence that it lacks anything.
+"""How much the planner's model lacks: four hypotheses, averaged, and the evidence that it lacks anything.
 
 Under each, the weights of the discrepancy have another standard deviation beforehand: the model is right
-but for a per cent; it is off by what a cell is usually off; something essential is missing. Each hypothesis
-learns parameters, weights and scatter of its own, and each tap shifts its probability by how well it foretold
-that tap (Bayesian model averaging: Hoeting et al., Statistical Science 14, 1999). So scatter and discrepancy
-are told apart, large discrepancies are believed within a few taps, and a model that is right costs none.
+but for some tenths of a per cent; it lacks resistance that grows with speed, for which it has a parameter; it
+is off as models usually are; something essential is missing. Each learns parameters, weights and scatter of
+its own, and each tap shifts its probability by how well it foretold that tap (Bayesian model averaging:
+Hoeting et al., Statistical Science 14, 1999). So scatter and discrepancy are told apart, large discrepancies
+are believed within a few taps, and a model that is right costs none.
 
 With nothing missing the Bayes factor of the others over the first has expectation 1 after any number of taps,
 so that it exceeds 1/alpha at any time with a probability of at most alpha (Ville, 1939).
@@ -16,7 +17,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from impactcell.positioning.displacement_discrepancy import FEATURES, largest_weight
+from impactcell.positioning.displacement_discrepancy import (
+    FEATURES,
+    MASS_KG,
+    SPEED_M_S,
+    largest_weight,
+)
 from impactcell.positioning.planner_posterior import (
     BATCH_STD,
     FRICTION,
@@ -27,16 +33,20 @@ from impactcell.positioning.planner_posterior import (
     prior_of_plant,
     with_single_gaussian,
 )
-from impactcell.positioning.prediction_watch import ALARM, place_bets
+from impactcell.positioning.prediction_watch import ALARM, PredictionWatch, place_bets
 from impactcell.positioning.scatter_hypotheses import prior_weights
 from impactcell.records import Evidence, Samples, TapPredictions
 
-WEIGHTS_STD = np.array([0.008, 0.035, 0.16])
+WEIGHTS_STD = np.array([0.002, 0.005, 0.025, 0.16])
 """Of the weights beforehand, under each hypothesis: relative to a displacement, or to an indentation."""
-PROBABILITIES = np.array([0.75, 0.17, 0.08])
+VISCOUS_STD = np.array([0.0, 60.0, 4.0, 24.0])
+"""Of k_v beforehand on top of what the model says, N s/m: as much as slows a light part by half."""
+PROBABILITIES = np.array([0.72, 0.06, 0.15, 0.07])
 """Of the hypotheses before the first tap: most models are right but for friction; a choice."""
-VISCOUS_N_S_PER_M = 150.0
-"""What k_v is off by where a weight of the discrepancy is 1: this the model has a parameter for."""
+RESISTANCE = 1
+"""The hypothesis that resistance grows with speed and nothing else is missing."""
+GRAVITY_M_S2 = 9.81
+"""For what is said of a resistance in per cent of friction."""
 LEAST_PROBABILITY = 1e-6
 """Of a hypothesis, however long another was right: what a cell lacks may come later."""
 MOST_EVIDENCE_OF_A_TAP = math.log(1e3)
@@ -50,15 +60,15 @@ def prior(
 ) -> PlannerPosterior:
     """Posterior before the first tap, under all hypotheses; arguments as in `prior_of_plant`."""
     plant = prior_of_plant(stiffness, damping, mu_s, mu_k, viscous, friction_std)
-    parts = [_with_weights(plant, std) for std in WEIGHTS_STD]
+    parts = [_lacking(plant, *std) for std in zip(WEIGHTS_STD, VISCOUS_STD, strict=True)]
     return join(parts, PROBABILITIES, plant)
 
 
-def _with_weights(plant: PlannerPosterior, std: float) -> PlannerPosterior:
+def _lacking(plant: PlannerPosterior, std: float, viscous_std: float) -> PlannerPosterior:
     covs = plant.covs.copy()
     weights = np.arange(PARAMETERS, PARAMETERS + FEATURES)
     covs[:, weights, weights] = std**2
-    covs[:, VISCOUS, VISCOUS] += (std * VISCOUS_N_S_PER_M) ** 2
+    covs[:, VISCOUS, VISCOUS] += viscous_std**2
     return replace(plant, covs=covs)
 
 
@@ -118,15 +128,39 @@ def tap_predictions(posterior: PlannerPosterior) -> TapPredictions:
     gap = log_bayes_factor(posterior)
     if gap >= GAP_EVIDENCE or not posterior.watch.alarming:
         probabilities = posterior.probabilities
-        likeliest = parts_of(posterior)[1 + int(probabilities[1:].argmax()) if probabilities.size > 1 else 0]
-        weights = slice(PARAMETERS, None)
-        depends_on, size, std = largest_weight(likeliest.mean[weights], likeliest.cov[weights, weights])
+        likeliest = 1 + int(probabilities[1:].argmax()) if probabilities.size > 1 else 0
+        part, weights = parts_of(posterior)[likeliest], slice(PARAMETERS, None)
+        depends_on, size, std = largest_weight(part.mean[weights], part.cov[weights, weights])
+        if likeliest == RESISTANCE:
+            # of the force of friction, at a speed and a mass in the middle
+            relative = SPEED_M_S / (part.mu_k * MASS_KG * GRAVITY_M_S2)
+            depends_on, size = "velocity", -relative * float(part.mean[VISCOUS])
+            std = relative * math.sqrt(float(part.cov[VISCOUS, VISCOUS]))
         evidence = Evidence(statistic=gap, threshold=GAP_EVIDENCE, size=size, size_std=std)
         return TapPredictions(posterior.taps, gap >= GAP_EVIDENCE, depends_on, evidence)
     off = math.log(posterior.watch.evidence)
     size = posterior.watch.score * posterior.scatter
     evidence = Evidence(statistic=off, threshold=math.log(ALARM), size=size, size_std=posterior.scatter)
     return TapPredictions(posterior.taps, lacking=True, depends_on="", evidence=evidence)
+
+
+def with_model_accepted(posterior: PlannerPosterior) -> PlannerPosterior:
+    """Posterior once the model has been extended by what was missing.
+
+    How far taps move a part is what was learned under the likeliest hypothesis; that is now what the model
+    says, and the hypotheses are about what may be missing beside it. Taps to come have to show whether it is.
+    """
+    if posterior.probabilities.size < WEIGHTS_STD.size:
+        return replace(posterior, watch=PredictionWatch())
+    learned = parts_of(posterior)[int(posterior.probabilities.argmax())]
+    weights = np.arange(PARAMETERS, learned.covs.shape[1])
+    parts = []
+    for std, viscous_std in zip((0.0, *WEIGHTS_STD[1:]), VISCOUS_STD, strict=True):
+        covs = learned.covs.copy()
+        covs[:, weights, weights] += std**2
+        covs[:, VISCOUS, VISCOUS] += viscous_std**2
+        parts.append(replace(learned, covs=covs))
+    return join(parts, PROBABILITIES, replace(posterior, watch=PredictionWatch()))
 
 
 def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:

@@ -18,19 +18,18 @@ from impactcell.positioning.displacement_quantiles import (
 from impactcell.positioning.dynamic_programming import Goal, nearer
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 from impactcell.positioning.lookahead_table import (
-    SCATTER_Z,
     LookaheadTable,
     PlannerLimits,
     build_lookahead,
+    knowledge_of,
     stiffest,
 )
-from impactcell.positioning.model_hypotheses import tap_predictions, with_score
+from impactcell.positioning.model_hypotheses import tap_predictions, with_model_accepted, with_score
 from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.prediction_watch import score_of
 from impactcell.positioning.quadrature import Z
 from impactcell.positioning.safety_limits import largest_force
-from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.positioning.tap_model import model_of_tap
 from impactcell.records import Quality, Samples, Signature, TapPredictions
@@ -38,7 +37,7 @@ from impactcell.records import Quality, Samples, Signature, TapPredictions
 CAUTION = (1.0, 20.0, 400.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
 SHARE_OF_A_STEP = 0.2
 """Of the bound on overshoot, for a tap that only brings the part nearer, so that more is learned there."""
-WORTH_A_STEP = 0.2
+WORTH_A_STEP = 0.05
 """Of the remaining distance that such a tap has to come nearer by."""
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
 REMEMBERED = 64  # tables, of parts of different mass
@@ -121,6 +120,10 @@ class TapPlanner:
         """Go on from what had been learned earlier."""
         self._posterior = posterior
 
+    def accept_model(self) -> None:
+        """Go on with a model that has been extended: what it lacked before is not told again."""
+        self._posterior = with_model_accepted(self._posterior)
+
     @property
     def predictions(self) -> TapPredictions:
         """What the taps so far say of the model: `lacking` where, beyond chance, it lacks something."""
@@ -163,18 +166,17 @@ class TapPlanner:
         part = self._part(mass_kg)
         place = np.array([position_m, math.copysign(1.0, remaining_m)])
         scenarios = parameter_scenarios(self._posterior, Z, part, place)
-        least = 1.0
+        least, lookahead = 1.0, self._lookahead(part, place)
+        if not lookahead.furthest_m > 0.0:
+            return Unreachable(
+                f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
+                f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
+            )
+        space = self._limits.space(self._posterior, part, lookahead.strokes)
+        table = lookahead.at(place)
         for caution in CAUTION:
-            lookahead = self._lookahead(part, place, caution)
-            if not lookahead.furthest_m > 0.0:
-                return Unreachable(
-                    f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
-                    f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
-                )
-            space = self._limits.space(self._posterior, part, lookahead.strokes)
-            table = lookahead.at(place)
             action, safest = select_action(
-                distance, table, lookahead.value, space,
+                distance, table, lookahead.outlook.value(self._limits, caution), space,
                 scenarios, self._limits.goal(caution), self.overshoot_probability,
             )  # fmt: skip
             if action is not None:
@@ -185,7 +187,7 @@ class TapPlanner:
                 distance, table, nearer(distance), space,
                 scenarios, self._limits.goal(caution), SHARE_OF_A_STEP * self.overshoot_probability,
             )  # fmt: skip
-            if action is not None and action.median < WORTH_A_STEP * distance:
+            if action is not None and action.mean < WORTH_A_STEP * distance:
                 action = None
         if action is None:
             return Unreachable(
@@ -216,7 +218,6 @@ class TapPlanner:
         """
         if not (math.isfinite(moved_m) and math.isfinite(mass_kg) and mass_kg > 0.0):
             raise PositioningError(f"cannot learn from a displacement of {moved_m} m of {mass_kg} kg")
-
         part = self._part(mass_kg)
         place = np.array([tap.position_m, float(tap.direction)])
         band = self._band(tap.velocity_m_s, tap.stroke_m, part, place)
@@ -271,16 +272,14 @@ class TapPlanner:
         band: Samples = moved[0]
         return band
 
-    def _lookahead(self, part: Samples, place: Samples, caution: float) -> LookaheadTable:
+    def _lookahead(self, part: Samples, place: Samples) -> LookaheadTable:
         """Outlook for this part, made anew where the posterior has moved on."""
-        scatter = quantile_scales(self._posterior.mixed_scatter, SCATTER_Z)
-        for n, lookahead in enumerate(self._lookaheads):
-            if lookahead.serves(part, caution, self._posterior, scatter):
-                self._lookaheads.append(self._lookaheads.pop(n))
-                return lookahead
-        lookahead = build_lookahead(self._limits, self._posterior, part, place, caution)
-        self._lookaheads.append(lookahead)
-        del self._lookaheads[:-REMEMBERED]
+        knowledge = knowledge_of(self._posterior)
+        alike = (n for n, known in enumerate(self._lookaheads) if known.concerns(part))
+        lookahead = self._lookaheads.pop(n) if (n := next(alike, None)) is not None else None
+        if lookahead is None or not lookahead.serves(knowledge):
+            lookahead = build_lookahead(self._limits, self._posterior, part, place, lookahead)
+        self._lookaheads = [*self._lookaheads[1 - REMEMBERED :], lookahead]
         return lookahead
 
 
@@ -289,11 +288,11 @@ def _ready() -> None:
     """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
     posterior = model_hypotheses.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
     limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
-    part = np.array([20.0, 9.81])
-    place = np.array([0.0, 1.0])
-    lookahead = build_lookahead(limits, posterior, part, place, 1.0)
+    part, place = np.array([20.0, 9.81]), np.array([0.0, 1.0])
+    lookahead = build_lookahead(limits, posterior, part, place)
+    value, space = lookahead.outlook.value(limits, 1.0), limits.space(posterior, part, lookahead.strokes)
     select_action(
-        2e-3, lookahead.table, lookahead.value, limits.space(posterior, part, lookahead.strokes),
+        2e-3, lookahead.table, value, space,
         parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,
     )  # fmt: skip
     tap = Tap(0.02, 2e-4)

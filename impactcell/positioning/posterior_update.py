@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from impactcell.positioning.displacement_discrepancy import FEATURES
+from impactcell.positioning.displacement_discrepancy import FEATURES, INDENTATION
 from impactcell.positioning.model_hypotheses import join, parts_of, reweighted
 from impactcell.positioning.planner_posterior import (
     BATCH_STD,
@@ -118,6 +118,14 @@ def update_hypothesis(
     return merge_components(learned), density
 
 
+def narrow_enough(std: Samples) -> dict[int, float]:
+    """Return the standard deviations that one Gaussian is trusted with.
+
+    Where the discrepancy leaves the indentation uncertain, a crooked response to stiffness does not matter.
+    """
+    return {**NARROW, STIFFNESS: max(NARROW[STIFFNESS], float(std[PARAMETERS + INDENTATION]))}
+
+
 def split_components(posterior: PlannerPosterior) -> PlannerPosterior:
     """Sum of Gaussians, each narrow in friction, then in stiffness, with the posterior's mean and spread.
 
@@ -126,13 +134,14 @@ def split_components(posterior: PlannerPosterior) -> PlannerPosterior:
     weights, means, covs = [], [], []
     for weight, mean, cov in zip(posterior.weights, posterior.means, posterior.covs, strict=True):
         std = np.sqrt(np.diag(cov))
-        wide = next((axis for axis, narrow in NARROW.items() if std[axis] > 1.5 * narrow), None)
+        widths = narrow_enough(std)
+        wide = next((axis for axis, narrow in widths.items() if std[axis] > 1.5 * narrow), None)
         if wide is None:
             weights.append(weight)
             means.append(mean)
             covs.append(cov)
             continue
-        ratio = std[wide] / NARROW[wide]
+        ratio = std[wide] / widths[wide]
         nodes = np.linspace(-2.6, 2.6, 2 * math.ceil(1.3 * ratio) + 1)
         shares = np.exp(-0.5 * nodes**2)
         shares /= shares.sum()
@@ -156,7 +165,7 @@ def merge_components(posterior: PlannerPosterior) -> PlannerPosterior:
     if posterior.weights.size == 1:
         return posterior
     std = np.sqrt(np.diag(posterior.cov))
-    if any(std[axis] > 1.3 * narrow for axis, narrow in NARROW.items()):
+    if any(std[axis] > 1.3 * narrow for axis, narrow in narrow_enough(std).items()):
         return posterior
     return with_single_gaussian(posterior, posterior.mean, posterior.cov)
 

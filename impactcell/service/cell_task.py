@@ -150,7 +150,7 @@ class CellTask:
         design = cell_design(self.cell)
         await self.worker.redesign(design)
         if self._positioning is not None:
-            self._positioning.redesign(design)
+            await self._positioning.redesign(design)
         self.log.info("reloaded; model %s", self.cell.model.name)
 
     async def set_target(self, target_m: float, audit: AuditEntry) -> None:

@@ -144,8 +144,15 @@ class PositioningTask:
                 f"{self._cell.name}: no further tap is commanded, but the module could not be told: {error}"
             ) from error
 
-    def redesign(self, design: CellDesign) -> None:
-        """Go on with another model of the cell; what the planner has learned of its contact stays."""
+    async def redesign(self, design: CellDesign) -> None:
+        """Go on with another model of the cell; what the planner has learned of its contact stays.
+
+        What the model lacked is not told again; taps to come have to show whether the new one lacks any.
+        """
+        if design.model.plant != self._design.model.plant:
+            await self._worker.run(self._planner.accept_model)
+            self._worker.belief = self._planner.posterior
+            self._predictions = self._planner.predictions
         self._design = design
 
     def update_friction(self, snapshot: Snapshot) -> None:

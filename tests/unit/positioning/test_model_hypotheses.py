@@ -18,6 +18,7 @@ from impactcell.positioning.model_hypotheses import (
     prior,
     reweighted,
     tap_predictions,
+    with_model_accepted,
     with_score,
 )
 from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior
@@ -80,20 +81,38 @@ def test_what_is_missing_is_learned_and_told() -> None:
 
 
 def test_one_tap_is_no_proof() -> None:
-    after = reweighted(PROBABILITIES, np.array([-900.0, -10.0, 0.0]))
-    assert after[0] / after[2] == pytest.approx(
-        PROBABILITIES[0] / PROBABILITIES[2] * math.exp(-MOST_EVIDENCE_OF_A_TAP)
+    after = reweighted(PROBABILITIES, np.array([-900.0, -10.0, -5.0, 0.0]))
+    assert after[0] / after[3] == pytest.approx(
+        PROBABILITIES[0] / PROBABILITIES[3] * math.exp(-MOST_EVIDENCE_OF_A_TAP)
     )
 
 
 def test_no_hypothesis_is_ever_given_up() -> None:
-    sure = join(parts_of(START), np.array([1.0, 0.0, 0.0]), START)
+    sure = join(parts_of(START), np.array([1.0, 0.0, 0.0, 0.0]), START)
     assert (sure.probabilities >= 0.99 * LEAST_PROBABILITY).all()
 
 
 def test_doubt_brings_the_hypotheses_back_halfway() -> None:
-    sure = join(parts_of(START), np.array([1.0, 1e-6, 1e-6]), START)
+    sure = join(parts_of(START), np.array([1.0, 1e-6, 1e-6, 1e-6]), START)
     for _ in range(6):
         sure = with_score(sure, 4.0)
     assert sure.watch.doubted
-    assert sure.probabilities[2] > 1e-4
+    assert sure.probabilities[3] > 1e-4
+
+
+def test_an_accepted_model_lacks_nothing_until_taps_show_it_and_plans_as_before() -> None:
+    weights = np.zeros(FEATURES)
+    weights[1] = 0.12
+    posterior, _ = taught(weights, 25, 3)
+    accepted = with_model_accepted(posterior)
+    assert tap_predictions(posterior).lacking
+    assert not tap_predictions(accepted).lacking
+    assert log_bayes_factor(accepted) == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(accepted.mean, posterior.mean, atol=2e-3)
+    rng, again = np.random.default_rng(4), accepted
+    for _ in range(15):  # what the extended model says is right: no alarm comes back
+        features = np.zeros(FEATURES)
+        features[:3] = rng.standard_normal(3)
+        moved = SLIDE_M * math.exp(features @ weights) * (1.0 + 0.03 * rng.standard_normal())
+        again = update_posterior(again, slide(features), moved)
+    assert not tap_predictions(again).lacking

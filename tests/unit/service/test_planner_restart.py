@@ -1,5 +1,6 @@
 """What positioning has learned is there after a restart, and a new task plans with it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
 from impactcell.positioning import PlannerPosterior
+from impactcell.positioning.model_hypotheses import join, parts_of
 from impactcell.records import PositioningState
 from impactcell.service.factory import cell_design, module_link
 from impactcell.service.positioning import PositioningTask
@@ -62,3 +64,23 @@ async def test_the_planner_goes_on_after_a_restart(tmp_path: Path, cell: CellCon
     await second.close()
     with pytest.raises(AssertionError):
         assert_same(untaught, learned)
+
+
+async def test_a_model_that_is_accepted_clears_what_taps_said_of_the_one_before(
+    tmp_path: Path, cell: CellConfig
+) -> None:
+    design = cell_design(cell)
+    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    task = task_of(cell, design, worker)
+    learned = task.belief
+    lacking = join(parts_of(learned), np.array([1e-6, 1e-6, 1e-6, 1.0]), learned)
+    worker.belief = lacking
+    task = task_of(cell, design, worker)
+    assert task.state.predictions.lacking
+    await task.redesign(design)  # settings were read again, the model is the same
+    assert task.state.predictions.lacking
+    plant = replace(design.model.plant, stiffness_n_per_m=1.01 * design.model.plant.stiffness_n_per_m)
+    await task.redesign(replace(design, model=replace(design.model, plant=plant)))
+    assert not task.state.predictions.lacking
+    assert worker.belief is task.belief
+    await worker.close()
