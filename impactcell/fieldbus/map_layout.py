@@ -19,6 +19,10 @@ _LARGEST: Final[Mapping[str, int]] = {
     "u32": 2**32 - 1,
 }
 """Types that count from 0 up, to what; over OPC UA a cycle has 32 bits."""
+_SIGNED: Final = ("i16", "i32", "i64")
+"""Types that show -1, too."""
+_COMMAND_OF_A_BIT: Final = "command_abort"
+"""The only thing written that is on or off."""
 _ECHOED: Final = {
     "acknowledge_cycle": "cycle_counter",
     "acknowledge_session": "session",
@@ -84,8 +88,11 @@ def _kind_faults(registers: Mapping[str, Register]) -> Iterator[str]:
             yield f"register {name} must be a number"
         if name in WRITTEN and not register.writable:
             yield f"register {name} must be writable: the service writes it"
-        if name in _WHOLE and (register.kind == "bit" or register.bit is not None):
+        is_number = name in _WHOLE or (name in WRITTEN and name != _COMMAND_OF_A_BIT)
+        if is_number and (register.kind == "bit" or register.bit is not None):
             yield f"register {name} must be a whole number, not a bit"
+        if name == "command_direction" and register.kind not in _SIGNED:
+            yield f"register {name} must be i16, i32 or i64: it is +1 or -1"
 
 
 def _header_of(registers: Mapping[str, Register]) -> list[Register]:

@@ -167,20 +167,20 @@ async def test_commands_and_flags_may_be_bits(tmp_path: Path) -> None:
                 "state": {"address": 9, "type": "bit", "table": "discrete", "codes": {0: "off", 1: "on"}},
                 "command_abort": {"address": 3, "type": "bit", "table": "coil", "writable": True},
                 "command_sequence": {"address": 4, "type": "u16", "writable": True},
-                "command_direction": {"address": 5, "type": "u16", "bit": 11, "writable": True},
+                "lamp": {"address": 5, "type": "u16", "bit": 11, "writable": True},
             },
         }
     )  # fmt: skip
     device = Image()
     async with connected("tcp", device, tmp_path) as (_, modbus):
         client = RegisterClient(modbus, layout)
-        await client.write_values({"command_abort": 1, "command_sequence": 7, "command_direction": 1})
+        await client.write_values({"command_abort": 1, "command_sequence": 7, "lamp": 1})
         assert device.bits["coil"][3] == 1
         assert (device.words[4], device.words[5]) == (7, 5 | 1 << 11)
-        await client.write_values({"command_abort": 0, "command_direction": 0})
+        await client.write_values({"command_abort": 0, "lamp": 0})
         assert (device.bits["coil"][3], device.words[5]) == (0, 5)
-        values = (await client.read_image(("state", "command_abort", "command_direction"))).values
-        assert values == {"state": int(bits_of(1)[9]), "command_abort": 0, "command_direction": 0}
+        values = (await client.read_image(("state", "command_abort", "lamp"))).values
+        assert values == {"state": int(bits_of(1)[9]), "command_abort": 0, "lamp": 0}
 
 
 @given(st.integers(1, 2_000), st.integers(0, 60_000), st.sampled_from(BITS), st.data())

@@ -285,6 +285,16 @@ def test_the_smallest_map_is_one_and_says_what_it_lacks() -> None:
             "acknowledge_cycle must hold what cycle_counter can show",
         ),
         ("direction", {"address": 9, "type": "bit", "table": "discrete"}, "direction must be a whole number"),
+        (
+            "command_direction",
+            {"address": 9, "type": "bit", "table": "coil", "writable": True},
+            "command_direction must be a whole number, not a bit",
+        ),
+        (
+            "command_direction",
+            {"address": 9, "type": "u16", "writable": True},
+            "command_direction must be i16, i32 or i64: it is +1 or -1",
+        ),
         ("direction", {"address": 9, "type": "u16", "bit": 3}, "direction must be a whole number, not a bit"),
         ("cycle_counter", {"address": 0, "type": "i16"}, "cycle_counter must be u16, u32"),
         ("cycle_counter", {"address": 0, "type": "f32"}, "cycle_counter must be u16, u32"),
