@@ -19,12 +19,6 @@ ARCHIVES = (b"PK\x03\x04", b"PK\x05\x06", b"\x1f\x8b")
 """Begin of a zip, of an empty zip, and of a gzip file."""
 
 
-def is_archive(path: Path) -> bool:
-    """Whether a file is a zip or gzip archive, by its first bytes."""
-    with path.open("rb") as file:
-        return file.read(4).startswith(ARCHIVES)
-
-
 @contextmanager
 def unpacked(path: Path, limits: Limits) -> Iterator[Path]:
     """Give a directory that holds what an archive holds, for as long as the context lasts.
