@@ -1,6 +1,7 @@
 """Process: 24 cells on one OPC UA server, two cycles a second each, with a past of 20 000 cycles."""
 
 import asyncio
+import gc
 import json
 import sys
 import tempfile
@@ -110,6 +111,7 @@ async def main() -> None:
             here.history.values, here.history.alarms = history.values, history.alarms  # type: ignore[method-assign]
             for cell in CELLS:
                 here.raise_alarm(cell=cell)
+            gc.freeze()  # as the service does
             cells = Cells(here)
             tasks = [
                 asyncio.create_task(cells.run(cell, i / RATE_HZ / len(CELLS))) for i, cell in enumerate(CELLS)
