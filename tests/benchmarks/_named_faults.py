@@ -143,7 +143,7 @@ NAMED_FAULTS: Final = (
         "impactcell/service/cell_task.py",
         "await self.worker.record_audit(audit)",
         "pass",
-        ("tests/unit/service", "tests/integration/test_positioning.py"),
+        ("tests/unit/service",),
     ),
     NamedFault(
         "what the planner has learned not restored",

@@ -219,11 +219,12 @@ def tables() -> list[Table]:
         sure = interval(killed, len(real)) if real else ""
         equal = len(tried) - len(real)
         rows.append((room, f"{len(drawn(room))}", f"{equal}", f"{first}", f">= {BAR:.0%}", shown, sure))
-    survivors = [
-        (row["room"], f"{row['file']}: {row['function']}", f"`{row['before']}` to `{row['after']}`",
-         row.get("equivalent", "**not noticed**"))
-        for row in on_file() if not row["killed"]
-    ]  # fmt: skip
+    survivors = []
+    for row in on_file():
+        if not row["killed"]:
+            fault = f"`{row['before']}` to `{row['after']}`".replace("|", "\\|")
+            why = row.get("equivalent", "**not noticed**")
+            survivors.append((row["room"], f"{row['file']}: {row['function']}", fault, why))
     return [
         Table(
             "Single faults in the code that a test of the same room notices",

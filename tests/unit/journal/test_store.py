@@ -249,3 +249,11 @@ def test_no_call_drops_everything_at_once(
         assert left[:3] == [300, 172, 44]
         assert list(journal.captures()) == []
         assert journal._db.execute("SELECT cycle FROM cycles").fetchall() == [(300,)]
+
+
+def test_what_is_no_database_is_not_read_as_a_journal(tmp_path: Path) -> None:
+    text = tmp_path / "text"
+    text.write_bytes(b"nothing of a database\n" * 200)
+    with pytest.raises(ForeignJournalError, match="it is left as it is"):
+        Journal(text, None, read_only=True)
+    assert text.read_bytes() == b"nothing of a database\n" * 200
