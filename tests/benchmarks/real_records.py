@@ -26,6 +26,9 @@ from impactcell.records import Capture, Channel, Samples
 from tests.benchmarks.table import Table
 
 ROWS = Path("bench-results/discrepancy-real.jsonl")
+README = Path("impactcell/discrepancy/README.md")
+MARKS = "<!-- real records: from here -->", "<!-- real records: to here -->"
+"""Between which the table stands in it."""
 STEP_S = 1e-3
 """Sampling of the free pendulum [s]."""
 TORQUE_CONSTANT, RESISTANCE, FULL_SCALE = 0.387, 4.02, 885.0
@@ -331,6 +334,7 @@ def main() -> None:
     parser.add_argument("--way", action="append", choices=[*WAYS], help="only this way; may be repeated")
     parser.add_argument("--rows", type=Path, default=ROWS)
     parser.add_argument("--table", action="store_true", help="only print the table of the rows there are")
+    parser.add_argument("--readme", action="store_true", help="write it into the workflow's README too")
     given = parser.parse_args()
     given.rows.parent.mkdir(parents=True, exist_ok=True)
     given.rows.touch()
@@ -344,7 +348,19 @@ def main() -> None:
         found.append({"set": name, "way": way} | run(motions, base, real.authors))
         with given.rows.open("a", encoding="utf-8") as file:
             file.write(json.dumps(found[-1]) + "\n")
-    print(table(found).markdown())
+    found.sort(key=lambda row: ([*WAYS].index(row["way"]), [*SETS].index(row["set"])))
+    text = table(found).markdown()
+    print(text)
+    if given.readme:
+        write_to_readme(text, missing=len(WAYS) * len(SETS) - len(found))
+
+
+def write_to_readme(text: str, missing: int) -> None:
+    """Put the table between its marks in the workflow's README."""
+    before, _, rest = README.read_text(encoding="utf-8").partition(MARKS[0])
+    _, _, after = rest.partition(MARKS[1])
+    told = f"{missing} of {len(WAYS) * len(SETS)} runs have not been made." if missing else "All runs."
+    README.write_text(f"{before}{MARKS[0]}\n#{text}\n{told}\n{MARKS[1]}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":
