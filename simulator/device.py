@@ -25,7 +25,7 @@ from simulator.cycle import RunningTap
 from simulator.image import RegisterImage
 from simulator.plant import NeverAtRestError, TapInput, simulate_tap
 from simulator.process import strike_conditions
-from simulator.recorder import Recording, record
+from simulator.recorder import Recording, record, reported
 from simulator.scenario import Scenario
 from simulator.scenario_file import MM_PER_MIN
 from simulator.tasks import PartSequence
@@ -188,7 +188,7 @@ class Device:
         header = (
             ended.header(time_ns, self._announcements.batch_id, mass_stated=scenario.part.mass_stated) | rates
         )
-        header |= self._figures(header, ended.met.random)
+        header |= reported(self._image.registers, header, ended.met.random)
         self._rested_s = self._now_s
         self._image.put("state", ModuleState.READY)
         if scenario.positioning is not None:
@@ -203,13 +203,6 @@ class Device:
         self._tell(ended.truth(self._image.session, cycle, time_ns))
         self._show_part()
         self._announcements.announce(self._made, self.cycle)
-
-    def _figures(self, header: Mapping[str, float | str], random: np.random.Generator) -> dict[str, float]:
-        """Give the module's own figures, with the errors that its map tells of."""
-        registers = self._image.registers
-        told = [name for name in ("peak_force", "sliding_distance") if name in registers]
-        stds = {name: registers[name].si_std for name in told if registers[name].std is not None}
-        return {name: float(header[name]) + std * random.standard_normal() for name, std in stds.items()}
 
     def _time_ns(self, own_s: float) -> int:
         return self._epoch_ns and self._epoch_ns + round(own_s / self.scenario.acceleration * 1e9)

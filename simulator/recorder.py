@@ -98,6 +98,15 @@ def record(
     return _spoil(samples, faulty), header
 
 
+def reported(
+    registers: RegisterMap, header: Mapping[str, float | str], random: np.random.Generator
+) -> dict[str, float]:
+    """Return the module's own figures, with the errors that its map tells of."""
+    told = [name for name in ("peak_force", "sliding_distance") if name in registers]
+    stds = {name: registers[name].si_std for name in told if registers[name].std is not None}
+    return {name: float(header[name]) + std * random.standard_normal() for name, std in stds.items()}
+
+
 def _rate(sensor: Sensor, lasts_s: float, room: int) -> int:
     """Rate at which the record fits both its longest duration and its room."""
     most = min(room, max(int(sensor.longest_s * sensor.rate_hz), 1))
