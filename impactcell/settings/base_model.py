@@ -8,7 +8,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from impactcell.campaign import Coordinate, Excitation
-from impactcell.discrepancy.machine import CATALOGUE, Prior, Response, TermChoice
+from impactcell.discrepancy.machine import CATALOGUE, NumberPrior, Response, TermChoice
 from impactcell.discrepancy.machine import BaseModel as MachineModel
 from impactcell.errors import SettingsError
 from impactcell.process import yaml_loader
@@ -30,9 +30,9 @@ class UncertainNumber(_Part):
     value: FiniteFloat = 0.0
     std: NotNegative | Literal["free"]
 
-    def prior(self) -> Prior:
+    def prior(self) -> NumberPrior:
         """Return it as the workflow takes it."""
-        return Prior(self.value, math.inf if self.std == "free" else self.std)
+        return NumberPrior(self.value, math.inf if self.std == "free" else self.std)
 
 
 Number = FiniteFloat | UncertainNumber
@@ -117,7 +117,7 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
     model = MachineModel(
         coordinate=Coordinate(file.coordinate),
         response=Response(file.predicts),
-        inertia=Prior(math.nan) if inertia is None else _prior(inertia),
+        inertia=NumberPrior(math.nan) if inertia is None else _prior(inertia),
         gravity_torque=_prior(file.gravity_torque_n_m),
         terms=tuple(choices),
         position_offset=_prior(nuisances.position_offset),
@@ -158,11 +158,11 @@ def base_model_text(model: MachineModel, excitation: Excitation, provenance: dic
     return HEADER + yaml.safe_dump(mapping, sort_keys=False, allow_unicode=True, width=110)
 
 
-def _prior(number: float | UncertainNumber) -> Prior:
-    return number.prior() if isinstance(number, UncertainNumber) else Prior(number)
+def _prior(number: float | UncertainNumber) -> NumberPrior:
+    return number.prior() if isinstance(number, UncertainNumber) else NumberPrior(number)
 
 
-def _number(prior: Prior) -> float | dict[str, float | str]:
+def _number(prior: NumberPrior) -> float | dict[str, float | str]:
     if prior.is_held:
         return prior.value
     return {"value": prior.value, "std": "free" if math.isinf(prior.std) else prior.std}

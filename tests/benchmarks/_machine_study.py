@@ -22,7 +22,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import (
     BaseModel,
     MachineFinding,
-    Prior,
+    NumberPrior,
     Response,
     TermChoice,
     investigate_machine,
@@ -62,13 +62,15 @@ class Machine:
 
 PENDULUM = Machine(
     BaseModel(
-        coordinate=Coordinate.ROTATION, inertia=Prior(0.02), gravity_torque=Prior(0.55, math.inf),
-        position_offset=Prior(0.0, 0.05), force_offset=Prior(0.0, 0.01),
+        coordinate=Coordinate.ROTATION, inertia=NumberPrior(0.02), gravity_torque=NumberPrior(0.55, math.inf),
+        position_offset=NumberPrior(0.0, 0.05), force_offset=NumberPrior(0.0, 0.01),
     ),
     0.02, 0.6, 0.002, 2e-5,
 )  # fmt: skip
 SLIDE = Machine(
-    BaseModel(response=Response.FORCE, inertia=Prior(2.0, 0.1), force_offset=Prior(0.0, math.inf)),
+    BaseModel(
+        response=Response.FORCE, inertia=NumberPrior(2.0, 0.1), force_offset=NumberPrior(0.0, math.inf)
+    ),
     2.0, 0.0, 3.0, 0.2,
 )  # fmt: skip
 

@@ -15,7 +15,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.app import app
 from impactcell.discrepancy.machine import (
     BaseModel,
-    Prior,
+    NumberPrior,
     Response,
     TermChoice,
     investigate_machine,
@@ -122,9 +122,9 @@ def seal(increase_per_bar: float) -> Campaign:
 
 SEAL = BaseModel(
     response=Response.FORCE,
-    inertia=Prior(0.0),
+    inertia=NumberPrior(0.0),
     terms=(TermChoice("coulomb_friction"), TermChoice("covariate_force", "pressure_bar")),
-    force_offset=Prior(0.0, math.inf),
+    force_offset=NumberPrior(0.0, math.inf),
 )
 
 

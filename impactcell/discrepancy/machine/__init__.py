@@ -1,10 +1,10 @@
 """Any machine with one coordinate: a base model without a cell, and what its records say it lacks."""
 
-from impactcell.discrepancy.machine.base_model import BaseModel, Prior, Response, TermChoice
-from impactcell.discrepancy.machine.finding import FallOfGap, MachineFinding, Model
+from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
 from impactcell.discrepancy.machine.investigation import investigate_machine
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep, Trial
-from impactcell.discrepancy.machine.simulation import SimulationError, simulate_held_out
+from impactcell.discrepancy.machine.simulation import OpenLoopError, simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE, Term
 
 __all__ = [
@@ -12,12 +12,12 @@ __all__ = [
     "BaseModel",
     "ChosenTerm",
     "FallOfGap",
+    "FittedModel",
     "MachineFinding",
-    "Model",
-    "Prior",
+    "NumberPrior",
+    "OpenLoopError",
     "Response",
     "SelectionStep",
-    "SimulationError",
     "Term",
     "TermChoice",
     "Trial",

@@ -15,7 +15,7 @@ class Response(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Prior:
+class NumberPrior:
     """What is known of one number: a standard deviation of 0 holds it, inf leaves it free."""
 
     value: float = 0.0
@@ -50,19 +50,19 @@ class BaseModel:
         Where it is a rotation, I is an inertia [kg m²] and F a torque [N m].
     response : Response
         What is predicted: the position from the force, or the force from the position.
-    inertia : Prior
+    inertia : NumberPrior
         I [kg or kg m²]; nan where each shot states its own.
-    gravity_torque : Prior
+    gravity_torque : NumberPrior
         G = m g l [N m]; 0 and held where gravity does not act.
     terms : tuple of TermChoice
         What the model has beside inertia and gravity.
-    position_offset : Prior
+    position_offset : NumberPrior
         q_0, zero of the position sensor against the vertical [m or rad].
-    force_offset : Prior
+    force_offset : NumberPrior
         F_0 [N or N m].
-    force_gain : Prior
+    force_gain : NumberPrior
         g, relative error of the force [1].
-    delay_s : Prior
+    delay_s : NumberPrior
         How late the force was recorded against the position [s].
     block_s : float
         Length of the blocks that count as independent [s]; nan: from the motion.
@@ -71,12 +71,12 @@ class BaseModel:
 
     coordinate: Coordinate = Coordinate.TRANSLATION
     response: Response = Response.POSITION
-    inertia: Prior = Prior(math.nan)
-    gravity_torque: Prior = Prior()
+    inertia: NumberPrior = NumberPrior(math.nan)
+    gravity_torque: NumberPrior = NumberPrior()
     terms: tuple[TermChoice, ...] = field(default=(TermChoice("coulomb_friction"),))
-    position_offset: Prior = Prior()
-    force_offset: Prior = Prior()
-    force_gain: Prior = Prior()
-    delay_s: Prior = Prior()
+    position_offset: NumberPrior = NumberPrior()
+    force_offset: NumberPrior = NumberPrior()
+    force_gain: NumberPrior = NumberPrior()
+    delay_s: NumberPrior = NumberPrior()
     block_s: float = math.nan
     name: str = "base"

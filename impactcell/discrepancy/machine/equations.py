@@ -12,7 +12,7 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.free_forms import free_columns
-from impactcell.discrepancy.machine.terms import CATALOGUE, Motion, Term
+from impactcell.discrepancy.machine.terms import CATALOGUE, MotionState, Term
 from impactcell.discrepancy.machine.uniform_records import (
     MIN_HALF_SUPPORT,
     MotionScale,
@@ -125,11 +125,11 @@ def _record_rows(
     for choice in (*base.terms, *candidates):
         term = CATALOGUE[choice.identifier]
         value = record.covariates.get(choice.covariate, 0.0)
-        motion = Motion(record.position, velocity, load, value * one)
+        motion = MotionState(record.position, velocity, load, value * one)
         for shape in shape_grid(term, scale):
             for number, feature in enumerate(term.features(motion, shape)):
                 raw[choice.name, shape, number] = -direction * feature if term.is_friction else feature
-    motion = Motion(record.position, velocity, load, one)
+    motion = MotionState(record.position, velocity, load, one)
     raw |= free_columns(motion, direction, (scale.speed, scale.load), (scale.low, scale.high))
     columns = {name: _averaged(values, weight, centres) for name, values in raw.items()}
     columns["inertia", 0.0, 0] = -accelerating

@@ -43,7 +43,7 @@ class FallOfGap:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Model:
+class FittedModel:
     """A fitted model of a machine.
 
     Attributes
@@ -89,7 +89,7 @@ class MachineFinding:
     unconfirmed : tuple of str
     falls : mapping
         Of each established term.
-    nominal, final : Model
+    nominal, final : FittedModel
     training, held_out : Blocks
     train_gaps : (float, float)
         Of the nominal and the final model.
@@ -113,8 +113,8 @@ class MachineFinding:
     established: tuple[str, ...]
     unconfirmed: tuple[str, ...]
     falls: Mapping[str, FallOfGap]
-    nominal: Model
-    final: Model
+    nominal: FittedModel
+    final: FittedModel
     training: Blocks
     held_out: Blocks
     train_gaps: tuple[float, float]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from impactcell.discrepancy.machine.terms import Motion
+from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.records import Samples
 
 KNOTS = 7
@@ -41,13 +41,13 @@ PLACES: Mapping[str, str] = {
 
 
 def free_columns(
-    motion: Motion, direction: Samples, largest: tuple[float, float], positions: tuple[float, float]
+    motion: MotionState, direction: Samples, largest: tuple[float, float], positions: tuple[float, float]
 ) -> dict[tuple[str, float, int], Samples]:
     """Columns of all free forms, shape (n,) each.
 
     Parameters
     ----------
-    motion : Motion
+    motion : MotionState
     direction : ndarray, shape (n,)
     largest : (float, float)
         Speed and load.

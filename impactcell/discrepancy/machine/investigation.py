@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.machine.base_model import BaseModel, Prior, Response, TermChoice
+from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.study import Study
 from impactcell.discrepancy.machine.terms import CATALOGUE
@@ -93,19 +93,19 @@ def hold_what_cannot_be_seen(
             for name in ("force_gain", "delay_s")
             if not getattr(base, name).is_held
         ]
-        base = replace(base, force_gain=Prior(), delay_s=Prior(base.delay_s.value))
+        base = replace(base, force_gain=NumberPrior(), delay_s=NumberPrior(base.delay_s.value))
         if not base.inertia.is_held:
             notes.append(
                 "A free motion shows accelerations only: the inertia is held at its stated value, "
                 "and every force counts in units that go with it."
             )
-            base = replace(base, inertia=Prior(base.inertia.value))
+            base = replace(base, inertia=NumberPrior(base.inertia.value))
     anchors = [base.inertia, base.force_gain, *([base.gravity_torque] if base.gravity_torque.value else [])]
     if is_driven and base.response is Response.POSITION and all(math.isinf(one.std) for one in anchors):
         notes.append(
             "Inertia, gravity and gain of the force are all free: the inertia is held, as the unit of all."
         )
-        base = replace(base, inertia=Prior(base.inertia.value))
+        base = replace(base, inertia=NumberPrior(base.inertia.value))
     return base, notes
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from scipy.stats import t as student
 
-from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FallOfGap, Model
+from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FallOfGap, FittedModel
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.selection import sign_flip_p
 
@@ -15,13 +15,13 @@ MIN_OPEN_GAP = 1.05
 """Gap above which there is something to close, as in the workflow of shots [1]."""
 
 
-def gap(blocks: Blocks, model: Model) -> float:
+def gap(blocks: Blocks, model: FittedModel) -> float:
     """RMS of a model's residuals over the sensors' noise."""
     losses = blocks.losses(model.fit.columns, model.fit.coefficients)
     return math.sqrt(float(losses.sum()) / max(float(blocks.noise.sum()), 1e-300))
 
 
-def fall_of_gap(blocks: Blocks, before: Model, after: Model, seed: int) -> FallOfGap:
+def fall_of_gap(blocks: Blocks, before: FittedModel, after: FittedModel, seed: int) -> FallOfGap:
     """How the held-out gap falls from one model to the next, blocks drawn with replacement."""
     losses = [blocks.losses(model.fit.columns, model.fit.coefficients) for model in (before, after)]
     gap_before, gap_after = gap(blocks, before), gap(blocks, after)
@@ -42,7 +42,7 @@ def fall_of_gap(blocks: Blocks, before: Model, after: Model, seed: int) -> FallO
     return FallOfGap(gap_before, gap_after, closed, low, high, sign_flip_p(losses[0] - losses[1], seed))
 
 
-def expected_gap(blocks: Blocks, model: Model) -> tuple[float, float]:
+def expected_gap(blocks: Blocks, model: FittedModel) -> tuple[float, float]:
     """Range of the gap where nothing is left: about one, by the scatter between blocks."""
     losses = blocks.losses(model.fit.columns, model.fit.coefficients)
     ratio = losses / np.maximum(blocks.noise, 1e-300)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from impactcell.discrepancy.machine.base_model import Prior
+from impactcell.discrepancy.machine.base_model import NumberPrior
 from impactcell.discrepancy.machine.equations import Column, IndexArray, Rows
 from impactcell.records import Samples
 
@@ -111,7 +111,7 @@ def blocks_of(rows: Rows, number: IndexArray, fold: Mapping[int, int]) -> Blocks
 def fit_blocks(
     blocks: Blocks,
     columns: Sequence[Column],
-    priors: Mapping[Column, Prior],
+    priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
 ) -> LinearFit:
     """Fit a model to blocks, with 95 % intervals by the scatter between them (sandwich over blocks)."""
@@ -135,7 +135,7 @@ def fit_blocks(
 def out_of_fold_losses(
     blocks: Blocks,
     columns: Sequence[Column],
-    priors: Mapping[Column, Prior],
+    priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
 ) -> Samples:
     """Squared residual of each block under coefficients fitted without its fold, shape (b,)."""
@@ -152,7 +152,7 @@ def _solve(
     blocks: Blocks,
     chosen: IndexArray,
     columns: Sequence[Column],
-    priors: Mapping[Column, Prior],
+    priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
 ) -> tuple[Samples, Samples]:
     """Coefficients on some blocks, and which of them stand at the end of what they may be."""
@@ -182,12 +182,14 @@ def _solve(
     return coefficients, held
 
 
-def _reach(column: Column, priors: Mapping[Column, Prior]) -> float:
+def _reach(column: Column, priors: Mapping[Column, NumberPrior]) -> float:
     """How far a coefficient may go: a nuisance to two standard deviations of its prior."""
     return PRIOR_REACH * priors[column].std if column in priors else math.inf
 
 
-def _weight(variance_per_piece: float, columns: Sequence[Column], priors: Mapping[Column, Prior]) -> Samples:
+def _weight(
+    variance_per_piece: float, columns: Sequence[Column], priors: Mapping[Column, NumberPrior]
+) -> Samples:
     return np.array(
         [
             variance_per_piece / priors[column].std ** 2
@@ -199,7 +201,7 @@ def _weight(variance_per_piece: float, columns: Sequence[Column], priors: Mappin
 
 
 def _prior_weight(
-    blocks: Blocks, columns: Sequence[Column], coefficients: Samples, priors: Mapping[Column, Prior]
+    blocks: Blocks, columns: Sequence[Column], coefficients: Samples, priors: Mapping[Column, NumberPrior]
 ) -> Samples:
     left = float(blocks.losses(columns, coefficients).sum())
     return _weight(left / (PIECES_PER_BLOCK * len(blocks)), columns, priors)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import Prior, TermChoice
+from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
 from impactcell.discrepancy.machine.equations import Column
 from impactcell.discrepancy.machine.free_forms import FREE_FORMS, KNOTS, PLACES
 from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
@@ -136,7 +136,7 @@ class TermSearch:
     blocks: Blocks
     candidates: Sequence[TermChoice]
     shapes: Mapping[str, tuple[float, ...]]
-    priors: Mapping[Column, Prior]
+    priors: Mapping[Column, NumberPrior]
     nonnegative: frozenset[Column]
 
     def losses(self, columns: Sequence[Column]) -> Samples:

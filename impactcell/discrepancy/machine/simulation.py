@@ -17,8 +17,8 @@ from impactcell.discrepancy.machine.equations import (
     smoothed_acceleration,
     smoothed_speed,
 )
-from impactcell.discrepancy.machine.finding import MachineFinding, Model
-from impactcell.discrepancy.machine.terms import CATALOGUE, Motion
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
+from impactcell.discrepancy.machine.terms import CATALOGUE, MotionState
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
 from impactcell.records import Samples
 
@@ -29,7 +29,7 @@ START_SAMPLES = 5
 
 
 @dataclass(frozen=True, slots=True)
-class SimulationError:
+class OpenLoopError:
     """Error of a simulation over all held-out stretches.
 
     Attributes
@@ -47,7 +47,7 @@ class SimulationError:
     relative_force: float
 
 
-def simulate_held_out(finding: MachineFinding, model: Model) -> SimulationError:
+def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopError:
     """Simulate a model on what was held out."""
     stretches = []
     for place, begin_s, end_s in finding.held_spans:
@@ -66,10 +66,10 @@ def simulate_held_out(finding: MachineFinding, model: Model) -> SimulationError:
     error = np.concatenate([values[mask] for values, mask in zip(simulated, counted, strict=True)]) - value
     rmse = float(np.sqrt(np.mean(error**2)))
     relative = rmse / float(np.sqrt(np.mean(value**2))) if model.base.response is Response.FORCE else math.nan
-    return SimulationError(rmse, 100.0 * (1.0 - rmse / float(value.std())), relative)
+    return OpenLoopError(rmse, 100.0 * (1.0 - rmse / float(value.std())), relative)
 
 
-def _forces(model: Model, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
+def _forces(model: FittedModel, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
     """Force that the measured motion needs; nan where the part rests or turns."""
     half, narrow = half_supports(record, scale)
     velocity, noise = smoothed_speed(record.position, narrow, record.step_s)
@@ -92,7 +92,7 @@ def _forces(model: Model, record: UniformRecord, stretch: slice, scale: MotionSc
 
 
 def _positions(
-    model: Model, stretches: Sequence[tuple[UniformRecord, slice]], period_s: float
+    model: FittedModel, stretches: Sequence[tuple[UniformRecord, slice]], period_s: float
 ) -> list[Samples]:
     """Positions that the measured forces lead to, all stretches at once."""
     records = [record for record, _ in stretches]
@@ -137,7 +137,7 @@ class _Lanes:
 
 
 def _advance(
-    model: Model, machine: _Lanes, state: tuple[Samples, Samples], drive: Samples, step: Samples
+    model: FittedModel, machine: _Lanes, state: tuple[Samples, Samples], drive: Samples, step: Samples
 ) -> tuple[Samples, Samples]:
     """One step of Moreau's scheme, its speeds at the middle of the step."""
     q, v = state
@@ -155,14 +155,14 @@ def _advance(
 
 
 def _terms(
-    model: Model, covariates: Mapping[str, Samples], position: Samples, velocity: Samples, load: Samples
+    model: FittedModel, covariates: Mapping[str, Samples], position: Samples, velocity: Samples, load: Samples
 ) -> tuple[Samples, Samples]:
     """Sum of all smooth forces, and level of friction, shape (n,) each."""
     smooth, friction = np.zeros(position.shape), np.zeros(position.shape)
     for chosen in model.terms:
         term = CATALOGUE[chosen.choice.identifier]
         covariate = covariates[chosen.choice.covariate]
-        features = term.features(Motion(position, velocity, load, covariate), chosen.shape)
+        features = term.features(MotionState(position, velocity, load, covariate), chosen.shape)
         for column, feature in zip(chosen.columns, features, strict=True):
             value = model.value(column) * feature
             if term.is_friction:
@@ -172,7 +172,7 @@ def _terms(
     return smooth, friction
 
 
-def _gravity_deviation(model: Model, position: Samples) -> Samples:
+def _gravity_deviation(model: FittedModel, position: Samples) -> Samples:
     """Torque of gravity beyond its stated value, and by the zero of the position sensor."""
     deviation: Samples = model.gravity * model.nuisance("position_offset") * np.cos(position)
     return deviation - model.nuisance("gravity_torque") * np.sin(position)

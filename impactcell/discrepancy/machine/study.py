@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import BaseModel, Prior, TermChoice
+from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
 from impactcell.discrepancy.machine.equations import (
     Column,
     IndexArray,
@@ -14,7 +14,7 @@ from impactcell.discrepancy.machine.equations import (
     build_rows,
     shape_grid,
 )
-from impactcell.discrepancy.machine.finding import FallOfGap, MachineFinding, Model
+from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import BLOCKS_OF_RECORD, Blocks, blocks_of, fit_blocks
 from impactcell.discrepancy.machine.selection import (
@@ -65,7 +65,7 @@ class Study:
         self.block_s = base.block_s if math.isfinite(base.block_s) else self.scale.period_s
         self.gravity = base.gravity_torque.value
         self.delay_s = base.delay_s.value
-        self.priors: dict[Column, Prior] = {}
+        self.priors: dict[Column, NumberPrior] = {}
         self._set_priors()
         self._rows = lru_cache(maxsize=4)(self._build)
         self.shapes = {
@@ -75,12 +75,12 @@ class Study:
 
     def _set_priors(self) -> None:
         for name in NUISANCES:
-            prior: Prior = getattr(self.base, name)
+            prior: NumberPrior = getattr(self.base, name)
             if prior.is_held or (name == "position_offset" and self.gravity == 0.0):
                 continue
             # The columns are deviations from the stated value, that of the inertia relative to it.
             std = prior.std / prior.value if name == "inertia" and math.isfinite(prior.value) else prior.std
-            self.priors[name, 0.0, 0] = Prior(0.0, std)
+            self.priors[name, 0.0, 0] = NumberPrior(0.0, std)
 
     def _build(self, gravity: float, delay_s: float) -> Rows:
         return build_rows(self.records, self.base, self.candidates, gravity, delay_s)
@@ -136,13 +136,13 @@ class Study:
         """Columns of a model: its free nuisances and its terms."""
         return [*self.priors, *(column for term in terms for column in term.columns)]
 
-    def fit(self, terms: tuple[ChosenTerm, ...], *, settle: bool) -> Model:
+    def fit(self, terms: tuple[ChosenTerm, ...], *, settle: bool) -> FittedModel:
         """Fit a model to the training blocks; with `settle` gravity and delay are found with it."""
         if settle:
             self._settle(terms)
         training, _, _ = self.blocks()
         fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
-        return Model(self.base, terms, fit, self.delay_s, self.gravity)
+        return FittedModel(self.base, terms, fit, self.delay_s, self.gravity)
 
     def _settle(self, terms: tuple[ChosenTerm, ...]) -> None:
         free_gravity = not self.base.gravity_torque.is_held
@@ -255,7 +255,7 @@ class Study:
                 spans.append((place, begin, float(record.time_s[-1])))
         return tuple(spans)
 
-    def _correlation_time(self, model: Model) -> float:
+    def _correlation_time(self, model: FittedModel) -> float:
         """Time over which residuals stay alike: the sum of their correlations to the first below 0."""
         rows = self.rows()
         residual = rows.target - sum(

@@ -13,7 +13,7 @@ from impactcell.records import Samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class MotionState:
     """State of a machine at n samples, each of shape (n,).
 
     Attributes
@@ -33,7 +33,7 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class TermShape:
     """A parameter in which a term is not linear.
 
     Attributes
@@ -67,7 +67,7 @@ class Term:
         It acts against the motion.
     needs_covariate : bool
         It is a law of a column of `shots.csv`.
-    shape : Shape or None
+    shape : TermShape or None
     nonnegative : bool
         A negative strength would give energy.
     has_memory : bool
@@ -78,10 +78,10 @@ class Term:
     equation: str
     reference: str
     strengths: tuple[tuple[str, str], ...]
-    features: Callable[[Motion, float], Samples]
+    features: Callable[[MotionState, float], Samples]
     is_friction: bool = False
     needs_covariate: bool = False
-    shape: Shape | None = None
+    shape: TermShape | None = None
     nonnegative: bool = False
     has_memory: bool = False
 
@@ -135,7 +135,7 @@ CATALOGUE: dict[str, Term] = {
             (("friction_increase", "{F}"),),
             lambda motion, velocity: np.exp(-((motion.velocity / velocity) ** 2))[None],
             is_friction=True,
-            shape=Shape("stribeck_velocity", "speed", SPEED_SHARES),
+            shape=TermShape("stribeck_velocity", "speed", SPEED_SHARES),
             nonnegative=True,
         ),
         Term(
@@ -179,7 +179,7 @@ CATALOGUE: dict[str, Term] = {
             (("sine_amplitude", "{F}"), ("cosine_amplitude", "{F}")),
             lambda motion, period: _waves(motion.position, period),
             is_friction=True,
-            shape=Shape("period", "position", PERIOD_SHARES),
+            shape=TermShape("period", "position", PERIOD_SHARES),
         ),
         Term(
             "periodic_force",
@@ -187,7 +187,7 @@ CATALOGUE: dict[str, Term] = {
             "cogging of a motor or gear",
             (("sine_amplitude", "{F}"), ("cosine_amplitude", "{F}")),
             lambda motion, period: _waves(motion.position, period),
-            shape=Shape("period", "position", PERIOD_SHARES),
+            shape=TermShape("period", "position", PERIOD_SHARES),
         ),
         Term(
             "restoring_force",
@@ -209,7 +209,7 @@ CATALOGUE: dict[str, Term] = {
             "Dahl 1968",
             (("friction", "{F}"),),
             lambda motion, length: _direction(motion.velocity) - _dahl_state(motion.position, length)[None],
-            shape=Shape("presliding_length", "position", LENGTH_SHARES),
+            shape=TermShape("presliding_length", "position", LENGTH_SHARES),
             nonnegative=True,
             has_memory=True,
         ),

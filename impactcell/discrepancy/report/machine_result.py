@@ -8,9 +8,9 @@ from impactcell.discrepancy.machine import (
     CATALOGUE,
     ChosenTerm,
     FallOfGap,
+    FittedModel,
     MachineFinding,
-    Model,
-    SimulationError,
+    OpenLoopError,
     simulate_held_out,
 )
 from impactcell.discrepancy.report.result import FORMAT, round_digits
@@ -147,7 +147,7 @@ def _fall(fall: FallOfGap) -> dict[str, Any]:
     return {"before": round_digits(fall.before), "after": round_digits(fall.after), "closed_ci95": closed}
 
 
-def _simulation(finding: MachineFinding, errors: tuple[SimulationError, SimulationError]) -> dict[str, Any]:
+def _simulation(finding: MachineFinding, errors: tuple[OpenLoopError, OpenLoopError]) -> dict[str, Any]:
     channel = str(finding.base.response)
     symbols = SYMBOLS[finding.base.coordinate]
     when = dict(zip(("before", "after"), errors, strict=True))
@@ -198,7 +198,7 @@ def _parameters(finding: MachineFinding, chosen: ChosenTerm, *, in_full: bool = 
     return document
 
 
-def _nuisances(model: Model) -> dict[str, Any]:
+def _nuisances(model: FittedModel) -> dict[str, Any]:
     document = {
         column[0]: _estimate(model, place)
         for place, column in enumerate(model.fit.columns)
@@ -220,7 +220,7 @@ def _nuisances(model: Model) -> dict[str, Any]:
     return document
 
 
-def _estimate(model: Model, place: int) -> dict[str, Any]:
+def _estimate(model: FittedModel, place: int) -> dict[str, Any]:
     fit = model.fit
     return {
         "value": round_digits(float(fit.coefficients[place])),
