@@ -32,6 +32,8 @@ from tests.benchmarks._positioning_tasks import MOST_TAPS, NOMINAL, RATIO
 RESULTS = Path("bench-results")
 LEVEL_ERROR = 0.01
 """Relative error of the friction that the tracker tells."""
+RESOLUTION_M = 1e-6
+"""Of the encoder: displacements that differ by less are one."""
 TAPS_A_TASK = 3.3
 """About; how many shots an effect that grows from shot to shot takes a cell to have."""
 
@@ -53,6 +55,9 @@ class Attempt:
     steps: int
     planning_s: float
     slowest_s: float
+    tellable: float = (
+        math.nan
+    )  # what somebody who knows the effect has seen of it by now: expected ln of odds
 
 
 class Cell:
@@ -65,6 +70,7 @@ class Cell:
         self.level = math.nan
         self.shots = max(int(TAPS_A_TASK * len(tasks)), 1)
         self.shot = 0
+        self.seen: list[np.ndarray] = []
         self.hidden = {
             name: parameters for name, parameters in condition.effects.items() if name not in SENSOR_ONLY
         }
@@ -81,6 +87,7 @@ class Cell:
             )
             return error * float(nominal.displacement_m[0])
         plant = Plant(task.stiffness, task.damping, mu_s, RATIO * mu_s, effects=self.hidden)
+        nuisances = self.without(task, tap, mu_s)
         strike = TapInput(
             tap.velocity_m_s, task.mass_kg, tap.stroke_m, start_m=position_m, dwell_s=dwell_s,
             shot=self.shot, shots=self.shots, batch=task.batch,
@@ -90,7 +97,38 @@ class Cell:
         except NeverAtRestError:
             return math.nan
         self.factor = motion.mu_k / plant.mu_k
+        self.seen.append(self.in_scatter(motion.displacement_m, nuisances))
         return error * motion.displacement_m
+
+    def without(self, task: CellTask, tap: Tap, mu_s: float) -> np.ndarray:
+        """Displacements (m) without the effect: of the plant, and with friction, k and b 1 % higher."""
+        return np.array(
+            [
+                nominal_taps(
+                    k * task.stiffness, b * task.damping, f * mu_s, f * RATIO * mu_s, task.mass_kg,
+                    tap.velocity_m_s, tap.stroke_m,
+                ).displacement_m[0]
+                for f, k, b in ((1.0, 1.0, 1.0), (1.01, 1.0, 1.0), (1.0, 1.01, 1.0), (1.0, 1.0, 1.01))
+            ]
+        )  # fmt: skip
+
+    def in_scatter(self, moved_m: float, nuisances: np.ndarray) -> np.ndarray:
+        """What the effect does to a tap, and what 1 % of friction, k and b would, in scatters of the tap."""
+        plain, slopes = nuisances[0], nuisances[1:] - nuisances[0]
+        by_friction = 100.0 * self.condition.friction_scatter * slopes[0]
+        by_itself = self.condition.displacement_scatter * plain
+        return np.array([moved_m - plain, *slopes]) / math.hypot(by_friction, by_itself, RESOLUTION_M)
+
+    def tellable(self) -> float:
+        """Half the squared effect that no change of friction, k and b explains: the expected log odds.
+
+        So much a likelihood ratio test with the effect known would see, all nuisances fitted.
+        """
+        if not self.seen:
+            return 0.0
+        seen = np.array(self.seen)
+        fitted, *_ = np.linalg.lstsq(seen[:, 1:], seen[:, 0], rcond=None)
+        return 0.5 * float(((seen[:, 0] - seen[:, 1:] @ fitted) ** 2).sum())
 
     def attempt(self, task: CellTask) -> Attempt:
         """One task from start to end in closed loop."""
@@ -123,7 +161,7 @@ class Cell:
         return Attempt(
             self.condition.key, self.number, task.number, task.mass_kg, task.distance_m, task.tolerance_m,
             taps, end, target - position, int(planner.predictions.lacking), steps, planning,
-            slowest,
+            slowest, self.tellable(),
         )  # fmt: skip
 
 
@@ -137,7 +175,10 @@ def read_attempts(path: Path) -> list[Attempt]:
         return []
     types = Attempt.__annotations__
     with path.open(newline="") as file:
-        return [Attempt(**{name: types[name](row[name]) for name in types}) for row in csv.DictReader(file)]
+        return [
+            Attempt(**{name: types[name](row[name]) for name in types if name in row})
+            for row in csv.DictReader(file)
+        ]
 
 
 def run_cell(condition: Condition, seeds: str, cell: int, count: int) -> list[Attempt]:
