@@ -35,7 +35,7 @@ def certificate(
     own: int,
     issuer: tuple[str, int] | None = None,
     *,
-    ca: bool = False,
+    ca: bool | None = False,
     days: int = 10,
     hash_=None,
 ) -> x509.Certificate:
@@ -45,7 +45,7 @@ def certificate(
     def named(text: str) -> x509.Name:
         return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, text)])
 
-    return (
+    builder = (
         x509.CertificateBuilder()
         .subject_name(named(name))
         .issuer_name(named(issuer_name))
@@ -53,9 +53,10 @@ def certificate(
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - dt.timedelta(days=20))
         .not_valid_after(now + dt.timedelta(days=days))
-        .add_extension(x509.BasicConstraints(ca=ca, path_length=None), critical=True)
-        .sign(key(issuer_key), hash_ or hashes.SHA256())
     )
+    if ca is not None:
+        builder = builder.add_extension(x509.BasicConstraints(ca=ca, path_length=None), critical=True)
+    return builder.sign(key(issuer_key), hash_ or hashes.SHA256())
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +125,7 @@ def test_chains_and_revocation(pki: Path, whose: str) -> None:
         trust.check(der(client))
 
 
-@pytest.mark.parametrize("what", ["expired", "no authority", "forged", "noise"])
+@pytest.mark.parametrize("what", ["expired", "no authority", "no word of authority", "forged", "noise"])
 def test_what_is_refused(pki: Path, what: str) -> None:
     trust = TrustList(pki, URI)
     if what == "expired":
@@ -132,6 +133,9 @@ def test_what_is_refused(pki: Path, what: str) -> None:
         put(pki, "trusted", expired)
     elif what == "no authority":
         put(pki, "trusted", certificate("friend", 1))
+        found = der(certificate("client", 0, ("friend", 1)))
+    elif what == "no word of authority":
+        put(pki, "trusted", certificate("friend", 1, ca=None))
         found = der(certificate("client", 0, ("friend", 1)))
     elif what == "forged":
         put(pki, "trusted", certificate("root", 1, ca=True))
