@@ -20,6 +20,7 @@ from impactcell.positioning import (
 )
 from impactcell.serialization import Migration
 from impactcell.serialization.tree import Tree
+from impactcell.tracking.wear_batch import block_filter
 
 ALARM_NAMES_1: Final[Mapping[str, str]] = {
     "WEAR_LIMIT": "WearLimit",
@@ -162,6 +163,11 @@ _STATE_2_ADDED: Final[Mapping[str, Tree]] = {
     },
 }
 """What a state did not keep before."""
+_WEAR_BLOCKS_3_ADDED: Final[Mapping[str, Tree]] = {
+    "segments": np.zeros((0, block_filter.SEGMENTS, block_filter.WIDTH)),
+    "weighed_until": 0.0,
+}
+"""Format 2 kept all blocks: they are weighed once more, and then forgotten."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
 
@@ -170,6 +176,10 @@ STATE_MIGRATIONS: Final = (
         _state_2,
         renamed=_STATE_2_RENAMED,
         added={**_under("state.alarms.alarms.*", _ALARM_2_ADDED), **_STATE_2_ADDED},
+    ),
+    Migration(
+        added=_under("cell.tracker.wear_blocks", _WEAR_BLOCKS_3_ADDED),
+        dropped=("cell.tracker.wear_blocks.weighed_blocks",),
     ),
 )
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)

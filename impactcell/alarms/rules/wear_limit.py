@@ -1,7 +1,7 @@
 """WearLimit: friction at the reference batch has passed the limit at which the surface counts as worn.
 
 It watches the probability that the level is above the limit, with hysteresis in probability: the level itself
-goes over the limit and back many times while it crosses. What is promised: it comes once that is 95 % sure.
+goes over the limit and back many times while it crosses. What is promised: it comes once that is 97 % sure.
 """
 
 from impactcell.alarms.rule import (
@@ -63,7 +63,7 @@ RULE = AlarmRule(
     title=Message("Wear limit", "Verschleißgrenze"),
     description="The filtered friction has probably passed the wear limit.",
     settings=RuleSettings(
-        severity=700, on_delay=5, off_delay=20, activate_above=0.95, clear_below=0.5, told_step=1.0
+        severity=700, on_delay=5, off_delay=20, activate_above=0.97, clear_below=0.5, told_step=1.0
     ),
     condition_class=ConditionClass.MAINTENANCE,
     input_node="Wear/Level",

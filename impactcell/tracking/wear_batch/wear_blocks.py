@@ -2,13 +2,14 @@
 
 The bank of run lengths has one Gaussian for all pasts of a hypothesis. A step of a few tenths of a standard
 deviation looks like wear for many cycles, and when the next batch comes the bank keeps the mean of both
-stories, though later cycles could have told them apart. So the cycles are kept, as means of `BLOCK` of them,
+stories, though later cycles could have told them apart. So the cycles are taken as means of `BLOCK` of them,
 each an observation of the friction of its batch::
 
     z_k = level + slope (t_k - t_0) + offset + e_k,   offset steps with the hazard of a change
 
-and the evidence of each slope is what all of them say of it (`impactcell.tracking.wear_batch.block_filter`).
-What is older than the blocks is kept as a Gaussian of slope, level and total.
+and go forward through a filter for each slope (`impactcell.tracking.wear_batch.block_filter`). While the
+scale of the noise is being learned the blocks are kept and all are taken in anew; then one by one, and
+forgotten.
 """
 
 import math
@@ -21,45 +22,46 @@ from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch.block_filter import (
     BLOCK,
-    CHANGE,
     CYCLE,
     LEVEL,
+    SEGMENT,
+    SEGMENTS,
     SLOPE,
     TOTAL,
     VALUE,
     WEIGHT,
+    WIDTH,
     BlockModel,
+    Segments,
     filter_slopes,
+    levels,
+    relay,
 )
 from impactcell.tracking.wear_batch.wear_report import WearMoments
 
-MOST_BLOCKS = 200
-"""Closed blocks that are kept; neighbours of one batch are put together to make room."""
-RECENT_BLOCKS = 64
-"""The newest blocks, which are left as they are."""
-LONGEST = 200.0
-"""Cycles at which the length of a block weighs against putting it together as much as a standard deviation
-between the two."""
-MOST_CYCLES = 30_000.0
-"""Span of the blocks; then the older half becomes a Gaussian."""
-FEWEST_BLOCKS = 6
+KEPT_BLOCKS = 64
+"""Closed blocks that are kept and weighed again with every new one: the cycles of commissioning."""
+FEWEST_BLOCKS = 12
 """Blocks before which the bank says as much."""
-RENEWED = 128
-"""The posterior is renewed whenever the blocks have grown by one part in so many."""
 FIRST_SLOPE_STD = 0.02
-"""Half width of the first grid is `SPAN` times this, standard deviations of one estimate a cycle."""
-SLOPES = 11
-"""Slopes that are weighed at a time."""
-SPAN = 4.0
-"""How far they reach, in standard deviations on either side."""
+"""Standard deviation from which the first grid is made, standard deviations of one estimate a cycle."""
+OFFSETS = np.array(
+    [-9.0, -6.5, -4.8, -3.6, -2.8, -2.1, -1.4, -0.7, 0.0, 0.7, 1.4, 2.1, 2.8, 3.6, 4.8, 6.5, 9.0]
+)
+"""Slopes that are weighed at a time, in standard deviations from the mean: far out there may be a slope with
+a batch change more, which later cycles prove right."""
 WIDENED = 1.2
 """Factor of the last standard deviation from which the next grid is made."""
 EDGE = 1e-3
 """Probability of an outermost slope at which the grid is laid again."""
-WIDEST_SPACING = 1.3
-"""Spacing of the grid, in standard deviations of the slope, beyond which it is laid again."""
+MOVED = 1e-2
+"""The same where the blocks are gone: what is known at a slope beyond is less sure than what is lost."""
+WIDEST_SPACING = 1.0
+"""Spacing in the middle of the grid, in standard deviations of the slope, beyond which it is laid again."""
 MOST_GRIDS = 6
 """Grids that are tried; the first is good enough nearly always."""
+SMALLEST_SHARE = 1e-300
+"""Probability of a slope below which its logarithm is not followed."""
 DIFFUSE = 100.0
 """Standard deviation of the level before any block, in standard deviations of one estimate."""
 
@@ -76,14 +78,17 @@ class WearBlocks:
         Slope, level and total before the blocks; the covariance over the variance of a usual estimate, which
         may still be learned.
     blocks : ndarray, shape (n, 4)
-        Oldest first; the last one is still open.
+        Those that may be weighed again, oldest first; the last one is still open.
     open_cycles : int
         Cycles in it.
     slopes : ndarray, shape (j, 4)
         Posterior: slope, its probability, mean and variance of the level at the origin given it; empty before
         the first.
-    weighed_blocks : int
-        Closed blocks that it rests on.
+    segments : ndarray, shape (j, SEGMENTS, WIDTH)
+        Of each slope, after the blocks that are no longer kept, see `block_filter.SEGMENT`; empty while all
+        are.
+    weighed_until : float
+        Cycle of the last of those blocks.
     """
 
     origin: float
@@ -92,7 +97,8 @@ class WearBlocks:
     blocks: Samples = field(default_factory=lambda: np.zeros((0, 4)))
     open_cycles: int = 0
     slopes: Samples = field(default_factory=lambda: np.zeros((0, 4)))
-    weighed_blocks: int = 0
+    segments: Samples = field(default_factory=lambda: np.zeros((0, SEGMENTS, WIDTH)))
+    weighed_until: float = 0.0
 
 
 def begin(index: int, value: float, slope_std: float) -> WearBlocks:
@@ -137,22 +143,29 @@ def append(wear: WearBlocks, index: int, value: float, weight: float, change: fl
 
 
 def update(wear: WearBlocks, model: BlockModel) -> WearBlocks:
-    """Renew the posterior where the blocks have grown enough since the last time."""
+    """Renew the posterior where a block has been closed."""
     closed = len(wear.blocks) - 1
-    if wear.open_cycles > 1 or closed < FEWEST_BLOCKS:
+    if wear.open_cycles > 1 or closed < 1:
+        return wear
+    if len(wear.segments):
+        grid = wear.slopes[:, 0]
+        evidence = np.log(np.maximum(wear.slopes[:, 1], SMALLEST_SHARE) / np.gradient(grid))
+        segments = _records(wear.segments.copy())
+        blocks, before = wear.blocks[:closed], wear.weighed_until
+        evidence += filter_slopes(grid, segments, blocks, wear.origin, before, model)
+        return _renewed(wear, closed, *_relaid(grid, evidence, segments))
+    if closed < FEWEST_BLOCKS:
         return wear
     if len(wear.slopes):
-        wear = _condensed(wear, model)
-        closed = len(wear.blocks) - 1
-        if RENEWED * (closed - wear.weighed_blocks) < closed:
-            return wear
         around = _moments(wear.slopes[:, 0], wear.slopes[:, 1])
     else:
         unit = math.sqrt(model.variance)
         prior = unit * math.sqrt(wear.covariance[SLOPE, SLOPE])
         around = float(wear.mean[SLOPE]), min(FIRST_SLOPE_STD * unit, prior)
     weighed = _weigh(wear, wear.blocks[:closed], model, (around[0], WIDENED * around[1]))
-    return replace(wear, slopes=weighed[:, :4].copy(), weighed_blocks=closed)
+    if closed < KEPT_BLOCKS:
+        return replace(wear, slopes=_posterior(*weighed))
+    return _renewed(wear, closed, *weighed)
 
 
 def moments(wear: WearBlocks, index: int) -> WearMoments:
@@ -182,83 +195,88 @@ def probability_above(wear: WearBlocks, index: int, limit: float) -> float:
     return float(share @ ndtr((level - limit) / np.sqrt(variance)))
 
 
-def _condensed(wear: WearBlocks, model: BlockModel) -> WearBlocks:
-    """Make room for the block that was just opened: the cost of a cycle stays bounded."""
-    if wear.blocks[-1, CYCLE] - wear.origin > MOST_CYCLES:
-        return _shortened(wear, model)
-    if len(wear.blocks) <= MOST_BLOCKS + 1:
-        return wear
-    if np.all(wear.blocks[1:-RECENT_BLOCKS, CHANGE] > 0.0):
-        return _shortened(wear, model)  # no two neighbours are of one batch
-    slope, _ = _moments(wear.slopes[:, 0], wear.slopes[:, 1])
-    blocks = _merged_neighbours(wear.blocks, slope, model.variance)
-    return replace(wear, blocks=blocks, weighed_blocks=max(wear.weighed_blocks - 1, 0))
-
-
-def _merged_neighbours(blocks: Samples, slope: float, variance: float) -> Samples:
-    """Put together the two neighbours that are most likely of one batch and shortest."""
-    weight, cycle, value, change = blocks[:-RECENT_BLOCKS].T
-    apart = np.diff(value) - slope * np.diff(cycle)
-    lengths = np.append(np.diff(cycle), BLOCK)
-    cost = apart**2 / (variance / weight[1:] + variance / weight[:-1])
-    cost += ((lengths[1:] + lengths[:-1]) / LONGEST) ** 2
-    cost[change[1:] > 0.0] = np.inf
-    k = int(np.argmin(cost))
-    total = weight[k] + weight[k + 1]
-    share = weight[k + 1] / total
-    merged = blocks[k].copy()
-    merged[WEIGHT] = total
-    merged[CYCLE] += share * (cycle[k + 1] - cycle[k])
-    merged[VALUE] += share * (value[k + 1] - value[k])
-    return np.vstack([blocks[:k], merged, blocks[k + 2 :]])
-
-
-def _shortened(wear: WearBlocks, model: BlockModel) -> WearBlocks:
-    """Make the older half of the blocks a Gaussian of slope, level and total at its end."""
-    half = (len(wear.blocks) - 1) // 2
-    centre, std = _moments(wear.slopes[:, 0], wear.slopes[:, 1])
-    older = _weigh(wear, wear.blocks[:half], model, (centre, 2.0 * std))
-    slope, share, level, level_variance, total, covariance, total_variance = older.T
-    passed = wear.blocks[half - 1, CYCLE] - wear.origin
-    values = np.array([slope, level + slope * passed, total + slope * passed])
-    mean = values @ share
-    apart = values - mean[:, None]
-    spread = (share * apart) @ apart.T
-    spread[LEVEL, LEVEL] += share @ level_variance
-    spread[TOTAL, TOTAL] += share @ total_variance
-    spread[LEVEL, TOTAL] += share @ covariance
-    spread[TOTAL, LEVEL] += share @ covariance
-    moved = wear.slopes.copy()
-    moved[:, 2] += moved[:, 0] * passed
+def _renewed(
+    wear: WearBlocks, closed: int, grid: Samples, evidence: Samples, segments: Segments
+) -> WearBlocks:
+    """Forget the blocks that have been taken in."""
     return replace(
         wear,
-        origin=wear.origin + passed,
-        mean=mean,
-        covariance=spread / model.variance,
-        blocks=wear.blocks[half:],
-        slopes=moved,
-        weighed_blocks=max(wear.weighed_blocks - half, 0),
+        blocks=wear.blocks[closed:],
+        slopes=_posterior(grid, evidence, segments),
+        segments=segments.view(np.float64).reshape(*segments.shape, WIDTH),
+        weighed_until=float(wear.blocks[closed - 1, CYCLE]),
     )
 
 
-def _weigh(wear: WearBlocks, blocks: Samples, model: BlockModel, around: tuple[float, float]) -> Samples:
-    """Weigh a grid of slopes, shape (j, 7): `WearBlocks.slopes`, then total, covariance, total variance."""
+def _relaid(grid: Samples, evidence: Samples, segments: Segments) -> tuple[Samples, Samples, Segments]:
+    """Lay the grid again where it has become too coarse, or the posterior has moved to its end."""
+    share = _shares(grid, evidence)
+    slope, std = _moments(grid, share)
+    spacing = _spacing(grid)
+    if max(share[0], share[-1]) < MOVED and spacing < WIDEST_SPACING * std:
+        return grid, evidence, segments
+    onto = slope + WIDENED * max(std, 0.5 * spacing) * OFFSETS
+    nearest = np.abs(grid - onto[:, None]).argmin(axis=1)
+    moved = np.zeros_like(segments)
+    gained = relay(grid, segments, onto, moved)
+    return onto, evidence[nearest] + gained, moved
+
+
+def _weigh(
+    wear: WearBlocks, blocks: Samples, model: BlockModel, around: tuple[float, float]
+) -> tuple[Samples, Samples, Segments]:
+    """Weigh a grid of slopes by all blocks: the slopes, the log evidence and the segments of each."""
     slope, std = around
-    covariance = model.variance * wear.covariance
-    weighed = np.empty((SLOPES, 7))
     for _ in range(MOST_GRIDS):
-        grid = slope + std * np.linspace(-SPAN, SPAN, SLOPES)
-        evidence = filter_slopes(grid, blocks, wear.origin, wear.mean, covariance, model, weighed)
-        evidence = evidence - 0.5 * (grid - wear.mean[SLOPE]) ** 2 / covariance[SLOPE, SLOPE]
-        share = np.exp(evidence - evidence.max())
-        share /= share.sum()
-        spacing = grid[1] - grid[0]
+        grid = slope + std * OFFSETS
+        evidence, segments = before_blocks(wear, grid, model.variance)
+        evidence = evidence + filter_slopes(grid, segments, blocks, wear.origin, wear.origin, model)
+        share = _shares(grid, evidence)
+        spacing = _spacing(grid)
         slope, std = _moments(grid, share)
-        weighed[:, 0], weighed[:, 1] = grid, share
         if max(share[0], share[-1]) < EDGE and spacing < WIDEST_SPACING * std:
             break
         std = max(std, 0.5 * spacing)
-    return weighed
+    return grid, evidence, segments
+
+
+def before_blocks(wear: WearBlocks, grid: Samples, variance: float) -> tuple[Samples, Segments]:
+    """Log density of each slope before any block, and what is known of level and total given it."""
+    covariance = variance * wear.covariance
+    apart, spread = grid - wear.mean[SLOPE], covariance[SLOPE, SLOPE]
+    by_slope = covariance[:, SLOPE] / spread
+    given = covariance - np.outer(by_slope, covariance[SLOPE])
+    segments = _records(np.zeros((len(grid), SEGMENTS, WIDTH)))
+    first = segments[:, 0]
+    first["probability"], first["change"] = 1.0, wear.origin
+    first["level"] = wear.mean[LEVEL] + by_slope[LEVEL] * apart
+    first["total"] = wear.mean[TOTAL] + by_slope[TOTAL] * apart
+    first["level_variance"], first["total_variance"] = given[LEVEL, LEVEL], given[TOTAL, TOTAL]
+    first["covariance"] = given[LEVEL, TOTAL]
+    first["level_by_slope"], first["total_by_slope"] = by_slope[LEVEL], by_slope[TOTAL]
+    first["log_by_slope"], first["log_curvature"] = -apart / spread, -1.0 / spread
+    return -0.5 * apart**2 / spread, segments
+
+
+def _posterior(grid: Samples, evidence: Samples, segments: Segments) -> Samples:
+    """Give `WearBlocks.slopes`."""
+    return np.column_stack([grid, _shares(grid, evidence), levels(segments)])
+
+
+def _records(numbers: Samples) -> Segments:
+    return numbers.view(SEGMENT)[..., 0]
+
+
+def _spacing(grid: Samples) -> float:
+    middle = len(grid) // 2
+    return float(grid[middle] - grid[middle - 1])
+
+
+def _shares(grid: Samples, evidence: Samples) -> Samples:
+    """Probability of each slope: of the range that it stands for."""
+    share: Samples = np.exp(evidence - evidence.max()) * np.gradient(grid)
+    share /= share.sum()
+    return share
 
 
 def _moments(values: Samples, shares: Samples) -> tuple[float, float]:

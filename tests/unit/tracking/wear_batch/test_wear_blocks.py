@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from impactcell.journal.migrations import STATE_MIGRATIONS
 from impactcell.tracking import wear_batch
 from impactcell.tracking.wear_batch import (
     BatchKnowledge,
@@ -46,10 +47,15 @@ def test_evidence_level_and_variance_of_each_slope_are_those_of_the_model_in_one
     mean, covariance = np.array([0.0, 0.2, 0.2]), np.full((3, 3), before)
     covariance[0] = covariance[:, 0] = 0.0
     covariance[0, 0] = 1e-10
-    grid, weighed = np.array([-1e-5, 0.0, 3e-6, 1e-5]), np.empty((4, 7))
+    grid = np.array([-1e-5, 0.0, 3e-6, 1e-5])
     walk = 0.01 * STD**2
     model = MODEL._replace(level_walk=walk)
-    evidence = block_filter.filter_slopes(grid, blocks, 0.0, mean, covariance, model, weighed)
+    wear = wear_blocks.WearBlocks(0.0, mean, covariance / STD**2)
+    prior, segments = wear_blocks.before_blocks(wear, grid, STD**2)
+    assert prior == pytest.approx(-0.5 * grid**2 / 1e-10)
+    evidence = block_filter.filter_slopes(grid, segments, blocks[:4], 0.0, 0.0, model)
+    evidence += block_filter.filter_slopes(grid, segments, blocks[4:], 0.0, cycles[3], model)
+    weighed = block_filter.levels(segments)
     later = (np.arange(6) >= 3).astype(float)
     walked = walk * np.minimum.outer(cycles, cycles)
     for slope, log_evidence, row in zip(grid, evidence, weighed, strict=True):
@@ -67,23 +73,81 @@ def test_evidence_level_and_variance_of_each_slope_are_those_of_the_model_in_one
             squares.append(before + walk * cycles[-1] - gain @ crossed + level**2)
         share = STEP_SHARES * densities / (STEP_SHARES @ densities)
         assert log_evidence == pytest.approx(math.log(STEP_SHARES @ densities), abs=1e-9)
-        assert row[2] == pytest.approx(share @ levels, abs=1e-12)
-        assert row[3] == pytest.approx(share @ squares - (share @ levels) ** 2, rel=1e-6)
+        assert row[0] == pytest.approx(share @ levels, abs=1e-12)
+        assert row[1] == pytest.approx(share @ squares - (share @ levels) ** 2, rel=1e-6)
+
+
+def test_what_is_known_at_some_slopes_is_known_at_others_without_the_blocks():
+    """Of one history of changes exactly: the blocks taken in at those slopes say the same."""
+    rng = np.random.default_rng(7)
+    cycles = 8.0 * np.arange(40)
+    values = 0.2 + 2e-6 * cycles + 0.3 * STD * rng.normal(size=40)
+    blocks = np.column_stack([np.full(40, 8.0), cycles, values, np.full(40, SURELY_NONE)])
+    wear = wear_blocks.begin(0, 0.2, 0.1)
+    grid, others = np.linspace(-1e-5, 1e-5, 5), np.linspace(-6e-6, 9e-6, 5)
+    evidence, segments = wear_blocks.before_blocks(wear, grid, STD**2)
+    evidence += block_filter.filter_slopes(grid, segments, blocks, 0.0, 0.0, MODEL)
+    expected, straight = wear_blocks.before_blocks(wear, others, STD**2)
+    expected += block_filter.filter_slopes(others, straight, blocks, 0.0, 0.0, MODEL)
+    moved = np.zeros_like(segments)
+    gained = block_filter.relay(grid, segments, others, moved)
+    nearest = np.abs(grid - others[:, None]).argmin(axis=1)
+    assert evidence[nearest] + gained == pytest.approx(expected, abs=1e-6)
+    assert block_filter.levels(moved) == pytest.approx(block_filter.levels(straight), rel=1e-9)
+
+
+def test_beyond_the_grid_nothing_is_likelier_than_at_its_end():
+    wear = wear_blocks.begin(0, 0.2, 0.1)
+    grid = np.linspace(1e-5, 2e-5, 5)
+    _, segments = wear_blocks.before_blocks(wear, grid, STD**2)  # steep: likelier the nearer to no wear
+    gained = block_filter.relay(grid, segments, np.array([0.0, 1e-5]), np.zeros_like(segments[:2]))
+    assert gained.max() <= 0.0
 
 
 def test_a_long_run_stays_small_and_loses_nothing_of_the_slope():
-    """Without batches it is a line through all cycles, whatever has been put together on the way."""
+    """Without batches it is a line through all cycles, whatever has been forgotten on the way."""
     cycles = 25 * np.arange(3600)
     values = 0.2 + 1e-8 * cycles + STD * np.random.default_rng(2).normal(size=len(cycles))
     wear = taken(values, cycles)
-    assert wear.origin > 0  # the older half has become a Gaussian
-    assert len(wear.blocks) <= wear_blocks.MOST_BLOCKS + 1
+    assert len(wear.blocks) <= 2
+    assert wear.segments.shape == (len(wear_blocks.OFFSETS), block_filter.SEGMENTS, block_filter.WIDTH)
     found = wear_blocks.moments(wear, int(cycles[-1]))
-    used = (wear.weighed_blocks > 0) * (len(cycles) // BLOCK - 2) * BLOCK
+    used = (len(cycles) // BLOCK - 1) * BLOCK
     line, spread = np.polyfit(cycles[:used], values[:used], 1, cov="unscaled")
     std = STD * math.sqrt(spread[0, 0])
     assert abs(found.slope - line[0]) < 0.25 * std
     assert math.sqrt(found.slope_variance) == pytest.approx(std, rel=0.05)
+
+
+def test_blocks_kept_by_an_earlier_version_are_weighed_once_and_go_on():
+    """Format 2 of the state had all blocks of 16 cycles and no segments."""
+    cycles = np.arange(1600)
+    values = 0.2 + 1e-6 * cycles + STD * np.random.default_rng(8).normal(size=1600)
+    means = values.reshape(-1, 16).mean(axis=1)
+    blocks = np.column_stack(
+        [np.full(100, 16.0), 16.0 * np.arange(100) + 7.5, means, np.full(100, SURELY_NONE)]
+    )
+    old = {
+        "origin": 0.0,
+        "mean": np.array([0.0, 0.2, 0.2]),
+        "covariance": wear_blocks.begin(0, 0.2, 0.1).covariance,
+        "blocks": blocks,
+        "open_cycles": 16,
+        "slopes": np.array([[1e-6, 0.5, 0.2, 1e-8], [2e-6, 0.5, 0.2, 1e-8]]),
+        "weighed_blocks": 99,
+    }
+    migrated = STATE_MIGRATIONS[-1]({"cell": {"tracker": {"wear_blocks": old}}})
+    wear = wear_blocks.WearBlocks(**migrated["cell"]["tracker"]["wear_blocks"])
+    wear = wear_blocks.update(wear_blocks.append(wear, 1600, 0.2016, 1.0, SURELY_NONE), MODEL)
+    found = wear_blocks.moments(wear, 1600)
+    line, spread = np.polyfit(cycles, values, 1, cov="unscaled")
+    std = STD * math.sqrt(spread[0, 0])
+    assert len(wear.blocks) == 1
+    assert len(wear.segments) == len(wear_blocks.OFFSETS)
+    assert abs(found.slope - line[0]) < 0.1 * std
+    assert math.sqrt(found.slope_variance) == pytest.approx(std, rel=0.05)
+    nothing = {"cell": {"tracker": {"wear_blocks": None}}}
+    assert STATE_MIGRATIONS[-1](nothing) == nothing
 
 
 def test_the_probability_is_that_of_the_mixture():
