@@ -136,11 +136,10 @@ def relay(grid: Samples, segments: Segments, onto: Samples, moved: Segments) -> 
             segment.probability = math.log(segment.probability) + gained
             top = max(top, segment.probability)
         for i in range(count):
-            moved[k, i].probability = math.exp(moved[k, i].probability - top)
-            total += moved[k, i].probability
-        for i in range(count):
-            moved[k, i].probability /= total
+            total += math.exp(moved[k, i].probability - top)
         evidence[k] = top + math.log(total)
+        for i in range(count):
+            moved[k, i].probability = math.exp(moved[k, i].probability - evidence[k])
         if not grid[0] <= onto[k] <= grid[-1]:
             evidence[k] = min(evidence[k], 0.0)  # nothing was seen there: no more than at the end
     return evidence
