@@ -27,8 +27,9 @@ from tests.benchmarks._mutation_run import LIBRARIES, ROOT, as_it_is, with_fault
 from tests.benchmarks._named_faults import NAMED_FAULTS, faulty_source
 from tests.benchmarks.table import Table
 
-RESULTS = ROOT / "bench-results" / "mutation.jsonl"
-NAMED, NAMED_RESULTS = "named", ROOT / "bench-results" / "mutation-named.jsonl"
+ROWS = ROOT / "tests" / "benchmarks" / "rows"
+RESULTS = ROWS / "mutation.jsonl"
+NAMED, NAMED_RESULTS = "named", ROWS / "mutation-named.jsonl"
 TESTS_FAILED = 1
 """Exit code of pytest when all could be collected and a test failed."""
 SEED = 20261122
