@@ -43,13 +43,13 @@ class ConditionCount:
 
 def stored_counts() -> list[ConditionCount]:
     """Return the rows that are stored."""
-    with (files(__package__) / STORED).open(newline="") as file:
-        return [
-            ConditionCount(
-                row["condition"], row["version"], int(row["tasks"]), int(row["overshot"]), int(row["taps"])
-            )
-            for row in csv.DictReader(file)
-        ]
+    lines = (files(__package__) / STORED).read_text(encoding="utf-8").splitlines()
+    return [
+        ConditionCount(
+            row["condition"], row["version"], int(row["tasks"]), int(row["overshot"]), int(row["taps"])
+        )
+        for row in csv.DictReader(lines)
+    ]
 
 
 def draw(directory: Path) -> list[Path]:
