@@ -21,6 +21,10 @@ SPANS = 7
 """Polynomial pieces of a spline: an S with a fold is followed, a single sample is not. Own choice."""
 SPANS_OF_TABLE = 24
 """The same over the position on the table, where a surface may have waves and spots: a wave takes three."""
+FINE_SPANS = 72
+"""The same where those leave something: two dozen waves."""
+FINE = "_fine"
+"""End of the identifier of a finer term."""
 LOWER, UPPER = "lower", "upper"
 """Names of the parameters that say where the knots lie."""
 
@@ -38,6 +42,16 @@ def _friction_over_position(x: float, _b: float, _c: float, _d: float, p: FloatP
 def _force_over_position(x: float, _v: float, _m: float, _g: float, p: FloatPointer) -> float:
     """s(x) on the part."""
     return spline(x, p, SPANS_OF_TABLE)
+
+
+def _friction_over_position_fine(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
+    """1 + s(x), factor of mu_s and mu_k."""
+    return 1.0 + spline(x, p, FINE_SPANS)
+
+
+def _force_over_position_fine(x: float, _v: float, _m: float, _g: float, p: FloatPointer) -> float:
+    """s(x) on the part."""
+    return spline(x, p, FINE_SPANS)
 
 
 def _drag_over_speed(_x: float, v: float, _m: float, _g: float, p: FloatPointer) -> float:
@@ -116,6 +130,11 @@ class FreeForm:
     dissipates: str = ""
 
     @property
+    def place(self) -> str:
+        """Identifier of the place, whatever the number of pieces."""
+        return self.effect.identifier.removesuffix(FINE)
+
+    @property
     def coefficients(self) -> tuple[str, ...]:
         """Names of the parameters that a fit moves."""
         return tuple(parameter.name for parameter in self.effect.parameters[2:])
@@ -155,6 +174,7 @@ def _form(
     extra: Mapping[LawKind, Law] = MappingProxyType({}),
     constant_is: str = "",
     dissipates: str = "",
+    spans: int = SPANS,
 ) -> FreeForm:
     """Declare a place: its covariate (name, unit, argument), and how its function enters.
 
@@ -168,7 +188,7 @@ def _form(
     )
     coefficients = tuple(
         Parameter(f"c{i}", unit, null=0.0, lower=-1e3 * typical, upper=1e3 * typical, typical=typical)
-        for i in range((SPANS_OF_TABLE if name == "position" else SPANS) + 3)
+        for i in range(spans + 3)
     )
     effect = Effect(
         identifier=identifier,
@@ -193,20 +213,34 @@ _DECLARED = (
         constant_is="mu_k",
         dissipates="mu_k",
     ),
-    _form(
-        "free_friction_over_position",
-        _friction_over_position,
-        ("position", "m", "a"),
-        (LawKind.SCALE, Kind.FRICTION, "1.0 + s", "1", 0.1),
-        "mu (1 + s(x))",
-        constant_is="mu_k",
+    *(
+        _form(
+            f"free_friction_over_position{end}",
+            law,
+            ("position", "m", "a"),
+            (LawKind.SCALE, Kind.FRICTION, "1.0 + s", "1", 0.1),
+            "mu (1 + s(x))",
+            constant_is="mu_k",
+            spans=spans,
+        )
+        for end, law, spans in (
+            ("", _friction_over_position, SPANS_OF_TABLE),
+            (FINE, _friction_over_position_fine, FINE_SPANS),
+        )
     ),
-    _form(
-        "free_force_over_position",
-        _force_over_position,
-        ("position", "m", "a"),
-        (LawKind.BODY, Kind.BODY, "s", "N", 3.0),
-        "s(x) on the part",
+    *(
+        _form(
+            f"free_force_over_position{end}",
+            law,
+            ("position", "m", "a"),
+            (LawKind.BODY, Kind.BODY, "s", "N", 3.0),
+            "s(x) on the part",
+            spans=spans,
+        )
+        for end, law, spans in (
+            ("", _force_over_position, SPANS_OF_TABLE),
+            (FINE, _force_over_position_fine, FINE_SPANS),
+        )
     ),
     _form(
         "free_drag_over_speed",
@@ -268,5 +302,12 @@ _DECLARED = (
 
 """Friction, forces on the part, contact, actuator and sensor: wherever a law of one covariate may act."""
 
-FREE_FORMS: Mapping[str, FreeForm] = MappingProxyType({form.effect.identifier: form for form in _DECLARED})
+_BY_NAME = {form.effect.identifier: form for form in _DECLARED}
+FREE_FORMS: Mapping[str, FreeForm] = MappingProxyType(
+    {name: form for name, form in _BY_NAME.items() if not name.endswith(FINE)}
+)
 """Every place by the identifier of its effect."""
+FINER: Mapping[str, FreeForm] = MappingProxyType(
+    {name: _BY_NAME[name + FINE] for name in FREE_FORMS if name + FINE in _BY_NAME}
+)
+"""Terms with more pieces at the same places, where there are any."""

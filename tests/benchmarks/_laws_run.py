@@ -148,7 +148,7 @@ def run(item: Hidden, job: Job) -> dict[str, Any]:
         return row
     proposed = finding.proposed
     row["law"] = {
-        "place": finding.term.form.effect.identifier,
+        "place": finding.term.form.place,
         "rival_places": list(finding.rival_places),
         "form": None if proposed is None else proposed.functional_form,
         "equivalents": [law.law.functional_form for law in finding.equivalents],
@@ -166,7 +166,7 @@ def _error(item: Hidden, job: Job, finding: LawFinding) -> float | None:
     A constant that the plant has taken up is no error.
     """
     form, seen = finding.term.form, finding.term.visited
-    if item.truth is None or finding.refused or form.effect.identifier != item.place:
+    if item.truth is None or finding.refused or form.place != item.place:
         return None
     truth = item.truth(seen.values, hidden(job)[item.effect])
     if finding.proposed is not None:

@@ -13,12 +13,14 @@ import numpy as np
 from scipy.optimize import fmin
 
 from impactcell.discrepancy.laws.free_term import FreeTerm, equations
-from impactcell.discrepancy.laws.grammar import WAVES, Form, Shaped, name, shaped_terms
+from impactcell.discrepancy.laws.grammar import WAVE_ATOMS, WAVES, Form, Shaped, name, shaped_terms
 from impactcell.physics.bspline import spline_basis
 from impactcell.records import Samples
 
-GRID = 80
-"""Points of the range on which a form is projected on the spline."""
+GRID = 240
+"""Points of the range on which a form is projected on the spline: three for each of the most pieces."""
+WAVE_CYCLES, WAVE_STEP = 25.0, 0.1
+"""Most cycles of a wave in the range, a third of the most pieces, and how finely they are gone through."""
 PAIRS = 400
 """Single-atom terms that are paired into sums, the best first."""
 REFINED = 60
@@ -45,6 +47,8 @@ class Tangent:
         How many were fitted.
     constant : bool
         A constant function is a law of its own.
+    fitted : ndarray, shape (K,)
+        Coefficients of the fitted spline itself.
     others, response : ndarray, shape (p,) and (p, K)
         All other coordinates at zero coefficients, and how they move with the coefficients.
     """
@@ -55,6 +59,7 @@ class Tangent:
     upper: float
     samples: int
     constant: bool
+    fitted: Samples
     others: Samples
     response: Samples
 
@@ -111,7 +116,9 @@ def tangent(term: FreeTerm) -> Tangent:
     others = term.fit.theta[rest] + inverse @ g[rest] - response @ term.coefficients
     span, form = term.visited, term.form
     samples = term.fit.residual.size
-    return Tangent(S, pull, span.lower, span.upper, samples, not form.constant_is, others, response)
+    return Tangent(
+        S, pull, span.lower, span.upper, samples, not form.constant_is, term.coefficients, others, response
+    )
 
 
 def rank_forms(quadratic: Tangent) -> list[RankedForm]:
@@ -149,13 +156,16 @@ def rank_forms(quadratic: Tangent) -> list[RankedForm]:
             continue
         offer(float(pair[place]), (one, other))
     order = sorted(best.values(), key=lambda entry: -entry[0])
-    order = order[:REFINED] + [entry for entry in order[REFINED:] if list(map(_atoms, entry[1])) == [1]]
+    order = order[:REFINED] + [
+        entry for entry in order[REFINED:] if is_simple(tuple(t.term for t in entry[1]))
+    ]
     refined = [projector.refine(terms, cost) for _, terms in order]
-    return sorted(refined, key=lambda item: -item.score)
+    return sorted([*refined, projector.wave(cost)], key=lambda item: -item.score)
 
 
-def _atoms(item: Shaped) -> int:
-    return len(item.term)
+def is_simple(form: Form) -> bool:
+    """Whether a form is one atom, or a wave of any phase: these are looked at whatever their rank."""
+    return list(map(len, form)) == [1] or {term[0].name for term in form if len(term) == 1} == set(WAVES)
 
 
 def _is_wave(one: Shaped, other: Shaped) -> bool:
@@ -196,6 +206,29 @@ class _Projector:
             for shape, value in zip(atom.shapes, values, strict=True)
             if shape.name == "centre"
         )
+
+    def wave(self, cost: float) -> RankedForm:
+        """Wave of any phase that is nearest to the fitted spline itself.
+
+        Over many waves the likelihood is no quadratic: a slip of a quarter of one turns its slope around.
+        """
+        lower, upper, fitted = self.quadratic.lower, self.quadratic.upper, self.quadratic.fitted
+        values = spline_basis(self.points, lower, upper, len(fitted) - 3) @ fitted
+
+        def projected(cycles: float) -> tuple[float, tuple[Shaped, ...], Samples]:
+            terms = tuple(Shaped((atom,), (((upper - lower) / cycles,),)) for atom in WAVE_ATOMS)
+            columns = [item.values(self.points, self.quadratic.reference) for item in terms]
+            design = np.column_stack([*columns, np.ones(len(self.points))])
+            amplitudes = np.asarray(np.linalg.lstsq(design, values)[0], dtype=np.float64)
+            return float(np.sum((values - design @ amplitudes) ** 2)), terms, amplitudes[:2]
+
+        cycles = np.arange(WAVE_STEP, WAVE_CYCLES, WAVE_STEP).tolist()
+        _, terms, amplitudes = min(map(projected, cycles), key=lambda entry: entry[0])
+        coefficients = amplitudes @ np.array([self.coefficients(item) for item in terms])
+        others = self.quadratic.others + self.quadratic.response @ coefficients
+        h, gram = self.against(np.array([self.coefficients(item) for item in terms]))
+        gain = float(amplitudes @ h - 0.5 * amplitudes @ gram @ amplitudes)
+        return RankedForm(terms, tuple(amplitudes.tolist()), gain, gain - 3.0 * cost, others)
 
     def refine(self, terms: tuple[Shaped, ...], cost: float) -> RankedForm:
         """Move the shapes to where the gain is largest."""

@@ -19,7 +19,7 @@ from impactcell.discrepancy.model import (
 )
 from impactcell.errors import DiscrepancyError
 from impactcell.physics.free_column_forms import column_form
-from impactcell.physics.free_forms import FREE_FORMS, LOWER, UPPER, FreeForm
+from impactcell.physics.free_forms import FINER, FREE_FORMS, LOWER, UPPER, FreeForm
 from impactcell.records import Samples
 
 SMOOTHNESS = (1e-6, 1e-4, 1e-2, 1.0)
@@ -32,6 +32,10 @@ PLACES = 4
 """Places that are fitted, of those that promise most to first order."""
 FIRST_TRY = 1e-4
 """Weight of the roughness at which places are compared."""
+FINE_SMOOTHNESS = (1e-6, 1e-4, 1e-2)
+"""Weights that are tried for a term with more pieces."""
+FINE_FROM = 1.3
+"""Mean squared residual from which on a term with more pieces is tried at the place."""
 WORTH_MORE = 4.0
 """Times the least mean squared residual: places within it are fitted at the other weights too."""
 
@@ -117,16 +121,33 @@ def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
             first.append((form, span, {FIRST_TRY: _check(parts, inner_base, form, span, FIRST_TRY)}))
     nearest = min((float(np.mean(errors[FIRST_TRY])) for _, _, errors in first), default=np.inf)
     terms = []
-    for form, span, errors in first:
-        if float(np.mean(errors[FIRST_TRY])) < WORTH_MORE * nearest:
+    for coarse, span, tried in first:
+        if float(np.mean(tried[FIRST_TRY])) < WORTH_MORE * nearest:
             for smoothness in set(SMOOTHNESS) - {FIRST_TRY}:
-                errors[smoothness] = _check(parts, inner_base, form, span, smoothness)
-        smoothness = min(errors, key=lambda weight: float(np.mean(errors[weight])))
+                tried[smoothness] = _check(parts, inner_base, coarse, span, smoothness)
+        form, errors = _finer(parts, inner_base, (coarse, span, tried))
+        smoothness = _best(errors)
         if not np.isfinite(errors[smoothness]).all():
             continue
         extended, whole = _fit(problem, base, form, span, smoothness)
         terms.append(FreeTerm(form, span, extended, whole, smoothness, errors[smoothness]))
     return sorted(terms, key=lambda term: term.check)
+
+
+def _finer(
+    parts: tuple[Problem, Problem], base: Fit, coarse: tuple[FreeForm, Visited, dict[float, Samples]]
+) -> tuple[FreeForm, dict[float, Samples]]:
+    """Take more pieces where a term leaves something and they leave less."""
+    form, span, errors = coarse
+    finer, left = FINER.get(form.place), float(np.mean(errors[_best(errors)]))
+    if finer is None or left <= FINE_FROM:
+        return form, errors
+    fine = {weight: _check(parts, base, finer, span, weight) for weight in FINE_SMOOTHNESS}
+    return (finer, fine) if float(np.mean(fine[_best(fine)])) < left else (form, errors)
+
+
+def _best(errors: dict[float, Samples]) -> float:
+    return min(errors, key=lambda weight: float(np.mean(errors[weight])))
 
 
 def _check(

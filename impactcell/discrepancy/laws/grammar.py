@@ -18,6 +18,8 @@ SCALES = tuple(float(x) for x in np.geomspace(0.04, 4.0, 12))
 wider than four times, no campaign shows."""
 EXPONENTS = (0.25, 0.5, 1.5, 2.5, 4.0)
 """Exponents to start from."""
+CYCLES = (0.25, *(0.5 * count for count in range(1, 49)))
+"""Cycles of a wave in the range gone through to start from: closer ones are alike there."""
 CENTRES = tuple(float(x) for x in np.linspace(0.1, 0.9, 9))
 """Centres to start from, as shares of the range gone through."""
 
@@ -30,7 +32,8 @@ class Shape:
     ----------
     name : str
     grid : tuple of float
-        Starts: over the reference of the covariate, as a share of its range for a centre, else as they are.
+        Starts: over the reference of the covariate, as a share of its range for a centre, as cycles in it
+        for a period, else as they are.
     has_unit : bool
         It is measured in the covariate's unit.
     """
@@ -41,7 +44,7 @@ class Shape:
 
 
 SCALE = Shape("scale", SCALES)
-PERIOD = Shape("period", SCALES)
+PERIOD = Shape("period", CYCLES)
 CENTRE = Shape("centre", CENTRES)
 EXPONENT = Shape("exponent", EXPONENTS, has_unit=False)
 
@@ -110,6 +113,9 @@ ATOMS = (
 WAVES = ("sin(2pi u/p)", "cos(2pi u/p)")
 """Atoms that make one wave of any phase together: they share their period."""
 
+WAVE_ATOMS = tuple(atom for atom in ATOMS if atom.name in WAVES)
+"""The same as atoms."""
+
 Term = tuple[Atom, ...]
 Form = tuple[Term, ...]
 
@@ -154,14 +160,21 @@ def shaped_terms(lower: float, upper: float, *, constant: bool) -> Iterator[Shap
         if not one.shapes and not other.shapes:
             continue
         grids = [
-            list(itertools.product(*(_starts(shape, lower, upper, reference)[::3] for shape in atom.shapes)))
+            list(itertools.product(*(_few(_starts(shape, lower, upper, reference)) for shape in atom.shapes)))
             for atom in (one, other)
         ]
         for pair in itertools.product(*grids):
             yield Shaped((one, other), pair)
 
 
+def _few(starts: tuple[float, ...]) -> tuple[float, ...]:
+    """Four of many starts, as products have."""
+    return starts[:: max(len(starts) // 4, 1)]
+
+
 def _starts(shape: Shape, lower: float, upper: float, reference: float) -> tuple[float, ...]:
     if shape is CENTRE:
         return tuple(lower + share * (upper - lower) for share in shape.grid)
+    if shape is PERIOD:
+        return tuple((upper - lower) / cycles for cycles in shape.grid)
     return tuple(value * reference if shape.has_unit else value for value in shape.grid)

@@ -5,7 +5,6 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 
 from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.effect_file import effect_file
@@ -98,15 +97,22 @@ class Law:
         return evaluate(self.expression, u, known)
 
     def effect(self) -> Effect:
-        """Effect that the text defines, ready to enter a plant."""
-        effect = _run(self.text(), self.identifier)
+        """Effect that the text defines, ready to enter a plant; the same however often the law is found.
+
+        Its identifier tells form and start of the fit: a text with other values is the same law.
+        """
+        effect = _MADE.get(self.identifier) or _run(self.text(), self.identifier)
         add_effect(effect)
+        _MADE[self.identifier] = effect
         return effect
 
 
-@cache
+_MADE: dict[str, Effect] = {}
+"""Effects of the laws found in this process."""
+
+
 def _run(text: str, identifier: str) -> Effect:
-    """Run the text of an effect file; the same text is the same effect, however often it is found."""
+    """Run the text of an effect file."""
     space: dict[str, object] = {"__name__": identifier}
     exec(compile(text, f"<{identifier}>", "exec"), space)  # noqa: S102  # our own text
     effect = space["EFFECT"]

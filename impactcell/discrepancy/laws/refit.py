@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.laws.condense import RankedForm
+from impactcell.discrepancy.laws.condense import RankedForm, is_simple
 from impactcell.discrepancy.laws.free_term import FreeTerm
 from impactcell.discrepancy.laws.grammar import Shaped, name
 from impactcell.discrepancy.laws.law import Law, write_law
@@ -22,6 +22,8 @@ RANGES = (0.03, 0.1, 0.3, 1.0)
 """Ranges of a pull that are tried, over the largest gap."""
 SIMPLIFIED = 5
 """Sums of two terms, the best first, of which each term is then tried alone."""
+FARTHEST = 3.0
+"""Coordinates, most of them logarithms, by which a first-order step is believed: a factor of twenty."""
 MOST_STEPS = 9
 """Gauss-Newton steps of each."""
 TIED_SCORE = 6.0
@@ -62,16 +64,21 @@ class FittedLaw:
 
 def refit_forms(base: Fit, term: FreeTerm, ranked: Sequence[RankedForm]) -> list[FittedLaw]:
     """Fit forms through the simulation, the best first: of those that are tied the simplest."""
-    simple = [entry for entry in ranked[REFITTED:] if list(map(len, entry.form)) == [1]]
+    simple = [entry for entry in ranked[REFITTED:] if is_simple(entry.form)]
     fitted = _fitted(base, term, [*ranked[:REFITTED], *simple])
-    known = {item.law.functional_form for item in fitted}
+    known = {item.law.functional_form: item for item in fitted}
     simpler = {
         name(entry.form): entry
-        for item in fitted[:SIMPLIFIED]
+        for item in reversed(fitted[:SIMPLIFIED])
         for entry in _single_terms(term, item)
-        if name(entry.form) not in known
+        if name(entry.form) not in known or not tied_with(item, known[name(entry.form)])
     }
-    laws = sorted(fitted + _fitted(base, term, list(simpler.values())), key=lambda item: -item.score)
+    best = dict(known)
+    for item in _fitted(base, term, list(simpler.values())):
+        form = item.law.functional_form
+        if form not in best or item.score > best[form].score:
+            best[form] = item
+    laws = sorted(best.values(), key=lambda item: -item.score)
     tied = [item for item in laws if tied_with(laws[0], item)]
     simplest = min(tied, key=lambda item: (len(item.law.parameters), -item.score), default=None)
     return laws if simplest is None else [simplest, *(item for item in laws if item is not simplest)]
@@ -126,23 +133,28 @@ def _refit(base: Fit, term: FreeTerm, entry: RankedForm) -> FittedLaw:
     law.effect()
     held = {name: value for name, value in term.problem.constraints.held.items() if not _of(term, name)}
     problem = term.problem.constrained((*base.effects, law.identifier), Constraints(held))
-    theta = np.concatenate(
-        [
-            entry.others,
-            [
-                coordinate.coordinate(parameter.first)
-                for coordinate, parameter in zip(
-                    problem.coordinates[len(base.coordinates) :], law.parameters, strict=True
-                )
-            ],
-        ]
-    )
+    own = [
+        coordinate.coordinate(parameter.first)
+        for coordinate, parameter in zip(
+            problem.coordinates[len(base.coordinates) :], law.parameters, strict=True
+        )
+    ]
+    # Over many waves a first-order step of the others is worse than none.
+    theta = np.concatenate([base.theta if law.is_wave else _within_bounds(entry.others, base), own])
     if law.place.law_kind is LawKind.PULL:
         theta = _with_best_range(problem, theta, term)
     fitted = fit(problem, theta, term.fit.shot_parameters, spread=term.fit.spread, most_steps=MOST_STEPS)
     per_shot = fitted.log_likelihood(problem.shots)
     cost = 0.5 * len(law.parameters) * math.log(fitted.residual.size)
     return FittedLaw(law, entry, problem, fitted, float(per_shot.sum()) - cost, per_shot)
+
+
+def _within_bounds(theta: Samples, base: Fit) -> Samples:
+    """Coordinates of a first-order step, which may have left all sense, within what a fit may look at."""
+    lower = np.array([coordinate.lower for coordinate in base.coordinates])
+    upper = np.array([coordinate.upper for coordinate in base.coordinates])
+    usable = np.isfinite(theta) & (np.abs(theta - base.theta) < FARTHEST)
+    return np.clip(np.where(usable, theta, base.theta), lower, upper)
 
 
 def _with_best_range(problem: Problem, theta: Samples, term: FreeTerm) -> Samples:
