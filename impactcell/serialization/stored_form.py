@@ -51,8 +51,9 @@ def described(hint: Any) -> Any:
     """Describe the stored form of a type without the name of any class: what a test pins.
 
     >>> from impactcell.records import Summary
-    >>> described(Summary)
-    {'peak_force_n': 'float', 'sliding_distance_m': 'float'}
+    >>> described(Summary)  # doctest: +NORMALIZE_WHITESPACE
+    {'peak_force_n': 'float', 'sliding_distance_m': 'float', 'peak_force_std_n': 'float',
+     'sliding_distance_std_m': 'float'}
     """
     if is_dataclass(hint):
         return {f.key: _described_field(f) for f in fields_of(hint)}

@@ -143,8 +143,10 @@ def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
 
 
 def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
-    hidden = "position_dependent_friction"
-    found = investigate(make(hidden, seed=920030), library=[one for one in LIBRARY if one != hidden])
+    # Without it friction differs by direction, for the parts slide apart: that is asked about first.
+    hidden = {"position_dependent_friction", "direction_asymmetry"}
+    campaign = make("position_dependent_friction", seed=920030)
+    found = investigate(campaign, library=[one for one in LIBRARY if one not in hidden])
     assert found.selection.alternatives[0].effects == ("friction_patch",)
     assert answer(found) == ("unknown", set())
 
