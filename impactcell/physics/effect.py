@@ -146,6 +146,8 @@ class Effect:
     ----------
     equation, reference : str
         The law as one would print it, and where it comes from.
+    meaning, look_at : str
+        What it is in a sentence for whoever knows the machine and no mechanics, and what to look at there.
     phases : tuple of Phase
         Where in a record it shows directly.
     laws : mapping
@@ -173,3 +175,5 @@ class Effect:
     columns: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     dissipates: bool = False
     order: int = 0
+    meaning: str = ""
+    look_at: str = ""

@@ -92,6 +92,9 @@ def test_it_says_what_it_is(identifier: str) -> None:
     assert effect.identifier == identifier
     assert effect.equation
     assert effect.reference
+    assert effect.meaning.endswith(".")
+    assert effect.look_at
+    assert not effect.look_at.endswith(".")  # it goes on a sentence
     assert effect.phases
     assert bool(effect.laws) != (effect.between is not None)
     assert any(not math.isnan(parameter.null) for parameter in effect.parameters)

@@ -32,6 +32,8 @@ EFFECT = Effect(
     kind=Kind.BODY,
     equation="+P",
     reference="a weight on a string",
+    meaning="Something pulls, always as much.",
+    look_at="strings",
     phases=(Phase.FREE_SLIDE,),
     parameters=(Parameter("pull_n", "N", null=0.0, lower=-10.0, upper=10.0, typical=1.0),),
     laws={LawKind.BODY: pull},

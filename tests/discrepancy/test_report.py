@@ -3,10 +3,12 @@
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlparse
 
 import pytest
 
+from impactcell.discrepancy.report import figures
 from impactcell.discrepancy.report.page import (
     format_number,
     page_context,
@@ -78,11 +80,37 @@ def unknown() -> DiscrepancyResult:
 
 def test_the_page_is_whole_and_fetches_nothing(tied: DiscrepancyResult, tmp_path: Path) -> None:
     page = page_of(tied, tmp_path)
-    assert page.headings == [*SECTIONS, "What to measure next", "How it was computed"]
+    assert page.headings == [*SECTIONS, "How it was computed"]
     assert page.outside() == []
     assert page.pictures == 4  # two maps, the traces, the friction factors
     assert all(phrase(effect) in page.text for effect in LIBRARY)
     assert "weigh the part" in page.text
+
+
+def test_the_first_screen_says_what_it_means_and_what_to_do(tied: DiscrepancyResult, tmp_path: Path) -> None:
+    text = page_of(tied, tmp_path).text
+    first_screen = text[: text.index("Where they disagree")]
+    assert "A noise floor is the difference between model and measurement" in first_screen
+    assert first_screen.index("A noise floor is") < first_screen.index("held-out gap in noise floors")
+    for effect in ("mass_error", "force_sensor_gain"):
+        assert LIBRARY[effect].meaning in first_screen
+        assert f"Look at {LIBRARY[effect].look_at}." in first_screen
+    assert "impactcell model accept CELL.yaml model.extended.yaml" in first_screen
+    assert "weigh the part" in first_screen
+
+
+def test_noise_alone_is_drawn_thin(tied: DiscrepancyResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four standard deviations of noise take a fifth of a panel, a per cent of friction a tenth, at most."""
+    drawn: list[Any] = []
+    monkeypatch.setattr(figures, "_svg", lambda figure: drawn.append(figure) or "")
+    figures.trace_figure(tied)
+    figures.factor_figure(tied)
+    residuals = drawn[0].axes[1::2]
+    assert len(residuals) == 9
+    for axes, noise in (*((axes, 4.0) for axes in residuals), (drawn[1].axes[0], 2.0)):
+        low, high = axes.get_ylim()
+        assert high - low >= 5.0 * noise
+        assert all(low <= value <= high for line in axes.lines for value in line.get_ydata())
 
 
 def test_a_tie_is_told_in_the_sentence(tied: DiscrepancyResult) -> None:

@@ -16,6 +16,12 @@ SCALES = (1.0, 1e3, 1e3)
 """From SI to the units of the figures."""
 INK, BEFORE, AFTER = "#22313f", "#c8553d", "#2a7f8e"
 MEASURED, UNTESTED = "#9fb0bf", "#eceff2"
+MAP_SCALE = (2.0, 8.0)
+"""Scores over their spread at both ends of the map's colours: noise alone, up to 3, stays pale."""
+RESIDUAL_SCALE = 10.0
+"""Residuals are drawn over ± this many standard deviations of the noise at least: noise alone looks thin."""
+FACTOR_SCALE_PERCENT = 5.0
+"""Friction factors are drawn over ± this at least [%]: one per cent, usual from shot to shot, looks small."""
 # Style of all figures; the salt makes the ids in an SVG the same in every run.
 STYLE: Any = {
     "font.family": "sans-serif",
@@ -54,7 +60,7 @@ def map_figure(evidence: ModelEvidence) -> str:
         axes = figure.add_subplot()
         shown = np.ma.masked_invalid(np.sqrt(statistic).reshape(rows, columns))
         axes.set_facecolor(UNTESTED)
-        image = axes.imshow(shown, cmap="YlOrRd", vmin=1.0, vmax=6.0, aspect="auto")
+        image = axes.imshow(shown, cmap="YlOrRd", vmin=MAP_SCALE[0], vmax=MAP_SCALE[1], aspect="auto")
         for row in range(rows):
             for column in range(columns):
                 place = row * columns + column
@@ -127,6 +133,8 @@ def trace_figure(result: DiscrepancyResult) -> str:
                 for model, colour, label in models:
                     shown = _moving_average(model.residual[part][in_channel], step)[::step]
                     lower.plot(t[::step], shown, color=colour, linewidth=0.8, label=label)
+                low, high = lower.get_ylim()
+                lower.set_ylim(min(low, -RESIDUAL_SCALE), max(high, RESIDUAL_SCALE))
                 if column == 0:
                     upper.set_ylabel(f"{CHANNELS[channel]} [{UNITS[channel]}]")
                     lower.set_ylabel("residual\n[noise std]")
@@ -188,6 +196,8 @@ def factor_figure(result: DiscrepancyResult) -> str:
                 label=f"{label}, held out".removeprefix("training, "),
             )
         axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, -FACTOR_SCALE_PERCENT), max(high, FACTOR_SCALE_PERCENT))
         axes.set_xlabel("shot, in order")
         axes.set_ylabel("friction factor [%]")
         axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))

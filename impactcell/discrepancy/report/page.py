@@ -9,7 +9,14 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report import figures
 from impactcell.discrepancy.report.result import locate_effect
-from impactcell.discrepancy.report.sentences import headline, law_sentences, phrase
+from impactcell.discrepancy.report.sentences import (
+    advice,
+    headline,
+    law_sentences,
+    next_step,
+    noise_floor_sentence,
+    phrase,
+)
 from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import LIBRARY
@@ -67,6 +74,9 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
         "source": source,
         "verdict": result.verdict,
         "sentence": headline(result),
+        "noise_floor": noise_floor_sentence(result),
+        "advice": advice(result),
+        "next_step": next_step(result),
         "shots": len(result.prepared.shots),
         "training": len(result.training),
         "held_out": len(result.held_out),

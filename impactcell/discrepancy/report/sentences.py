@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import find_effect
@@ -28,6 +29,53 @@ def headline(result: DiscrepancyResult) -> str:
     if finding.proposed is not None:
         what = f"{finding.proposed.functional_form} of u, the {u}, a law that no library has"
     return f"{_conclusion(result)} With s in {form.effect.equation} as {what}, the {fall}."
+
+
+def noise_floor_sentence(result: DiscrepancyResult) -> str:
+    """Say what a noise floor is, in the numbers of this campaign."""
+    units = zip(CHANNELS, result.floor.noise_std, (1.0, 1e6, 1e6), ("N", "µm", "µm"), strict=True)
+    noise = [
+        f"{channel} {scale * std:.3g} {unit}" for channel, std, scale, unit in units if not math.isnan(std)
+    ]
+    return (
+        "A noise floor is the difference between model and measurement that the sensors' noise alone makes "
+        f"(standard deviation of {', '.join(noise)}). A gap of 1 is a model that misses nothing; a gap of "
+        f"{_gap(result.validation)} is that many times as far away."
+    )
+
+
+def advice(result: DiscrepancyResult) -> list[dict[str, Any]]:
+    """Say of each missing effect, and of what is tied with it, what it means and what to look at."""
+    rows = []
+    for effect in result.added:
+        for place, name in enumerate((effect, *result.selection.ties.get(effect, ()))):
+            told = find_effect(name)
+            if told.meaning:
+                rows.append(
+                    {
+                        "name": phrase(name).capitalize(),
+                        "is_rival": place > 0,
+                        "meaning": told.meaning,
+                        "look_at": told.look_at,
+                    }
+                )
+    return rows
+
+
+def next_step(result: DiscrepancyResult) -> str:
+    """Say what to measure where no two effects have to be told apart."""
+    conclusion = result.conclusion
+    if conclusion.verdict == UNTESTED:
+        unit = result.prepared.excitation.unit
+        return f"about {conclusion.missing_shots} {unit} more, at settings like these"
+    if conclusion.remaining.explained:
+        return "nothing more; the gap on the cell's page shows whether it stays so"
+    place = result.unexplained or next(iter(conclusion.remaining.where), None)
+    if place is None:
+        return "the same settings again: held-out shots do not say yet where something remains"
+    varied = " and ".join(map(phrase, place.depends_on))
+    what = f"more values of {varied}, all else unchanged" if varied else "the same settings again"
+    return f"{what}; what remains is in {phrase(place.phase)}"
 
 
 def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:

@@ -17,6 +17,9 @@ EFFECT = Effect(
     equation="y' = v - w, tau w' + w = c F",
     reference="Load regulation of a speed-controlled drive: Leonhard, Control of Electrical Drives, "
     "Springer (2001)",
+    meaning="Under load the actuator slows down, and comes back to its speed only after a moment.",
+    look_at="the drive: its current limit and the gain of its speed loop, a slipping belt or "
+    "coupling, low air or oil pressure",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(
         Parameter("speed_loss_m_per_s_n", "m/(s N)", null=0.0, lower=0.0, upper=0.001, typical=5e-05),

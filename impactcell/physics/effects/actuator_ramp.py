@@ -19,6 +19,9 @@ EFFECT = Effect(
     kind=Kind.ACTUATOR,
     equation="y' grows linearly from 0 to v in t_r",
     reference="Trapezoidal velocity profile of motion controllers",
+    meaning="The actuator has not reached its speed when it meets the part; it is still speeding up.",
+    look_at="the drive's acceleration limit, and the free travel before contact: start "
+    "farther away, or speed up faster",
     phases=(Phase.PRELOAD, Phase.LOADING),
     parameters=(Parameter("ramp_time_s", "s", null=0.0, lower=0.0, upper=0.05, typical=0.002),),
     laws={LawKind.SPEED: run_up, LawKind.UNTIL: end},

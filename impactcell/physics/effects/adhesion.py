@@ -22,6 +22,8 @@ EFFECT = Effect(
     equation="pull -A (1 - gap/l) after separation, gap < l",
     reference="Liquid bridge of constant volume, linearised: Israelachvili, Intermolecular and "
     "Surface Forces, 3rd ed. (2011), chapter 17",
+    meaning="A film of oil or glue holds part and actuator together for a moment when they separate.",
+    look_at="the faces that touch: oil, coolant, glue, a soft pad; clean them and repeat some taps",
     phases=(Phase.FREE_SLIDE,),
     parameters=(
         Parameter("force_n", "N", null=0.0, lower=0.0, upper=200.0, typical=10.0),

@@ -21,6 +21,8 @@ EFFECT = Effect(
     kind=Kind.BETWEEN_SHOTS,
     equation="one factor 1 + r of mu a batch, the first batch is the reference",
     reference="Analysis of variance, one fixed factor",
+    meaning="One batch of material has more friction than another.",
+    look_at="what differs between the batches: coating, oil, surface finish, supplier, storage",
     phases=(Phase.BETWEEN_SHOTS,),
     parameters=(
         Parameter("relative_change", "1", null=0.0, lower=-0.9, upper=0.9, typical=0.05, per_batch=True),

@@ -14,6 +14,8 @@ EFFECT = Effect(
     kind=Kind.SENSOR,
     equation="force recorded at t is that of t - delay",
     reference="Inter-channel delay of multiplexed converters: IEEE 1057 (2017)",
+    meaning="Force and position are not recorded at the same time: one comes later than the other.",
+    look_at="the two channels' filters and converters, and the trigger: let both record one sharp event",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("delay_s", "s", null=0.0, lower=-0.01, upper=0.01, typical=0.0003),),
     laws={LawKind.DELAY: delay},

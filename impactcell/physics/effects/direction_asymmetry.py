@@ -18,6 +18,8 @@ EFFECT = Effect(
     equation="mu (1 + a direction)",
     reference="Ratchet-like asperities: Zmitrowicz, Models of kinematics dependent anisotropic "
     "friction, Int. J. Solids Struct. 39 (2002)",
+    meaning="The part slides more easily one way than the other.",
+    look_at="the lay of the machining marks, burrs on the part's edge, hoses or cables that pull one way",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.BETWEEN_SHOTS),
     parameters=(Parameter("relative_amplitude", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
     between=factors,

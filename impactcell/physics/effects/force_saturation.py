@@ -16,6 +16,9 @@ EFFECT = Effect(
     kind=Kind.SENSOR,
     equation="min(F, F_max)",
     reference="Overrange of a measuring amplifier",
+    meaning="The force signal is cut off at the top: above a limit the sensor shows no more.",
+    look_at="the range of the force sensor, of its amplifier and of the converter; a range "
+    "that ends well above the peak",
     phases=(Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("limit_n", "N", null=math.inf, lower=1.0, upper=math.inf, typical=200.0),),
     laws={LawKind.READING: shown},

@@ -14,6 +14,9 @@ EFFECT = Effect(
     kind=Kind.SENSOR,
     equation="F (1 + e)",
     reference="Span error: ISO 376 (2011)",
+    meaning="The force sensor shows every force too large or too small by the same per cent.",
+    look_at="the force sensor's calibration: load it with a known weight, and compare the "
+    "scale factor that was entered",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("relative_error", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
     laws={LawKind.READING: shown},

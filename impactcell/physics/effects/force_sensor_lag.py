@@ -14,6 +14,9 @@ EFFECT = Effect(
     kind=Kind.SENSOR,
     equation="tau F_m' + F_m = F",
     reference="First-order instrument: Doebelin, Measurement Systems, McGraw-Hill (2003), chapter 3",
+    meaning="The force signal follows the force late and rounded, as through a filter.",
+    look_at="the low-pass filter of the force amplifier: its cut-off may be too low for a tap "
+    "of some milliseconds",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("time_constant_s", "s", null=0.0, lower=0.0, upper=0.02, typical=0.0003),),
     laws={LawKind.LAG: time_constant},

@@ -14,6 +14,9 @@ EFFECT = Effect(
     kind=Kind.SENSOR,
     equation="F + F_0",
     reference="Zero error: ISO 376 (2011)",
+    meaning="The force sensor does not show zero when nothing touches it.",
+    look_at="the zero of the force sensor: tare it unloaded, and look for preload, drift with "
+    "temperature, a cable that pulls",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.STOP),
     parameters=(Parameter("offset_n", "N", null=0.0, lower=-100.0, upper=100.0, typical=2.0),),
     laws={LawKind.READING: shown},

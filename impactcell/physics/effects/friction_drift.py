@@ -17,6 +17,8 @@ EFFECT = Effect(
     kind=Kind.BETWEEN_SHOTS,
     equation="mu (1 + c (shot/N - 1/2))",
     reference="Running-in and wear: Blau, On the nature of running-in, Tribol. Int. 38 (2005)",
+    meaning="Friction changes slowly from the first shot to the last.",
+    look_at="what changes over a campaign: wear, running-in, temperature, dirt, oil that is used up",
     phases=(Phase.BETWEEN_SHOTS,),
     parameters=(Parameter("relative_change", "1", null=0.0, lower=-0.9, upper=0.9, typical=0.05),),
     between=factors,

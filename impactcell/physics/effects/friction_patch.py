@@ -16,6 +16,8 @@ EFFECT = Effect(
     kind=Kind.FRICTION,
     equation="mu (1 + a exp(-(x - x_0)²/2w²))",
     reference="A local wear scar or contamination, as a Gaussian",
+    meaning="At one place on the table the surface is rougher or smoother than elsewhere.",
+    look_at="the table at the position named: a scratch, a worn or soiled spot, a joint between two plates",
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("amplitude", "1", null=0.0, lower=-0.9, upper=3.0, typical=0.3),

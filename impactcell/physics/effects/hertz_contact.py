@@ -16,6 +16,9 @@ EFFECT = Effect(
     kind=Kind.CONTACT,
     equation="k d^n, n free (k in N/m^n)",
     reference="Johnson, Contact Mechanics, Cambridge (1985), chapter 4",
+    meaning="The contact gets stiffer the harder it is pressed, as of a round tip on a plane.",
+    look_at="the shape of actuator tip and part where they touch: a ball or an edge, a soft "
+    "layer, contact that is not plane",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("exponent", "1", null=1.0, lower=0.7, upper=1.8, typical=1.1),),
     laws={LawKind.CONTACT: stiffening},

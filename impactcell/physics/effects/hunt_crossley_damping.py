@@ -15,6 +15,8 @@ EFFECT = Effect(
     equation="c d d' beside b, on approach and departure",
     reference="Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, "
     "J. Appl. Mech. 42 (1975)",
+    meaning="The contact takes up more energy the deeper it is pressed in.",
+    look_at="what lies between actuator and part: rubber, plastic, a soft pad, a loose tip",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(
         Parameter("damping_n_s_per_m2", "N s/m²", null=0.0, lower=0.0, upper=20000000.0, typical=500000.0),

@@ -16,6 +16,8 @@ EFFECT = Effect(
     kind=Kind.BODY,
     equation="m (1 + e)",
     reference="Fixture or cover that moves with the part but was not weighed",
+    meaning="More or less mass moves than was entered.",
+    look_at="the part's mass: weigh it, with everything that moves along (fixture, cover, coupling)",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("relative_error", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
     between=factors,

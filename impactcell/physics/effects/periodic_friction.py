@@ -16,6 +16,9 @@ EFFECT = Effect(
     kind=Kind.FRICTION,
     equation="mu (1 + a sin(2 pi x/p + phase))",
     reference="First harmonic of a surface texture: ISO 21920-2 (2021)",
+    meaning="Friction rises and falls again and again along the table.",
+    look_at="the table's surface: tracks of milling or grinding with the period named, "
+    "grooves, a row of bores",
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("amplitude", "1", null=0.0, lower=0.0, upper=0.9, typical=0.1),

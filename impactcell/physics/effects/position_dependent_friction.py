@@ -14,6 +14,9 @@ EFFECT = Effect(
     kind=Kind.FRICTION,
     equation="mu (1 + a x)",
     reference="First order of any slow variation of the surface",
+    meaning="Friction grows steadily from one end of the table to the other.",
+    look_at="wear, dirt or oil spread unevenly along the table, and whether the part is "
+    "guided more tightly at one end",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(Parameter("gradient_per_m", "1/m", null=0.0, lower=-50.0, upper=50.0, typical=10.0),),
     laws={LawKind.SCALE: factor},

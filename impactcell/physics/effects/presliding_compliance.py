@@ -17,6 +17,9 @@ EFFECT = Effect(
     equation="elastic stick of stiffness s0 up to mu_s m g",
     reference="Courtney-Pratt and Eisner, The effect of a tangential force on the contact of "
     "metallic bodies, Proc. R. Soc. A 238 (1957)",
+    meaning="Before it breaks loose the part already gives way a little, like a spring.",
+    look_at="soft layers beneath the part, a fixture that bends, a sensor fastened to "
+    "something other than the part",
     phases=(Phase.PRELOAD, Phase.STOP, Phase.DRIVEN),
     parameters=(
         Parameter(

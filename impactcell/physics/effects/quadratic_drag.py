@@ -14,6 +14,9 @@ EFFECT = Effect(
     kind=Kind.BODY,
     equation="-c x' abs(x')",
     reference="Rayleigh, On the resistance of fluids, Phil. Mag. 2 (1876)",
+    meaning="Something is pushed aside: resistance grows with the square of the speed.",
+    look_at="fluid or air around the part: coolant on the table, a film that piles up in "
+    "front, a closed volume that is emptied",
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("drag_coefficient_n_s2_per_m2", "N s²/m²", null=0.0, lower=0.0, upper=5000.0, typical=50.0),

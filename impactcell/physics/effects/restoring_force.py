@@ -14,6 +14,8 @@ EFFECT = Effect(
     kind=Kind.BODY,
     equation="-k_r x on the part",
     reference="Hooke's law",
+    meaning="A spring-like force pulls the part back to where it started.",
+    look_at="cables, hoses, bellows, seals and springs fastened to the part, and whether they are tight",
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("stiffness_n_per_m", "N/m", null=0.0, lower=-5000.0, upper=20000.0, typical=500.0),

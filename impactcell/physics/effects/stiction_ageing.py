@@ -19,6 +19,9 @@ EFFECT = Effect(
     kind=Kind.BETWEEN_SHOTS,
     equation="mu_s (1 + b log10 dwell_s), dwell at least 0.1 s",
     reference="Dieterich, Time-dependent friction in rocks, J. Geophys. Res. 77 (1972)",
+    meaning="The longer the part rests, the harder it is to break loose.",
+    look_at="waiting times before a tap, oil that is squeezed out, contacts that stick; tap "
+    "after equal rests",
     phases=(Phase.PRELOAD, Phase.BETWEEN_SHOTS),
     parameters=(Parameter("increase_per_decade", "1", null=0.0, lower=-0.2, upper=0.5, typical=0.03),),
     between=factors,

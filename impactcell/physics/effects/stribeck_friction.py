@@ -16,6 +16,9 @@ EFFECT = Effect(
     kind=Kind.FRICTION,
     equation="mu_k + dmu exp(-(x'/v_s)²)",
     reference="Bo and Pavelescu, The friction-speed relation, Wear 82 (1982)",
+    meaning="Friction is higher while the part slides slowly; at speed a film carries it.",
+    look_at="lubrication: kind and amount of oil, and whether the slide is long enough at low "
+    "speed for it to matter",
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("friction_increase", "1", null=0.0, lower=0.0, upper=0.5, typical=0.03),

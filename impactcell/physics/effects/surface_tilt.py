@@ -16,6 +16,8 @@ EFFECT = Effect(
     kind=Kind.BODY,
     equation="-m g sin(a), a > 0 uphill along +1",
     reference="Newtonian mechanics of the inclined plane",
+    meaning="The table is not level: gravity helps the part one way and hinders it the other.",
+    look_at="the table with a level along the axis; tilt is named in radians, 0.001 rad is 1 mm in a metre",
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.STOP, Phase.DRIVEN),
     parameters=(Parameter("tilt_rad", "rad", null=0.0, lower=-0.1, upper=0.1, typical=0.005),),
     laws={LawKind.BODY: downhill},

@@ -15,6 +15,9 @@ EFFECT = Effect(
     equation="-k_v x'",
     reference="Equation (2) of the source paper; Olsson et al., Friction models and friction "
     "compensation, Eur. J. Control 4 (1998)",
+    meaning="Resistance grows in proportion to the speed, as in oil.",
+    look_at="lubrication: more oil or a thicker one than the model was made with, its "
+    "temperature, a sealed guide",
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("viscous_coefficient_n_s_per_m", "N s/m", null=0.0, lower=0.0, upper=1000.0, typical=60.0),
