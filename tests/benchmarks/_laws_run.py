@@ -1,7 +1,8 @@
 """Runs the study of laws that nobody had listed: a row of a file for each campaign, resumable.
 
 `python -m tests.benchmarks._laws_run --turns 2 --budget 300` adds the campaigns that are not there yet,
-balanced over what is hidden, and stops after 300 s of processor time.
+balanced over what is hidden, and stops after 300 s of processor time; `--only none` takes those with nothing
+hidden, any other name those with that effect, and `--from 50` begins with a later turn.
 """
 
 import argparse
@@ -184,12 +185,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--turns", type=int, default=10)
     parser.add_argument("--budget", type=float, default=math.inf, help="processor time [s]")
+    parser.add_argument("--only", default="", help="an effect, or none")
+    parser.add_argument("--from", dest="first", type=int, default=0, help="first turn")
     arguments = parser.parse_args()
     ROWS.parent.mkdir(exist_ok=True)
     known = {json.loads(line)["key"] for line in ROWS.read_text().splitlines()} if ROWS.exists() else set()
     begun = time.process_time()
-    for turn in range(arguments.turns):
+    for turn in range(arguments.first, arguments.turns):
         for number, item in enumerate((*FUNCTIONS, *OTHERS, NONE)):
+            if arguments.only not in {"", item.effect or "none"}:
+                continue
             job = job_of(item, turn, number)
             if job.key in known or time.process_time() - begun > arguments.budget:
                 continue
