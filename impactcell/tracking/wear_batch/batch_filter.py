@@ -140,14 +140,23 @@ def detect_change(
     return replace(state, accepted_before=state.accepted, accepted=index, change_point=change), change
 
 
+def refined_change_point(state: TrackerState, bank: Samples) -> ChangePoint | None:
+    """Let the cycles since say more of the bank's last change: when it was and how large."""
+    change = state.change_point
+    if change is None or change.detected_at != state.accepted:
+        return change
+    located = run_length_bank.locate_change_point(bank, state.accepted_before, state.accepted)
+    return ChangePoint(*located, change.detected_at, change.statistic, change.threshold)
+
+
 def innovation(state: TrackerState, cycle: UsableCycle) -> float:
     """Give the estimate minus what the bank predicts before it is taken in, in standard deviations."""
-    mean, covariance = run_length_bank.moments(state.bank)
+    bank = run_length_bank.wear_moments(state.bank)
     ahead = cycle.timing.passed - cycle.timing.lag
-    predicted = mean[TOTAL] + ahead * mean[SLOPE]
-    variance = covariance[TOTAL, TOTAL] + 2.0 * ahead * covariance[TOTAL, SLOPE]
-    variance = variance + ahead**2 * covariance[SLOPE, SLOPE] + cycle.variance
-    return float((cycle.observation.mu_s - predicted) / math.sqrt(variance))
+    predicted = bank.total + ahead * bank.slope
+    variance = bank.total_variance + 2.0 * ahead * bank.total_slope
+    variance = variance + ahead**2 * bank.slope_variance + cycle.variance
+    return (cycle.observation.mu_s - predicted) / math.sqrt(variance)
 
 
 def compare_with_previous_batch(

@@ -9,7 +9,6 @@ How much wider or narrower than usual an estimate is, it declares itself, as far
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -106,32 +105,34 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
     else:
         std = usual = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
         weight, guessed = 0.0, True
-    updated: dict[str, Any] = {
-        "usual_std": usual,
-        "guessed": guessed,
-        "identical": identical_run(noise, value),
-    }
+    identical = identical_run(noise, value)
     if late:
-        return replace(noise, weight=weight, **updated), std
-    updated |= {"last_value": value, "last_std": std}
-    if math.isnan(noise.last_value):
-        return replace(noise, weight=weight, **updated), std
-    learned = _learned_factor(noise, value, (std, noise.last_std), usual, (weight, guessed))
-    return replace(noise, **updated, **learned), std
+        return replace(noise, weight=weight, usual_std=usual, guessed=guessed, identical=identical), std
+    factors, posterior = (noise.factor, noise.winsorised_factor), noise.exponent_posterior
+    if not math.isnan(noise.last_value):
+        weight = min(weight + 1.0, MEMORY)
+        factors, posterior = _learned_factors(noise, value, (std, usual), weight, guessed=guessed)
+    factor, winsorised_factor = factors
+    learned = NoiseScale(factor, weight, winsorised_factor, usual, value, std, identical, guessed, posterior)
+    return learned, std
 
 
-def _learned_factor(
-    noise: NoiseScale, value: float, stds: tuple[float, float], usual: float, rests_on: tuple[float, bool]
-) -> dict[str, Any]:
-    """Learn from the difference of an estimate from the one before; the fields that change."""
-    square, weight = (value - noise.last_value) ** 2, min(rests_on[0] + 1.0, MEMORY)
-    squared = square / sum(
-        declared_std_calibration.calibrated_std(noise.exponent_posterior, std, usual) ** 2 for std in stds
+def _learned_factors(
+    noise: NoiseScale, value: float, stds: tuple[float, float], weight: float, *, guessed: bool
+) -> tuple[tuple[float, float], Samples]:
+    """Learn from the difference of an estimate from the one before: both factors, and the exponents.
+
+    `stds` are the estimate's and the usual one; the scale rests on `weight` differences with this one.
+    """
+    (std, usual), posterior, square = stds, noise.exponent_posterior, (value - noise.last_value) ** 2
+    squared = square / (
+        declared_std_calibration.calibrated_std(posterior, std, usual) ** 2
+        + declared_std_calibration.calibrated_std(posterior, noise.last_std, usual) ** 2
     )
-    if rests_on[1] and weight <= UNSCALED:
+    if guessed and weight <= UNSCALED:
         # nothing to judge outliers by yet: the plain mean
         factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
-        return {"factor": factor, "winsorised_factor": factor, "weight": weight}
+        return (factor, factor), posterior
     clipped = min(squared, CLIP**2 * noise.winsorised_factor) / CONSISTENCY
     winsorised_factor = max(
         noise.winsorised_factor + (clipped - noise.winsorised_factor) / weight, SMALLEST_FACTOR
@@ -141,15 +142,8 @@ def _learned_factor(
         noise.factor + (weighted - noise.factor) / weight, winsorised_factor / ROUGH_BIAS, SMALLEST_FACTOR
     )
     usual_square = square / (2.0 * noise.factor * usual**2)
-    exponent_posterior = declared_std_calibration.update(
-        noise.exponent_posterior, usual_square, *stds, usual, weight
-    )
-    return {
-        "factor": factor,
-        "winsorised_factor": winsorised_factor,
-        "weight": weight,
-        "exponent_posterior": exponent_posterior,
-    }
+    posterior = declared_std_calibration.update(posterior, usual_square, std, noise.last_std, usual, weight)
+    return (factor, winsorised_factor), posterior
 
 
 def variance(noise: NoiseScale, std: float) -> float:

@@ -24,11 +24,11 @@ from impactcell.tracking.wear_batch import run_length_update
 from impactcell.tracking.wear_batch.run_length_model import (
     HYPOTHESIS,
     OUTLIER_SCALE,
-    SHIFT,
     SLOPE,
     STEPS,
     Bank,
     BankModel,
+    BankMoments,
     Measurement,
 )
 from impactcell.tracking.wear_batch.run_length_update import CAPACITY
@@ -149,7 +149,7 @@ def workspace(rows: Samples) -> Bank:
 
 def stored(bank: Bank, count: int) -> Samples:
     """Give the first `count` hypotheses as rows to be kept, shape (count, 22)."""
-    return bank.view(np.float64).reshape(len(bank), WIDTH)[:count].copy()
+    return np.ndarray((count, WIDTH), np.float64, bank).copy()
 
 
 def initial_bank(value: float, variance: float, slope_std: float, cycle: int, outliers: float) -> Samples:
@@ -169,13 +169,14 @@ def initial_bank(value: float, variance: float, slope_std: float, cycle: int, ou
 
 def moments(rows: Samples) -> tuple[Samples, Samples]:
     """Mean, shape (4,), and covariance, shape (4, 4), of the whole mixture."""
-    return _merged(_records(rows))
-
-
-def _merged(bank: Bank) -> tuple[Samples, Samples]:
     mixture = np.empty(1, HYPOTHESIS)
-    run_length_update.merge(bank, 0, len(bank), mixture)
+    run_length_update.merge(_records(rows), 0, len(rows), mixture)
     return mixture["mean"][0], mixture["covariance"][0]
+
+
+def wear_moments(rows: Samples) -> BankMoments:
+    """Of `moments`, those that tell of wear and batch, without the arrays."""
+    return run_length_update.wear_moments(_records(rows))
 
 
 def threshold(false_alarm_cycles: float) -> float:
@@ -189,15 +190,9 @@ def threshold(false_alarm_cycles: float) -> float:
 
 def locate_change_point(rows: Samples, after: float, until: float) -> tuple[int, float, float]:
     """Most probable first cycle of the change in (after, until], its size and standard deviation."""
-    bank = _records(rows)
-    cycles = bank["change_cycle"]
-    within = (cycles > after) & (cycles <= until)
-    if np.any(within):
-        bank = _records(rows[within])
-    likeliest = int(bank["change_cycle"][int(np.argmax(bank["log_weight"]))])
-    mean, covariance = _merged(bank)
-    return likeliest, float(mean[SHIFT]), math.sqrt(max(float(covariance[SHIFT, SHIFT]), 0.0))
+    cycle, size, variance = run_length_update.change_within(_records(rows), float(after), float(until))
+    return int(cycle), size, math.sqrt(max(variance, 0.0))
 
 
 def _records(rows: Samples) -> Bank:
-    return rows.view(HYPOTHESIS)[:, 0]
+    return np.ndarray(len(rows), HYPOTHESIS, rows)

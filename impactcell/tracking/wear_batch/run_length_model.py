@@ -63,6 +63,20 @@ class BankModel(NamedTuple):
     slope_prior: float
 
 
+class BankMoments(NamedTuple):
+    """Means, variances and covariances of total, slope and offset over all hypotheses."""
+
+    total: float
+    slope: float
+    offset: float
+    total_variance: float
+    total_slope: float
+    total_offset: float
+    slope_variance: float
+    slope_offset: float
+    offset_variance: float
+
+
 class Measurement(NamedTuple):
     """What one cycle brings to the bank; all floats.
 

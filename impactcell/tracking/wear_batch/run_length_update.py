@@ -20,6 +20,7 @@ from impactcell.tracking.wear_batch.run_length_model import (
     TOTAL,
     Bank,
     BankModel,
+    BankMoments,
     Measurement,
 )
 
@@ -74,15 +75,15 @@ def merge(bank: Bank, first: int, last: int, into: Bank) -> None:
     """Write the moment-matched mixture of hypotheses first..last-1 to the one of `into`; weights add."""
     total = log_sum_exp(bank, first, last)
     mean, covariance = np.zeros(STATES), np.zeros((STATES, STATES))
-    heaviest = first
+    shares, heaviest = np.empty(last - first), first
     for i in range(first, last):
         if bank[i].log_weight > bank[heaviest].log_weight:
             heaviest = i
-        share = math.exp(bank[i].log_weight - total)
+        share = shares[i - first] = math.exp(bank[i].log_weight - total)
         for a in range(STATES):
             mean[a] += share * bank[i].mean[a]
     for i in range(first, last):
-        share = math.exp(bank[i].log_weight - total)
+        share = shares[i - first]
         for a in range(STATES):
             for b in range(STATES):
                 between = (bank[i].mean[a] - mean[a]) * (bank[i].mean[b] - mean[b])
@@ -93,6 +94,41 @@ def merge(bank: Bank, first: int, last: int, into: Bank) -> None:
         merged.mean[a] = mean[a]
         for b in range(STATES):
             merged.covariance[a, b] = covariance[a, b]
+
+
+@compiled
+def wear_moments(bank: Bank) -> BankMoments:
+    """Moments of the whole mixture that tell of wear and batch."""
+    mixture = np.empty(1, bank.dtype)
+    merge(bank, 0, len(bank), mixture)
+    mean, covariance = mixture[0].mean, mixture[0].covariance
+    return BankMoments(
+        mean[TOTAL],
+        mean[SLOPE],
+        mean[OFFSET],
+        covariance[TOTAL, TOTAL],
+        covariance[TOTAL, SLOPE],
+        covariance[TOTAL, OFFSET],
+        covariance[SLOPE, SLOPE],
+        covariance[SLOPE, OFFSET],
+        covariance[OFFSET, OFFSET],
+    )
+
+
+@compiled
+def change_within(bank: Bank, after: float, until: float) -> tuple[float, float, float]:
+    """Give the most probable change in (after, until], its size and its variance; of all if there is none."""
+    first, last = 0, len(bank)
+    while first < last and bank[first].change_cycle <= after:
+        first += 1
+    while last > first and bank[last - 1].change_cycle > until:
+        last -= 1
+    if first == last:
+        first, last = 0, len(bank)
+    mixture = np.empty(1, bank.dtype)
+    merge(bank, first, last, mixture)
+    found = mixture[0]
+    return found.change_cycle, found.mean[SHIFT], found.covariance[SHIFT, SHIFT]
 
 
 @compiled
@@ -169,8 +205,7 @@ def update(bank: Bank, count: int, measurement: Measurement, outliers: float) ->
         wide = predicted + OUTLIER_SCALE**2 * variance
         good = log_good - 0.5 * (innovation**2 / narrow + math.log(2.0 * math.pi * narrow))
         outlying = log_outlying - 0.5 * (innovation**2 / wide + math.log(2.0 * math.pi * wide))
-        top = max(good, outlying)
-        likelihood = top + math.log(math.exp(good - top) + math.exp(outlying - top))
+        likelihood = max(good, outlying) + math.log(1.0 + math.exp(-abs(good - outlying)))
         share = math.exp(good - likelihood)
         bank[i].log_weight += likelihood
         good_share[i] = share

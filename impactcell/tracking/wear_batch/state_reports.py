@@ -1,7 +1,7 @@
 """The tracker's state in the words of `impactcell.records`."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
 from impactcell.tracking.wear_batch import (
@@ -11,7 +11,6 @@ from impactcell.tracking.wear_batch import (
     wear_filter,
     wear_report,
 )
-from impactcell.tracking.wear_batch.run_length_model import OFFSET, SLOPE, TOTAL
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import (
     ChangePoint,
@@ -68,8 +67,8 @@ def tracking_result(
             total = moments.level + offset
             moments = wear_blocks.moments(blocks, index)
             offset = total - moments.level
-            probability = wear_blocks.probability_above(blocks, index, settings.wear_limit)
-    state = _refine_change_point(state)
+            if math.isfinite(settings.wear_limit):
+                probability = wear_blocks.probability_above(blocks, index, settings.wear_limit)
     walks = (state.level_variance, state.slope_variance)
     wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes), probability)
     change = state.change_point
@@ -110,24 +109,15 @@ def _filter_moments(known: wear_filter.WearFilter) -> tuple[WearMoments, float, 
 
 def _bank_moments(bank: Samples) -> tuple[WearMoments, float, float]:
     """Level is total minus offset: friction as if the first batch were still there."""
-    mean, covariance = run_length_bank.moments(bank)
-    level_variance = covariance[TOTAL, TOTAL] - 2.0 * covariance[TOTAL, OFFSET] + covariance[OFFSET, OFFSET]
+    known = run_length_bank.wear_moments(bank)
     moments = WearMoments(
-        float(mean[TOTAL] - mean[OFFSET]),
-        float(mean[SLOPE]),
-        float(level_variance),
-        float(covariance[TOTAL, SLOPE] - covariance[SLOPE, OFFSET]),
-        float(covariance[SLOPE, SLOPE]),
+        known.total - known.offset,
+        known.slope,
+        known.total_variance - 2.0 * known.total_offset + known.offset_variance,
+        known.total_slope - known.slope_offset,
+        known.slope_variance,
     )
-    return moments, float(mean[OFFSET]), math.sqrt(max(float(covariance[OFFSET, OFFSET]), 0.0))
-
-
-def _refine_change_point(state: TrackerState) -> TrackerState:
-    """Let the cycles since say more of the bank's last change: when it was and how large."""
-    if state.change_point is None or state.change_point.detected_at != state.accepted:
-        return state
-    cycle, size, std = run_length_bank.locate_change_point(state.bank, state.accepted_before, state.accepted)
-    return replace(state, change_point=replace(state.change_point, cycle=cycle, size=size, size_std=std))
+    return moments, known.offset, math.sqrt(max(known.offset_variance, 0.0))
 
 
 def _evidence(settings: TrackerSettings, state: TrackerState, change: ChangePoint) -> Evidence:

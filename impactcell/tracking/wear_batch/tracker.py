@@ -95,6 +95,7 @@ def update(
         filter=known,
         bank=updated.bank,
         outliers=updated.outliers,
+        change_point=batch_filter.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
         innovation_correlation=correlation,
     )

@@ -149,10 +149,11 @@ def update(wear: WearBlocks, model: BlockModel) -> WearBlocks:
         return wear
     if len(wear.segments):
         grid = wear.slopes[:, 0]
-        evidence = np.log(np.maximum(wear.slopes[:, 1], SMALLEST_SHARE) / np.gradient(grid))
+        evidence = np.log(np.maximum(wear.slopes[:, 1], SMALLEST_SHARE) / _ranges(grid))
         segments = _records(wear.segments.copy())
         blocks, before = wear.blocks[:closed], wear.weighed_until
-        evidence += filter_slopes(grid, segments, blocks, wear.origin, before, model)
+        # in one piece, as in the first grids: one machine code serves both
+        evidence += filter_slopes(grid.copy(), segments, blocks, wear.origin, before, model)
         return _renewed(wear, closed, *_relaid(grid, evidence, segments))
     if closed < FEWEST_BLOCKS:
         return wear
@@ -218,7 +219,7 @@ def _relaid(grid: Samples, evidence: Samples, segments: Segments) -> tuple[Sampl
     onto = slope + WIDENED * max(std, 0.5 * spacing) * OFFSETS
     nearest = np.abs(grid - onto[:, None]).argmin(axis=1)
     moved = np.zeros_like(segments)
-    gained = relay(grid, segments, onto, moved)
+    gained = relay(grid.copy(), segments, onto, moved)
     return onto, evidence[nearest] + gained, moved
 
 
@@ -272,9 +273,17 @@ def _spacing(grid: Samples) -> float:
     return float(grid[middle] - grid[middle - 1])
 
 
+def _ranges(grid: Samples) -> Samples:
+    """Width of the range that each slope stands for: half way to its neighbours, at the ends a whole way."""
+    widths = np.empty(len(grid))
+    widths[0], widths[-1] = grid[1] - grid[0], grid[-1] - grid[-2]
+    widths[1:-1] = (grid[2:] - grid[:-2]) / 2.0
+    return widths
+
+
 def _shares(grid: Samples, evidence: Samples) -> Samples:
     """Probability of each slope: of the range that it stands for."""
-    share: Samples = np.exp(evidence - evidence.max()) * np.gradient(grid)
+    share: Samples = np.exp(evidence - evidence.max()) * _ranges(grid)
     share /= share.sum()
     return share
 

@@ -129,6 +129,27 @@ def test_one_hypothesis_is_filterpys_kalman_filter():
     assert covariance[:2, :2] == pytest.approx(oracle.P, rel=1e-9)
 
 
+def test_what_is_said_of_wear_and_of_a_change_is_of_the_whole_mixture():
+    rng = np.random.default_rng(8)
+    rows = np.zeros((30, run_length_bank.WIDTH))
+    rows[:, 0], rows[:, 1] = rng.normal(size=30), np.repeat(np.arange(10.0), 3)
+    rows[:, 2:6] = rng.normal(size=(30, 4))
+    roots = rng.normal(size=(30, 4, 4))
+    rows[:, 6:] = (roots @ roots.transpose(0, 2, 1)).reshape(30, 16)
+    mean, covariance = run_length_bank.moments(rows)
+    said = run_length_bank.wear_moments(rows)
+    assert said[:3] == pytest.approx(mean[:3])
+    assert said[3:] == pytest.approx(covariance[np.triu_indices(3)])
+    for after, until, included in ((2.0, 6.0, slice(9, 21)), (-1.0, 9.0, slice(30)), (20.0, 30.0, slice(30))):
+        cycle, size, std = run_length_bank.locate_change_point(rows, after, until)
+        share = np.exp(rows[included, 0])
+        share /= share.sum()
+        shift = float(share @ rows[included, 5])
+        assert cycle == rows[included, 1][share.argmax()]
+        assert size == pytest.approx(shift)
+        assert std**2 == pytest.approx(float(share @ (rows[included, 21] + (rows[included, 5] - shift) ** 2)))
+
+
 def test_a_late_reading_gives_the_same_state_as_in_time():
     rng = np.random.default_rng(2)
     values = rng.normal(size=60)
