@@ -36,6 +36,7 @@ def probe(cell: Path) -> None:
     module = ModuleAcquisition(config.name, ModbusClient(transport_for(link)), config.register_map)
     result = asyncio.run(probe_module(module))
     rows = [("link", f"{link}, {1e3 * result.round_trip_s:.2f} ms a request"), *_rows(result)]
+    rows.insert(1, ("in flight", result.window))
     rows += [("no promise", text) for text in not_promised(config.register_map)]
     print_result("\n".join(f"{name:12}{text}" for name, text in rows))
     if result.faults:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
-from impactcell.errors import FieldbusError
+from impactcell.errors import FieldbusError, LinkError
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_consistent, next_capture
@@ -78,6 +78,7 @@ class ModuleAcquisition:
         self._durable: CycleId | None = None
         self._acknowledged: CycleId | None = None
         self._connections = 0
+        self._said_given_up = False
         self._identity = IdentityCheck(cell, self.register_client, self._status_reader)
 
     @property
@@ -157,6 +158,7 @@ class ModuleAcquisition:
                 if target is None:
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
+                await self.find_window()
                 await self._identity.check_for(target.cycle_id)
                 fetched = await self._reader.fetch(target, taken)
             except FieldbusError as error:
@@ -208,6 +210,24 @@ class ModuleAcquisition:
         await self._identity.check_word_order(status)
         return status
 
+    async def find_window(self) -> None:
+        """Try, once for each connection, how many requests the module can have in flight.
+
+        Raises
+        ------
+        LinkError
+            If the trial has cost the connection; the next one is not tried again.
+        """
+        if not await self.register_client.find_window():
+            raise LinkError(f"{self.link}: the connection was lost while several requests were in flight")
+
+    def _say_given_up(self) -> None:
+        """Log, once, that the module has one request in flight for good."""
+        reason = self._client.window.given_up
+        if reason and not self._said_given_up:
+            self._said_given_up = True
+            self._log.warning("one request in flight from now on, for with several: %s", reason)
+
     async def _connect(self) -> None:
         """Connect and check who answers."""
         self._ready.clear()
@@ -219,6 +239,7 @@ class ModuleAcquisition:
     async def _poll(self) -> StatusBlock:
         if not self._client.connected:
             await self._connect()
+        self._say_given_up()
         status = await self.read_status()
         await self._identity.check_word_order(status)
         if self._durable != self._acknowledged:

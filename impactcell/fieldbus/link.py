@@ -107,8 +107,8 @@ class ModuleLink:
         The line of transport `rtu`, in the place of host and port.
     device_id : int
         Modbus unit id; behind a gateway the address on the serial line.
-    window : int
-        Requests in flight; 1 is safe with any device.
+    window : int or None
+        Requests in flight over Modbus TCP; None: found by trials, see `RequestWindow`.
     max_registers : int
         Registers asked for at once, at most 125.
     pause_s : float
@@ -123,7 +123,7 @@ class ModuleLink:
     host: str = "127.0.0.1"
     port: int = 502
     device_id: int = 1
-    window: int = 1
+    window: int | None = None
     max_registers: int = 125
     pause_s: float = 0.0
     timeout_s: float = 0.5

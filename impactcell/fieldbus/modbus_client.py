@@ -2,12 +2,14 @@
 
 from typing import Final
 
+from impactcell.errors import LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import Request, mask_write_request, read_write_request, write_request
 from impactcell.fieldbus.device_identification import OBJECTS, identification_objects, identification_request
 from impactcell.fieldbus.register_types import BIT_TABLES
 from impactcell.fieldbus.registers import Words
 from impactcell.fieldbus.request_batching import Exchange, PartialBlock, ReplyData, RequestBatch
 from impactcell.fieldbus.transports.protocol import Transport
+from impactcell.fieldbus.transports.request_window import TRIAL_SIZES, RequestWindow
 
 _MOST_PARTS: Final = 8
 """So many replies a device identification has at most: more would be a device that never ends."""
@@ -32,6 +34,11 @@ class ModbusClient:
         return self._transport.connected
 
     @property
+    def window(self) -> RequestWindow:
+        """How many requests may be in flight."""
+        return self._transport.window
+
+    @property
     def round_trip_s(self) -> float:
         """Time between the last request and its reply; nan before the first."""
         return self._transport.round_trip_s
@@ -43,6 +50,44 @@ class ModbusClient:
     async def close(self) -> None:
         """Close the connection and wait until it is gone; all that is pending fails."""
         await self._transport.close()
+
+    async def find_window(self, address: int, count: int, table: str = "holding") -> bool:
+        """Try, unless the settings say it, how many requests the device can have in flight.
+
+        Parameters
+        ----------
+        address, count, table
+            Registers that may be read; what they hold is of no interest.
+
+        Returns
+        -------
+        bool
+            Whether the connection is still good; if not, the next one begins without a trial.
+        """
+        window = self.window
+        if not window.untried:
+            return True
+        longest = min(count, self.link.max_registers)
+        for size in TRIAL_SIZES:
+            if size > longest:
+                break
+            window.size = size
+            blocks = [PartialBlock(address, longest - shorter, table, longest) for shorter in range(size)]
+            exchange = Exchange()
+            self._transport.submit([batch for block in blocks for batch in block.batches(exchange)])
+            try:
+                await exchange.done
+            except ModbusExceptionError as error:
+                window.leave_undecided(str(error))
+                return True
+            except (LinkError, ProtocolError):
+                return False
+            if exchange.first_sent_s:
+                window.leave_undecided(f"{self.link}: busy where {size} requests are in flight")
+            if window.size < size:
+                return True
+        window.accept_trials()
+        return True
 
     async def read(self, address: int, count: int, table: str = "holding") -> Words:
         """Read registers as they stand on the wire, shape (count,), dtype `WIRE`.

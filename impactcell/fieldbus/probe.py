@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from impactcell.errors import FieldbusError
+from impactcell.errors import FieldbusError, LinkError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture
@@ -30,6 +30,8 @@ class ProbeResult:
     status : StatusBlock
     round_trip_s : float
         Of the last request.
+    window : str
+        Requests in flight at most, and why.
     capture : Capture or None
         The newest cycle; None where there is none yet.
     faults : tuple of str
@@ -40,6 +42,7 @@ class ProbeResult:
     identification: Mapping[str, str]
     status: StatusBlock
     round_trip_s: float
+    window: str
     capture: Capture | None
     faults: tuple[str, ...]
 
@@ -54,13 +57,20 @@ async def probe(module: ModuleAcquisition) -> ProbeResult:
     """
     async with module:
         status = await module.connect_once()
+        try:
+            await module.find_window()
+        except LinkError:
+            await module.close()
+            status = await module.connect_once()
         identity = (await module.register_client.read_image(IDENTITY)).values
         capture: Capture | None = None
         faults: tuple[str, ...] = ()
         if status.cycle_counter in status.ring and status.cycle_counter:
             capture, faults = await _newest(module, status)
         round_trip_s = module.status.round_trip_s
-        return ProbeResult(identity, await _identification(module), status, round_trip_s, capture, faults)
+        window = str(module.register_client.modbus.window)
+        identification = await _identification(module)
+        return ProbeResult(identity, identification, status, round_trip_s, window, capture, faults)
 
 
 async def _identification(module: ModuleAcquisition) -> Mapping[str, str]:

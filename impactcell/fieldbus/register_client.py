@@ -28,6 +28,14 @@ class RegisterClient:
         self._groups: dict[tuple[str, ...], tuple[RegisterBlock, ...]] = {}
         self._images: dict[tuple[str, ...], RegisterImage] = {}
 
+    async def find_window(self) -> bool:
+        """Try how many requests the device can have in flight, by its samples; see `ModbusClient`."""
+        arrays = [self.registers[name] for name in self.registers.arrays]
+        if not arrays:
+            return True
+        most = max(arrays, key=lambda register: register.end - register.address)
+        return await self.modbus.find_window(most.address, most.end - most.address, most.table)
+
     async def read_image(self, names: tuple[str, ...]) -> RegisterImage:
         """Read registers; those that the map does not have are left out.
 

@@ -129,6 +129,7 @@ async def ours(port: int, window: int | None) -> tuple[Run, Callable[[], Awaitab
     link = ModuleLink(port=port) if window is None else ModuleLink(port=port, window=window, timeout_s=30.0)
     client = ModbusClient(transport_for(link))
     await client.connect()
+    assert await client.find_window(100, REGISTERS)  # as the service does before it reads a capture
 
     async def run() -> None:
         words = await client.read(100, REGISTERS)

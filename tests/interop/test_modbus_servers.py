@@ -34,7 +34,7 @@ async def pymodbus_server() -> AsyncIterator[int]:
 
 
 @asynccontextmanager
-async def connected(port: int, window: int = 1, device_id: int = 1) -> AsyncIterator[ModbusClient]:
+async def connected(port: int, window: int | None = 1, device_id: int = 1) -> AsyncIterator[ModbusClient]:
     client = ModbusClient(
         transport_for(ModuleLink(port=port, window=window, device_id=device_id, timeout_s=TIMEOUT_S))
     )
@@ -107,9 +107,19 @@ async def test_pymodbus_server_that_goes_away() -> None:
             await client.read(0, 10)
 
 
-@pytest.mark.parametrize("window", [1, 16])
-async def test_libmodbus_server(libmodbus_port: int, window: int) -> None:
+async def test_what_pymodbus_server_can_have_in_flight_is_found_and_its_registers_are_right() -> None:
+    async with pymodbus_server() as port, connected(port, None) as client:
+        await client.find_window(100, 20_000)
+        await client.connect()
+        assert np.array_equal(await client.read(100, 20_000), np.arange(100, 20_100))
+        assert bool(client.window.given_up) is (client.window.size == 1)
+
+
+@pytest.mark.parametrize("window", [1, 16, None])
+async def test_libmodbus_server(libmodbus_port: int, window: int | None) -> None:
     async with connected(libmodbus_port, window) as client:
+        await client.find_window(100, 20_000)
+        assert client.window.size == (window or 16)
         for _ in range(3):
             assert np.array_equal(await client.read(100, 20_000), np.arange(100, 20_100))
         assert np.array_equal(await client.read(0, 500, "input"), 65_535 - np.arange(500))

@@ -7,18 +7,23 @@ from collections.abc import Sequence
 from impactcell.errors import LinkError
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.request_batching import RequestBatch
+from impactcell.fieldbus.transports.request_window import RequestWindow
 from impactcell.fieldbus.transports.tcp_connection import TcpConnection
 from impactcell.fieldbus.transports.transaction_ids import TransactionIds
 
 
 class PipelinedTcp:
-    """A `Transport` with up to `link.window` requests in flight.
+    """A `Transport` with up to `window.size` requests in flight.
 
     Every attempt has a fresh transaction id, also across connections.
     """
 
     def __init__(self, link: ModuleLink) -> None:
         self.link = link
+        if link.window is None and link.pause_s:
+            self.window = RequestWindow(1, "for the pause between requests")
+        else:
+            self.window = RequestWindow(link.window)
         self._connection: TcpConnection | None = None
         self._transaction_ids = TransactionIds()
 
@@ -43,12 +48,13 @@ class PipelinedTcp:
         if self.connected:
             return
         link, loop = self.link, asyncio.get_running_loop()
+        self.window.begin_connection()
         context = link.tls.context() if link.tls else None
         name = (link.tls.server_name or link.host) if link.tls else None
         try:
             async with asyncio.timeout(link.timeout_s):
                 _, self._connection = await loop.create_connection(
-                    lambda: TcpConnection(link, self._transaction_ids),
+                    lambda: TcpConnection(link, self._transaction_ids, self.window),
                     link.host,
                     link.port,
                     ssl=context,

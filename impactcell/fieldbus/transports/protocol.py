@@ -5,6 +5,7 @@ from typing import Protocol
 
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.request_batching import RequestBatch
+from impactcell.fieldbus.transports.request_window import RequestWindow
 
 
 class Transport(Protocol):
@@ -25,6 +26,10 @@ class Transport(Protocol):
     @property
     def link(self) -> ModuleLink:
         """How the device is reached."""
+
+    @property
+    def window(self) -> RequestWindow:
+        """How many requests may be in flight."""
 
     @property
     def connected(self) -> bool:

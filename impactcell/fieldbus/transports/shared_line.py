@@ -14,6 +14,7 @@ from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, Pr
 from impactcell.fieldbus.codec import BUSY, Request
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.request_batching import RequestBatch
+from impactcell.fieldbus.transports.request_window import RequestWindow
 
 _BUSY_PAUSE_S: Final = 0.02
 """How long a device that said busy is left alone; it is asked again until the timeout has passed."""
@@ -139,10 +140,11 @@ class SharedLine:
 
 
 class LineTransport:
-    """A `Transport` to one device on a line; `link.window` is not used, for one request is in flight."""
+    """A `Transport` to one device on a line, where one request is in flight, whatever the settings say."""
 
     def __init__(self, link: ModuleLink, line: SharedLine) -> None:
         self.link = link
+        self.window = RequestWindow(1, "as everywhere but over TCP to a device of its own")
         self.round_trip_s = float("nan")
         self._line = line
         self._connected = False

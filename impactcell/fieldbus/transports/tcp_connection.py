@@ -18,6 +18,7 @@ from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.request_batching import Exchange, RequestBatch
 from impactcell.fieldbus.transports.batch_in_flight import BatchInFlight
 from impactcell.fieldbus.transports.mbap import FrameReader
+from impactcell.fieldbus.transports.request_window import RequestWindow
 from impactcell.fieldbus.transports.transaction_ids import TransactionIds
 
 BUSY_PAUSE_S: Final = 0.02
@@ -38,8 +39,9 @@ class TcpConnection(asyncio.BufferedProtocol):
         Set once the socket is gone.
     """
 
-    def __init__(self, link: ModuleLink, transactions: TransactionIds) -> None:
+    def __init__(self, link: ModuleLink, transactions: TransactionIds, window: RequestWindow) -> None:
         self.link = link
+        self.window = window
         self.round_trip_s = float("nan")
         self.lost = asyncio.Event()
         self._loop = asyncio.get_running_loop()
@@ -51,6 +53,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         self._waiting: deque[RequestBatch] = deque()
         self._in_flight: list[BatchInFlight] = []
         self._requests_in_flight = 0
+        self._together = False
         self._busy: dict[asyncio.TimerHandle, RequestBatch] = {}
         self._unconfirmed: list[Exchange] = []
         self._answered_s = -math.inf
@@ -76,6 +79,8 @@ class TcpConnection(asyncio.BufferedProtocol):
 
     def fail(self, error: FieldbusError) -> None:
         """Close the connection and fail all that is pending."""
+        if self._in_flight and self._together:
+            self.window.fail(str(error))
         for handle in (self._timeout_timer, self._pause_timer, *self._busy):
             if handle is not None:
                 handle.cancel()
@@ -143,8 +148,9 @@ class TcpConnection(asyncio.BufferedProtocol):
         if self._transport is None or self._pause_timer is not None:
             return False
         frames: list[bytes] = []
+        self._together = self._together and bool(self._in_flight)
         now = self._loop.time()
-        while self._waiting and (room := self.link.window - self._requests_in_flight) > 0:
+        while self._waiting and (room := self.window.size - self._requests_in_flight) > 0:
             batch = self._waiting[0]
             if batch.exchange.done.done():  # its block has failed, or nobody waits for it any more
                 self._waiting.popleft()
@@ -160,6 +166,7 @@ class TcpConnection(asyncio.BufferedProtocol):
             self._requests_in_flight += len(batch.requests)
             frames += flight.frames()
         if frames:
+            self._together = self._together or self._requests_in_flight > 1
             self._transport.write(b"".join(frames))
             if self._timeout_timer is None:
                 self._timeout_timer = self._loop.call_later(self.link.timeout_s, self._check_timeout)
@@ -189,7 +196,7 @@ class TcpConnection(asyncio.BufferedProtocol):
             return
         timeout = f"within {self.link.timeout_s:g} s"
         if self._requests_in_flight > 1:
-            timeout += f", of {self._requests_in_flight} in flight (window {self.link.window})"
+            timeout += f", of {self._requests_in_flight} in flight (window {self.window.size})"
         self.fail(LinkError(f"{self.link}: no answer to {oldest.batch.requests[0].description} {timeout}"))
 
     def _consume_good_replies(self, stream: bytes) -> bytes:
@@ -219,6 +226,8 @@ class TcpConnection(asyncio.BufferedProtocol):
             self._confirm()
             self._handle_exception(self._take_from_flight(flight, at, 1), exception)
             return
+        if at or flight is not self._in_flight[0]:
+            self.window.give_up(f"{self.link}: answers come out of order")
         self._accept_replies(self._take_from_flight(flight, at, 1), data)
 
     def _take_from_flight(self, flight: BatchInFlight, first: int, count: int) -> BatchInFlight:
@@ -244,6 +253,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         if batch.block is not None:
             batch.block.fill(batch.first, count, data)
         exchange.unanswered -= count
+        self.window.answered += count
         if not exchange.unanswered:
             self.round_trip_s = self._loop.time() - answered.sent_s
             self._unconfirmed.append(exchange)

@@ -41,7 +41,7 @@ class Image:
 
 @asynccontextmanager
 async def linked(
-    server: ModbusServer, window: int = 1, timeout_s: float = SILENT_S, **link: float
+    server: ModbusServer, window: int | None = 1, timeout_s: float = SILENT_S, **link: float
 ) -> AsyncIterator[ModbusClient]:
     client = ModbusClient(
         transport_for(
