@@ -1,5 +1,7 @@
-"""The documented map of the FPGA module, parsed once."""
+"""The documented map of the FPGA module, parsed once, and a clock that does not wait."""
 
+import asyncio
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +9,14 @@ import pytest
 import yaml
 
 from impactcell.fieldbus.registers import RegisterMap
+from tests.virtual_time import HastyLoop
 
 MAP = Path(__file__).resolve().parents[3] / "config" / "maps" / "fpga-v1.yaml"
+
+
+def pytest_asyncio_loop_factories() -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
+    """Run the tests of this folder with a clock that is turned on while nobody has anything to do."""
+    return {"hasty": HastyLoop}
 
 
 @pytest.fixture(scope="session")
