@@ -22,8 +22,8 @@ from impactcell.settings.model_file import read_model, write_model
 
 FILES = ("result.json", "model.extended.yaml", "report.html")
 """What a run leaves in its directory."""
-LAW_FILES = "law_of_*.py"
-"""And where it proposes a law that nobody had listed, its effect file."""
+LAW_FILES = "law_of_*"
+"""And where it proposes a law that nobody had listed, its effect file; with a base model, that with it."""
 SMALLEST_SHARE = 1e-4
 """Smallest standard deviation of a prior, relative to its value: a prior of none would stop any fit."""
 

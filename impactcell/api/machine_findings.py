@@ -35,6 +35,11 @@ def write_machine_findings(finding: MachineFinding, data: Campaign, output: Path
         (beside / "result.json").write_text(json_text(document), encoding="utf-8")
         text = base_model_text(extended, data.excitation, provenance)
         (beside / "model.extended.yaml").write_text(text, encoding="utf-8")
+        law = None if finding.law is None else finding.law.choice
+        if law is not None:
+            proposed = replace(extended, terms=(*terms, law))
+            text = base_model_text(proposed, data.excitation, provenance)
+            (beside / f"{law.identifier}.yaml").write_text(text, encoding="utf-8")
         write_machine_report(finding, document, source, beside / "report.html")
 
     write_files(output, write)

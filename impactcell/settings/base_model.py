@@ -8,7 +8,9 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from impactcell.campaign import Coordinate, Excitation
-from impactcell.discrepancy.machine import CATALOGUE, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.laws import ATOMS as ATOMS_IN_ORDER
+from impactcell.discrepancy.laws import Shaped
+from impactcell.discrepancy.machine import CATALOGUE, LAW_PLACES, LawForm, NumberPrior, Response, TermChoice
 from impactcell.discrepancy.machine import BaseModel as MachineModel
 from impactcell.errors import SettingsError
 from impactcell.process import yaml_loader
@@ -18,6 +20,10 @@ Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 """A finite number of at least 0."""
 HEADER = "# A base model of impactcell: a machine with one coordinate, for `impactcell discrepancy --base`.\n"
+
+
+ATOMS = {atom.name: atom for atom in ATOMS_IN_ORDER}
+"""Functions of u that a law is made of, by their names."""
 
 
 class _Part(BaseModel):
@@ -46,6 +52,14 @@ class TermOfColumn(_Part):
     covariate: Annotated[str, Field(min_length=1)]
 
 
+class TermOfLaw(_Part):
+    """A function that the catalogue does not have: summands, each a product of atoms with their shapes."""
+
+    term: str
+    law: Annotated[list[dict[str, dict[str, FiniteFloat]]], Field(min_length=1)]
+    reference: Positive = 1.0
+
+
 class Nuisances(_Part):
     """What a measurement may be off by; each is 0 and exact where it is not named."""
 
@@ -66,7 +80,7 @@ class BaseModelFile(_Part):
     mass_kg: Number | None = None
     inertia_kg_m2: Number | None = None
     gravity_torque_n_m: Number = 0.0
-    terms: list[str | TermOfColumn] = ["coulomb_friction"]
+    terms: list[str | TermOfColumn | TermOfLaw] = ["coulomb_friction"]
     nuisances: Nuisances = Nuisances()
     block_s: Positive | None = None
     provenance: dict[str, str] = {}
@@ -96,20 +110,16 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
         Listing every fault as `file:line:column: message`.
     """
     file, positions = yaml_loader.read(path, BaseModelFile)
-    faults, choices = [], []
+    faults: list[str] = []
+    choices: list[TermChoice] = []
     for number, item in enumerate(file.terms):
-        identifier = item if isinstance(item, str) else item.term
-        covariate = "" if isinstance(item, str) else item.covariate
-        fault = _fault_of_term(identifier, covariate, file.predicts)
+        choice = _choice(item)
+        fault = _fault_of_law(item) if isinstance(item, TermOfLaw) else _fault_of_term(choice, file.predicts)
+        if not fault and choice.name in {other.name for other in choices}:
+            fault = f"{choice.name} appears twice"
         if fault:
             faults.append(yaml_loader.format_error(path, positions.value(("terms", number)), fault))
-        elif TermChoice(identifier, covariate) in choices:
-            faults.append(
-                yaml_loader.format_error(
-                    path, positions.value(("terms", number)), f"{identifier} appears twice"
-                )
-            )
-        choices.append(TermChoice(identifier, covariate))
+        choices.append(choice)
     if faults:
         raise SettingsError("\n".join(faults))
     inertia = file.inertia_kg_m2 if file.coordinate == "rotation" else file.mass_kg
@@ -144,10 +154,7 @@ def base_model_text(model: MachineModel, excitation: Excitation, provenance: dic
         mapping[inertia] = _number(model.inertia)
     if model.coordinate is Coordinate.ROTATION:
         mapping["gravity_torque_n_m"] = _number(model.gravity_torque)
-    mapping["terms"] = [
-        {"term": choice.identifier, "covariate": choice.covariate} if choice.covariate else choice.identifier
-        for choice in model.terms
-    ]
+    mapping["terms"] = [_term(choice) for choice in model.terms]
     mapping["nuisances"] = {
         name: _number(getattr(model, name))
         for name in ("position_offset", "force_offset", "force_gain", "delay_s")
@@ -168,8 +175,65 @@ def _number(prior: NumberPrior) -> float | dict[str, float | str]:
     return {"value": prior.value, "std": "free" if math.isinf(prior.std) else prior.std}
 
 
-def _fault_of_term(identifier: str, covariate: str, predicts: str) -> str:
-    """Say what is wrong with a term; empty if nothing is."""
+def _term(choice: TermChoice) -> str | dict[str, Any]:
+    """Write a term as it is read."""
+    if choice.law is not None:
+        parts = [
+            {
+                atom.name: {shape.name: value for shape, value in zip(atom.shapes, values, strict=True)}
+                for atom, values in zip(item.term, item.shapes, strict=True)
+            }
+            for item in choice.law.terms
+        ]
+        return {"term": choice.identifier, "law": parts, "reference": choice.law.reference}
+    if choice.covariate:
+        return {"term": choice.identifier, "covariate": choice.covariate}
+    return choice.identifier
+
+
+def _choice(item: str | TermOfColumn | TermOfLaw) -> TermChoice:
+    """Term of a file; atoms and shapes that do not exist are left out, and told as a fault."""
+    if isinstance(item, str):
+        return TermChoice(item)
+    if isinstance(item, TermOfColumn):
+        return TermChoice(item.term, item.covariate)
+    terms = tuple(
+        Shaped(
+            tuple(ATOMS[name] for name in part if name in ATOMS),
+            tuple(
+                tuple(shapes.get(shape.name, 1.0) for shape in ATOMS[name].shapes)
+                for name, shapes in part.items()
+                if name in ATOMS
+            ),
+        )
+        for part in item.law
+    )
+    return TermChoice(item.term, law=LawForm(terms, item.reference))
+
+
+def _fault_of_law(item: TermOfLaw) -> str:
+    """Say what is wrong with a law; empty if nothing is."""
+    if item.term not in LAW_PLACES:
+        return f"no place {item.term!r} for a law; {yaml_loader.suggest(item.term, LAW_PLACES)}"
+    for part in item.law:
+        for name, shapes in part.items():
+            if name not in ATOMS:
+                return f"no function {name!r} of u; {yaml_loader.suggest(name, ATOMS)}"
+            needed = {shape.name for shape in ATOMS[name].shapes}
+            if set(shapes) != needed:
+                wants = ", ".join(sorted(needed)) or "no shape"
+                return f"{name} takes {wants}, not {', '.join(sorted(shapes)) or 'none'}"
+            bad = [shape for shape in needed - {"centre"} if shapes[shape] <= 0.0]
+            if bad:
+                return f"{name}: {bad[0]} must be above 0"
+        if not part:
+            return "a summand of a law is at least one function of u"
+    return ""
+
+
+def _fault_of_term(choice: TermChoice, predicts: str) -> str:
+    """Say what is wrong with a term of the catalogue; empty if nothing is."""
+    identifier, covariate = choice.identifier, choice.covariate
     if identifier not in CATALOGUE:
         return f"no term {identifier!r}; {yaml_loader.suggest(identifier, CATALOGUE)}"
     term = CATALOGUE[identifier]

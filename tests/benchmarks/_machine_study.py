@@ -26,6 +26,7 @@ from impactcell.discrepancy.machine import (
     Response,
     TermChoice,
     investigate_machine,
+    simulate_held_out,
 )
 from impactcell.records import Capture, Channel, Samples
 from tests.benchmarks.table import Table
@@ -33,6 +34,10 @@ from tests.benchmarks.table import Table
 ROWS = Path("bench-results/machines.jsonl")
 REPORTING, TUNING = 900_000, 800_000
 """First seeds."""
+CLOSED_GAP = 1.2
+"""Gap up to which a law leaves nothing, in noise floors."""
+LAW_SEEDS = 50_000
+"""By how much later the seeds of the study of laws begin."""
 NOISES = ("white", "correlated", "heavy_tailed", "quantised", "outliers")
 GAPS, LEVELS = (1.5, 6.0), (0.2, 2.0)
 """Gap of the hidden term alone, and model error alone [1 = noise floor], even in their logarithms."""
@@ -47,17 +52,38 @@ HIDDEN: dict[str, Law] = {
     "directional_viscous_friction": lambda q, v, s: -np.abs(v),
 }
 """What may be hidden, per unit of its strength."""
+UNLISTED: dict[str, tuple[str, Callable[[float, float], Law]]] = {
+    "bump_of_friction": (
+        "friction_over_position",
+        lambda reach, fastest: lambda q, v, s: -s * np.exp(-0.5 * ((q / reach - 0.2) / 0.25) ** 2),
+    ),
+    "root_of_speed": ("friction_over_speed", lambda reach, fastest: lambda q, v, s: -s * np.abs(v) ** 0.5),
+    "threshold_of_speed": (
+        "friction_over_speed",
+        lambda reach, fastest: lambda q, v, s: -s * np.maximum(np.abs(v) - 0.4 * fastest, 0.0),
+    ),
+    "saturating_spring": (
+        "force_over_position", lambda reach, fastest: lambda q, v, s: -np.tanh(q / (0.3 * reach))
+    ),
+    "bump_of_force": (
+        "force_over_position",
+        lambda reach, fastest: lambda q, v, s: np.exp(-0.5 * ((q / reach + 0.3) / 0.2) ** 2),
+    ),
+}  # fmt: skip
+"""Laws that the catalogue does not have: place, and law by farthest position and largest speed."""
 
 
 @dataclass(frozen=True)
 class Machine:
-    """One machine: its base model, its law, and whether its force or its position is predicted."""
+    """One machine: base model, law, noise of what is predicted, farthest position and largest speed."""
 
     base: BaseModel
     inertia: float
     gravity: float
     coulomb: float
     noise: float
+    reach: float
+    fastest: float
 
 
 PENDULUM = Machine(
@@ -65,13 +91,13 @@ PENDULUM = Machine(
         coordinate=Coordinate.ROTATION, inertia=NumberPrior(0.02), gravity_torque=NumberPrior(0.55, math.inf),
         position_offset=NumberPrior(0.0, 0.05), force_offset=NumberPrior(0.0, 0.01),
     ),
-    0.02, 0.6, 0.002, 2e-5,
+    0.02, 0.6, 0.002, 2e-5, 1.2, 6.0,
 )  # fmt: skip
 SLIDE = Machine(
     BaseModel(
         response=Response.FORCE, inertia=NumberPrior(2.0, 0.1), force_offset=NumberPrior(0.0, math.inf)
     ),
-    2.0, 0.0, 3.0, 0.2,
+    2.0, 0.0, 3.0, 0.2, 0.2, 1.0,
 )  # fmt: skip
 
 
@@ -198,6 +224,18 @@ def task(number: int, first: int) -> dict[str, Any]:
     }
 
 
+def law_task(number: int, first: int) -> dict[str, Any]:
+    """Plan of a campaign with a law that nobody had listed: laws and machines take turns."""
+    names = [*UNLISTED]
+    return {
+        "seed": first + LAW_SEEDS + number,
+        "kind": "unlisted",
+        "machine": "pendulum" if number % 2 else "slide",
+        "noise": "white",
+        "hidden": names[(number // 2) % len(names)],
+    }
+
+
 def run(plan: dict[str, Any]) -> dict[str, Any]:
     """One row of the study."""
     machine = PENDULUM if plan["machine"] == "pendulum" else SLIDE
@@ -206,7 +244,7 @@ def run(plan: dict[str, Any]) -> dict[str, Any]:
     laws: list[Law] = []
     if plan["hidden"]:
         gap = math.exp(rng.uniform(*np.log(GAPS)))
-        term = HIDDEN[plan["hidden"]]
+        term = HIDDEN[plan["hidden"]] if plan["hidden"] in HIDDEN else _unlisted(plan["hidden"], machine)
         laws.append(_times(term, calibrated(machine, term, gap, seed)))
     if plan["kind"] == "beside_model_error":
         level = math.exp(rng.uniform(*np.log(LEVELS)))
@@ -223,6 +261,10 @@ def run(plan: dict[str, Any]) -> dict[str, Any]:
     return plan | _outcome(finding) | {"seconds": round(time.process_time() - started, 2)}
 
 
+def _unlisted(name: str, machine: Machine) -> Law:
+    return UNLISTED[name][1](machine.reach, machine.fastest)
+
+
 def _outcome(finding: MachineFinding) -> dict[str, Any]:
     return {
         "verdict": finding.verdict,
@@ -230,7 +272,20 @@ def _outcome(finding: MachineFinding) -> dict[str, Any]:
         "tied": {name: list(rivals) for name, rivals in finding.tied_with.items()},
         "gap": [finding.fall.before, finding.fall.after],
         "reason": finding.steps[-1].reason if finding.steps else "",
+        "law": _law(finding),
     }
+
+
+def _law(finding: MachineFinding) -> dict[str, Any]:
+    """What was proposed where something remained, and what it does to the held-out simulation."""
+    law = finding.law
+    if law is None:
+        return {"refused": finding.law_refused}
+    row: dict[str, Any] = {"place": law.place, "gap": [law.fall.before, law.fall.after]}
+    if law.choice is not None and law.choice.law is not None:
+        errors = [simulate_held_out(finding, model).rmse for model in (law.without, law.model)]
+        row |= {"form": law.choice.law.name, "equivalents": list(law.equivalents), "rmse": errors}
+    return row
 
 
 def table(found: list[dict[str, Any]]) -> Table:
@@ -268,8 +323,42 @@ def table(found: list[dict[str, Any]]) -> Table:
             for noise in NOISES
         ),
     ]
+    unlisted = [row for row in found if row["kind"] == "unlisted"]
+    if unlisted:
+        lines = _law_lines(unlisted, share)
+    elif any("law" in row for row in found):
+        lines.append(
+            ["nothing hidden: a law proposed", "1 %", *share("nothing", lambda row: "place" in row["law"])]
+        )
     note = f"{len(found)} campaigns of six records; hidden alone: gap 1.5 to 6, model error: 0.2 to 2 floors."
     return Table("Machines by a base model", ("what", "bar", "measured", "95 % interval"), lines, note)
+
+
+def _law_lines(
+    rows: list[dict[str, Any]], share: Callable[[str, Callable[[dict[str, Any]], bool]], list[str]]
+) -> list[list[str]]:
+    """Bars of the laws that nobody had listed."""
+
+    def place(row: dict[str, Any]) -> str:
+        return f"law_of_{UNLISTED[row['hidden']][0]}"
+
+    def is_there(row: dict[str, Any]) -> bool:
+        return bool(row["law"].get("place") == place(row))
+
+    def is_told(row: dict[str, Any]) -> bool:
+        return bool(row["established"]) or "place" in row["law"]
+
+    def is_closed(row: dict[str, Any]) -> bool:
+        gap: float = row["law"]["gap"][1] if "gap" in row["law"] else row["gap"][1]
+        return gap <= CLOSED_GAP
+
+    rises = sum("rmse" in row["law"] and row["law"]["rmse"][1] >= row["law"]["rmse"][0] for row in rows)
+    return [
+        ["held-out gap after, at most 1.2", "80 %", *share("unlisted", is_closed)],
+        ["law at the right place", "", *share("unlisted", is_there)],
+        ["a named term or a law", "", *share("unlisted", is_told)],
+        ["held-out simulation errs more with the law", "0", f"{rises}/{len(rows)}", ""],
+    ]
 
 
 def main() -> None:
@@ -280,6 +369,7 @@ def main() -> None:
     parser.add_argument(
         "--tuning", action="store_true", help="seeds that numbers of the method may be set on"
     )
+    parser.add_argument("--laws", action="store_true", help="laws that the catalogue does not have")
     parser.add_argument("--table", action="store_true", help="only print the table of the rows there are")
     given = parser.parse_args()
     given.rows.parent.mkdir(parents=True, exist_ok=True)
@@ -287,7 +377,8 @@ def main() -> None:
     first = TUNING if given.tuning else REPORTING
     found = [json.loads(line) for line in given.rows.read_text(encoding="utf-8").splitlines()]
     seeds = {row["seed"] for row in found}
-    plans = [task(number, first) for number in range(given.campaigns)]
+    plan_of = law_task if given.laws else task
+    plans = [plan_of(number, first) for number in range(given.campaigns)]
     for plan in [] if given.table else [plan for plan in plans if plan["seed"] not in seeds]:
         found.append(run(plan))
         with given.rows.open("a", encoding="utf-8") as file:

@@ -1,8 +1,26 @@
 """A law that nobody had listed: a free-form term where something remains, then the laws that it may be."""
 
+from impactcell.discrepancy.laws.condense import RankedForm, Tangent, rank_forms
 from impactcell.discrepancy.laws.finding import FittedFunction, LawFinding, find_law
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
+from impactcell.discrepancy.laws.grammar import ATOMS, Atom, Shaped
+from impactcell.discrepancy.laws.grammar import name as form_name
 from impactcell.discrepancy.laws.law import Law
 from impactcell.discrepancy.laws.refit import FittedLaw
 
-__all__ = ["FittedFunction", "FittedLaw", "FreeTerm", "Law", "LawFinding", "find_law", "fit_free_terms"]
+__all__ = [
+    "ATOMS",
+    "Atom",
+    "FittedFunction",
+    "FittedLaw",
+    "FreeTerm",
+    "Law",
+    "LawFinding",
+    "RankedForm",
+    "Shaped",
+    "Tangent",
+    "find_law",
+    "fit_free_terms",
+    "form_name",
+    "rank_forms",
+]

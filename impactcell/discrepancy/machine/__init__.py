@@ -1,19 +1,27 @@
 """Any machine with one coordinate: a base model without a cell, and what its records say it lacks."""
 
-from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
-from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
+from impactcell.discrepancy.machine.base_model import BaseModel, LawForm, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.free_forms import COVARIATES, FREE_FORMS, VALUES
 from impactcell.discrepancy.machine.investigation import investigate_machine
+from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep, Trial
-from impactcell.discrepancy.machine.simulation import OpenLoopError, simulate_held_out
+from impactcell.discrepancy.machine.simulation import OpenLoopError, motions, simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE, Term
 
 __all__ = [
     "CATALOGUE",
+    "COVARIATES",
+    "FREE_FORMS",
+    "LAW_PLACES",
+    "VALUES",
     "BaseModel",
     "ChosenTerm",
     "FallOfGap",
     "FittedModel",
+    "LawForm",
     "MachineFinding",
+    "MachineLaw",
     "NumberPrior",
     "OpenLoopError",
     "Response",
@@ -22,5 +30,7 @@ __all__ = [
     "TermChoice",
     "Trial",
     "investigate_machine",
+    "motions",
     "simulate_held_out",
+    "term_of",
 ]

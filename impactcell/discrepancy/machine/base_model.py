@@ -5,6 +5,7 @@ import math
 from dataclasses import dataclass, field
 
 from impactcell.campaign import Coordinate
+from impactcell.discrepancy.laws import Shaped, form_name
 
 
 class Response(enum.StrEnum):
@@ -28,16 +29,49 @@ class NumberPrior:
 
 
 @dataclass(frozen=True, slots=True)
-class TermChoice:
-    """A term of the model: its identifier and, where it needs one, a column of `shots.csv`."""
+class LawForm:
+    """A function s(u) that no term of the catalogue is.
 
-    identifier: str
-    covariate: str = ""
+    Attributes
+    ----------
+    terms : tuple of Shaped
+        What is summed, each with an amplitude of its own, at the values of their shapes.
+    reference : float
+        Covariate by which powers are made dimensionless, in its unit.
+    """
+
+    terms: tuple[Shaped, ...]
+    reference: float
 
     @property
     def name(self) -> str:
-        """Name by which it is told from the same term of another column."""
-        return f"{self.identifier}({self.covariate})" if self.covariate else self.identifier
+        """The function as one would print it, without its numbers."""
+        return form_name(tuple(item.term for item in self.terms))
+
+
+@dataclass(frozen=True, slots=True)
+class TermChoice:
+    """A term of the model.
+
+    Attributes
+    ----------
+    identifier : str
+        Of the catalogue; for a law, the place where it acts.
+    covariate : str
+        Column of `shots.csv`, where the term needs one.
+    law : LawForm or None
+        What acts there, where no term of the catalogue does.
+    """
+
+    identifier: str
+    covariate: str = ""
+    law: LawForm | None = None
+
+    @property
+    def name(self) -> str:
+        """Name by which it is told from the same term of another column, and from another law."""
+        inside = self.covariate if self.law is None else self.law.name
+        return f"{self.identifier}({inside})" if inside else self.identifier
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
-from impactcell.discrepancy.machine.free_forms import free_columns
-from impactcell.discrepancy.machine.terms import CATALOGUE, MotionState, Term
+from impactcell.discrepancy.machine.free_forms import Basis, free_columns, hats
+from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.terms import MotionState, Term
 from impactcell.discrepancy.machine.uniform_records import (
     MIN_HALF_SUPPORT,
     MotionScale,
@@ -67,8 +68,8 @@ def build_rows(
     records: Sequence[UniformRecord],
     base: BaseModel,
     candidates: Sequence[TermChoice],
-    gravity: float,
-    delay_s: float,
+    gravity_and_delay: tuple[float, float],
+    basis: Basis = hats,
 ) -> Rows:
     """Rows of all records with a column for every term, shape and nuisance.
 
@@ -78,13 +79,14 @@ def build_rows(
     base : BaseModel
     candidates : sequence of TermChoice
         Terms beside those of the base model.
-    gravity : float
-        G as it is known so far; the load and the zero of the position go by it.
-    delay_s : float
-        By which the force was recorded late.
+    gravity_and_delay : (float, float)
+        G as it is known so far, by which load and zero of the position go, and how late the force was
+        recorded.
+    basis : callable
+        Of the free forms.
     """
-    scale = motion_scale(records, base.response, gravity)
-    parts = [_record_rows(record, base, candidates, (gravity, delay_s), scale) for record in records]
+    scale = motion_scale(records, base.response, gravity_and_delay[0])
+    parts = [_record_rows(record, base, candidates, gravity_and_delay, (scale, basis)) for record in records]
     return Rows(
         np.concatenate([part.target for part in parts]),
         {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns},
@@ -99,9 +101,10 @@ def _record_rows(
     base: BaseModel,
     candidates: Sequence[TermChoice],
     gravity_and_delay: tuple[float, float],
-    scale: MotionScale,
+    scale_and_basis: tuple[MotionScale, Basis],
 ) -> Rows:
     gravity, delay_s = gravity_and_delay
+    scale, basis = scale_and_basis
     step = record.step_s
     half, narrow = half_supports(record, scale)
     weight, curvature = _test_function(half, step)
@@ -123,14 +126,14 @@ def _record_rows(
         ("position_offset", 0.0, 0): gravity * np.cos(record.position),
     }
     for choice in (*base.terms, *candidates):
-        term = CATALOGUE[choice.identifier]
+        term = term_of(choice)
         value = record.covariates.get(choice.covariate, 0.0)
         motion = MotionState(record.position, velocity, load, value * one)
         for shape in shape_grid(term, scale):
             for number, feature in enumerate(term.features(motion, shape)):
                 raw[choice.name, shape, number] = -direction * feature if term.is_friction else feature
     motion = MotionState(record.position, velocity, load, one)
-    raw |= free_columns(motion, direction, (scale.speed, scale.load), (scale.low, scale.high))
+    raw |= free_columns(motion, direction, scale.ranges, basis)
     columns = {name: _averaged(values, weight, centres) for name, values in raw.items()}
     columns["inertia", 0.0, 0] = -accelerating
     if base.response is Response.FORCE:

@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from impactcell.discrepancy.machine.base_model import BaseModel
+from impactcell.discrepancy.laws import FittedFunction
+from impactcell.discrepancy.machine.base_model import BaseModel, TermChoice
 from impactcell.discrepancy.machine.equations import Column
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep
@@ -76,6 +77,41 @@ class FittedModel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class MachineLaw:
+    """A function that the catalogue does not have, where something remains.
+
+    Attributes
+    ----------
+    place : str
+        Identifier of the place where it acts.
+    tested : (float, float)
+        Range of its covariate that was gone through.
+    spline : FittedFunction
+        Spline in that place, with its 95 % band.
+    choice : TermChoice or None
+        Functional form that does as well as a spline; None where only the spline does.
+    equivalents : tuple of str
+        Other forms that the records cannot tell from it.
+    rival_places : tuple of str
+        Other places at which a spline does as well.
+    without, model : FittedModel
+        Without and with it; with the form where there is one, else with the spline.
+    fall : FallOfGap
+        Of the held-out gap, from the one to the other.
+    """
+
+    place: str
+    tested: tuple[float, float]
+    spline: FittedFunction
+    choice: TermChoice | None
+    equivalents: tuple[str, ...]
+    rival_places: tuple[str, ...]
+    without: FittedModel
+    model: FittedModel
+    fall: FallOfGap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class MachineFinding:
     """Outcome of an investigation with a base model.
 
@@ -105,6 +141,10 @@ class MachineFinding:
     scale : MotionScale
     notes : tuple of str
     seed : int
+    law : MachineLaw or None
+        What is proposed where something remains.
+    law_refused : str
+        Why nothing is, where something was looked for.
     """
 
     base: BaseModel
@@ -126,6 +166,8 @@ class MachineFinding:
     scale: MotionScale
     notes: tuple[str, ...]
     seed: int
+    law: MachineLaw | None = None
+    law_refused: str = ""
 
     @staticmethod
     def enough(training: Blocks, held_out: Blocks) -> bool:

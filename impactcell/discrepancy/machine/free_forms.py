@@ -3,15 +3,18 @@
 A named effect is held against them: where only the free form does well, something else is missing.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from impactcell.discrepancy.machine.terms import MotionState
+from impactcell.physics.bspline import spline_basis
 from impactcell.records import Samples
 
 KNOTS = 7
 """Corners of a free form over the range that was gone through."""
+SPLINE_PIECES = 16
+"""Pieces of a cubic spline over the same: a bend a sixteenth of the range wide is followed [1]."""
 FREE_FORMS: Mapping[str, str] = {
     "friction_over_speed": "-s(|q'|) sign(q')",
     "friction_over_load": "-s(|F + G sin(q - q_0)|) sign(q')",
@@ -40,8 +43,31 @@ PLACES: Mapping[str, str] = {
 """The free form in whose place a term acts; terms that are not here have none."""
 
 
+VALUES: Mapping[str, Callable[[MotionState], Samples]] = {
+    "speed": lambda motion: np.abs(motion.velocity),
+    "load": lambda motion: motion.load,
+    "position": lambda motion: motion.position,
+}
+"""Values of each covariate in a motion."""
+Ranges = Mapping[str, tuple[float, float]]
+"""Range of each covariate that was gone through."""
+Basis = Callable[[Samples, float, float], Samples]
+"""Functions that a free form is made of, shape (functions, n), of values and the range of a covariate."""
+
+
+def hats(values: Samples, lower: float, upper: float) -> Samples:
+    """Piecewise linear functions about the corners, constant beyond the ends."""
+    knots = np.linspace(lower, upper, KNOTS)
+    return np.stack([np.interp(values, knots, corner) for corner in np.eye(KNOTS)])
+
+
+def splines(values: Samples, lower: float, upper: float) -> Samples:
+    """Cubic B-splines, straight beyond the ends."""
+    return spline_basis(values, lower, upper, SPLINE_PIECES).T
+
+
 def free_columns(
-    motion: MotionState, direction: Samples, largest: tuple[float, float], positions: tuple[float, float]
+    motion: MotionState, direction: Samples, ranges: Ranges, basis: Basis
 ) -> dict[tuple[str, float, int], Samples]:
     """Columns of all free forms, shape (n,) each.
 
@@ -49,24 +75,16 @@ def free_columns(
     ----------
     motion : MotionState
     direction : ndarray, shape (n,)
-    largest : (float, float)
-        Speed and load.
-    positions : (float, float)
-        Range of the positions.
+        Of the motion, -1 to 1.
+    ranges : mapping
+    basis : callable
+        `hats` or `splines`.
     """
-    by_speed = _hats(np.abs(motion.velocity), np.linspace(0.0, largest[0], KNOTS))
-    by_load = _hats(motion.load, np.linspace(0.0, max(largest[1], 1e-300), KNOTS))
-    by_place = _hats(motion.position, np.linspace(*positions, KNOTS))
     columns: dict[tuple[str, float, int], Samples] = {}
-    for number in range(KNOTS):
-        columns["friction_over_speed", 0.0, number] = -direction * by_speed[number]
-        columns["friction_over_load", 0.0, number] = -direction * by_load[number]
-        columns["friction_over_position", 0.0, number] = -direction * by_place[number]
-        columns["force_over_position", 0.0, number] = by_place[number]
+    for form, covariate in COVARIATES.items():
+        lower, upper = ranges[covariate]
+        functions = basis(VALUES[covariate](motion), lower, upper if upper > lower else lower + 1.0)
+        sense = -direction if form.startswith("friction") else 1.0
+        for number, values in enumerate(functions):
+            columns[form, 0.0, number] = sense * values
     return columns
-
-
-def _hats(values: Samples, knots: Samples) -> Samples:
-    """Hat functions about the knots, shape (knots, n); constant beyond the ends."""
-    corners = np.eye(len(knots))
-    return np.stack([np.interp(values, knots, corner) for corner in corners])

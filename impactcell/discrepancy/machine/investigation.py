@@ -10,6 +10,7 @@ import numpy as np
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
 from impactcell.discrepancy.machine.finding import MachineFinding
+from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.study import Study
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
@@ -57,7 +58,7 @@ def investigate_machine(
     base, notes = hold_what_cannot_be_seen(base, records)
     candidates = _candidates(base, records)
     study = Study(records, base, candidates, _held_records(records, train, test))
-    return study.investigate([*notes_of(data_faults), *notes], seed)
+    return with_law(study, study.investigate([*notes_of(data_faults), *notes], seed))
 
 
 def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:

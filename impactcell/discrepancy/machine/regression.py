@@ -122,7 +122,7 @@ def fit_blocks(
         "bij,j->bi", blocks.products[np.ix_(range(len(blocks)), places, places)], coefficients
     )
     matrix = blocks.products.sum(axis=0)[np.ix_(places, places)] + np.diag(
-        _prior_weight(blocks, columns, coefficients, priors)
+        prior_weight(blocks, columns, coefficients, priors)
     )
     matrix += RIDGE * np.diag(np.diag(matrix))
     inverse = np.linalg.pinv(matrix, hermitian=True)
@@ -200,8 +200,9 @@ def _weight(
     )
 
 
-def _prior_weight(
+def prior_weight(
     blocks: Blocks, columns: Sequence[Column], coefficients: Samples, priors: Mapping[Column, NumberPrior]
 ) -> Samples:
+    """Weight of each column's prior against a model's squared residuals, shape (p,)."""
     left = float(blocks.losses(columns, coefficients).sum())
     return _weight(left / (PIECES_PER_BLOCK * len(blocks)), columns, priors)

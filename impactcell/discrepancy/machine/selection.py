@@ -13,8 +13,8 @@ import numpy as np
 from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
 from impactcell.discrepancy.machine.equations import Column
 from impactcell.discrepancy.machine.free_forms import FREE_FORMS, KNOTS, PLACES
+from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
-from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.records import Samples
 
 MIN_GAIN_Z = 3.0
@@ -57,7 +57,7 @@ class ChosenTerm:
     @property
     def columns(self) -> tuple[Column, ...]:
         """Its columns of the regression."""
-        strengths = CATALOGUE[self.choice.identifier].strengths
+        strengths = term_of(self.choice).strengths
         return tuple((self.choice.name, self.shape, number) for number in range(len(strengths)))
 
 
@@ -225,18 +225,14 @@ def _is_tied(best: Trial, rival: Trial) -> bool:
 
 
 def mean_over_error(values: Samples) -> float:
-    """Mean over its standard error; inf where nothing scatters."""
+    """Mean over its standard error; inf where nothing scatters, 0 where there is nothing."""
     error = float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else math.inf
-    return float(values.mean()) / error if error > 0.0 else math.inf
+    mean = float(values.mean())
+    return mean / error if error > 0.0 else math.inf * mean if mean else 0.0
 
 
 def _free_columns(form: str) -> list[Column]:
     return [(form, 0.0, number) for number in range(KNOTS)]
-
-
-def free_form_columns(form: str) -> tuple[Column, ...]:
-    """Columns of a free form."""
-    return tuple(_free_columns(form))
 
 
 def sign_flip_p(differences: Samples, seed: int, draws: int = 1999) -> float:

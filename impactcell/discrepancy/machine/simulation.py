@@ -5,8 +5,8 @@ that may stop the part and never turns it. Where the force is predicted, the mea
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,14 +18,19 @@ from impactcell.discrepancy.machine.equations import (
     smoothed_speed,
 )
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
-from impactcell.discrepancy.machine.terms import CATALOGUE, MotionState
+from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
 from impactcell.records import Samples
 
 STEPS_PER_PERIOD = 200
 """Least steps in a period of the motion: second order, a step errs by (2 pi / 200)² / 24 of its force [1]."""
 START_SAMPLES = 5
-"""Samples at either side by which the first speed is found [samples]."""
+"""Samples at either side by which the first speed is looked for at first [samples]."""
+START_PERIODS = 1.0
+"""Periods of the motion, or a quarter of a stretch, by which its first state is fitted."""
+START_NUDGE = 1e-3
+"""Size of the nudges that tell how a motion follows from its first state, over its range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +103,9 @@ def _positions(
     records = [record for record, _ in stretches]
     parts = max(math.ceil(STEPS_PER_PERIOD * max(record.step_s for record in records) / period_s), 1)
     step = np.array([record.step_s for record in records]) / parts
-    sizes = [stretch.stop - stretch.start for _, stretch in stretches]
-    drive = np.zeros((max(sizes) + 1, len(records)))
+    measured = [record.position[stretch] for record, stretch in stretches]
+    longest = max(map(len, measured))
+    drive = np.zeros((longest + 1, len(records)))
     start = np.empty((2, len(records)))
     for lane, (record, stretch) in enumerate(stretches):
         force = np.interp(record.time_s[stretch] + model.delay_s, record.time_s, record.force)
@@ -116,16 +122,52 @@ def _positions(
             for term in model.terms
         },
     )
-    q, v = start
-    out = np.empty((max(sizes), len(records)))
-    for place in range(max(sizes)):
-        out[place] = q
-        for part in range(parts):
-            share = (part + 0.5) / parts
-            q, v = _advance(
-                model, machine, (q, v), (1.0 - share) * drive[place] + share * drive[place + 1], step
-            )
-    return [out[: len(record.position[stretch]), lane] for lane, (record, stretch) in enumerate(stretches)]
+
+    def run(state: Samples, count: int) -> Samples:
+        q, v = state
+        out = np.empty((count, len(records)))
+        for place in range(count):
+            out[place] = q
+            for part in range(parts):
+                share = (part + 0.5) / parts
+                q, v = _advance(
+                    model, machine, (q, v), (1.0 - share) * drive[place] + share * drive[place + 1], step
+                )
+        return out
+
+    begin = [
+        max(min(int(START_PERIODS * period_s / record.step_s), len(values) // 4), 2)
+        for record, values in zip(records, measured, strict=True)
+    ]
+    start = _settled_start(lambda state: run(state, max(begin)), start, measured, begin)
+    out = run(start, longest)
+    return [out[: len(values), lane] for lane, values in enumerate(measured)]
+
+
+def _settled_start(
+    run: Callable[[Samples], Samples], start: Samples, measured: Sequence[Samples], begin: Sequence[int]
+) -> Samples:
+    """First states, shape (2, lanes), by least squares of a model over the begin of each stretch.
+
+    The speed that a few samples show errs by more than the model does; one Gauss-Newton step from it.
+    """
+    reached = [float(np.ptp(values)) for values in measured]
+    nudge = START_NUDGE * np.array([reached, reached])
+    nudge[1] *= np.abs(start[1]).max() / max(*reached, np.finfo(float).tiny) + 1.0
+    plain = run(start)
+    moved = [run(start + nudge * np.array([[1.0 - axis], [axis]])) - plain for axis in (0.0, 1.0)]
+    settled = start.copy()
+    for lane, (values, count) in enumerate(zip(measured, begin, strict=True)):
+        slopes = np.stack([change[:count, lane] for change in moved], axis=1)
+        left = values[:count] - plain[:count, lane]
+        step = np.linalg.lstsq(slopes, left, rcond=1e-6)[0] * nudge[:, lane]
+        settled[:, lane] += step
+    after = run(settled)
+    for lane, (values, count) in enumerate(zip(measured, begin, strict=True)):
+        errors = [float(np.sum((values[:count] - out[:count, lane]) ** 2)) for out in (plain, after)]
+        if not errors[1] < errors[0]:
+            settled[:, lane] = start[:, lane]
+    return settled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +202,7 @@ def _terms(
     """Sum of all smooth forces, and level of friction, shape (n,) each."""
     smooth, friction = np.zeros(position.shape), np.zeros(position.shape)
     for chosen in model.terms:
-        term = CATALOGUE[chosen.choice.identifier]
+        term = term_of(chosen.choice)
         covariate = covariates[chosen.choice.covariate]
         features = term.features(MotionState(position, velocity, load, covariate), chosen.shape)
         for column, feature in zip(chosen.columns, features, strict=True):
@@ -170,6 +212,45 @@ def _terms(
             else:
                 smooth += value
     return smooth, friction
+
+
+def motions(finding: MachineFinding) -> list[MotionState]:
+    """Measured motion of every record, by the final model's gravity; without any column of `shots.csv`."""
+    states = []
+    for record in finding.records:
+        _, narrow = half_supports(record, finding.scale)
+        velocity, _ = smoothed_speed(record.position, narrow, record.step_s)
+        gravity = finding.final.gravity * np.sin(record.position)
+        load = np.abs(carried_force(finding.base.response, record.force, gravity))
+        states.append(MotionState(record.position, velocity, load, np.zeros(velocity.shape)))
+    return states
+
+
+def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, float]:
+    """Least and largest force against the motion over all records, by the terms that may not give energy.
+
+    Terms of friction count, and those whose strength may not be negative; springs and waves of force do not.
+    """
+    least, largest = math.inf, 0.0
+    for record, motion in zip(finding.records, motions(finding), strict=True):
+        _, narrow = half_supports(record, finding.scale)
+        noise = smoothed_speed(record.position, narrow, record.step_s)[1] * record.noise[0]
+        moving = np.abs(direction_of_motion(motion.velocity, finding.scale, noise)) == 1.0
+        against = np.zeros(record.position.shape)
+        for chosen in model.terms:
+            term = term_of(chosen.choice)
+            column = np.full(moving.shape, record.covariates.get(chosen.choice.covariate, 0.0))
+            features = term.features(replace(motion, covariate=column), chosen.shape)
+            if term.is_friction or term.nonnegative:
+                sense = 1.0 if term.is_friction else -np.sign(motion.velocity)
+                against += sense * sum(
+                    model.value(name) * feature
+                    for name, feature in zip(chosen.columns, features, strict=True)
+                )
+        if moving.any():
+            least = min(least, float(against[moving].min()))
+            largest = max(largest, float(against[moving].max()))
+    return least, largest
 
 
 def _gravity_deviation(model: FittedModel, position: Samples) -> Samples:

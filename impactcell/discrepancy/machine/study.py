@@ -15,6 +15,8 @@ from impactcell.discrepancy.machine.equations import (
     shape_grid,
 )
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
+from impactcell.discrepancy.machine.free_forms import Basis
+from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import BLOCKS_OF_RECORD, Blocks, blocks_of, fit_blocks
 from impactcell.discrepancy.machine.selection import (
@@ -24,7 +26,6 @@ from impactcell.discrepancy.machine.selection import (
     like_the_machine,
     select_terms,
 )
-from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
 
 RECORDS_FOR_FOLDS = 4
@@ -69,8 +70,7 @@ class Study:
         self._set_priors()
         self._rows = lru_cache(maxsize=4)(self._build)
         self.shapes = {
-            choice.name: shape_grid(CATALOGUE[choice.identifier], self.scale)
-            for choice in (*base.terms, *self.candidates)
+            choice.name: shape_grid(term_of(choice), self.scale) for choice in (*base.terms, *self.candidates)
         }
 
     def _set_priors(self) -> None:
@@ -83,7 +83,7 @@ class Study:
             self.priors[name, 0.0, 0] = NumberPrior(0.0, std)
 
     def _build(self, gravity: float, delay_s: float) -> Rows:
-        return build_rows(self.records, self.base, self.candidates, gravity, delay_s)
+        return build_rows(self.records, self.base, self.candidates, (gravity, delay_s))
 
     def rows(self) -> Rows:
         """Rows at the gravity and delay of now."""
@@ -95,14 +95,18 @@ class Study:
         return frozenset(
             column
             for choice in (*self.base.terms, *self.candidates)
-            if CATALOGUE[choice.identifier].nonnegative
+            if term_of(choice).nonnegative
             for shape in self.shapes[choice.name]
             for column in ChosenTerm(choice, shape).columns
         )
 
-    def blocks(self) -> tuple[Blocks, Blocks, IndexArray]:
-        """Training and held-out blocks, and the block of each row."""
-        rows = self.rows()
+    def rows_with(self, choices: Sequence[TermChoice], basis: Basis) -> Rows:
+        """Rows at the same, of other terms beside the base model's, and of free forms in another basis."""
+        return build_rows(self.records, self.base, choices, (self.gravity, self.delay_s), basis)
+
+    def blocks(self, rows: Rows | None = None) -> tuple[Blocks, Blocks, IndexArray]:
+        """Training and held-out blocks, and the block of each row; of the rows of now, or of others."""
+        rows = rows or self.rows()
         number: IndexArray = (rows.record * BLOCKS_OF_RECORD + np.floor(rows.time_s / self.block_s)).astype(
             np.int64
         )

@@ -80,6 +80,11 @@ class MotionScale:
     low: float
     high: float
 
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Range of each covariate that a function may be one of."""
+        return {"speed": (0.0, self.speed), "load": (0.0, self.load), "position": (self.low, self.high)}
+
 
 def uniform_records(campaign: Campaign, base: BaseModel) -> tuple[UniformRecord, ...]:
     """Lay all shots out at equal steps.

@@ -8,8 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS
+from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.search import ALL, ModelEvidence
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.records import Samples
 
 UNITS = ("N", "mm", "mm")
 SCALES = (1.0, 1e3, 1e3)
@@ -228,10 +230,41 @@ def law_figure(result: DiscrepancyResult) -> str | None:
     finding = result.law
     if finding is None or finding.refused:
         return None
-    form, curve, law = finding.term.form, finding.function, finding.proposed
-    # What the plant takes up is no difference: both are drawn about their means then.
-    level = float(np.mean(curve.function)) if form.constant_is else 0.0
-    scale, unit = (1e3, "mm") if form.covariate_unit == "m" else (1.0, form.covariate_unit)
+    form, law = finding.term.form, finding.proposed
+    return function_figure(
+        finding.function,
+        None if law is None else (law.values(finding.function.covariate), law.functional_form),
+        finding.term.visited.values,
+        (form.covariate, form.covariate_unit, form.unit),
+        less_mean=bool(form.constant_is),
+    )
+
+
+def function_figure(
+    curve: FittedFunction,
+    law: tuple[Samples, str] | None,
+    met: Samples,
+    covariate_and_units: tuple[str, str, str],
+    *,
+    less_mean: bool,
+) -> str:
+    """Spline with its band, a law beside it, and where the covariate was met.
+
+    Parameters
+    ----------
+    curve : FittedFunction
+    law : (ndarray, str) or None
+        Values of the law where the curve has them, and its name.
+    met : ndarray
+        Values of the covariate.
+    covariate_and_units : (str, str, str)
+        Covariate, its unit and that of the function.
+    less_mean : bool
+        The model takes a constant up, so that it is no difference: both are drawn about their means.
+    """
+    covariate, covariate_unit, function_unit = covariate_and_units
+    level = float(np.mean(curve.function)) if less_mean else 0.0
+    scale, unit = (1e3, "mm") if covariate_unit == "m" else (1.0, covariate_unit)
     u = scale * curve.covariate
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 3.4))
@@ -240,13 +273,13 @@ def law_figure(result: DiscrepancyResult) -> str | None:
         above.fill_between(u, curve.low - level, curve.high - level, color=MEASURED, alpha=0.5, linewidth=0)
         above.plot(u, curve.function - level, color=BEFORE, label="spline, 95 % band")
         if law is not None:
-            function = law.values(curve.covariate)
-            shift = float(np.mean(function)) if form.constant_is else 0.0
-            above.plot(u, function - shift, "--", color=AFTER, label=law.functional_form)
-        what = "s(u) less its mean" if form.constant_is else "s(u)"
-        above.set_ylabel(what if form.unit == "1" else f"{what} [{form.unit}]")
+            function, name = law
+            shift = float(np.mean(function)) if less_mean else 0.0
+            above.plot(u, function - shift, "--", color=AFTER, label=name)
+        what = "s(u) less its mean" if less_mean else "s(u)"
+        above.set_ylabel(what if function_unit == "1" else f"{what} [{function_unit}]")
         above.legend(frameon=False, fontsize=8)
-        below.hist(scale * finding.term.visited.values, bins=60, color=MEASURED)
+        below.hist(scale * met, bins=60, color=MEASURED)
         below.set_yticks([])
-        below.set_xlabel(f"u, {form.covariate.replace('_', ' ')} [{unit}]; below: where samples lie")
+        below.set_xlabel(f"u, {covariate.replace('_', ' ')} [{unit}]; below: where samples lie")
         return _svg(figure)

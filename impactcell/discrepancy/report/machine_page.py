@@ -4,12 +4,16 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
 
-from impactcell.discrepancy.machine import CATALOGUE, MachineFinding
-from impactcell.discrepancy.report.machine_result import phrase
+from impactcell.discrepancy.machine import CATALOGUE, VALUES, ChosenTerm, MachineFinding, motions
+from impactcell.discrepancy.report.figures import function_figure
+from impactcell.discrepancy.report.machine_result import SYMBOLS, law_covariate, phrase
 from impactcell.discrepancy.report.page import format_number
 
+SHOWN_FORMS = 5
+"""Forms alike that the page lists [1]."""
 SHOWN_TRIALS = 15
 """Terms that the page lists [1]."""
 
@@ -47,4 +51,32 @@ def machine_page_context(finding: MachineFinding, document: dict[str, Any], sour
         "gain_of_all": first.gain_of_all if first else 0.0,
         "reason": finding.steps[-1].reason if finding.steps else "",
         "base": [term.choice.name for term in finding.nominal.terms],
+        "law_figure": _law_figure(finding),
+        "shown_forms": SHOWN_FORMS,
     }
+
+
+def _law_figure(finding: MachineFinding) -> str:
+    """Spline of what remains, and the law beside it; empty where nothing is proposed."""
+    law = finding.law
+    if law is None:
+        return ""
+    covariate, unit = law_covariate(finding)
+    force = SYMBOLS[finding.base.coordinate]["force"]
+    values = None
+    if law.choice is not None and law.choice.law is not None:
+        chosen = ChosenTerm(law.choice, 0.0)
+        functions = [
+            item.values(law.spline.covariate, law.choice.law.reference) for item in law.choice.law.terms
+        ]
+        sizes = [law.model.value(column) for column in chosen.columns]
+        values = sum(size * function for size, function in zip(sizes, functions, strict=True))
+    name = "" if law.choice is None or law.choice.law is None else law.choice.law.name
+    met = np.concatenate([VALUES[covariate](motion) for motion in motions(finding)])
+    return function_figure(
+        law.spline,
+        None if values is None else (np.asarray(values), name),
+        met[(met >= law.tested[0]) & (met <= law.tested[1])],
+        (covariate, unit, force),
+        less_mean=True,
+    )

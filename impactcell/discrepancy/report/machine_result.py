@@ -5,15 +5,18 @@ from typing import Any
 
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import (
-    CATALOGUE,
+    COVARIATES,
+    FREE_FORMS,
+    LAW_PLACES,
     ChosenTerm,
     FallOfGap,
     FittedModel,
     MachineFinding,
     OpenLoopError,
     simulate_held_out,
+    term_of,
 )
-from impactcell.discrepancy.report.result import FORMAT, round_digits
+from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, round_digits
 
 SYMBOLS = {
     Coordinate.TRANSLATION: {"force": "N", "F": "n", "q": "m"},
@@ -111,8 +114,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
             },
         },
         "simulation": _simulation(finding, errors),
-        "law": None,
-        "law_refused": finding.steps[-1].reason if finding.steps and not finding.is_at_floor else None,
+        **_law(finding),
         "next_experiment": [],
         "nominal": _nuisances(finding.final)
         | {
@@ -136,6 +138,63 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
         "model": "model.extended.yaml",
         "report": "report.html",
     }
+
+
+def _law(finding: MachineFinding) -> dict[str, Any]:
+    """Write what is proposed where something remains; null, with the reason, where nothing is."""
+    law = finding.law
+    if law is None:
+        return {"law": None, "law_refused": finding.law_refused or None}
+    covariate, unit = law_covariate(finding)
+    chosen = None if law.choice is None else ChosenTerm(law.choice, 0.0)
+    errors = (
+        None
+        if chosen is None
+        else (simulate_held_out(finding, law.without), simulate_held_out(finding, law.model))
+    )
+    document = {
+        "place": FREE_FORMS[LAW_PLACES[law.place]],
+        "covariates": [covariate],
+        "form": SPLINE_ONLY if law.choice is None or law.choice.law is None else law.choice.law.name,
+        "equation": FREE_FORMS[LAW_PLACES[law.place]] if law.choice is None else term_of(law.choice).equation,
+        "parameters": {} if chosen is None else _law_parameters(finding, chosen),
+        "equivalents": list(law.equivalents),
+        "rival_places": [FREE_FORMS[LAW_PLACES[place]] for place in law.rival_places],
+        "tested_range": {
+            covariate: {
+                "low": round_digits(law.tested[0]), "high": round_digits(law.tested[1]), "unit": unit
+            }
+        },
+        "held_out": {**_fall(law.fall), "p_value": round_digits(law.fall.p_value)},
+        "simulation": None if errors is None else _simulation(finding, errors),
+        "file": None if law.choice is None else f"{law.place}.yaml",
+    }  # fmt: skip
+    return {"law": document, "law_refused": None}
+
+
+def law_covariate(finding: MachineFinding) -> tuple[str, str]:
+    """Name what a proposed law is a function of, and its unit."""
+    symbols = SYMBOLS[finding.base.coordinate]
+    covariate = "" if finding.law is None else COVARIATES[LAW_PLACES[finding.law.place]]
+    units = {"speed": f"{symbols['q']}/s", "load": symbols["force"], "position": symbols["q"]}
+    return covariate, units.get(covariate, "1")
+
+
+def _law_parameters(finding: MachineFinding, chosen: ChosenTerm) -> dict[str, Any]:
+    """Amplitudes with their intervals, and the shapes that went with the spline."""
+    assert finding.law is not None  # noqa: S101 - asked for a law alone
+    assert chosen.choice.law is not None  # noqa: S101
+    model = finding.law.model
+    document: dict[str, Any] = {}
+    for (name, unit), column in zip(term_of(chosen.choice).strengths, chosen.columns, strict=True):
+        place = model.fit.columns.index(column)
+        document[parameter_name(name, unit, finding.base.coordinate)] = _estimate(model, place)
+    for number, item in enumerate(chosen.choice.law.terms, 1):
+        for atom, values in zip(item.term, item.shapes, strict=True):
+            for shape, value in zip(atom.shapes, values, strict=True):
+                name = shape.name if f"{shape.name}" not in document else f"{shape.name}_{number}"
+                document[name] = {"value": round_digits(value), "ci95": None, "at_bound": False}
+    return document
 
 
 def _phase(finding: MachineFinding) -> str:
@@ -183,7 +242,7 @@ def _effect(finding: MachineFinding, term: ChosenTerm) -> dict[str, Any]:
 
 def _parameters(finding: MachineFinding, chosen: ChosenTerm, *, in_full: bool = False) -> dict[str, Any]:
     """Strengths with their intervals, and the shape where there is one; `in_full` names the term too."""
-    term, fit = CATALOGUE[chosen.choice.identifier], finding.final.fit
+    term, fit = term_of(chosen.choice), finding.final.fit
     prefix = f"{chosen.choice.name}." if in_full else ""
     document: dict[str, Any] = {}
     for (name, unit), column in zip(term.strengths, chosen.columns, strict=True):

@@ -1,0 +1,156 @@
+"""A smooth spline in one place of a machine's model, as smooth as blocks it was not fitted to want it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.discrepancy.laws import FittedFunction, Tangent
+from impactcell.discrepancy.machine.equations import Column, IndexArray
+from impactcell.discrepancy.machine.finding import FittedModel
+from impactcell.discrepancy.machine.free_forms import SPLINE_PIECES, splines
+from impactcell.discrepancy.machine.regression import PIECES_PER_BLOCK, Blocks, prior_weight
+from impactcell.discrepancy.machine.study import Study
+from impactcell.records import Samples
+
+SMOOTHNESS = (1e-4, 1e-2, 1.0, 1e2)
+"""Weights of the roughness that are tried, over the information that the blocks have of a coefficient [1]."""
+RIDGE = 1e-6
+"""Weight of the size of a spline, over the same: what no block sees of it stays at zero [1]."""
+DRAWN = 60
+"""Points of the range at which a spline is drawn."""
+BAND_STDS = 1.96
+"""Standard deviations of a 95 % band."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeSpline:
+    """A spline in one place.
+
+    Attributes
+    ----------
+    form : str
+    penalty : ndarray, shape (K, K)
+    gains : ndarray, shape (b,)
+        Fall of each training block's squared residual out of fold.
+    """
+
+    form: str
+    penalty: Samples
+    gains: Samples
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Its columns of the regression."""
+        return spline_columns(self.form)
+
+
+def spline_columns(form: str) -> tuple[Column, ...]:
+    """Columns of the regression of the spline in a place."""
+    return tuple((form, 0.0, number) for number in range(SPLINE_PIECES + 3))
+
+
+def best_spline(study: Study, blocks: Blocks, model: FittedModel, before: Samples, form: str) -> FreeSpline:
+    """As smooth as blocks that it was not fitted to want it."""
+    count = SPLINE_PIECES + 3
+    places = blocks.places(spline_columns(form))
+    information = float(np.trace(blocks.products.sum(axis=0)[np.ix_(places, places)])) / count
+    bends = np.diff(np.eye(count), n=2, axis=0)
+    trials = []
+    for weight in SMOOTHNESS:
+        penalty = information * (weight * bends.T @ bends + RIDGE * np.eye(count))
+        losses = np.empty(len(blocks))
+        for fold in np.unique(blocks.fold):
+            inside = blocks.fold == fold
+            fitted = _solve(study, blocks, model, (spline_columns(form), penalty), np.flatnonzero(~inside))
+            losses[inside] = blocks.losses(*fitted)[inside]
+        trials.append(FreeSpline(form, penalty, before - losses))
+    return max(trials, key=lambda spline: float(spline.gains.sum()))
+
+
+def _solve(
+    study: Study,
+    blocks: Blocks,
+    model: FittedModel,
+    spline: tuple[Sequence[Column], Samples],
+    chosen: IndexArray,
+) -> tuple[tuple[Column, ...], Samples]:
+    """Columns and coefficients of a model and a spline on some blocks; what is at its bound stays there."""
+    columns, penalty = spline
+    fit = model.fit
+    every = (*fit.columns, *columns)
+    places = blocks.places(every)
+    total = blocks.products[chosen].sum(axis=0)
+    matrix = total[np.ix_(places, places)].copy()
+    weight = prior_weight(blocks, fit.columns, fit.coefficients, study.priors)
+    own = len(fit.columns)
+    matrix[:own, :own] += np.diag(weight) * len(chosen) / len(blocks)
+    matrix[own:, own:] += penalty * len(chosen) / len(blocks)
+    coefficients = np.concatenate([np.where(fit.at_bound, fit.coefficients, 0.0), np.zeros(len(columns))])
+    free = np.concatenate([np.logical_not(fit.at_bound), np.ones(len(columns), dtype=bool)])
+    right = total[places, -1] - matrix @ coefficients
+    size = np.sqrt(np.maximum(np.diag(matrix)[free], np.finfo(float).tiny))
+    scaled = matrix[np.ix_(free, free)] / np.outer(size, size)
+    coefficients[free] += np.linalg.lstsq(scaled, right[free] / size, rcond=1e-12)[0] / size
+    return every, coefficients
+
+
+def with_spline(study: Study, blocks: Blocks, model: FittedModel, spline: FreeSpline) -> FittedModel:
+    """Model with a spline beside its terms, fitted to all blocks."""
+    every, coefficients = _solve(
+        study, blocks, model, (spline.columns, spline.penalty), np.arange(len(blocks))
+    )
+    unknown = np.full(len(every), math.nan)
+    at_bound = np.append(model.fit.at_bound, np.zeros(len(spline.columns), dtype=bool))
+    return replace(model, fit=replace(
+        model.fit, columns=every, coefficients=coefficients, low=unknown, high=unknown, at_bound=at_bound
+    ))  # fmt: skip
+
+
+def tangent_of(
+    blocks: Blocks, study: Study, model: FittedModel, spline: FreeSpline, tested: tuple[float, float]
+) -> tuple[Tangent, float]:
+    """Quadratic log-likelihood of the spline's coefficients, and the variance that it is over.
+
+    What is left scatters by blocks: a block counts as `PIECES_PER_BLOCK` independent pieces.
+    """
+    fit = model.fit
+    count = len(spline.columns)
+    own = [place for place in range(len(fit.columns) - count) if not fit.at_bound[place]]
+    inside = blocks.places(spline.columns)
+    beside = blocks.places([fit.columns[place] for place in own])
+    total = blocks.products.sum(axis=0)
+    pieces = PIECES_PER_BLOCK * len(blocks)
+    variance = float(blocks.losses(fit.columns, fit.coefficients).sum()) / pieces
+    weight = prior_weight(blocks, fit.columns[:-count], fit.coefficients[:-count], study.priors)
+    matrix = total[np.ix_(beside, beside)] + np.diag(weight[own])
+    held = [place for place in range(len(fit.columns) - count) if fit.at_bound[place]]
+    at_bound = blocks.places([fit.columns[place] for place in held])
+    target = total[:, -1] - total[:, at_bound] @ fit.coefficients[held]
+    inverse = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
+    cross = total[np.ix_(inside, beside)]
+    information = total[np.ix_(inside, inside)] - cross @ inverse @ cross.T
+    pull = target[inside] - cross @ inverse @ target[beside]
+    quadratic = Tangent(
+        information / variance,
+        pull / variance,
+        *tested,
+        samples=int(pieces),
+        constant=False,
+        fitted=fit.coefficients[-count:],
+        others=np.zeros(0),
+        response=np.zeros((0, count)),
+    )
+    return quadratic, variance
+
+
+def spline_function(tangent: Tangent, penalty: Samples, tested: tuple[float, float]) -> FittedFunction:
+    """Spline, and the 95 % band of it less its mean, which the machine's own friction or offset takes up."""
+    u = np.linspace(*tested, DRAWN)
+    basis = splines(u, *tested).T
+    covariance = np.linalg.pinv(tangent.information + penalty, rcond=1e-12, hermitian=True)
+    moving = basis - basis.mean(axis=0)
+    std = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", moving, covariance, moving), 0.0))
+    value = basis @ tangent.fitted
+    return FittedFunction(u, value, value - BAND_STDS * std, value + BAND_STDS * std)

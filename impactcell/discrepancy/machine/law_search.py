@@ -1,0 +1,180 @@
+"""What remains of a machine's records as a function of speed, load or position that nobody had listed.
+
+A smooth spline is fitted in each place, as smooth as blocks that it was not fitted to want it. The place that
+predicts them best is condensed: near the spline the squared residuals are a quadratic function of its
+coefficients, functional forms are projected on it, and the best are fitted by themselves. Held-out blocks and
+the held-out simulation decide.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from impactcell.discrepancy.laws import RankedForm, rank_forms
+from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
+from impactcell.discrepancy.machine.equations import Column
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.free_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
+from impactcell.discrepancy.machine.free_splines import best_spline, spline_function, tangent_of, with_spline
+from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
+from impactcell.discrepancy.machine.proof import fall_of_gap
+from impactcell.discrepancy.machine.regression import (
+    Blocks,
+    fit_blocks,
+    out_of_fold_losses,
+)
+from impactcell.discrepancy.machine.selection import (
+    MIN_GAIN_Z,
+    MIN_SHARE_OF_FREE,
+    TIE_Z,
+    ChosenTerm,
+    mean_over_error,
+)
+from impactcell.discrepancy.machine.simulation import resistance, simulate_held_out
+from impactcell.discrepancy.machine.study import Study
+from impactcell.records import Samples
+
+MIN_SHARE = 0.05
+"""Share of the squared residual above the noise that a spline has to close: less is not worth a law [1]."""
+REFITTED = 20
+"""Functional forms that are fitted by themselves, of those that come nearest to the spline."""
+PIECES_PER_WAVE = 3.0
+"""Pieces of a spline that a wave takes to be seen in it."""
+NEGATIVE_SHARE = 0.02
+"""Share of the largest friction by which it may be below zero before it gives energy [1]."""
+
+
+def with_law(study: Study, finding: MachineFinding) -> MachineFinding:
+    """Look for a law where a finding leaves something; the finding with it, or with the reason for none."""
+    if finding.missing_blocks or finding.is_at_floor:
+        return finding
+    outcome = _find_law(study, finding)
+    if isinstance(outcome, str):
+        return replace(finding, law_refused=outcome)
+    return replace(finding, law=outcome)
+
+
+def _find_law(study: Study, finding: MachineFinding) -> MachineLaw | str:
+    own = tuple(term.choice for term in finding.final.terms[len(finding.nominal.terms) :])
+    training, held_out, _ = study.blocks(study.rows_with(own, splines))
+    columns = study.columns(finding.final.terms)
+    fit = fit_blocks(training, columns, study.priors, study.nonnegative)
+    model = replace(finding.final, fit=fit)
+    before = out_of_fold_losses(training, columns, study.priors, study.nonnegative)
+    tried = sorted(
+        (best_spline(study, training, model, before, form) for form in _gone_through(finding)),
+        key=lambda spline: -float(spline.gains.sum()),
+    )
+    best = tried[0]
+    excess = float(before.sum() - training.noise.sum())
+    if mean_over_error(best.gains) < MIN_GAIN_Z or float(best.gains.sum()) < MIN_SHARE * excess:
+        return "no function of speed, load or position helps block after block that it was not fitted to"
+    rivals = tuple(
+        LAW_PREFIX + other.form for other in tried[1:] if mean_over_error(best.gains - other.gains) < TIE_Z
+    )
+    tested = finding.scale.ranges[COVARIATES[best.form]]
+    smooth = with_spline(study, training, model, best)
+    tangent, variance = tangent_of(training, study, smooth, best, tested)
+    ranked = [item for item in rank_forms(tangent) if _is_resolved(item, tested)]
+    choices = _choices(best.form, ranked[:REFITTED], max(map(abs, tested)))
+    laws = _Forms(study, (*own, *choices), model, choices)
+    chosen, equivalents = laws.condensed(best.gains, before)
+    law_model, blocks = (smooth, held_out) if chosen is None else laws.fitted(chosen)
+    fall = fall_of_gap(blocks, model, law_model, finding.seed)
+    curve = spline_function(tangent, best.penalty / variance, tested)
+    law = MachineLaw(
+        LAW_PREFIX + best.form, tested, curve, chosen, equivalents, rivals, model, law_model, fall
+    )
+    return _refusal(finding, law) or law
+
+
+def _gone_through(finding: MachineFinding) -> list[str]:
+    """Free forms whose covariate has a range."""
+    ranges = finding.scale.ranges
+    return [form for form in FREE_FORMS if ranges[COVARIATES[form]][1] > ranges[COVARIATES[form]][0]]
+
+
+def _refusal(finding: MachineFinding, law: MachineLaw) -> str:
+    """Say why a law is not proposed; empty if it is."""
+    if not law.fall.is_real:
+        return "on held-out blocks the gap does not fall by more than chance"
+    if law.choice is None:
+        return ""
+    without, with_it = (simulate_held_out(finding, model).rmse for model in (law.without, law.model))
+    if not with_it < without:
+        return "simulated open loop, the law that fits best errs no less on held-out records than no law"
+    least, largest = resistance(finding, law.model)
+    if least < -NEGATIVE_SHARE * largest:
+        return "with the law that fits best friction would give energy in the range that was gone through"
+    return ""
+
+
+def _is_resolved(form: RankedForm, tested: tuple[float, float]) -> bool:
+    """Whether a spline could have shown every wave of a form."""
+    shortest = PIECES_PER_WAVE * (tested[1] - tested[0]) / SPLINE_PIECES
+    return all(
+        value >= shortest
+        for item in form.terms
+        for atom, values in zip(item.term, item.shapes, strict=True)
+        for shape, value in zip(atom.shapes, values, strict=True)
+        if shape.name == "period"
+    )
+
+
+def _choices(form: str, ranked: Sequence[RankedForm], reference: float) -> tuple[TermChoice, ...]:
+    """Name the forms; of two with one name the first."""
+    choices: dict[str, TermChoice] = {}
+    for item in ranked:
+        choice = TermChoice(LAW_PREFIX + form, law=LawForm(item.terms, reference))
+        choices.setdefault(choice.name, choice)
+    return tuple(choices.values())
+
+
+class _Forms:
+    """Functional forms in one place, fitted by themselves beside a model."""
+
+    def __init__(
+        self,
+        study: Study,
+        choices: Sequence[TermChoice],
+        model: FittedModel,
+        forms: Sequence[TermChoice],
+    ) -> None:
+        self.study, self.model, self.forms = study, model, forms
+        self.training, self.held_out, _ = study.blocks(study.rows_with(choices, splines))
+
+    def _fit_columns(self, form: TermChoice) -> list[Column]:
+        return [*self.model.fit.columns, *ChosenTerm(form, 0.0).columns]
+
+    def condensed(self, spline: Samples, before: Samples) -> tuple[TermChoice | None, tuple[str, ...]]:
+        """Shortest form that does as well out of fold as the spline, and those that do as well as it."""
+        gains = {
+            form: before - out_of_fold_losses(
+                self.training, self._fit_columns(form), self.study.priors, self.study.nonnegative
+            )
+            for form in self.forms
+        }  # fmt: skip
+        best = max(gains.values(), key=lambda gain: float(gain.sum()))
+        if float(best.sum()) < MIN_SHARE_OF_FREE * float(spline.sum()):
+            return None, ()
+        alike = [
+            form
+            for form, gain in gains.items()
+            if float(gain.sum()) >= MIN_SHARE_OF_FREE * float(best.sum())
+            and mean_over_error(best - gain) < TIE_Z
+        ]
+        shortest = min(alike, key=lambda form: (_numbers(form), -float(gains[form].sum())))
+        return shortest, tuple(form.law.name for form in alike if form is not shortest and form.law)
+
+    def fitted(self, form: TermChoice) -> tuple[FittedModel, Blocks]:
+        """Model with a form, and held-out blocks with its columns."""
+        fit = fit_blocks(self.training, self._fit_columns(form), self.study.priors, self.study.nonnegative)
+        terms = (*self.model.terms, ChosenTerm(form, 0.0))
+        return replace(self.model, terms=terms, fit=fit), self.held_out
+
+
+def _numbers(choice: TermChoice) -> int:
+    """How many numbers a form has, a wave's period once."""
+    if choice.law is None:
+        return 0
+    shapes = {value for item in choice.law.terms for atom in item.shapes for value in atom}
+    return len(term_of(choice).strengths) + len(shapes)

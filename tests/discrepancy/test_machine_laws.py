@@ -1,0 +1,187 @@
+"""A law that no catalogue has, of a machine without a cell: scipy's integrator moves it, the records tell."""
+
+import json
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
+
+from impactcell.campaign import Campaign, Coordinate, Excitation, write
+from impactcell.cli.app import app
+from impactcell.discrepancy.machine import (
+    BaseModel,
+    MachineFinding,
+    NumberPrior,
+    Response,
+    investigate_machine,
+    simulate_held_out,
+)
+from impactcell.errors import SettingsError
+from impactcell.records import Capture, Channel
+from impactcell.settings.base_model import read_base_model
+
+COULOMB, CENTRE, WIDTH = 3.0, 0.04, 0.05
+"""Friction of the slide [N], and where it is larger, and over what length [m]."""
+SLIDE = BaseModel(
+    response=Response.FORCE, inertia=NumberPrior(2.0, 0.1), force_offset=NumberPrior(0.0, math.inf)
+)
+SLIDE_FILE = """\
+format: 1
+coordinate: translation
+excitation: driven
+predicts: force
+mass_kg: {value: 2.0, std: 0.1}
+terms: [coulomb_friction]
+nuisances:
+  force_offset: {std: free}
+"""
+NOISE = 2e-5
+"""Of the pendulum's angle [rad]."""
+
+
+@lru_cache
+def slide(size: float) -> Campaign:
+    """Six paths of a slide whose friction has a bump of so many newtons about one place."""
+    rng = np.random.default_rng(11)
+    shots = []
+    for number in range(1, 7):
+        time = np.arange(0.0, 12.0, 4e-3)
+        rates = 2.0 * np.pi * rng.uniform(0.3, 1.2, 3)
+        angles = rates[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, (3, 1))
+        sizes = 0.08 * rng.uniform(0.5, 1.0, 3)
+        position = sizes @ np.sin(angles)
+        velocity = (sizes * rates) @ np.cos(angles)
+        acceleration = -(sizes * rates**2) @ np.sin(angles)
+        level = COULOMB + size * np.exp(-0.5 * ((position - CENTRE) / WIDTH) ** 2)
+        force = 2.0 * acceleration + level * np.tanh(velocity / 1e-3) + 0.2 * rng.standard_normal(time.size)
+        channels = Channel(time, force, 0.2), Channel(time, position, 1e-7)
+        shots.append(Capture(number, math.nan, math.nan, *channels))
+    return Campaign(Excitation.DRIVEN, tuple(shots))
+
+
+@lru_cache
+def investigated(size: float) -> MachineFinding:
+    return investigate_machine(slide(size), SLIDE)
+
+
+def test_a_bump_of_friction_is_found_at_its_place() -> None:
+    law = investigated(0.6).law
+    assert law is not None
+    assert law.choice is not None
+    assert law.choice.law is not None
+    assert law.place == "law_of_friction_over_position"
+    assert "exp(-(u-c)^2/2l^2)" in (law.choice.law.name, *law.equivalents)
+    assert law.fall.after < 1.2 < 2.0 < law.fall.before
+    assert law.fall.low > 0.0
+    position = np.linspace(-0.1, 0.15, 60)
+    truth = 0.6 * np.exp(-0.5 * ((position - CENTRE) / WIDTH) ** 2)
+    sizes = [law.model.value(column) for column in law.model.terms[-1].columns]
+    parts = [item.values(position, law.choice.law.reference) for item in law.choice.law.terms]
+    function = sum(size * part for size, part in zip(sizes, parts, strict=True))
+    error = (function - np.mean(function)) - (truth - truth.mean())
+    assert np.abs(error).max() < 0.1 * 0.6
+
+
+def test_no_law_is_looked_for_where_nothing_remains() -> None:
+    finding = investigated(0.0)
+    assert finding.verdict == "no_gap"
+    assert finding.law is None
+    assert not finding.law_refused
+
+
+def test_a_law_that_would_give_energy_is_refused() -> None:
+    finding = investigated(-3.6)
+    assert finding.law is None
+    assert "give energy" in finding.law_refused
+
+
+def test_law_is_a_base_model_again_and_leaves_nothing(tmp_path: Path) -> None:
+    write(slide(0.6), tmp_path / "campaign")
+    (tmp_path / "base.yaml").write_text(SLIDE_FILE, encoding="utf-8")
+    command = ["discrepancy", "-q", str(tmp_path / "campaign"), "-o"]
+    first = CliRunner().invoke(
+        app, [*command, str(tmp_path / "found"), "--base", str(tmp_path / "base.yaml")]
+    )
+    assert first.exit_code == 0, first.output
+    result = json.loads((tmp_path / "found" / "result.json").read_text(encoding="utf-8"))
+    law = result["law"]
+    assert law["file"] == "law_of_friction_over_position.yaml"
+    assert law["tested_range"]["position"]["unit"] == "m"
+    assert law["simulation"]["rmse"]["after"] < law["simulation"]["rmse"]["before"]
+    page = (tmp_path / "found" / "report.html").read_text(encoding="utf-8")
+    assert "A law that nobody had listed" in page
+    assert "s(u) less its mean [N]" in page
+    again = CliRunner().invoke(
+        app, [*command, str(tmp_path / "again"), "--base", str(tmp_path / "found" / law["file"])]
+    )
+    assert again.exit_code == 0, again.output
+    second = json.loads((tmp_path / "again" / "result.json").read_text(encoding="utf-8"))
+    assert second["verdict"] == "no_gap"
+    assert second["law"] is None
+    assert not list((tmp_path / "again").glob("law_of_*"))
+
+
+def pendulum(force: float) -> Campaign:
+    """Six free swings past a place that pushes, so many newton metres over a third of a radian."""
+    rng = np.random.default_rng(7)
+    shots = []
+    for number, amplitude in enumerate(np.linspace(1.4, 0.7, 6), 1):
+        time = np.arange(0.0, 8.0, 2e-3)
+
+        def rates(_t: float, state: np.ndarray) -> tuple[float, float]:
+            q, v = state
+            push = force * math.exp(-0.5 * ((q + 0.36) / 0.24) ** 2)
+            return v, (-0.6 * math.sin(q) - 0.002 * math.tanh(v / 0.02) + push) / 0.02
+
+        run = solve_ivp(
+            rates, (0.0, 8.0), (amplitude, 0.0), t_eval=time, rtol=1e-8, atol=1e-9, method="LSODA"
+        )
+        angle = run.y[0] + rng.normal(0.0, NOISE, time.size)
+        shots.append(Capture(number, math.nan, math.nan, None, Channel(time, angle, NOISE)))
+    return Campaign(Excitation.FREE_SLIDE, tuple(shots), coordinate=Coordinate.ROTATION)
+
+
+PENDULUM = BaseModel(
+    coordinate=Coordinate.ROTATION, inertia=NumberPrior(0.02), gravity_torque=NumberPrior(0.55, math.inf),
+    position_offset=NumberPrior(0.0, 0.05), force_offset=NumberPrior(0.0, 0.01),
+)  # fmt: skip
+
+
+def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes() -> None:
+    finding = investigate_machine(pendulum(1e-3), PENDULUM)
+    law = finding.law
+    assert law is not None
+    assert law.place == "law_of_force_over_position"
+    without, with_it = (simulate_held_out(finding, model).rmse for model in (law.without, law.model))
+    assert with_it < 0.4 * without
+    assert with_it < 4.0 * NOISE
+
+
+LAW = """\
+- term: law_of_friction_over_position
+  law:
+  - exp(-(u-c)^2/2l^2): {centre: 0.04, scale: 0.05}
+"""
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        (("over_position", "over_positon"), "did you mean 'law_of_friction_over_position'?"),
+        (("exp(-(u-c)^2/2l^2)", "exp(-(u-c)^2/l^2)"), "no function 'exp(-(u-c)^2/l^2)' of u"),
+        (("centre: 0.04, ", ""), "takes centre, scale, not scale"),
+        (("scale: 0.05", "scale: -0.05"), "scale must be above 0"),
+    ],
+)
+def test_faults_of_a_law_have_line_and_column(tmp_path: Path, changed: tuple[str, str], said: str) -> None:
+    terms = "terms:\n- coulomb_friction\n" + LAW.replace(*changed)
+    file = tmp_path / "base.yaml"
+    file.write_text(SLIDE_FILE.replace("terms: [coulomb_friction]\n", terms), encoding="utf-8")
+    with pytest.raises(SettingsError) as caught:
+        read_base_model(file)
+    assert "base.yaml:8:" in str(caught.value)
+    assert said in str(caught.value)
