@@ -19,8 +19,10 @@ import numpy as np
 import psutil
 import yaml
 from asyncua import Client, ua
+from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 from prometheus_client.parser import text_string_to_metric_families
 
+from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
 from impactcell.tracking.wear_batch.settings import TrackerSettings
@@ -28,8 +30,6 @@ from tests.integration.processes import CONFIG, ROOT
 
 PERIOD_S = 0.497  # two a second, and through all phases of the publishing clock
 PUBLISHING_MS = 100
-WINDOW, SMALLER = 64, 16
-"""Requests in flight; one cell is also shown with fewer."""
 SETTLED_MS = 1000.0
 """The cycles that waited at the start are worked off once none in a second came later than this."""
 LONGEST_START_S = 60.0
@@ -39,6 +39,7 @@ EVERY_CORE = sorted(os.sched_getaffinity(0))
 ITS_CORE, OTHERS = EVERY_CORE[:1], EVERY_CORE[1:] or EVERY_CORE
 """The service has one core of its own; modules and client have the others."""
 PASSWORD = "benchmark"
+CLIENT_URI = "urn:test:client"
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,6 @@ class Load:
     """
 
     cells: int
-    window: int
     commissioned: bool
     cpu: float
     memory_mb: float
@@ -74,7 +74,6 @@ class Load:
         p50, p99 = (f"{np.percentile(self.delays_ms, q):.0f}" for q in (50, 99)) if self.delays_ms else "--"
         return (
             f"{self.cells}",
-            f"{self.window}",
             "commissioned" if self.commissioned else "new",
             f"{100 * self.cpu:.0f} %",
             f"{1e3 * self.cpu / (self.cells / PERIOD_S):.1f} ms",
@@ -105,16 +104,15 @@ def modules(number: int, period_s: float) -> Iterator[list[int]]:
         process.communicate()
 
 
-def cell_file(
-    directory: Path, name: str, port: int, monitor: int, *, journal: bool, window: int = WINDOW
-) -> Path:
+def cell_file(directory: Path, name: str, port: int, monitor: int, *, journal: bool) -> Path:
+    """Write a cell with the settings that a cell has by itself."""
     cell = {
         "format": 1,
         "cell": name,
-        "module": {"port": port, "register_map": str(CONFIG / "maps" / "fpga-v1.yaml"), "window": window},
+        "module": {"port": port, "register_map": str(CONFIG / "maps" / "fpga-v1.yaml")},
         "model": str(CONFIG / "models" / "prototype.yaml"),
         "alarms": {"wear_limit": 0.25},
-        "opcua": {"endpoint": "opc.tcp://127.0.0.1:0/", "allow_sessions_without_encryption": True},
+        "opcua": {"endpoint": "opc.tcp://127.0.0.1:0/"},
         "monitoring": {"port": monitor},
     }
     if journal:
@@ -167,11 +165,18 @@ def totals(monitor: int) -> dict[str, float]:
 
 
 async def listen(
-    endpoint: str, cells: list[str], seconds: float, begun: Callable[[], None], *, commissioned: bool
+    endpoint: str,
+    pair: tuple[Path, Path],
+    cells: list[str],
+    seconds: float,
+    begun: Callable[[], None],
+    *,
+    commissioned: bool,
 ) -> tuple[float, list[float]]:
     """Seconds until settled, and then the delays from a cycle's end to its notification, ms, of all cells.
 
-    `begun` is called when the delays begin to count.
+    The session is signed and encrypted with `pair`, certificate and key. `begun` is called when the delays
+    begin to count.
     """
     delays: list[float] = []
 
@@ -184,6 +189,11 @@ async def listen(
     client = Client(endpoint, timeout=60)
     client.set_user("bench")
     client.set_password(PASSWORD)
+    client.application_uri = CLIENT_URI
+    certificate, key = (str(file) for file in pair)
+    await client.set_security(
+        SecurityPolicyBasic256Sha256, certificate, key, mode=ua.MessageSecurityMode.SignAndEncrypt
+    )
     async with client:
         index = await client.get_namespace_index("urn:impactcell:cells")
         subscription = await client.create_subscription(PUBLISHING_MS, Handler())
@@ -204,18 +214,25 @@ async def listen(
     return settling_s, delays
 
 
-def load(number: int, seconds: float, window: int = WINDOW, *, commissioned: bool = False) -> Load:
+def trusted_client(directory: Path) -> tuple[Path, Path]:
+    """Make a client's certificate and key, and have the service's certificate folder trust it."""
+    pair = write_pair(directory / "client", *make_certificate("bench", CLIENT_URI, own_hosts()))
+    trusted = directory / "pki" / "trusted"
+    trusted.mkdir(parents=True)
+    (trusted / "bench.der").write_bytes(pair[0].read_bytes())
+    return pair
+
+
+def load(number: int, seconds: float, *, commissioned: bool = False) -> Load:
     """Run so many cells for so long after they have settled, or after they have learned their noise."""
     with tempfile.TemporaryDirectory() as temporary, modules(number, PERIOD_S) as ports:
         directory = Path(temporary)
         write_users(
             directory / "users.yaml", {"bench": with_password(User("bench", Role.OBSERVER), PASSWORD)}
         )
+        pair = trusted_client(directory)
         names = [f"cell-{i}" for i in range(number)]
-        files = [
-            cell_file(directory, n, p, 0, journal=True, window=window)
-            for n, p in zip(names, ports, strict=True)
-        ]
+        files = [cell_file(directory, n, p, 0, journal=True) for n, p in zip(names, ports, strict=True)]
         with service(files) as (process, endpoint, monitor):
             at: list[tuple[float, float, dict[str, float]]] = []
 
@@ -224,14 +241,13 @@ def load(number: int, seconds: float, window: int = WINDOW, *, commissioned: boo
                 at.append((time.monotonic(), spent.user + spent.system, totals(monitor)))
 
             settling_s, delays = asyncio.run(
-                listen(endpoint, names, seconds, look, commissioned=commissioned)
+                listen(endpoint, pair, names, seconds, look, commissioned=commissioned)
             )
             look()
             memory = process.memory_info().rss
     (began, cpu, before), (ended, spent, after) = at
     return Load(
         number,
-        window,
         commissioned,
         (spent - cpu) / (ended - began),
         memory / 2**20,

@@ -52,7 +52,7 @@ async def report(here: Site, lag: list[float]) -> None:
         await asyncio.sleep(1.0)
         state = {
             "sessions": len(host._sessions),
-            "subscriptions": len(host.monitoring),
+            "subscriptions": len(host.subscription_service),
             "rss": process.memory_info().rss,
             "cpu": sum(process.cpu_times()[:2]),
             "late_ms": 1e3 * max(lag, default=0.0),
