@@ -23,6 +23,8 @@ REMEMBERED = 1000
 """Tasks whose outcome is kept."""
 WATCH_S = 0.1
 """Between two looks at the PLC's target register."""
+BY_PLC = "the PLC, which has a new target"
+"""Who aborts a task that another takes the place of."""
 
 
 class PositioningTask:
@@ -194,7 +196,7 @@ class PositioningTask:
         if status_block.target_sequence == 0:
             return
         if self._sequence.running:
-            await self.abort("the PLC, which has a new target")
+            await self.abort(BY_PLC)
         try:
             await self.begin(status_block.target_m)
         except PositioningError as error:
@@ -209,9 +211,10 @@ class PositioningTask:
             waiting = task_state_machine.commanded(self._sequence)
             self._set_sequence(waiting)
             try:
+                part = self._report().target_sequence
                 await self._positioner.tap(TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction))
                 await self._module.read_status()
-                position_m = self._report().position_m
+                report = self._report()
             except FieldbusError as error:
                 self._set_sequence(task_state_machine.failed(self._sequence, f"{self._cell.name}: {error}"))
                 return
@@ -220,8 +223,12 @@ class PositioningTask:
                 return
             if self._sequence is not waiting:
                 return
+            if report.target_sequence != part:
+                # Another part lies there by now: its position says nothing of the tap.
+                self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
+                return
             after = await self._worker.run(
-                lambda: task_state_machine.observed(waiting, self._cell, self._planner, position_m)  # noqa: B023
+                lambda: task_state_machine.observed(waiting, self._cell, self._planner, report.position_m)  # noqa: B023
             )
             self._worker.belief = self._planner.posterior
             self._predictions = self._planner.predictions
