@@ -10,12 +10,14 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from impactcell.errors import LinkError, ModbusExceptionError, PositioningError, ProtocolError
+from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, PositioningError, ProtocolError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.status_block import PositioningStatus
 
 _POLL_S: Final = 0.005
 """Between two looks at the outcome of a tap, seconds: a tenth of the shortest tap and slide."""
+_REFUSALS: Final = frozenset({1, 2, 3})
+"""Exception codes of a request that will never do (function, address, value); all others may pass."""
 _PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
 
 
@@ -77,6 +79,22 @@ class TapCommander:
                     f"{self._module.cell}: tap not finished within {self._patience_s:g} s; {struck}"
                 ) from None
 
+    async def read_report(self) -> PositioningStatus:
+        """Return what the module says now, waiting for the link where it is down.
+
+        Raises
+        ------
+        PositioningError
+            If it could not be read in time.
+        """
+        try:
+            async with asyncio.timeout(self._patience_s):
+                return (await self._read_positioning())[1]
+        except TimeoutError:
+            raise PositioningError(
+                f"{self._module.cell}: the module has not been read for {self._patience_s:g} s"
+            ) from None
+
     async def abort(self) -> None:
         """Abort what is being executed; raises LinkError without a connection."""
         await self._module.register_client.write_values({"command_abort": 1})
@@ -98,7 +116,9 @@ class TapCommander:
             await self._module.wait_connected()
             try:
                 report = await self._module.read_status()
-            except (LinkError, ProtocolError):
+            except FieldbusError as error:
+                if not _may_pass(error):
+                    raise
                 await asyncio.sleep(_POLL_S)
                 continue
             if report.positioning is None:
@@ -124,10 +144,12 @@ class TapCommander:
                             f"{self._module.cell}: register {name} ({register.address}) does not show what "
                             "was written; nothing has been commanded"
                         )
-            except (LinkError, ProtocolError):
+            except FieldbusError as error:
+                if not _may_pass(error):
+                    raise PositioningError(
+                        f"{self._module.cell}: {error}; nothing has been commanded"
+                    ) from error
                 await asyncio.sleep(_POLL_S)
-            except ModbusExceptionError as error:
-                raise PositioningError(f"{self._module.cell}: {error}; nothing has been commanded") from error
             else:
                 return
 
@@ -148,8 +170,15 @@ class TapCommander:
                 try:
                     await self._module.register_client.write_values({"command_sequence": sequence})
                     written = True
-                except (LinkError, ProtocolError):
-                    continue  # whether it arrived is seen in the next report
-                except ModbusExceptionError as error:
-                    raise PositioningError(f"{cell}: {error}; nothing has been commanded") from error
+                except FieldbusError as error:
+                    if not _may_pass(error):
+                        raise PositioningError(f"{cell}: {error}; nothing has been commanded") from error
+                    # whether it arrived is seen in the next report
             await asyncio.sleep(_POLL_S)
+
+
+def _may_pass(error: FieldbusError) -> bool:
+    """Whether the same request may be answered a moment later: the link's doing, or a module in trouble."""
+    if isinstance(error, ModbusExceptionError):
+        return error.code not in _REFUSALS
+    return isinstance(error, LinkError | ProtocolError)

@@ -192,6 +192,8 @@ class PositioningTask:
         status_block = None if self._module.status_block is None else self._module.status_block.positioning
         if status_block is None or status_block.target_sequence == self._plc_target:
             return
+        if not self._module.status.connected:
+            return  # it is still there once the link is up again
         self._plc_target = status_block.target_sequence
         if status_block.target_sequence == 0:
             return
@@ -211,10 +213,8 @@ class PositioningTask:
             waiting = task_state_machine.commanded(self._sequence)
             self._set_sequence(waiting)
             try:
-                part = self._report().target_sequence
                 await self._positioner.tap(TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction))
-                await self._module.read_status()
-                report = self._report()
+                report = await self._positioner.read_report()
             except FieldbusError as error:
                 self._set_sequence(task_state_machine.failed(self._sequence, f"{self._cell.name}: {error}"))
                 return
@@ -223,7 +223,7 @@ class PositioningTask:
                 return
             if self._sequence is not waiting:
                 return
-            if report.target_sequence != part:
+            if report.target_sequence != self._plc_target and self._plc_target is not None:
                 # Another part lies there by now: its position says nothing of the tap.
                 self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
                 return

@@ -14,6 +14,7 @@ import math
 import tempfile
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ import numpy as np
 from impactcell.errors import PositioningError
 from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
 from impactcell.journal.audit_entries import AuditEntry
+from impactcell.records import Quality
 from impactcell.service.cell_task import CellTask
 from simulator.device import Device
 from simulator.faults import Fault, FaultInjector, FaultKind
@@ -55,6 +57,8 @@ SCATTER = 0.03
 """Of friction, from tap to tap."""
 TAPS_A_TASK = 3.8
 """About; over how many strikes friction wears."""
+SINGLE_PRECISION = 1e-6
+"""Relative error of what registers carry, at most."""
 AUDIT = AuditEntry(1, "operator", "SetTarget", "", "Good")
 
 
@@ -86,16 +90,16 @@ class ServedTask:
 
 @dataclass
 class Struck:
-    """Commands and strikes since the part was put down, as the registers carry them."""
+    """Commands and strikes since the part was put down: velocity (m/s) and stroke (m)."""
 
-    commanded: list[tuple[str, str]] = field(default_factory=list)
-    executed: list[tuple[str, str]] = field(default_factory=list)
+    commanded: list[tuple[float, float]] = field(default_factory=list)
+    executed: list[tuple[float, float]] = field(default_factory=list)
 
     @property
     def twice(self) -> int:
         """Strikes that no command of their own stands behind, in the order of the commands."""
         commands = iter(self.commanded)
-        return sum(strike not in commands for strike in self.executed)
+        return sum(not any(map(partial(is_same, strike), commands)) for strike in self.executed)
 
 
 class Module(Device):
@@ -104,7 +108,7 @@ class Module(Device):
     struck = Struck()
 
     def _strike(self, commanded: TapInput, sequence: int) -> None:
-        self.struck.executed.append(registered(commanded.velocity_m_s, commanded.stroke_m))
+        self.struck.executed.append((commanded.velocity_m_s, commanded.stroke_m))
         super()._strike(commanded, sequence)
 
     @property
@@ -138,13 +142,13 @@ class CountedCommander(TapCommander):
     struck: Struck
 
     async def tap(self, command: TapCommand) -> int:
-        self.struck.commanded.append(registered(command.velocity_m_s, command.stroke_m))
+        self.struck.commanded.append((command.velocity_m_s, command.stroke_m))
         return await super().tap(command)
 
 
-def registered(velocity_m_s: float, stroke_m: float) -> tuple[str, str]:
-    """Velocity and stroke to six digits: the registers have single precision."""
-    return f"{velocity_m_s:.5e}", f"{stroke_m:.5e}"
+def is_same(strike: tuple[float, float], command: tuple[float, float]) -> bool:
+    """Whether the module struck as commanded: the registers have single precision."""
+    return all(map(partial(math.isclose, rel_tol=SINGLE_PRECISION), strike, command))
 
 
 def scenario_of(seeds: str, cell: int, parts: list[Part]) -> Scenario:
@@ -246,9 +250,9 @@ class Operator:
         return bool(strikes) and self.random.random() < RESTARTS
 
     def level_error(self) -> float:
-        """Of the tracker's friction, relative to the truth; nan before the first cycle."""
+        """Of the tracker's friction, relative to the truth; nan where it says that it knows none."""
         snapshot = self.cell.worker.snapshot
-        if snapshot is None:
+        if snapshot is None or snapshot.wear.quality is Quality.BAD:
             return math.nan
         offset = snapshot.batch.offset if math.isfinite(snapshot.batch.offset) else 0.0
         return (snapshot.wear.level + offset) / self.module.mu_s - 1.0

@@ -16,6 +16,7 @@ from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap, Words
 from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
 from impactcell.fieldbus.transports import transport_for
+from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 
@@ -103,6 +104,42 @@ async def test_an_answer_lost_with_the_connection_does_not_repeat_the_tap(fpga: 
         device.on_command = server.drop_clients
         assert await positioner.tap(COMMAND) == 1
     assert len(device.taps) == 1
+
+
+@pytest.mark.parametrize("code", [4, 6, 11])
+async def test_a_module_in_trouble_for_a_moment_makes_the_tap_once(fpga: RegisterMap, code: int) -> None:
+    """The reply says exception; whether the request was carried out, nobody knows."""
+    device = PositioningDevice(fpga)
+    async with ready(fpga, device) as (server, _, positioner):
+        for _ in range(3):
+            server.faults.inject(Fault(FaultKind.EXCEPTION, 0.5, remaining=4, code=code))
+        assert await positioner.tap(COMMAND) == 1
+        assert (await positioner.read_report()).accepted_command == 1
+    assert len(device.taps) == 1
+
+
+@pytest.mark.parametrize("code", [1, 2, 3])
+async def test_a_request_that_will_never_do_is_not_tried_again(fpga: RegisterMap, code: int) -> None:
+    device = PositioningDevice(fpga)
+    written = fpga["command_stroke"].address
+
+    def refuse(address: int, words: Words) -> None:
+        if address <= written < address + len(words):
+            raise {1: NotImplementedError, 2: LookupError, 3: ValueError}[code]
+
+    device.write = refuse  # type: ignore[method-assign]
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="nothing has been commanded"):
+            await positioner.tap(COMMAND)
+    assert device.taps == []
+
+
+async def test_a_module_that_cannot_be_read_is_given_up(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    async with ready(fpga, device, patience_s=0.5) as (server, _, positioner):
+        server.faults.inject(Fault(FaultKind.EXCEPTION, code=4))
+        with pytest.raises(PositioningError, match="has not been read for"):
+            await positioner.read_report()
 
 
 @pytest.mark.parametrize(

@@ -35,11 +35,11 @@ def block(**changed: Any) -> StatusBlock:
 class Module(ModuleAcquisition):
     """Shows what it is told to show."""
 
-    shown = block()
+    shown, connected = block(), True
 
     @property
     def status(self) -> ModuleStatus:
-        return ModuleStatus(connected=True)
+        return ModuleStatus(connected=self.connected)
 
     async def read_status(self) -> StatusBlock:
         self.status_block = self.shown
@@ -62,6 +62,10 @@ class Tapper:
         self.module.shown = block(**another) if self.taken_away else block(position_m=self.position_m)
         return self.taps
 
+    async def read_report(self) -> PositioningStatus:
+        assert self.module.shown.positioning is not None
+        return self.module.shown.positioning
+
 
 @pytest.mark.parametrize("taken_away", [True, False])
 async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
@@ -74,7 +78,7 @@ async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
     tapper = Tapper(module, task, taken_away=taken_away)
     task._positioner = tapper  # type: ignore[assignment]
     await module.read_status()
-    await task.begin(0.01)
+    await task._read_plc_target()
     await task._drive()
     [outcome] = task.outcomes
     assert outcome.taps == tapper.taps
@@ -83,4 +87,22 @@ async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
     assert task.fault is None
     assert tapper.taps == 1 or not taken_away
     assert task.belief.taps == (0 if taken_away else tapper.taps)
+    await worker.close()
+
+
+async def test_a_target_that_came_while_the_link_was_down_is_begun_once_it_is_up(
+    tmp_path: Path, cell: CellConfig
+) -> None:
+    design = cell_design(cell)
+    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    module = Module(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
+    task = PositioningTask(cell, design, module, worker, lambda: None)
+    await module.read_status()
+    module.connected = False
+    await task._read_plc_target()
+    assert task.fault is None
+    assert not task.state.running
+    module.connected = True
+    await task._read_plc_target()
+    assert task.state.running
     await worker.close()
