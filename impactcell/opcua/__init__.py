@@ -32,7 +32,7 @@ Who uses the server gives it an address space, methods and the answers of `host_
 `subscription_service`       Publish, Republish, TransferSubscriptions; subscriptions belong to their session
 `subscription`               publishing cycles, retransmission, lifetime, MoreNotifications
 `monitored_item_service`     items that exist, with the filters they can have
-`monitored_item`             queues that tell of overflow
+`monitored_item`             queues that tell of overflow; `ready_items`: what goes into one message
 `data_change_filter`         deadbands, NaN, index ranges
 `event_filter`               OfType with subtypes, three-valued where clauses, for `event_notification`
 `notification_encoding`      publish responses put together from parts encoded once
@@ -45,6 +45,7 @@ Who uses the server gives it an address space, methods and the answers of `host_
 `history_aggregates`         Average, Minimum, Maximum, Count by their definition; `history_processed` reads
                              once through what they need, `history_encoding` puts answers together
 `read_budget`                what one HistoryRead may take; `loop_share`: what any request may, at a time
+`large_requests`             long requests one at a time, and the garbage collector between them
 `type_instances`             objects made from types, with NodeIds that stay the same
 `service_host`               listener, services and clock put together
 ===========================  ==============================================================================

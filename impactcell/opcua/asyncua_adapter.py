@@ -183,13 +183,13 @@ def field_decoders(kind: type) -> tuple[tuple[str, Decoder, bool], ...]:
     Returns
     -------
     tuple of (name, decoder, is_array)
-        Of an array of structures it is the decoder of one element.
+        Of an array of structures, NodeIds or status codes it is the decoder of one element.
     """
     hints = ua_binary.get_safe_type_hints(kind, {"ua": ua})
     decoders = list[tuple[str, Decoder, bool]]()
     for field in fields(kind):
         hint = hints[field.name]
-        if _is_array_of_structures(hint):
+        if _is_array_of_objects(hint):
             element = ua_binary._create_type_deserializer(ua_binary.type_from_list(hint), kind)  # noqa: SLF001
             decoders.append((field.name, element, True))
         elif ua_binary.type_allow_subclass(hint):
@@ -200,18 +200,18 @@ def field_decoders(kind: type) -> tuple[tuple[str, Decoder, bool], ...]:
 
 
 def encoded_pieces(value: Any) -> Iterator[bytes]:
-    """Encode a response field by field, and its arrays of structures element by element."""
+    """Encode a response field by field, and its arrays of anything but numbers element by element."""
     for name, encoder, is_array in _field_encoders(value.__class__):
         part = getattr(value, name)
         if name == "Parameters":
             yield from encoded_pieces(part)
-        elif is_array and part:
-            yield ua_binary.Primitives.Int32.pack(len(part))
-            for element in part:
+        elif is_array:
+            yield ua_binary.Primitives.Int32.pack(-1 if part is None else len(part))
+            for element in part or ():
                 if isinstance(element, ua.BrowseResult):
                     yield from encoded_pieces(element)
                 else:
-                    yield struct_to_binary(element)
+                    yield encoder(element)
         else:
             yield encoder(part)
 
@@ -219,22 +219,25 @@ def encoded_pieces(value: Any) -> Iterator[bytes]:
 @functools.cache
 def _field_encoders(kind: type) -> tuple[tuple[str, Callable[[Any], bytes], bool], ...]:
     hints = ua_binary.get_safe_type_hints(kind, {"ua": ua})
-    return tuple(
-        (
-            field.name,
-            ua_binary.field_serializer(*ua_binary.resolve_uatype(hints[field.name]), kind),
-            _is_array_of_structures(hints[field.name]),
-        )
-        for field in fields(kind)
-    )
+    encoders = list[tuple[str, Callable[[Any], bytes], bool]]()
+    for field in fields(kind):
+        hint = hints[field.name]
+        if _is_array_of_objects(hint):
+            encoders.append(
+                (field.name, ua_binary.create_type_serializer(ua_binary.type_from_list(hint)), True)
+            )
+        else:
+            encoder = ua_binary.field_serializer(*ua_binary.resolve_uatype(hint), kind)
+            encoders.append((field.name, encoder, False))
+    return tuple(encoders)
 
 
-def _is_array_of_structures(hint: Any) -> bool:
+def _is_array_of_objects(hint: Any) -> bool:
+    """Whether each element takes work of its own; an array of numbers is packed as one."""
     if not ua_binary.type_is_list(hint):
         return False
     element = ua_binary.type_from_list(hint)
-    is_builtin = hasattr(ua.VariantType, element.__name__) and element is not ua.DataValue
-    return is_dataclass(element) and not is_builtin and not ua_binary.type_allow_subclass(element)
+    return is_dataclass(element) and not ua_binary.type_allow_subclass(element)
 
 
 def address_space(server: StandardServer) -> AddressSpace:

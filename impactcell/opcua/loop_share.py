@@ -26,12 +26,19 @@ class Turns:
 
     async def wait(self) -> None:
         """Wait for a round of the loop of one's own."""
+        await self._stand_in_line()
+
+    def call(self, work: Callable[[], None]) -> None:
+        """Have something done in a round of the loop of its own."""
+        self._stand_in_line().add_done_callback(lambda _: work())
+
+    def _stand_in_line(self) -> asyncio.Future[None]:
         loop = asyncio.get_running_loop()
         turn = loop.create_future()
         self._line.append(turn)
         if len(self._line) == 1:
             loop.call_soon(self._next)
-        await turn
+        return turn
 
     def _next(self) -> None:
         turn = self._line.popleft()

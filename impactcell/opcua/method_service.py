@@ -67,10 +67,10 @@ class MethodService:
     async def call(self, context: RequestContext, parameters: ua.CallParameters) -> ua.CallResponse:
         """Call methods, one after the other."""
         response = ua.CallResponse()
-        response.Results = [
-            await self._call(context, request)
-            for request in check_operations(parameters.MethodsToCall, MAX_CALLS)
-        ]
+        response.Results = results = list[ua.CallMethodResult]()
+        for request in check_operations(parameters.MethodsToCall, MAX_CALLS):
+            results.append(await self._call(context, request))
+            await context.share.give_way()
         return response
 
     async def _call(self, context: RequestContext, request: ua.CallMethodRequest) -> ua.CallMethodResult:

@@ -135,13 +135,14 @@ class DataMonitoredItem:
         """Number of values that wait to be reported."""
         return len(self._queue) if self.mode == ua.MonitoringMode.Reporting else 0
 
-    def take(self, max_count: int) -> list[tuple[int, bytes]]:
-        """Take up to `most` values, encoded, with the client's handle."""
-        queue = self._queue
-        return [
-            (self.handle, queue.popleft().encoded(self._timestamps))
-            for _ in range(min(max_count, len(queue)))
-        ]
+    def take(self, max_count: int, max_bytes: int) -> list[tuple[int, bytes]]:
+        """Take values, encoded, with the client's handle: so many, and none after so many bytes."""
+        taken = list[tuple[int, bytes]]()
+        while self._queue and len(taken) < max_count and max_bytes > 0:
+            encoded = self._queue.popleft().encoded(self._timestamps)
+            taken.append((self.handle, encoded))
+            max_bytes -= len(encoded)
+        return taken
 
     def set_mode(self, mode: ua.MonitoringMode) -> None:
         """Report, only sample, or do nothing."""
@@ -236,9 +237,12 @@ class EventMonitoredItem:
         """Number of events that wait to be reported."""
         return len(self._queue) if self.mode == ua.MonitoringMode.Reporting else 0
 
-    def take(self, max_count: int) -> list[bytes]:
-        """Take up to `most` events, encoded."""
-        notifications = [self._queue.popleft() for _ in range(min(max_count, len(self._queue)))]
+    def take(self, max_count: int, max_bytes: int) -> list[bytes]:
+        """Take events, encoded: so many, and none after so many bytes."""
+        notifications = list[bytes]()
+        while self._queue and len(notifications) < max_count and max_bytes > 0:
+            notifications.append(self._queue.popleft())
+            max_bytes -= len(notifications[-1])
         self._bytes -= sum(map(len, notifications))
         self._overflowed = self._overflowed and bool(self._queue)
         return notifications

@@ -9,8 +9,9 @@ from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import AccessPolicy, Permission, Role, ServerLimits
 from impactcell.opcua.item_room import ItemRoom
 from impactcell.opcua.monitored_item import DataMonitoredItem, EventMonitoredItem
+from impactcell.opcua.ready_items import MonitoredItem
 from impactcell.opcua.request_dispatch import RequestContext, Service, apply_to_each, check_operations
-from impactcell.opcua.subscription import MonitoredItem, Subscription
+from impactcell.opcua.subscription import Subscription
 from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.opcua.variable_store import VariableStore
 

@@ -23,6 +23,7 @@ from impactcell.opcua.binary_codec import (
     service_fault,
 )
 from impactcell.opcua.host_interface import Actor
+from impactcell.opcua.large_requests import LargeRequests
 from impactcell.opcua.loop_share import LoopShare
 from impactcell.opcua.session_table import Session, SessionTable
 from impactcell.opcua.tcp_connection import TcpConnection
@@ -87,6 +88,7 @@ class RequestDispatcher:
         self._sessions = sessions
         self._services = {request_id(name): service for name, service in services.items()}
         self._lost = lost
+        self.large_requests = LargeRequests()
         for service in services.values():
             if service.parameters is not None:
                 field_decoders(service.parameters)  # made now, and not while the first client waits for it
@@ -96,13 +98,18 @@ class RequestDispatcher:
         self._lost(connection)
 
     async def handle(self, connection: TcpConnection, request_id: int, body: bytes) -> None:
-        """Answer one request.
+        """Answer one request; a long one when those before it have been.
 
         Raises
         ------
         DecodingError
             The message has no header that could be answered.
         """
+        async with self.large_requests.turn(len(body)):
+            connection.share.begin()
+            await self._handle(connection, request_id, body)
+
+    async def _handle(self, connection: TcpConnection, request_id: int, body: bytes) -> None:
         buffer = StrictBuffer(body)
         kind = decode_type(buffer)
         header = decode(ua.RequestHeader, buffer)

@@ -65,7 +65,7 @@ class ServiceHost:
         self._discovery = DiscoveryService(settings, host.product, self._trust.own_certificate)
         self._connections = ConnectionTable(settings.limits)
         self._listener: asyncio.Server | None = None
-        self._clock: asyncio.Task[None] | None = None
+        self._tasks: list[asyncio.Task[None]] = []
         self._started = datetime.now(UTC)
         self._languages = Languages(host.translations)
         self.subscription_service = SubscriptionService(settings.limits, self._languages)
@@ -141,7 +141,11 @@ class ServiceHost:
                 "or end what uses it"
             ) from error
         self._discovery.port = self._listener.sockets[0].getsockname()[1]
-        self._clock = asyncio.get_running_loop().create_task(self._run_clock(), name="opcua clock")
+        loop = asyncio.get_running_loop()
+        self._tasks = [
+            loop.create_task(self._run_clock(), name="opcua clock"),
+            loop.create_task(dispatcher.large_requests.collect_garbage(), name="opcua garbage"),
+        ]
         _log.info("OPC UA server listens on %s (port %d)", settings.endpoint, self.port)
 
     async def log_in(self, name: str, password: str, address: str) -> Actor:
@@ -161,10 +165,10 @@ class ServiceHost:
         """Close every connection and stop listening."""
         if self._listener is not None:
             self._listener.close()
-        if self._clock is not None:
-            self._clock.cancel()
+        for task in self._tasks:
+            task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
-                await self._clock
+                await task
         self.subscription_service.close()
         for connection in self._connections.all():
             assert isinstance(connection, TcpConnection)  # noqa: S101 - nothing else was put in

@@ -7,7 +7,6 @@ never gave.
 """
 
 import asyncio
-from collections import OrderedDict
 from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -18,17 +17,15 @@ from impactcell.opcua import notification_encoding
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.languages import Languages
-from impactcell.opcua.monitored_item import DataMonitoredItem, EventMonitoredItem
+from impactcell.opcua.loop_share import LoopShare
+from impactcell.opcua.monitored_item import DataMonitoredItem
+from impactcell.opcua.ready_items import MAX_NOTIFICATIONS, MonitoredItem, ReadyItems
 from impactcell.opcua.retransmission_queue import RetransmissionQueue
 from impactcell.opcua.session_table import PublishRequest, Session
 from impactcell.opcua.tcp_connection import TcpConnection
 
-MonitoredItem = DataMonitoredItem | EventMonitoredItem
-
 QUEUED_VALUES: Final = 100_000
 """Room in the queues of all data items of one subscription; beyond it a queue holds one value."""
-MAX_NOTIFICATIONS: Final = 10_000
-"""Notifications in one message, where the client sets no limit."""
 MAX_LIFETIME_S: Final = 3_600.0
 """Longest a subscription lives unheard, seconds."""
 MAX_SEQUENCE_NUMBER: Final = 2**32 - 1
@@ -56,7 +53,8 @@ class Subscription:
         self._limits = limits
         self._languages = languages
         self._expired = expired
-        self._ready_items: OrderedDict[int, MonitoredItem] = OrderedDict()
+        self._ready_items = ReadyItems()
+        self._is_in_line = False
         self._status_changes: list[int] = []
         self._unacknowledged = RetransmissionQueue()
         self._granted = 0
@@ -106,7 +104,6 @@ class Subscription:
         if session is None or not session.publish_requests:
             self._lifetime_counter += 1
             if self._lifetime_counter >= self.lifetime_count:
-                self.close()
                 self._expired(self)
                 return
         else:
@@ -120,12 +117,36 @@ class Subscription:
         return bool(self._status_changes) or (self.enabled and bool(self._ready_items))
 
     def serve(self) -> None:
-        """Answer Publish requests as long as something is due and requests are there."""
+        """Answer Publish requests as long as something is due and requests are there.
+
+        What fits one message is told at once. For each message of more the subscription waits for a turn.
+        """
+        if self._is_in_line:
+            return
+        if self._ready_items.fit_one_message:
+            self._answer()
+        self._stand_in_line()
+
+    def _stand_in_line(self) -> None:
+        connection = self._listener()
+        if connection is not None:
+            self._is_in_line = True
+            connection.share.turns.call(self._take_turn)
+
+    def _take_turn(self) -> None:
+        self._is_in_line = False
+        self._answer()
+        self._stand_in_line()
+
+    def _answer(self) -> None:
+        connection = self._listener()
+        if connection is not None and self.session is not None:
+            self._respond(connection, self.session.publish_requests.popleft())
+
+    def _listener(self) -> TcpConnection | None:
+        """Find who waits for something that is due."""
         session = self.session
-        while (
-            self.late and session is not None and session.publish_requests and session.connection is not None
-        ):
-            self._respond(session.connection, session.publish_requests.popleft())
+        return session.connection if session and self.late and session.publish_requests else None
 
     def _respond(self, connection: TcpConnection, request: PublishRequest) -> None:
         now = datetime.now(UTC)
@@ -154,28 +175,7 @@ class Subscription:
         notifications: list[bytes] = []
         if self._status_changes:
             notifications.append(notification_encoding.status_change(self._status_changes.pop(0)))
-        if not self.enabled:
-            return notifications
-        room = self.max_notifications
-        data: list[tuple[int, bytes]] = []
-        events: list[bytes] = []
-        while self._ready_items and room > 0:
-            number, item = next(iter(self._ready_items.items()))
-            if isinstance(item, DataMonitoredItem):
-                data_of_item = item.take(room) if item.waiting else []
-                data += data_of_item
-                room -= len(data_of_item)
-            else:
-                events_of_item = item.take(room) if item.waiting else []
-                events += events_of_item
-                room -= len(events_of_item)
-            if not item.waiting:
-                del self._ready_items[number]
-        if data:
-            notifications.append(notification_encoding.data_changes(data))
-        if events:
-            notifications.append(notification_encoding.events(events))
-        return notifications
+        return notifications + (self._ready_items.take(self.max_notifications) if self.enabled else [])
 
     def translated(self, variant: Any) -> Any:
         """Give a value in the language of the session."""
@@ -185,7 +185,7 @@ class Subscription:
     def ready(self, item: MonitoredItem) -> None:
         """Learn that an item has something to report."""
         if item.mode == ua.MonitoringMode.Reporting:
-            self._ready_items[item.id] = item
+            self._ready_items.add(item)
 
     def next_item_id(self) -> int:
         """Give a number no other item of this subscription has or had.
@@ -237,7 +237,7 @@ class Subscription:
         if isinstance(item, DataMonitoredItem):
             self._granted -= item.size
         item.close()
-        self._ready_items.pop(number, None)
+        self._ready_items.discard(number)
         del self.items[number]
 
     def acknowledge(self, sequence: int) -> int:
@@ -263,8 +263,8 @@ class Subscription:
         """Sequence numbers that can be sent again."""
         return self._unacknowledged.sequence_numbers()
 
-    def move(self, session: Session, *, initial: bool) -> None:
-        """Belong to another session; with `initial` every data item reports its present value again."""
+    def move(self, session: Session) -> None:
+        """Belong to another session."""
         old = self.session
         if old is not None and old is not session and old.publish_requests and old.connection is not None:
             now = datetime.now(UTC)
@@ -277,22 +277,24 @@ class Subscription:
             old.connection.respond(request.request_id, request.handle, body)
         self.session = session
         self._lifetime_counter = 0
-        if initial:
-            for item in self.items.values():
-                if (
-                    isinstance(item, DataMonitoredItem)
-                    and item.mode == ua.MonitoringMode.Reporting
-                    and not item.waiting
-                ):
-                    item.offer_present()
 
-    def close(self) -> None:
-        """End: no further cycle, no item."""
-        self._is_closed = True
+    async def repeat_values(self, share: LoopShare) -> None:
+        """Let every data item of which nothing waits report its present value again."""
+
+        def repeat(item: MonitoredItem) -> None:
+            is_reporting = item.mode == ua.MonitoringMode.Reporting
+            if isinstance(item, DataMonitoredItem) and is_reporting and not item.waiting:
+                item.offer_present()
+
+        await share.each(tuple(self.items.values()), repeat)
+
+    def close(self) -> list[MonitoredItem]:
+        """End: no further cycle, no item; the items, which are still to be closed."""
+        self._is_closed, self.session = True, None
         if self._timer is not None:
             self._timer.cancel()
-        for item in self.items.values():
-            item.close()
+        items = list(self.items.values())
         self.items.clear()
         self._ready_items.clear()
         self._unacknowledged = RetransmissionQueue()
+        return items

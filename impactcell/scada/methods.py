@@ -1,13 +1,14 @@
 """Methods of cells and conditions: from a Call to the service, with rights, ranges and an audit trail."""
 
 import math
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from asyncua import ua
 
 from impactcell.alarms import EventKind
 from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.method_service import InputArgument, InvalidArgumentError, Method, MethodService
 from impactcell.opcua.request_dispatch import RequestContext
 from impactcell.opcua.subscription_service import SubscriptionService
@@ -174,19 +175,16 @@ def bind_refresh(
 ) -> None:
     """Make ConditionRefresh and ConditionRefresh2 callable."""
 
-    def events() -> list[Any]:
-        retained = [event for condition in conditions.values() if (event := condition.present()) is not None]
-        return [
-            refresh_event(_ids.RefreshStartEventType),
-            *retained,
-            refresh_event(_ids.RefreshEndEventType),
-        ]
+    def events() -> Iterator[EventNotification]:
+        yield refresh_event(_ids.RefreshStartEventType)
+        yield from filter(None, (condition.present() for condition in conditions.values()))
+        yield refresh_event(_ids.RefreshEndEventType)
 
     async def refresh(context: RequestContext, arguments: Sequence[Any]) -> None:
-        subscriptions.refresh(context.session, arguments[0], None, events())
+        await subscriptions.refresh(context, arguments[0], None, events())
 
     async def refresh_item(context: RequestContext, arguments: Sequence[Any]) -> None:
-        subscriptions.refresh(context.session, arguments[0], arguments[1], events())
+        await subscriptions.refresh(context, arguments[0], arguments[1], events())
 
     id_type = ua.VariantType.UInt32
     refresh_method = Method((InputArgument("SubscriptionId", id_type),), refresh)

@@ -13,6 +13,7 @@ from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import JournalError
 from impactcell.fieldbus.transports import Transports
+from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.signals import stop_on_signals
@@ -234,6 +235,7 @@ async def _until_signalled(service: Service) -> bool:
 
 def _say_started(service: Service) -> None:
     gc.freeze()  # nodes and their types stay: to look through them for garbage held everything for 0.4 s
+    leave_full_rounds_to_the_server()
     for cell, endpoint in service.endpoints.items():
         log.info("cell=%s at %s", cell, endpoint)
 

@@ -16,6 +16,7 @@ import numpy as np
 import psutil
 
 from impactcell.journal.store import Journal
+from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
 from impactcell.service.history_source import JournalHistory
 from tests.benchmarks._opcua_feed import cycle
 from tests.opcua_server import PASSWORDS, START_NS, Site, site
@@ -112,6 +113,7 @@ async def main() -> None:
             for cell in CELLS:
                 here.raise_alarm(cell=cell)
             gc.freeze()  # as the service does
+            leave_full_rounds_to_the_server()
             cells = Cells(here)
             tasks = [
                 asyncio.create_task(cells.run(cell, i / RATE_HZ / len(CELLS))) for i, cell in enumerate(CELLS)

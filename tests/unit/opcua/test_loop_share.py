@@ -1,12 +1,19 @@
 """Whoever asks for much waits for turns, one in a round of the loop; what many hear is told in slices."""
 
 import asyncio
+import gc
 import itertools
 from types import SimpleNamespace
 
 import pytest
 
-from impactcell.opcua.fan_out import FanOut
+from impactcell.opcua.fan_out import AT_ONCE, FanOut
+from impactcell.opcua.large_requests import (
+    LARGE_BYTES,
+    NEVER,
+    LargeRequests,
+    leave_full_rounds_to_the_server,
+)
 from impactcell.opcua.loop_share import SLICE_S, LoopShare, Turns
 
 PIECES = 10
@@ -66,7 +73,7 @@ async def test_one_who_leaves_the_line_does_not_stop_it() -> None:
 
 @pytest.mark.usefixtures("clock")
 async def test_many_listeners_are_told_in_slices_and_in_order() -> None:
-    fan_out, told = FanOut(), [list[int]() for _ in range(500)]
+    fan_out, told = FanOut(), [list[int]() for _ in range(AT_ONCE + 1)]
     fan_out.deliver([entries.append for entries in told], 1)
     assert not any(told), "told at once"
     fan_out.deliver([told[0].append], 2)  # few, but after the first
@@ -78,7 +85,83 @@ async def test_many_listeners_are_told_in_slices_and_in_order() -> None:
         assert sum(map(len, told)) - before <= PIECES + 1
     assert told[0] == [1, 2]
     assert all(entries == [1] for entries in told[1:])
-    assert rounds >= 501 / (PIECES + 1)
+    assert rounds >= (AT_ONCE + 2) / (PIECES + 1)
+
+
+@pytest.mark.usefixtures("clock")
+async def test_much_news_for_few_listeners_is_told_in_slices_too() -> None:
+    """What is told at once is counted over a round of the loop, not over one piece of news."""
+    fan_out, told = FanOut(10), list[int]()
+    for number in range(100):
+        fan_out.deliver([told.append, lambda _: None], number)
+    assert told == list(range(5))
+    rounds = 0
+    while len(told) < 100:
+        before = len(told)
+        await asyncio.sleep(0)
+        rounds += 1
+        assert len(told) - before <= PIECES + 1
+    assert told == list(range(100))
+    assert rounds >= 190 / (PIECES + 1)
+    fan_out.deliver([told.append], 100)
+    assert told[-1] == 100, "in a new round there is room again"
+
+
+async def test_turns_of_those_who_call_are_one_in_a_round() -> None:
+    turns, told = Turns(), list[int]()
+    for number in range(5):
+        turns.call(lambda number=number: told.append(number))
+    assert not told
+    while len(told) < 5:
+        before = len(told)
+        await asyncio.sleep(0)
+        assert len(told) - before <= 1
+    assert told == list(range(5))
+
+
+async def test_long_requests_are_answered_one_at_a_time_and_short_ones_at_once() -> None:
+    line, inside, together = LargeRequests(), list[int](), list[int]()
+
+    async def request(size: int) -> None:
+        async with line.turn(size):
+            inside.append(size)
+            together.append(sum(other >= LARGE_BYTES for other in inside))
+            try:
+                for _ in range(5):
+                    await asyncio.sleep(0)
+            finally:
+                inside.remove(size)
+
+    tasks = [asyncio.ensure_future(request(size)) for size in (LARGE_BYTES, LARGE_BYTES + 1, LARGE_BYTES - 1)]
+    await asyncio.sleep(0)
+    assert sorted(inside) == [LARGE_BYTES - 1, LARGE_BYTES]
+    tasks[0].cancel()  # whoever hangs up leaves the line
+    await asyncio.gather(*tasks, return_exceptions=True)
+    assert max(together) == 1
+    assert len(together) == 3
+
+
+async def test_garbage_is_looked_for_between_long_requests(monkeypatch: pytest.MonkeyPatch) -> None:
+    line, rounds = LargeRequests(), list[int]()
+    monkeypatch.setattr("impactcell.opcua.large_requests.COLLECT_EVERY_S", 0.0)
+    monkeypatch.setattr("impactcell.opcua.large_requests.gc.collect", lambda: rounds.append(1))
+    async with line.turn(LARGE_BYTES):
+        task = asyncio.ensure_future(line.collect_garbage())
+        for _ in range(20):
+            await asyncio.sleep(0)
+        assert not rounds
+    while len(rounds) < 2:
+        await asyncio.sleep(0)
+    task.cancel()
+
+
+def test_the_interpreter_begins_no_full_round_by_itself() -> None:
+    thresholds = gc.get_threshold()
+    try:
+        leave_full_rounds_to_the_server()
+        assert gc.get_threshold() == (*thresholds[:2], NEVER)
+    finally:
+        gc.set_threshold(*thresholds)
 
 
 async def test_few_listeners_are_told_at_once() -> None:
