@@ -9,21 +9,18 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from impactcell.api.finding_files import write_files
 from impactcell.api.friction import calibrated
+from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
 from impactcell.campaign import Campaign, Excitation, read
-from impactcell.discrepancy.report import headline, json_text, result_document, write_report
+from impactcell.discrepancy.report import json_text, machine_document, result_document, write_report
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.physics import Plant
 from impactcell.prediction import Model
 from impactcell.prediction.model import Prior
-from impactcell.process.whole_files import directory_beside
 from impactcell.settings.model_file import read_model, write_model
 
-FILES = ("result.json", "model.extended.yaml", "report.html")
-"""What a run leaves in its directory."""
-LAW_FILES = "law_of_*"
-"""And where it proposes a law that nobody had listed, its effect file; with a base model, that with it."""
 SMALLEST_SHARE = 1e-4
 """Smallest standard deviation of a prior, relative to its value: a prior of none would stop any fit."""
 
@@ -59,9 +56,7 @@ class DiscrepancyFindings:
     gap_before: float
     gap_after: float
     result: Mapping[str, Any]
-    _campaign: Campaign = field(repr=False)
-    _findings: DiscrepancyResult = field(repr=False)
-    _nominal: str = field(repr=False)
+    _write: Callable[[Path, str], None] = field(repr=False)
 
     def write(self, directory: str | PathLike[str], source: str = "campaign") -> Path:
         """Write result.json, model.extended.yaml and report.html; return the path of the report.
@@ -79,7 +74,7 @@ class DiscrepancyFindings:
             The directory cannot be written.
         """
         output = Path(directory)
-        write_findings(self._findings, self._campaign, output, source, self._nominal)
+        self._write(output, source)
         return output / "report.html"
 
 
@@ -88,6 +83,9 @@ def discrepancy(
     *,
     model: str | PathLike[str] | None = None,
     seed: int = 0,
+    base: str | PathLike[str] | None = None,
+    train: str | None = None,
+    test: str | None = None,
 ) -> DiscrepancyFindings:
     """Find where model and measurement disagree, name what is missing, add it, and prove the gap shrinks.
 
@@ -100,6 +98,11 @@ def discrepancy(
         it fitted.
     seed : int
         Of the split and of every resampling: the same data and seed give the same findings.
+    base : path, optional
+        Base model of a machine that is no cell, in place of `model`.
+    train, test : str, optional
+        With `base`: patterns of the shots or batches that fit and that are held out; one of them leaves the
+        rest to the other.
 
     Returns
     -------
@@ -113,6 +116,12 @@ def discrepancy(
         The nominal model cannot be fitted at all.
     """
     data = campaign if isinstance(campaign, Campaign) else read(Path(campaign))
+    if base is not None:
+        if model is not None:
+            raise CampaignError("base is a whole model of a machine: leave model out, or base")
+        return _of_machine(data, Path(base), (train, test), seed)
+    if train is not None or test is not None:
+        raise CampaignError("train and test go with base; without it the seed divides the shots")
     nominal = None if model is None else read_model(Path(model))
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         result = investigate(
@@ -121,24 +130,42 @@ def discrepancy(
             mapper=lambda function, items: list(pool.map(function, items)),
             plant=None if nominal is None else nominal.plant,
         )
-    outcome = result_document(result)
+    name = "fitted" if nominal is None else nominal.name
+    return _findings(
+        result_document(result),
+        lambda output, source: write_findings(result, data, output, source, name),
+    )
+
+
+def _of_machine(
+    data: Campaign, base: Path, patterns: tuple[str | None, str | None], seed: int
+) -> DiscrepancyFindings:
+    finding = investigate_with_base(data, base, patterns, seed)
+    return _findings(
+        machine_document(finding),
+        lambda output, source: write_machine_findings(finding, data, output, source),
+    )
+
+
+def _findings(outcome: Mapping[str, Any], write: Callable[[Path, str], None]) -> DiscrepancyFindings:
+    """Give what `result.json` has as attributes; an effect by a column of the shots is named with it."""
+    effects = {
+        f"{entry['effect']}({entry['covariate']})" if "covariate" in entry else entry["effect"]: entry
+        for entry in outcome["effects"]
+    }
     return DiscrepancyFindings(
-        verdict=result.verdict,
-        headline=headline(result),
-        effects=result.added,
-        tied_with={entry["effect"]: tuple(entry["tied_with"]) for entry in outcome["effects"]},
+        verdict=outcome["verdict"],
+        headline=outcome["headline"],
+        effects=tuple(effects),
+        tied_with={name: tuple(entry["tied_with"]) for name, entry in effects.items()},
         parameters={
-            entry["effect"]: {
-                name: (value["value"], value["ci95"]) for name, value in entry["parameters"].items()
-            }
-            for entry in outcome["effects"]
+            name: {key: (value["value"], value["ci95"]) for key, value in entry["parameters"].items()}
+            for name, entry in effects.items()
         },
-        gap_before=result.validation.gap_before,
-        gap_after=result.validation.gap_after,
+        gap_before=outcome["gap"]["held_out"]["before"],
+        gap_after=outcome["gap"]["held_out"]["after"],
         result=outcome,
-        _campaign=data,
-        _findings=result,
-        _nominal="fitted" if nominal is None else nominal.name,
+        _write=write,
     )
 
 
@@ -156,26 +183,6 @@ def write_findings(
             (beside / f"{law.identifier}.py").write_text(law.text(), encoding="utf-8")
 
     write_files(output, write)
-
-
-def write_files(output: Path, write: Callable[[Path], None]) -> None:
-    """Have all files written beside the directory and move them in together at the end.
-
-    Raises
-    ------
-    CampaignError
-        The directory cannot be written.
-    """
-    try:
-        with directory_beside(output) as beside:
-            write(beside)
-            output.mkdir(exist_ok=True)
-            for stale in output.glob(LAW_FILES):
-                stale.unlink()
-            for file in [*beside.glob(LAW_FILES), *(beside / name for name in FILES)]:
-                file.replace(output / file.name)
-    except OSError as error:
-        raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error
 
 
 def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nominal: str) -> Model:

@@ -3,11 +3,31 @@
 from dataclasses import replace
 from pathlib import Path
 
-from impactcell.api.findings import write_files
+from impactcell.api.finding_files import write_files
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.machine import MachineFinding
+from impactcell.discrepancy.machine import MachineFinding, investigate_machine
 from impactcell.discrepancy.report import json_text, machine_document, write_machine_report
-from impactcell.settings.base_model import base_model_text
+from impactcell.errors import CampaignError
+from impactcell.settings.base_model import base_model_text, read_base_model
+
+
+def investigate_with_base(
+    data: Campaign, base: Path, patterns: tuple[str | None, str | None], seed: int
+) -> MachineFinding:
+    """Find what a base model lacks; `patterns` say which shots fit and which are held out.
+
+    Raises
+    ------
+    CampaignError, SettingsError
+        What was given cannot be read or used.
+    """
+    model, excitation = read_base_model(base)
+    if data.excitation is not excitation:
+        raise CampaignError(
+            f"{base}: is of excitation {excitation}, the campaign of {data.excitation}; change one of them"
+        )
+    train, test = patterns
+    return investigate_machine(data, model, train=train, test=test, seed=seed)
 
 
 def write_machine_findings(finding: MachineFinding, data: Campaign, output: Path, source: str) -> None:

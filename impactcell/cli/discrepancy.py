@@ -8,11 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from impactcell.api.findings import write_findings
-from impactcell.api.machine_findings import write_machine_findings
+from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded import from_captures
 from impactcell.cli.paths import note_damage, open_journal
-from impactcell.discrepancy.machine import investigate_machine
 from impactcell.discrepancy.report import headline, machine_headline
 from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
@@ -111,20 +110,12 @@ def discrepancy_of_machine(
     CampaignError, SettingsError
         What was given cannot be read or used.
     """
-    from impactcell.settings.base_model import read_base_model
-
     if output.exists() and not output.is_dir():
         raise CampaignError(f"{output}: is a file; name a directory")
-    model, excitation = read_base_model(base)
     data = read(campaign)
-    if data.excitation is not excitation:
-        raise CampaignError(
-            f"{base}: is of excitation {excitation}, the campaign of {data.excitation}; change one of them"
-        )
-    train, test = patterns
     with named_steps() as report_step:
         report_step("naming what the base model lacks")
-        finding = investigate_machine(data, model, train=train, test=test, seed=seed)
+        finding = investigate_with_base(data, base, patterns, seed)
         report_step("writing the report")
         write_machine_findings(finding, data, output, str(campaign.name))
     if as_json:

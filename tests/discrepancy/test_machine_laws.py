@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
+import impactcell
 from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.app import app
 from impactcell.discrepancy.machine import (
@@ -20,7 +21,7 @@ from impactcell.discrepancy.machine import (
     investigate_machine,
     simulate_held_out,
 )
-from impactcell.errors import SettingsError
+from impactcell.errors import CampaignError, SettingsError
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import read_base_model
 
@@ -185,3 +186,16 @@ def test_faults_of_a_law_have_line_and_column(tmp_path: Path, changed: tuple[str
         read_base_model(file)
     assert "base.yaml:8:" in str(caught.value)
     assert said in str(caught.value)
+
+
+def test_findings_of_a_base_model_are_those_of_the_public_function(tmp_path: Path) -> None:
+    (tmp_path / "base.yaml").write_text(SLIDE_FILE, encoding="utf-8")
+    findings = impactcell.discrepancy(slide(0.6), base=tmp_path / "base.yaml")
+    assert findings.verdict == investigated(0.6).verdict
+    assert findings.result["law"]["place"] == "-s(q) sign(q')"
+    assert findings.write(tmp_path / "found").is_file()
+    assert (tmp_path / "found" / findings.result["law"]["file"]).is_file()
+    with pytest.raises(CampaignError, match="leave model out"):
+        impactcell.discrepancy(slide(0.6), base=tmp_path / "base.yaml", model="model.yaml")
+    with pytest.raises(CampaignError, match="go with base"):
+        impactcell.discrepancy(slide(0.6), test="1")

@@ -47,7 +47,7 @@ def test_each_is_documented_and_typed(name: str) -> None:
         ("simulate_tap", ["velocity_m_s", "mass_kg", "stroke_m", "plant", "time_s"]),
         ("estimate", ["time_s", "force_n", "position_m", "velocity_m_s", "mass_kg", "stroke_m", "model"]),
         ("track", ["cycle", "mu_s", "mu_s_std", "batch", "limit"]),
-        ("discrepancy", ["campaign", "model", "seed"]),
+        ("discrepancy", ["campaign", "model", "seed", "base", "train", "test"]),
     ],
 )
 def test_parameters_keep_names_and_order(name: str, parameters: list[str]) -> None:
