@@ -55,6 +55,20 @@ class Browser:
     def __init__(self, driver: webdriver.Chrome) -> None:
         self.driver = driver
 
+    def forget(self) -> None:
+        """Leave the page, and nothing of what was seen before: as a new browser with an empty profile."""
+        if self.driver.current_url.startswith("http"):
+            self.run("localStorage.clear(); sessionStorage.clear()")
+        self.open("about:blank")
+        for command in (
+            *("Network.clearBrowserCookies", "Network.clearBrowserCache"),
+            "Emulation.clearDeviceMetricsOverride",
+        ):
+            self.driver.execute_cdp_cmd(command, {})
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+        self.faults()
+        self.traffic()
+
     def open(self, address: str) -> None:
         self.driver.get(address)
 

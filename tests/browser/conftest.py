@@ -1,15 +1,20 @@
-"""A browser for each test."""
+"""A browser for each test: one program, in which nothing is left of the test before."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from tests.browser.chromium import Browser, chromium, need_chromium
 
 
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
+@pytest.fixture(scope="session")
+def started_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     need_chromium()
-    with chromium(tmp_path / "profile") as started:
+    with chromium(tmp_path_factory.mktemp("profile")) as started:
         yield started
+
+
+@pytest.fixture
+def browser(started_browser: Browser) -> Browser:
+    started_browser.forget()
+    return started_browser

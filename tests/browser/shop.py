@@ -1,11 +1,12 @@
 """A cell that runs with its page, people who log in to it, and what every page is held to."""
 
 import asyncio
+import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
@@ -13,10 +14,14 @@ from impactcell.records import Snapshot
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
 from tests.browser.chromium import Browser
-from tests.integration.watched import Watched
+from tests.integration.processes import write_cell
+from tests.integration.stepped import SteppedModule, stepped
+from tests.integration.watched import Watched, serving
 
 T = TypeVar("T")
 CELL = "press-1"
+PERIOD_S = 0.5
+"""Between the cycles of a cell that somebody looks at."""
 PASSWORDS = {"eva": "engineer-1", "otto": "operator-1", "olga": "observer-1"}
 ROLES = {"eva": Role.ENGINEER, "otto": Role.OPERATOR, "olga": Role.OBSERVER}
 AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
@@ -28,6 +33,7 @@ class Shop:
 
     watched: Watched
     directory: Path
+    module: SteppedModule
 
     @property
     def page(self) -> str:
@@ -44,6 +50,29 @@ class Shop:
     async def beside(self, work: Callable[[], T]) -> T:
         """Let a person do something in a thread, while the service runs on."""
         return await asyncio.to_thread(work)
+
+
+@contextlib.asynccontextmanager
+async def at_work(directory: Path, cycles: int, scenario: dict[str, Any], **cell: Any) -> AsyncIterator[Shop]:
+    """Run a cell with its page that has so many cycles behind it and goes on striking."""
+    write_shop_users(directory)
+    async with stepped(**scenario) as module:
+        file = write_cell(directory, module.port, CELL, web={"endpoint": "http://127.0.0.1:0"}, **cell)
+        async with serving(file) as watched:
+            for made in range(1, cycles + 1):
+                module.strike()
+                await watched.until(CELL, made)
+            striking = asyncio.create_task(_go_on(module))
+            try:
+                yield Shop(watched, directory, module)
+            finally:
+                striking.cancel()
+
+
+async def _go_on(module: SteppedModule) -> None:
+    while True:
+        await asyncio.sleep(PERIOD_S)
+        module.strike()
 
 
 def write_shop_users(directory: Path) -> None:

@@ -13,9 +13,8 @@ import yaml
 from simulator.campaign import write
 from simulator.campaign_scenario import CampaignScenario
 from tests.browser.chromium import DESK, PHONE, Browser, need_chromium
-from tests.browser.shop import CELL, Shop, enter, judge, write_shop_users
-from tests.integration.processes import CONFIG, simulator, write_cell
-from tests.integration.watched import serving
+from tests.browser.shop import CELL, Shop, at_work, enter, judge
+from tests.integration.processes import CONFIG
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(900), pytest.mark.asyncio(loop_scope="module")]
 
@@ -32,17 +31,13 @@ async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
     """A cell in which an effect acts that its model does not know."""
     need_chromium()
     directory = tmp_path_factory.mktemp("shop")
-    write_shop_users(directory)
     (directory / "model.yaml").write_bytes((CONFIG / "models" / "prototype.yaml").read_bytes())
     scenario = {
         "strikes": {"period_s": 0.5, "velocities_mm_per_min": [2000, 4000, 6000]},
         "appearances": [{"from_cycle": 1, "effects": MISSING}],
     }
-    async with simulator(directory, **scenario) as module:
-        changes = {"model": "model.yaml", "web": {"endpoint": "http://127.0.0.1:0"}}
-        async with serving(write_cell(directory, module["port"], CELL, **changes)) as watched:
-            await watched.until(CELL, 3)
-            yield Shop(watched, directory)
+    async with at_work(directory, 3, scenario, model="model.yaml") as shop:
+        yield shop
 
 
 def write_measurement(directory: Path) -> Path:

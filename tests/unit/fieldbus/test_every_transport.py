@@ -72,7 +72,7 @@ async def test_a_busy_device_is_asked_again(kind: str, tmp_path: Path) -> None:
 async def test_a_device_that_stays_busy_is_an_error_by_name(kind: str, tmp_path: Path) -> None:
     device = Image()
     device.busy = 10**9
-    async with connected(kind, device, tmp_path, timeout_s=0.3) as (_, client):
+    async with connected(kind, device, tmp_path, timeout_s=2.0) as (_, client):
         with pytest.raises(ModbusExceptionError, match="server device busy"):
             await client.read(0, 10)
         assert client.connected
@@ -83,9 +83,9 @@ async def test_a_device_that_stays_busy_is_an_error_by_name(kind: str, tmp_path:
 async def test_silence_closes_the_link_and_the_next_one_works(
     kind: str, fault: FaultKind, tmp_path: Path
 ) -> None:
-    async with connected(kind, Image(), tmp_path, timeout_s=0.2) as (server, client):
+    async with connected(kind, Image(), tmp_path, timeout_s=4.0) as (server, client):
         server.faults.inject(Fault(fault, remaining=1))
-        with pytest.raises(LinkError, match=r"no answer to 10 holding registers from 0 within 0\.2 s"):
+        with pytest.raises(LinkError, match=r"no answer to 10 holding registers from 0 within 4 s"):
             await client.read(0, 10)
         assert not client.connected
         for link in server.links:
@@ -125,7 +125,7 @@ async def test_a_reply_that_is_not_ours_closes_the_link(kind: str, fault: FaultK
 async def test_a_second_reply_is_never_taken_for_the_answer_to_another_request(
     kind: str, tmp_path: Path
 ) -> None:
-    async with connected(kind, Image(), tmp_path, timeout_s=0.2) as (server, client):
+    async with connected(kind, Image(), tmp_path, timeout_s=2.0) as (server, client):
         server.faults.inject(Fault(FaultKind.DUPLICATE))
         for address in range(5):
             try:
@@ -187,8 +187,8 @@ async def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(
     kind: str, tmp_path: Path
 ) -> None:
     """It comes on the next connection, as of a gateway, and after another request of the same shape."""
-    async with connected(kind, Image(), tmp_path, timeout_s=0.15) as (server, client):
-        server.faults.inject(Fault(FaultKind.LATE_REPLY, remaining=1, seconds=0.2))
+    async with connected(kind, Image(), tmp_path, timeout_s=2.0) as (server, client):
+        server.faults.inject(Fault(FaultKind.LATE_REPLY, remaining=1, seconds=2.5))
         with pytest.raises(LinkError):
             await client.read(1000, 10)
         for _ in range(20):
@@ -197,7 +197,7 @@ async def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(
                 assert (await client.read(0, 10)).tolist() == list(range(10))
             except FieldbusError:
                 continue
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(0.1)
 
 
 @pytest.mark.parametrize("kind", ["tcp", "tls", "rtu_over_tcp", "rtu"])
@@ -217,9 +217,9 @@ async def test_no_fault_gets_a_wrong_value_through(kind: str, seed: int, tmp_pat
     """The small version of the study in tests/benchmarks/transports.py."""
     faults = FaultInjector(seed)
     accepted = 0
-    async with connected(kind, Image(), tmp_path, faults, timeout_s=0.04, window=4) as (server, client):
+    async with connected(kind, Image(), tmp_path, faults, timeout_s=1.0, window=4) as (server, client):
         for fault in FaultKind:
-            faults.inject(Fault(fault, probability=0.02, seconds=0.05))
+            faults.inject(Fault(fault, probability=0.02, seconds=1.25))
         draw = np.random.default_rng(seed)
         for _ in range(60):
             address, count = int(draw.integers(0, 60_000)), int(draw.integers(1, 300))

@@ -121,7 +121,7 @@ async def test_a_device_without_them_refuses_and_the_link_stays(kind: str, tmp_p
 async def test_a_faulty_identification_closes_the_link_as_any_other_reply(
     kind: str, fault: FaultKind, tmp_path: Path
 ) -> None:
-    async with connected(kind, Image(), tmp_path, timeout_s=0.2) as (server, client):
+    async with connected(kind, Image(), tmp_path, timeout_s=4.0) as (server, client):
         server.faults.inject(Fault(fault, remaining=1))
         with pytest.raises((LinkError, ProtocolError)):
             await client.identification()
@@ -134,9 +134,9 @@ async def test_a_faulty_identification_closes_the_link_as_any_other_reply(
 async def test_no_fault_gets_a_wrong_bit_or_name_through(kind: str, tmp_path: Path) -> None:
     faults, draw = FaultInjector(5), np.random.default_rng(5)
     truth, right = {"coil": bits_of(0), "discrete": bits_of(1)}, 0
-    async with connected(kind, Image(), tmp_path, faults, timeout_s=0.04, window=4) as (server, client):
+    async with connected(kind, Image(), tmp_path, faults, timeout_s=1.0, window=4) as (server, client):
         for fault in FaultKind:
-            faults.inject(Fault(fault, probability=0.02, seconds=0.05))
+            faults.inject(Fault(fault, probability=0.02, seconds=1.25))
         for i in range(45):
             address, count = int(draw.integers(0, 60_000)), int(draw.integers(1, 4_500))
             table = ("coil", "discrete", "")[i % 3]

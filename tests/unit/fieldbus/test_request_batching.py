@@ -117,7 +117,7 @@ async def answered(window: int, blocks: list[PartialBlock], replies: list[bytes]
 
     async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
-        client = ModbusClient(transport_for(ModuleLink(port=port, window=window, timeout_s=0.2)))
+        client = ModbusClient(transport_for(ModuleLink(port=port, window=window, timeout_s=2.0)))
         await client.connect()
         try:
             await client.complete(*blocks)

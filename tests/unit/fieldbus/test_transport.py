@@ -181,7 +181,7 @@ async def test_a_busy_device_is_asked_again() -> None:
 async def test_a_device_that_stays_busy_is_an_error_by_name() -> None:
     device = Image()
     device.busy = 10**9
-    async with ModbusServer(device) as server, linked(server, timeout_s=0.5) as client:
+    async with ModbusServer(device) as server, linked(server, timeout_s=2.0) as client:
         with pytest.raises(ModbusExceptionError, match="server device busy"):
             await client.read(0, 10)
         assert client.connected
@@ -208,9 +208,9 @@ async def test_a_disconnect_fails_everything_at_once() -> None:
 
 @pytest.mark.parametrize("kind", [FaultKind.DROP, FaultKind.HALF_OPEN, FaultKind.TRUNCATED])
 async def test_silence_closes_the_link_and_the_next_connection_works(kind: FaultKind) -> None:
-    async with ModbusServer(Image()) as server, linked(server, timeout_s=0.25) as client:
+    async with ModbusServer(Image()) as server, linked(server, timeout_s=4.0) as client:
         server.faults.inject(Fault(kind, remaining=1))
-        with pytest.raises(LinkError, match=r"no answer to 10 holding registers from 0 within 0\.25 s"):
+        with pytest.raises(LinkError, match=r"no answer to 10 holding registers from 0 within 4 s"):
             await client.read(0, 10)
         assert not client.connected
         await client.connect()
@@ -246,7 +246,7 @@ async def test_a_reply_filled_up_by_the_whole_of_the_next_one_is_not_used() -> N
         writer.write(frames[0][: -len(frames[1])] + frames[1])
 
     async with peer(lose_bytes) as port:
-        client = ModbusClient(transport_for(ModuleLink(port=port, window=4, timeout_s=0.05)))
+        client = ModbusClient(transport_for(ModuleLink(port=port, window=4, timeout_s=2.0)))
         await client.connect()
         long, short = await asyncio.gather(client.read(100, 60), client.read(7, 3), return_exceptions=True)
         assert isinstance(long, LinkError)
@@ -257,7 +257,7 @@ async def test_a_reply_filled_up_by_the_whole_of_the_next_one_is_not_used() -> N
 @pytest.mark.parametrize("seed", range(8))
 async def test_a_reply_of_the_wrong_length_is_never_used(seed: int) -> None:
     faults = FaultInjector(seed)
-    async with ModbusServer(Image(), faults=faults) as server, linked(server, timeout_s=0.25) as client:
+    async with ModbusServer(Image(), faults=faults) as server, linked(server, timeout_s=2.0) as client:
         faults.inject(Fault(FaultKind.WRONG_LENGTH, remaining=1))
         with pytest.raises((ProtocolError, LinkError)):
             await client.read(0, 10)
@@ -274,8 +274,8 @@ async def test_legal_but_odd_framing_and_order_are_understood(kind: FaultKind) -
 async def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request() -> None:
     """As a gateway does it: the late reply comes on the next connection, with the old transaction id."""
     async with ModbusServer(Image()) as server:
-        server.faults.inject(Fault(FaultKind.LATE_REPLY, remaining=1, seconds=0.5))
-        async with linked(server, timeout_s=0.1) as impatient:
+        server.faults.inject(Fault(FaultKind.LATE_REPLY, remaining=1, seconds=10.0))
+        async with linked(server, timeout_s=2.0) as impatient:
             with pytest.raises(LinkError):
                 await impatient.read(1000, 10)
         async with linked(server) as next_one:
@@ -291,7 +291,7 @@ async def test_every_attempt_has_a_fresh_transaction_id() -> None:
         seen.append(struct.unpack(">H", (await reader.readexactly(12))[:2])[0])
 
     async with peer(never) as port:
-        client = ModbusClient(transport_for(ModuleLink(port=port, timeout_s=0.02)))
+        client = ModbusClient(transport_for(ModuleLink(port=port, timeout_s=4.0)))
         for _ in range(3):
             await client.connect()
             with pytest.raises(LinkError):
