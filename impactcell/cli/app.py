@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 failed while working, 2 bad input, 130 interrupted.
 """
 
+import gc
 import logging
 import sys
 from pathlib import Path
@@ -63,6 +64,7 @@ def demo(
 @verb(app)
 def run(cells: Cells) -> None:
     """Run the service; SIGTERM ends it cleanly, SIGHUP reloads what can be reloaded."""
+    gc.disable()  # until it has started: what is loaded and built by then stays, and is much to look through
     from impactcell.service import run as run_service
     from impactcell.settings import read_cells
 

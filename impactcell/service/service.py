@@ -236,6 +236,7 @@ async def _until_signalled(service: Service) -> bool:
 def _say_started(service: Service) -> None:
     gc.freeze()  # nodes and their types stay: to look through them for garbage held everything for 0.4 s
     leave_full_rounds_to_the_server()
+    gc.enable()
     for cell, endpoint in service.endpoints.items():
         log.info("cell=%s at %s", cell, endpoint)
 

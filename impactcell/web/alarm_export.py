@@ -6,9 +6,6 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Final
 
-from openpyxl import Workbook
-from openpyxl.cell import WriteOnlyCell
-
 from impactcell.records import Alarm
 
 HEADER: Final = (
@@ -45,6 +42,9 @@ def to_csv(history: Sequence[tuple[str, Alarm]]) -> bytes:
 
 def to_xlsx(history: Sequence[tuple[str, Alarm]]) -> bytes:
     """Write a workbook with one sheet; every text is a text, whatever it begins with."""
+    from openpyxl import Workbook  # a tenth of a second of every start, for what is asked for now and then
+    from openpyxl.cell import WriteOnlyCell
+
     book = Workbook(write_only=True)
     sheet = book.create_sheet("alarms")
     sheet.append(HEADER)

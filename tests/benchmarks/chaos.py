@@ -232,7 +232,7 @@ def tables(quick: bool = False) -> list[Table]:
     kinds = [kind for kind in KINDS if seen[f"fault {kind}"]]
     first_s = np.array([each[0] for each in trial])
     rows = [
-        ("faulty exchanges", ">= 10000", f"{seen['faults']}", f"{runs} runs, windows 1, 4 and 16"),
+        ("faulty exchanges", ">= 10000", f"{seen['faults']}", f"{runs} runs, windows 1, 4, 16 and found"),
         (
             "kinds of them",
             ">= 40",
