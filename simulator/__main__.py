@@ -71,7 +71,7 @@ def _serve(options: argparse.Namespace) -> int:
 def _campaign(options: argparse.Namespace) -> int:
     from pydantic import ValidationError
 
-    from simulator.campaign import write
+    from simulator.campaign_files import write
     from simulator.campaign_scenario import CampaignScenario
     from simulator.scenario_file import load
 

@@ -1,28 +1,24 @@
-"""Makes a campaign: shots in a design, struck on the simulator's plant, as a directory and its truth.
+"""Makes a campaign: shots in a design, struck on the simulator's plant, and what sensors show of them.
 
-The writer is the simulator's own, so that the product's reader is tested on files it has not written.
-Everything random comes from one seed; the same scenario gives the same bytes.
+Everything random comes from one seed; the same scenario gives the same shots.
 """
 
-import json
 import math
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from impactcell.errors import CampaignError
 from simulator.campaign_scenario import CampaignScenario, SensorScenario
 from simulator.plant import Motion, Plant, Shot, TapInput, simulate_driven, simulate_free_slide, simulate_tap
 from simulator.scenario_file import MM_PER_MIN
 
 Samples = NDArray[np.float64]
 COLUMNS = {"force": "force_n", "position": "position_m", "actuator": "actuator_m"}
+"""Column of each sensor in the files, which is also what the motion calls it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,106 +200,3 @@ def _measured(
         keep_them[first : first + lost] = False
         return time[keep_them], measured[keep_them]
     return time, measured
-
-
-def write(scenario: CampaignScenario, directory: Path) -> Path:
-    """Make the campaign, write it to `directory` and its truth beside it; returns the truth file.
-
-    Raises
-    ------
-    CampaignError
-        One of the two exists already, or cannot be written.
-    """
-    truth = directory.with_name(directory.name + ".truth.json")
-    for place in (directory, truth):
-        if place.exists() and not (place.is_dir() and not any(place.iterdir())):
-            message = f"{place}: exists already; choose another name or remove it"
-            raise CampaignError(message)
-    base, shots = make(scenario)
-    beside = directory.with_name(f".{directory.name}.partial")
-    try:
-        shutil.rmtree(beside, ignore_errors=True)
-        (beside / "traces").mkdir(parents=True)
-        (beside / "campaign.yaml").write_text(_header(scenario), encoding="utf-8")
-        (beside / "shots.csv").write_text(_table(scenario, shots), encoding="utf-8")
-        for shot in shots:
-            (beside / "traces" / f"{shot.plan.number}.csv").write_text(_trace(shot), encoding="utf-8")
-        truth.write_text(json.dumps(_truth(scenario, base, shots), indent=1) + "\n", encoding="utf-8")
-        if directory.is_dir():
-            directory.rmdir()
-        beside.rename(directory)
-    except OSError as error:
-        message = f"{directory}: cannot be written: {error.strerror}"
-        raise CampaignError(message) from error
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-    return truth
-
-
-def _header(scenario: CampaignScenario) -> str:
-    lines = ["format: 1", f"excitation: {scenario.excitation}", f"gravity_m_s2: {scenario.gravity_m_s2:g}"]
-    if scenario.excitation == "tap":
-        lines += ["actuator:", f"  stroke_m: {scenario.stroke_m:.9g}"]
-    lines.append("sensors:")
-    for name in COLUMNS:
-        sensor = getattr(scenario.sensors, name)
-        if sensor is not None:
-            unit = "n" if name == "force" else "m"
-            noise = f"{sensor.noise_std:.9g}" if scenario.noise.stated and sensor.noise_std > 0.0 else "null"
-            lines.append(f"  {name}: {{rate_hz: {sensor.rate_hz:.9g}, noise_std_{unit}: {noise}}}")
-    return "\n".join(lines) + "\n"
-
-
-def _table(scenario: CampaignScenario, shots: Sequence[MadeShot]) -> str:
-    is_tap = scenario.excitation == "tap"
-    names = ["shot", *(["velocity_mm_per_min"] if is_tap else []), "mass_kg", "direction", "batch", "dwell_s"]
-    starts = any(start != 0.0 for start in scenario.starts_m)
-    rows = [names + (["start_m"] if starts else []) + list(scenario.columns)]
-    for shot in shots:
-        plan = shot.plan
-        row = [str(plan.number)] + ([f"{plan.velocity:.9g}"] if is_tap else [])
-        row += [f"{plan.mass_kg:.9g}" if scenario.mass_stated else "", str(plan.direction)]
-        row += [scenario.batches[plan.batch], f"{plan.dwell_s:.9g}"]
-        row += [f"{plan.start_m:.9g}"] if starts else []
-        rows.append(row + [f"{value:.9g}" for value in plan.columns.values()])
-    return "".join(",".join(row) + "\n" for row in rows)
-
-
-def _trace(shot: MadeShot) -> str:
-    times = np.unique(np.concatenate([time for time, _ in shot.channels.values()]))
-    columns = [[f"{time:.9g}" for time in times.tolist()]]
-    for time, values in shot.channels.values():
-        cells = [""] * len(times)
-        for place, value in zip(np.searchsorted(times, time).tolist(), values.tolist(), strict=True):
-            cells[place] = f"{value:.9g}"
-        columns.append(cells)
-    header = ",".join(["time_s", *(COLUMNS[name] for name in shot.channels)])
-    return "\n".join([header, *(",".join(row) for row in zip(*columns, strict=True))]) + "\n"
-
-
-def _truth(scenario: CampaignScenario, base: Plant, shots: Sequence[MadeShot]) -> dict[str, Any]:
-    return {
-        "effect": "+".join(scenario.hide) or "none",
-        "effects": {name: dict(parameters) for name, parameters in base.effects.items()},
-        "seed": scenario.seed,
-        "base": {"k": base.stiffness_n_per_m, "b": base.damping_n_s_per_m},
-        "mus": base.mu_s,
-        "ratio": scenario.plant.ratio,
-        "shots": [
-            {
-                "shot": shot.plan.number,
-                "mu_s": shot.motion.mu_s,
-                "mu_k": shot.motion.mu_k,
-                "factor": shot.plan.factor,
-                "mass_kg": shot.plan.mass_kg,
-                "peak_force_n": shot.motion.peak_force_n,
-                "sliding_distance_m": _or_none(shot.motion.sliding_distance_m),
-                "displacement_m": shot.motion.displacement_m,
-            }
-            for shot in shots
-        ],
-    }
-
-
-def _or_none(value: float) -> float | None:
-    return None if math.isnan(value) else value

@@ -24,10 +24,9 @@ from simulator.commands import (
 from simulator.cycle import RunningTap
 from simulator.image import RegisterImage
 from simulator.plant import NeverAtRestError, TapInput, simulate_tap
-from simulator.process import strike_conditions
+from simulator.process import scheduled_tap, strike_conditions
 from simulator.recorder import Recording, record, reported
 from simulator.scenario import Scenario
-from simulator.scenario_file import MM_PER_MIN
 from simulator.tasks import PartSequence
 
 NO_SLOT: Final = 0xFFFF
@@ -146,17 +145,7 @@ class Device:
         if strikes is None:
             return
         self._next_s += strikes.period_s
-        velocities, directions = strikes.velocities_mm_per_min, strikes.directions
-        if strikes.order == "in_turn":
-            velocity = velocities[self._made % len(velocities)]
-            direction = directions[self._made % len(directions)]
-        else:
-            random = np.random.default_rng([self.scenario.seed, self._made, 1])
-            velocity = float(random.choice(velocities))
-            direction = 1 if random.choice(directions) == 1 else -1
-        # The part is put back after every strike of a schedule.
-        mass_kg = self.scenario.part.mass_kg
-        self._strike(TapInput(velocity * MM_PER_MIN, mass_kg, strikes.stroke_m, direction), sequence=0)
+        self._strike(scheduled_tap(self.scenario, strikes, self._made), sequence=0)
 
     def _strike(self, commanded: TapInput, sequence: int) -> None:
         self._made += 1

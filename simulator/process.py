@@ -1,4 +1,4 @@
-"""Which plant a strike meets: wear, batch, scatter, deviation, new effects. Pure."""
+"""Which strike comes next, and which plant it meets: wear, batch, scatter, deviation, new effects. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from simulator.effects import Parameter
-from simulator.plant import Plant
-from simulator.scenario import DEVIATION_EFFECT, Batch, Deviation, Scenario
+from simulator.plant import Plant, TapInput
+from simulator.scenario import DEVIATION_EFFECT, Batch, Deviation, Scenario, Strikes
+from simulator.scenario_file import MM_PER_MIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,19 @@ class StrikeConditions:
     batch: Batch
     deviation: str
     random: np.random.Generator
+
+
+def scheduled_tap(scenario: Scenario, strikes: Strikes, made: int) -> TapInput:
+    """Next strike of a schedule after so many; the part is put back after every one."""
+    velocities, directions = strikes.velocities_mm_per_min, strikes.directions
+    if strikes.order == "in_turn":
+        velocity = velocities[made % len(velocities)]
+        direction = directions[made % len(directions)]
+    else:
+        random = np.random.default_rng([scenario.seed, made, 1])
+        velocity = float(random.choice(velocities))
+        direction = 1 if random.choice(directions) == 1 else -1
+    return TapInput(velocity * MM_PER_MIN, scenario.part.mass_kg, strikes.stroke_m, direction)
 
 
 def strike_conditions(scenario: Scenario, number: int, start_m: float, direction: int) -> StrikeConditions:

@@ -14,7 +14,8 @@ import numpy as np
 from impactcell.physics.bspline import spline_basis
 from impactcell.physics.effect import Covariates, Effect, Factors, Kind, Parameter, Phase
 from impactcell.physics.effects import add_effect
-from impactcell.physics.free_forms import LOWER, SPANS, UPPER, FreeForm
+from impactcell.physics.free_form import FreeForm
+from impactcell.physics.free_forms import LOWER, SPANS, UPPER
 from impactcell.records import Samples
 
 COLUMN_PREFIX = "free_friction_over_column_"

@@ -9,13 +9,13 @@ They are no named effects: nobody accepts one, and no YAML offers them.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 from impactcell.numerics.jit import FloatPointer, Law
 from impactcell.physics.bspline import spline
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 from impactcell.physics.effects import add_effect
+from impactcell.physics.free_form import FINE, FreeForm
 
 SPANS = 7
 """Polynomial pieces of a spline: an S with a fold is followed, a single sample is not. Own choice."""
@@ -23,8 +23,6 @@ SPANS_OF_TABLE = 24
 """The same over the position on the table, where a surface may have waves and spots: a wave takes three."""
 FINE_SPANS = 72
 """The same where those leave something: two dozen waves."""
-FINE = "_fine"
-"""End of the identifier of a finer term."""
 LOWER, UPPER = "lower", "upper"
 """Names of the parameters that say where the knots lie."""
 
@@ -92,72 +90,6 @@ def _speed_over_time(t: float, _b: float, _c: float, _d: float, p: FloatPointer)
 def _reading_over_force(force: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
     """F (1 + s(F)) is shown."""
     return force * (1.0 + spline(force, p, SPANS))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FreeForm:
-    """A place in the equations of motion at which a free-form term may act.
-
-    Attributes
-    ----------
-    effect : Effect
-        What enters the plant.
-    covariate : str
-        `speed`, `position`, `indentation`, `indentation_rate`, `gap`, `time` or `force`.
-    covariate_unit : str
-    law_kind : LawKind or None
-        None where the term acts between shots.
-    around : str
-        How the function s of the covariate u enters, as Python of the law's own four numbers a, b, c and d,
-        e.g. `-b * s`.
-    argument : str
-        Python of the covariate in the same four numbers.
-    constant_is : str
-        Parameter of the nominal plant that does what a constant function would; empty where none does, so
-        that a constant is a law of its own.
-    dissipates : str
-        Parameter of the plant to which the function is added where the sum must not be negative, lest it give
-        energy; `0` where it is the function alone, empty where either sign is possible.
-    """
-
-    effect: Effect
-    covariate: str
-    covariate_unit: str
-    law_kind: LawKind | None
-    around: str
-    argument: str
-    constant_is: str = ""
-    dissipates: str = ""
-
-    @property
-    def place(self) -> str:
-        """Identifier of the place, whatever the number of pieces."""
-        return self.effect.identifier.removesuffix(FINE)
-
-    @property
-    def coefficients(self) -> tuple[str, ...]:
-        """Names of the parameters that a fit moves."""
-        return tuple(parameter.name for parameter in self.effect.parameters[2:])
-
-    @property
-    def spans(self) -> int:
-        """Polynomial pieces of its spline."""
-        return len(self.coefficients) - 3
-
-    @property
-    def is_factor(self) -> bool:
-        """Whether 1 + s multiplies the friction, so that s has no unit."""
-        return self.law_kind is LawKind.SCALE or self.is_between_shots
-
-    @property
-    def is_between_shots(self) -> bool:
-        """Whether it acts between shots, so that it shows in their friction factors only."""
-        return self.law_kind is None
-
-    @property
-    def unit(self) -> str:
-        """Unit of the function."""
-        return self.effect.parameters[2].unit
 
 
 _CONTACT = (Phase.LOADING, Phase.UNLOADING)

@@ -6,7 +6,7 @@ import numpy as np
 
 from impactcell.discrepancy.data import PHASES
 from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
-from impactcell.physics.free_forms import FreeForm
+from impactcell.physics.free_form import FreeForm
 from impactcell.records import Samples
 
 SLIDING = frozenset({"loading", "unloading", "free_slide", "driven"})

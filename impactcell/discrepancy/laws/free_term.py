@@ -19,7 +19,8 @@ from impactcell.discrepancy.model import (
 )
 from impactcell.errors import DiscrepancyError
 from impactcell.physics.free_column_forms import column_form
-from impactcell.physics.free_forms import FINER, FREE_FORMS, LOWER, UPPER, FreeForm
+from impactcell.physics.free_form import FreeForm
+from impactcell.physics.free_forms import FINER, FREE_FORMS, LOWER, UPPER
 from impactcell.records import Samples
 
 SMOOTHNESS = (1e-6, 1e-4, 1e-2, 1.0)

@@ -12,7 +12,7 @@ from impactcell.discrepancy.laws.grammar import WAVES, Shape, evaluate, name
 from impactcell.physics import Effect, LawKind
 from impactcell.physics.effects import add_effect
 from impactcell.physics.free_column_forms import printed
-from impactcell.physics.free_forms import FreeForm
+from impactcell.physics.free_form import FreeForm
 from impactcell.records import Samples
 
 SUFFIX = {

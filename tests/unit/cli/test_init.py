@@ -13,7 +13,7 @@ from impactcell.errors import ImpactCellError, PredictionError, SettingsError
 from impactcell.journal.store import Journal
 from impactcell.process.shipped import shipped_config
 from impactcell.settings import read_cell
-from simulator.campaign import write
+from simulator.campaign_files import write
 from simulator.campaign_scenario import CampaignScenario
 from tests.snapshots import make_snapshot
 

@@ -11,7 +11,8 @@ import yaml
 from impactcell.campaign import Excitation, read
 from impactcell.errors import CampaignError, SettingsError
 from simulator.__main__ import main
-from simulator.campaign import make, write
+from simulator.campaign import make
+from simulator.campaign_files import write
 from simulator.campaign_scenario import CampaignScenario
 from simulator.scenario_file import load
 
