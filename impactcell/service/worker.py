@@ -184,11 +184,6 @@ class CellWorker:
 
         await self.run(swap)
 
-    async def query_journal(self, question: Callable[[Journal], T]) -> T | None:
-        """Ask the journal; None without one."""
-        journal = self._journal_writer.journal
-        return None if journal is None else await self.run(lambda: question(journal))
-
     async def close(self) -> None:
         """Finish what has begun, and close the journal."""
         self._closing.set()

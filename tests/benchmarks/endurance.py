@@ -81,9 +81,9 @@ async def endure(directory: Path, cycles: int) -> Endured:
             size = path.stat().st_size / 2**20
             print(f"endurance: {cycle} cycles, {memory[-1]:.1f} MB, file {size:.1f} MB", file=sys.stderr)
     cpu_s = (time.process_time() - began_s) / cycles
-    held = await worker.query_journal(lambda journal: journal.count())
     await worker.close()
-    return Endured(memory, path.stat().st_size, held or 0, cpu_s)
+    with Journal(path, None, read_only=True) as journal:
+        return Endured(memory, path.stat().st_size, journal.count(), cpu_s)
 
 
 def endured(cycles: int) -> Endured:

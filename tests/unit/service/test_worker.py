@@ -300,17 +300,6 @@ async def test_shelving_ends_when_its_time_is_over(tmp_path: Path, design: core.
     await worker.close()
 
 
-async def test_the_journal_is_asked_where_there_is_one(tmp_path: Path, design: core.CellDesign) -> None:
-    with_journal = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
-    without = CellWorker(design, None, Retention())
-    for worker in (with_journal, without):
-        await worker.process(make_capture(1), PositioningState(), None)
-    assert await with_journal.query_journal(lambda journal: journal.count()) == 1
-    assert await without.query_journal(lambda journal: journal.count()) is None
-    for worker in (with_journal, without):
-        await worker.close()
-
-
 async def test_the_time_between_cycles_is_known_from_the_second_on(
     tmp_path: Path, design: core.CellDesign
 ) -> None:
