@@ -10,6 +10,8 @@ from typing import Any, TypeVar
 
 import pytest
 
+from impactcell.journal.audit_entries import AuditEntry
+from impactcell.journal.store import Journal
 from impactcell.records import Snapshot
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
@@ -46,6 +48,11 @@ class Shop:
     @property
     def last(self) -> Snapshot:
         return self.watched.snapshots[CELL][-1]
+
+    def audit(self) -> tuple[AuditEntry, ...]:
+        """What people did, as the journal has it."""
+        with Journal(self.directory / f"{CELL}.sqlite", CELL, read_only=True) as journal:
+            return journal.audit()
 
     async def beside(self, work: Callable[[], T]) -> T:
         """Let a person do something in a thread, while the service runs on."""

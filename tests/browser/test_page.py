@@ -93,9 +93,7 @@ async def test_an_alarm_that_is_acknowledged_here_is_acknowledged_over_opc_ua(
     text = await shop.beside(lambda: browser.text)
     assert comment in text
     assert await shop.beside(lambda: browser.driver.title) == "Alarms · impactcell"
-    journal = await shop.watched.service.running[CELL].worker.query_journal(lambda j: j.audit())
-    assert journal is not None
-    assert [entry.user for entry in journal if entry.action == "acknowledge"] == [
+    assert [entry.user for entry in shop.audit() if entry.action == "acknowledge"] == [
         "otto (operator) from 127.0.0.1"
     ]
 

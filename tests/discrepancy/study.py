@@ -7,10 +7,13 @@ hidden are drawn from its seed; how strong it is, is given, or calibrated to a g
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
+import pytest
 
 from impactcell.campaign import Campaign, Excitation, Sensor
+from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture, Channel
 from simulator.campaign import MadeShot, make
 from simulator.campaign_scenario import CampaignScenario
@@ -140,6 +143,16 @@ def campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:
     """Make the campaign of a job."""
     plan = scenario(job, multiples)
     return recorded(plan, make(plan)[1])
+
+
+def name_effects(campaign: Campaign, **options: Any) -> DiscrepancyResult:
+    """Investigate without looking for laws that nobody has listed: they have tests of their own.
+
+    What is named is concluded before; see `impactcell.discrepancy.workflow.investigate`.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("impactcell.discrepancy.workflow.find_law", lambda *_: None)
+        return investigate(campaign, **options)
 
 
 def with_column(job: Job, name: str, low: float, high: float, law: Callable[[float], float]) -> Campaign:

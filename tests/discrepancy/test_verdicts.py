@@ -17,6 +17,7 @@ from impactcell.discrepancy.search.validation import GapMeasure, Part, confirmed
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture, Channel
 from tests.benchmarks._discrepancy_driven import Job, record
+from tests.discrepancy.study import name_effects
 from tests.discrepancy.test_workflow import investigated, make
 
 
@@ -49,7 +50,7 @@ def test_too_few_blocks_are_untested_and_what_is_missing_is_said() -> None:
 
 
 def test_no_gap_is_never_said_beside_one() -> None:
-    outcome = result_document(investigate(part_of_record("machine_vibration", 6.0)))
+    outcome = result_document(name_effects(part_of_record("machine_vibration", 6.0)))
     held_out = outcome["gap"]["held_out"]
     assert held_out["before"] > 10.0 > held_out["expected_without_gap"][1]
     assert outcome["verdict"] == "unknown"
@@ -127,7 +128,7 @@ def test_the_first_effect_that_is_not_confirmed_ends_the_list(viscous: Discrepan
 
 def test_what_held_out_shots_do_not_confirm_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("impactcell.discrepancy.search.validation.MIN_CLOSED_SHARE", 2.0)
-    found = investigate(make("viscous_friction", shots=24))
+    found = name_effects(make("viscous_friction", shots=24))
     outcome = result_document(found)
     assert outcome["verdict"] == "unknown"
     assert outcome["effects"] == []

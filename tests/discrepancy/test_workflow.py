@@ -42,7 +42,7 @@ def make(*hidden: str, seed: int = 3, shots: int = 36) -> Campaign:
 @functools.cache
 def investigated(*hidden: str, shots: int = 36) -> DiscrepancyResult:
     """What comes of a campaign, once for all tests that look at it."""
-    return investigate(make(*hidden, shots=shots))
+    return study.name_effects(make(*hidden, shots=shots))
 
 
 def answer(found: DiscrepancyResult) -> tuple[str, set[str]]:
@@ -136,7 +136,7 @@ def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
 def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
     hidden = ("batch_shift", "force_sensor_gain")
     job = study.Job("two", hidden, 50_028, target=4.108, actuator=False)
-    found = investigate(study.campaign(job, [1.0751, 0.7086]), seed=job.seed)
+    found = study.name_effects(study.campaign(job, [1.0751, 0.7086]), seed=job.seed)
     gain = next(one for one in found.added if one != "batch_shift")
     assert {gain, *found.selection.ties[gain]} == {"mass_error", "force_sensor_gain"}
     assert "batch_shift" in found.added
@@ -146,7 +146,7 @@ def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
     # Without it friction differs by direction, for the parts slide apart: that is asked about first.
     hidden = {"position_dependent_friction", "direction_asymmetry"}
     campaign = make("position_dependent_friction", seed=920030)
-    found = investigate(campaign, library=[one for one in LIBRARY if one not in hidden])
+    found = study.name_effects(campaign, library=[one for one in LIBRARY if one not in hidden])
     assert found.selection.alternatives[0].effects == ("friction_patch",)
     assert answer(found) == ("unknown", set())
 
@@ -161,7 +161,7 @@ def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
 
 def test_a_gap_between_shots_is_unknown_with_the_covariate_that_it_goes_with() -> None:
     rivals = {"surface_tilt", "direction_asymmetry"}
-    found = investigate(make("surface_tilt"), library=[one for one in LIBRARY if one not in rivals])
+    found = study.name_effects(make("surface_tilt"), library=[one for one in LIBRARY if one not in rivals])
     assert answer(found) == ("unknown", set())
     assert found.unexplained is not None
     assert found.unexplained.phase == "between_shots"

@@ -5,10 +5,11 @@ import io
 import os
 import re
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from tests.integration.shell_commands import shell_commands
 
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 
@@ -41,9 +42,10 @@ def snippets(page: Path) -> list[Snippet]:
 def run(page: Path, directory: Path) -> list[tuple[Snippet, str]]:
     """Run the blocks of a page in a directory, in one program; return each with what it printed."""
     names: dict[str, Any] = {"__name__": page.stem}
-    with contextlib.chdir(directory):
+    commands = directory / ".commands"
+    with contextlib.chdir(directory), shell_commands(commands):
         return [
-            (block, _python(block, page, names) if block.language == "python" else _shell(block))
+            (block, _python(block, page, names) if block.language == "python" else _shell(block, commands))
             for block in snippets(page)
         ]
 
@@ -56,8 +58,8 @@ def _python(block: Snippet, page: Path, names: dict[str, Any]) -> str:
     return printed.getvalue()
 
 
-def _shell(block: Snippet) -> str:
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+def _shell(block: Snippet, commands: Path) -> str:
+    path = f"{commands}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         ["bash", "-euc", block.code],
         capture_output=True,

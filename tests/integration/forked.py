@@ -16,9 +16,12 @@ from multiprocessing.context import ForkServerProcess
 
 from tests.integration.running import Running
 
-_SERVER = multiprocessing.get_context("forkserver")
-_SERVER.set_forkserver_preload(
-    ["impactcell.cli.app", "impactcell.service", "simulator.serving", "tests.integration.preloaded"]
+SERVER = multiprocessing.get_context("forkserver")
+SERVER.set_forkserver_preload(
+    [
+        *("impactcell.cli.app", "impactcell.service", "impactcell.discrepancy.report", "simulator.serving"),
+        *("simulator.campaign_files", "tests.integration.preloaded"),
+    ]
 )
 
 
@@ -69,8 +72,8 @@ async def _stream(connection: Connection) -> tuple[asyncio.StreamReader, asyncio
 @contextlib.asynccontextmanager
 async def forked(*arguments: str) -> AsyncIterator[Running]:
     """Run a Python module; it is ended by SIGTERM afterwards."""
-    (output, writes_output), (errors, writes_errors) = (_SERVER.Pipe(duplex=False) for _ in range(2))
-    process = _SERVER.Process(target=_run, args=(arguments, writes_output, writes_errors))
+    (output, writes_output), (errors, writes_errors) = (SERVER.Pipe(duplex=False) for _ in range(2))
+    process = SERVER.Process(target=_run, args=(arguments, writes_output, writes_errors))
     await asyncio.to_thread(process.start)
     writes_output.close()
     writes_errors.close()

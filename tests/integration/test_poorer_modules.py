@@ -11,7 +11,8 @@ from asyncua import Client, ua
 
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
-from tests.integration.processes import CONFIG, simulator, started, truths, write_cell
+from tests.integration.forked import forked
+from tests.integration.processes import CONFIG, simulator, truths, write_cell
 from tests.integration.test_probe import probed
 from tests.integration.test_running_cell import engineer, node
 
@@ -50,7 +51,7 @@ async def test_a_cell_runs_on_a_module_that_has_less(kind: str, tmp_path: Path) 
         scenario["sensors"] = LOGGER
     async with simulator(tmp_path, **scenario) as told:
         cell = write_cell(tmp_path, told["port"], module={"register_map": register_map})
-        async with started("impactcell", "run", str(cell)) as service:
+        async with forked("impactcell", "run", str(cell)) as service:
             endpoint = (await service.line(r"cell=press-1 at (\S+)"))[1]
             async with asyncio.timeout(400):
                 while len(stored(tmp_path)) < CYCLES:

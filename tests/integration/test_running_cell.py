@@ -8,6 +8,7 @@ from asyncua import Client, Node, ua
 
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
+from tests.integration.forked import forked
 from tests.integration.processes import simulator, started, truths, write_cell
 
 CYCLES = 12
@@ -74,7 +75,7 @@ async def test_every_cycle_once_and_right(tmp_path: Path, users: str) -> None:
 
 async def test_a_module_that_is_not_there_is_said_and_the_service_ends_cleanly(tmp_path: Path) -> None:
     path = write_cell(tmp_path, 1)
-    async with started("impactcell", "run", str(path)) as service:
+    async with forked("impactcell", "run", str(path)) as service:
         await service.line(r"cell=press-1 127\.0\.0\.1:1.*no connection")
         await service.line(r"cell=press-1 at (\S+)")
         service.process.terminate()
