@@ -151,8 +151,12 @@ def _simulate(plant: Plant, tap: TapInput, initial_speed_m_s: float) -> Motion:
 def _sample(taps: TapArrays, time_s: Samples) -> ChannelSamples:
     """Integrate again, now with samples: it costs less than keeping every step would."""
     n = time_s.size
-    order = np.argsort(time_s, kind="stable")
     sample_index = np.array([[0, n, 2 * n, 3 * n, n, 2 * n, 3 * n, 4 * n, 0]], dtype=np.int64)
-    channels = np.empty((4, n))
-    channels[:, order] = sample_taps(taps, sample_index, np.tile(time_s[order], 4)).reshape(4, n)
+    ascends = bool((time_s[1:] >= time_s[:-1]).all())
+    order = None if ascends else np.argsort(time_s, kind="stable")
+    ascending = time_s if order is None else time_s[order]
+    channel_times = np.concatenate((ascending, ascending, ascending, ascending))
+    channels = sample_taps(taps, sample_index, channel_times).reshape(4, n)
+    if order is not None:
+        channels[:, order] = channels.copy()
     return ChannelSamples(*channels)
