@@ -42,6 +42,8 @@ BEYOND = 1.0
 """Logarithm of the stroke over delta of the second neighbourhood, that of short pushes."""
 RISE = 1.5
 """A weight of beta counts so many indentations: breakaway is what the model knows least of."""
+BREAKAWAY_SHARE = 0.3
+"""Of `RISE` indentations: what the scatter of the contact reaches at breakaway, though little moves there."""
 LOSS_M = 1e-3
 """Displacement beside which a loss of energy in the contact is told."""
 

@@ -2,7 +2,9 @@
 
 Uncertainty is split into the line along which friction varies (and, with it, whatever is correlated with
 it), followed exactly at the nodes `z` whatever the displacement does there, and the directions across,
-each taken at one standard deviation and added by `reach`.
+each taken at three standard deviations and added by `reach`: where a slow push sticks once more, or once
+less, the displacement jumps by up to a fifth of the indentation, and a slope taken near the mean knows
+nothing of it.
 """
 
 import math
@@ -13,6 +15,8 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.physics.closed_form import displacements
 from impactcell.positioning.displacement_discrepancy import (
+    BREAKAWAY,
+    BREAKAWAY_SHARE,
     FEATURES,
     breakaway_features,
     discrepancy_features,
@@ -24,6 +28,8 @@ from impactcell.records import Samples
 
 ACROSS = 4
 """Directions across the line: parameters other than friction."""
+ACROSS_Z = 3.0
+"""Standard deviations at which these are taken: beyond lies 1 in 1000, which is what is promised."""
 
 
 class Scenarios(NamedTuple):
@@ -32,8 +38,8 @@ class Scenarios(NamedTuple):
     Attributes
     ----------
     plants : ndarray, shape (nodes + 2 ACROSS, 5)
-        Rows (k, b, mu_s, mu_k, k_v): those along the line, then a standard deviation above and below it in
-        each direction across.
+        Rows (k, b, mu_s, mu_k, k_v): those along the line, then `ACROSS_Z` standard deviations above and
+        below it in each direction across.
     weights : ndarray, shape (nodes + 2 ACROSS, FEATURES)
         Of the discrepancy, with each of these.
     root : ndarray, shape (FEATURES, FEATURES)
@@ -66,10 +72,11 @@ def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, 
     aside = PARAMETERS - 1
     values, vectors = np.linalg.eigh(across[:aside, :aside])
     lengths = np.sqrt(np.maximum(values, 0.0))
-    steps = (vectors * lengths).T
+    steps = ACROSS_Z * (vectors * lengths).T
     # weights that go with each of these directions, and what is left of theirs
     going = (across[aside:, :aside] @ vectors / np.maximum(lengths, 1e-12)).T
     left = across[aside:, aside:] - going.T @ going
+    going *= ACROSS_Z
     own, axes = np.linalg.eigh(left)
     theta = np.empty((z.size + 2 * ACROSS, PARAMETERS + FEATURES))
     theta[:] = posterior.mean
@@ -149,7 +156,7 @@ def displacement_quantiles(
         for j in range(count):
             above = displaced(course[j], features[j], further[j], weights[p])
             below = displaced(other[j], features[j], further[j], weights[n])
-            step = max(abs(above - out[j, middle]), abs(below - out[j, middle]))
+            step = max(abs(above - out[j, middle]), abs(below - out[j, middle])) / ACROSS_Z
             square[j] += step * step
     line = np.empty(nodes)
     root = scenarios.root
@@ -159,6 +166,7 @@ def displacement_quantiles(
             step = line[middle] * product(features[j], root[:, a]) + product(further[j], root[:, a])
             square[j] += (step + slope[j] * own[a]) ** 2
         indented = max(abs(slope[j]), (1.0 - features[j, 0]) * min(depth, line[middle]))
+        indented = max(indented, BREAKAWAY_SHARE * further[j, BREAKAWAY])
         for q in range(nodes):
             if q != middle:
                 by_itself = scenarios.scatter[q, 0] * line[middle]

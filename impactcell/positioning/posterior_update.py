@@ -14,7 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from impactcell.positioning.displacement_discrepancy import FEATURES, INDENTATION
+from impactcell.positioning.displacement_discrepancy import (
+    BREAKAWAY,
+    BREAKAWAY_SHARE,
+    FEATURES,
+    INDENTATION,
+)
 from impactcell.positioning.model_hypotheses import join, parts_of, reweighted
 from impactcell.positioning.planner_posterior import (
     BATCH_STD,
@@ -30,8 +35,9 @@ from impactcell.records import Samples
 
 DEGREES = 8.0  # of freedom of the likelihood
 POSITION_NOISE_M = 0.5e-6  # standard deviation of a displacement by an encoder of 1 um: 1 um / sqrt 12, twice
-# Random walk a tap, in units of the parameters: wear of friction, a slow change of the contact.
-WALK = np.concatenate([[1.5e-3, 3e-4, 6e-4, 3e-4, 0.02], np.zeros(FEATURES)])
+# Random walk a tap, in units of the parameters: wear of friction, a slow change of the contact, and static
+# friction that ages with the time at rest, by some per cent a decade: what is learned of it does not last.
+WALK = np.concatenate([[1.5e-3, 3e-4, 6e-4, 4e-3, 0.02], np.zeros(FEATURES)])
 NARROW = {FRICTION: 0.05, STIFFNESS: 0.04}  # standard deviations that one Gaussian is trusted with
 NEGLIGIBLE = 1e-4  # weight of a component that is dropped
 ITERATIONS = 4  # of the linearisation; the last change is below a twentieth of a standard deviation
@@ -204,7 +210,8 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
         slope[PARAMETERS:size] += centre * model.features + model.indentation_m * model.breakaway
         by_itself, by_contact = abs(centre), abs(along[PARAMETERS + 1])
         pushed = (1.0 - model.features[0]) * min(model.indentation_m, by_itself)
-        by_contact = max(by_contact, pushed)
+        breaking = BREAKAWAY_SHARE * model.indentation_m * float(model.breakaway[BREAKAWAY])
+        by_contact = max(by_contact, pushed, breaking)
         noise = POSITION_NOISE_M**2 + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
         bent = float(((values - centre - POINTS @ white) ** 2).sum()) / (len(POINTS) - PARAMETERS - 3)
         crooked = max(bent, CROOKED * crooked)
