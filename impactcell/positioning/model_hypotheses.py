@@ -167,7 +167,8 @@ def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
     """Posterior after one more score of its predictions; where they turn out to be off, taps become cautious.
 
     A planner in doubt knows less of discrepancy and scatter than it thought: the probabilities of both move
-    halfway back to where they began.
+    halfway back to where they began. Predictions that are off are no evidence that the model is right: what
+    taps have said against the first hypothesis stays said.
     """
     watched = place_bets(posterior.watch, score)
     probabilities = posterior.probabilities
@@ -177,7 +178,10 @@ def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
     doubting = replace(posterior, scatter_weights=scatter / scatter.sum(axis=1, keepdims=True), watch=watched)
     if probabilities.size < WEIGHTS_STD.size:
         return doubting
-    return join(parts_of(doubting), np.sqrt(probabilities * PROBABILITIES), doubting)
+    halfway = np.sqrt(probabilities * PROBABILITIES)
+    right = min(float(halfway[0] / halfway.sum()), float(probabilities[0]))
+    lacking = (1.0 - right) * halfway[1:] / halfway[1:].sum()
+    return join(parts_of(doubting), np.append(right, lacking), doubting)
 
 
 def condition_on_friction(

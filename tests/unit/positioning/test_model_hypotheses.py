@@ -100,6 +100,18 @@ def test_doubt_brings_the_hypotheses_back_halfway() -> None:
     assert sure.probabilities[3] > 1e-4
 
 
+def test_doubt_takes_back_nothing_of_what_taps_have_said_against_the_model() -> None:
+    lacking = join(parts_of(START), np.array([1e-6, 1e-6, 1.0, 1e-6]), START)
+    assert tap_predictions(lacking).lacking
+    doubting = lacking
+    for _ in range(6):
+        doubting = with_score(doubting, 4.0)
+    assert doubting.watch.doubted
+    assert doubting.probabilities[3] > 1e-4
+    assert log_bayes_factor(doubting) == pytest.approx(log_bayes_factor(lacking), abs=0.1)
+    assert tap_predictions(doubting).lacking
+
+
 def test_an_accepted_model_lacks_nothing_until_taps_show_it_and_plans_as_before() -> None:
     weights = np.zeros(FEATURES)
     weights[1] = 0.12
