@@ -46,6 +46,19 @@ POLICIES = {
 START_NS = 1_780_000_000_000_000_000
 
 
+PATIENT_S = 300.0
+"""Nothing is judged by it: whoever is waited for works on a machine that may be busy."""
+PATIENT = {"hello_s": PATIENT_S, "activation_s": PATIENT_S}
+"""Limits of a server that does not close who is slow."""
+
+
+class PatientClient(Client):
+    """A client that gives up nobody who is slow; another asks each second whether it is answered in one."""
+
+    def __init__(self, endpoint: str) -> None:
+        super().__init__(endpoint, timeout=PATIENT_S, watchdog_intervall=PATIENT_S)
+
+
 class MemoryHistory:
     """A `HistorySource` that keeps what it is given; `resume` is the place to read on from."""
 
@@ -190,7 +203,7 @@ class Site:
         endpoint: str | None = None,
     ) -> Client:
         """Client of asyncua, not connected yet."""
-        client = Client(endpoint or self.server.endpoint, timeout=30)
+        client = PatientClient(endpoint or self.server.endpoint)
         client.application_uri = CLIENT_URI
         if user is not None:
             client.set_user(user)
@@ -253,7 +266,7 @@ async def site(
                 endpoint="opc.tcp://127.0.0.1:0/impactcell",
                 pki=place / "pki",
                 application_uri=SERVER_URI,
-                limits=limits or ServerLimits(),
+                limits=limits or ServerLimits(**PATIENT),
                 **settings,  # type: ignore[arg-type]
             ),
             place / "users.yaml",

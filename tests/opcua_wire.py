@@ -5,10 +5,10 @@ import contextlib
 import struct
 from collections.abc import AsyncIterator
 
-from asyncua import Client, ua
+from asyncua import ua
 from asyncua.ua.ua_binary import struct_to_binary
 
-from tests.opcua_server import Site
+from tests.opcua_server import PatientClient, Site
 
 NONE_URI = b"http://opcfoundation.org/UA/SecurityPolicy#None"
 
@@ -83,6 +83,6 @@ async def raw(here: Site) -> AsyncIterator[Raw]:
 
 
 async def alive(here: Site) -> None:
-    client = Client(here.server.endpoint, timeout=30)
+    client = PatientClient(here.server.endpoint)
     endpoints = await client.connect_and_get_server_endpoints()
     assert len(endpoints) == 3

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from asyncua import Client, ua
+from asyncua import ua
 
 from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, with_password, write_users
 from tests.browser.chromium import DESK, PHONE, Browser, need_chromium
 from tests.browser.shop import CELL, PASSWORDS, Shop, at_work, enter, judge
+from tests.opcua_server import PatientClient
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300), pytest.mark.asyncio(loop_scope="module")]
 
@@ -77,7 +78,7 @@ async def test_an_alarm_that_is_acknowledged_here_is_acknowledged_over_opc_ua(
         browser.find(f"{form} button[value=acknowledge]").click()
         browser.find(f'[data-alarm="{CELL}-WearLimit"] .said')
 
-    client = Client(shop.endpoint)
+    client = PatientClient(shop.endpoint)
     client.set_user("olga")
     client.set_password(PASSWORDS["olga"])
     async with client:

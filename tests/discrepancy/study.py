@@ -145,6 +145,13 @@ def campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:
     return recorded(plan, make(plan)[1])
 
 
+def quick_campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:
+    """Make the campaign of a job with samples at 2 kHz, which is enough to tell effects apart."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tests.discrepancy.study.RATE_HZ", 2000.0)
+        return campaign(job, multiples)
+
+
 def name_effects(campaign: Campaign, **options: Any) -> DiscrepancyResult:
     """Investigate without looking for laws that nobody has listed: they have tests of their own.
 

@@ -10,7 +10,7 @@ from asyncua import ua
 from asyncua.ua.ua_binary import struct_to_binary
 
 from impactcell.scada import ServerLimits
-from tests.opcua_server import site
+from tests.opcua_server import PATIENT, site
 from tests.opcua_wire import alive, frame, hello, message, open_channel, raw
 
 codes = ua.StatusCodes
@@ -124,21 +124,19 @@ async def test_noise(seed: int) -> None:
 
 
 async def test_half_open_connections_are_closed_in_time() -> None:
-    async with site(limits=ServerLimits(hello_s=0.2, activation_s=0.3)) as here:
-        async with raw(here) as wire:
-            assert await wire.error() == codes.BadTimeout, "says nothing"
-        async with raw(here) as wire:
-            await wire.send(hello()[:20])
-            assert await wire.error() == codes.BadTimeout, "stops in the middle of Hello"
-        async with raw(here) as wire:
-            await wire.channel()
-            assert await wire.error() == codes.BadTimeout, "opens a channel and no session"
+    async with site(limits=ServerLimits(hello_s=0.5, activation_s=2.5)) as here:
+        async with raw(here) as silent, raw(here) as stopped, raw(here) as idle:
+            await idle.channel()
+            await stopped.send(hello()[:20])
+            assert await silent.error() == codes.BadTimeout, "says nothing"
+            assert await stopped.error() == codes.BadTimeout, "stops in the middle of Hello"
+            assert await idle.error() == codes.BadTimeout, "opens a channel and no session"
         await alive(here)
 
 
 async def test_too_many_connections() -> None:
     async with (
-        site(limits=ServerLimits(connections=5, undisturbed_s=3600.0)) as here,
+        site(limits=ServerLimits(connections=5, undisturbed_s=3600.0, **PATIENT)) as here,
         contextlib.AsyncExitStack() as stack,
     ):
         held = [await stack.enter_async_context(raw(here)) for _ in range(5)]
@@ -157,7 +155,7 @@ async def test_too_many_connections() -> None:
 
 async def test_a_thousand_connections_at_once() -> None:
     """Those beyond the limit are told so before any cryptography; a client that is in goes on."""
-    async with site(limits=ServerLimits(connections=50, undisturbed_s=3600.0)) as here:
+    async with site(limits=ServerLimits(connections=50, undisturbed_s=3600.0, **PATIENT)) as here:
         here.publish()
         async with await here.client("observer") as inside:
 

@@ -16,7 +16,7 @@ from impactcell.opcua.certificates import make_certificate
 from impactcell.opcua.trust_list import der, fingerprint
 from impactcell.scada import Role, SecurityPolicy
 from impactcell.scada.users import User, read_users, write_users
-from tests.opcua_server import CLIENT_URI, PASSWORDS, Site, site
+from tests.opcua_server import CLIENT_URI, PASSWORDS, PatientClient, Site, site
 
 codes = ua.StatusCodes
 
@@ -223,7 +223,7 @@ def in_the_clear(parameters: ua.ActivateSessionParameters) -> None:
 async def test_a_password_in_the_clear_on_an_open_channel() -> None:
     """Even where sessions without encryption are allowed, a password is not sent for all to read."""
     async with site(allow_none=True) as here:
-        client = await with_session(Client(here.server.endpoint))
+        client = await with_session(PatientClient(here.server.endpoint))
         assert await activation(client, change=in_the_clear) == codes.BadIdentityTokenRejected
         assert await activation(client) == 0
         await client.disconnect()

@@ -14,7 +14,7 @@ from impactcell.errors import AccessError
 from impactcell.opcua import login_throttle
 from impactcell.scada import Role, SecurityPolicy, ServerLimits
 from impactcell.scada.users import User, read_users, verify, with_password, write_users
-from tests.opcua_server import CLIENT_URI, PASSWORDS, Site, site
+from tests.opcua_server import CLIENT_URI, PASSWORDS, PATIENT, PATIENT_S, PatientClient, Site, site
 
 codes = ua.StatusCodes
 
@@ -43,24 +43,24 @@ async def test_every_policy_with_password() -> None:
 
 async def test_no_session_without_encryption_unless_allowed() -> None:
     async with site() as here:
-        client = Client(here.server.endpoint)
+        client = PatientClient(here.server.endpoint)
         client.set_user("observer")
         client.set_password(PASSWORDS["observer"])
         assert await refusal(client) == codes.BadSecurityModeInsufficient
-        assert len(await Client(here.server.endpoint).connect_and_get_server_endpoints()) == 3
-        servers = await Client(here.server.endpoint).connect_and_find_servers()
+        assert len(await PatientClient(here.server.endpoint).connect_and_get_server_endpoints()) == 3
+        servers = await PatientClient(here.server.endpoint).connect_and_find_servers()
         assert [server.ApplicationUri for server in servers] == ["urn:test:impactcell"]
 
 
 async def test_allowed_without_encryption_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     async with site(allow_none=True) as here:
         assert any("without encryption" in record.message for record in caplog.records)
-        client = Client(here.server.endpoint)
+        client = PatientClient(here.server.endpoint)
         client.set_user("observer")
         client.set_password(PASSWORDS["observer"])
         async with client:
             await (await here.node(client, "Model/Name")).read_data_value(raise_on_bad_status=False)
-        nobody = Client(here.server.endpoint)
+        nobody = PatientClient(here.server.endpoint)
         assert await refusal(nobody) == codes.BadIdentityTokenRejected, "anonymous"
 
 
@@ -204,7 +204,9 @@ async def test_certificate_must_be_made_for_the_application() -> None:
 
 async def test_more_sessions_at_once_than_allowed() -> None:
     """A thousand scaled to forty: ten are let in, the rest is refused with the standard's code."""
-    async with site(limits=ServerLimits(sessions=10, connections=60, activation_s=3600.0)) as here:
+    async with site(
+        limits=ServerLimits(sessions=10, connections=60, undisturbed_s=PATIENT_S, **PATIENT)
+    ) as here:
         here.publish()
         async with await here.client("observer") as inside:
             held: list[Client] = []

@@ -10,6 +10,7 @@ from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
 from tests.integration.forked import forked
 from tests.integration.processes import simulator, started, truths, write_cell
+from tests.opcua_server import PatientClient
 
 CYCLES = 12
 
@@ -35,7 +36,7 @@ def users(tmp_path: Path) -> str:
 
 def engineer(endpoint: str, password: str) -> Client:
     """Client of an engineer, not connected yet."""
-    client = Client(endpoint)
+    client = PatientClient(endpoint)
     client.set_user("eve")
     client.set_password(password)
     return client

@@ -44,7 +44,7 @@ def test_cells_off_by_a_tenth_end_inside_and_never_beyond(tolerance_m: float) ->
     for stiffness, damping, mu_s in ((0.9, 1.1, 0.13), (1.1, 0.9, 0.29)):
         plant = Plant(6.5e5 * stiffness, 465.0 * damping, mu_s, 0.76 * mu_s)
         planner, drawn = TapPlanner(tolerance_m=tolerance_m, plant=NOMINAL), []
-        for _ in range(20):
+        for _ in range(12):
             mass, distance = math.exp(rng.uniform(math.log(5.0), math.log(40.0))), rng.uniform(2e-3, 40e-3)
             taps, remaining, last = deliver(planner, plant, mass, distance, rng, drawn=drawn)
             assert last is None

@@ -70,7 +70,7 @@ def taught(noise: float, taps: int, seed: int, sigma: float = 0.03) -> tuple[Pla
 
 def test_learns_the_cell_and_knows_how_well() -> None:
     errors = []
-    for seed in range(6):
+    for seed in range(4):
         belief, truth = taught(0.0, 25, seed)
         errors.append((belief.mean[:3] - truth) / std(belief)[:3])
         assert abs(belief.mean[0] - truth[0]) < 0.05
