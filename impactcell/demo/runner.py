@@ -8,6 +8,7 @@ import math
 import shutil
 import signal
 import sys
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -30,7 +31,11 @@ from impactcell.service import Service
 SHOWN_CYCLES = 400
 """Cycles that the view remembers: more than a wide terminal has columns."""
 PATIENCE_S = 60.0
-"""Without a cycle for so long, the demo has failed."""
+"""Without a cycle for so long, the demo has failed ..."""
+FIRST_PATIENCE_S = 300.0
+"""... and without the first one, before which a new machine compiles, s."""
+REDRAWN_S = 1.0
+"""Between two looks at a view that waits for the first cycle, s."""
 QUIET_S = 4.0
 """Without a cycle for so long, the last part lies where it stays: taps follow each other faster."""
 
@@ -73,6 +78,7 @@ class _DemoRun:
     seen: int = 0
     outcomes: tuple[TaskOutcome, ...] = ()
     raised: list[dict[str, Any]] = field(default_factory=list)
+    began_s: float = field(default_factory=time.monotonic)
     service: Service | None = None
     endpoint: str = ""
     page: str = ""
@@ -135,9 +141,10 @@ class _DemoRun:
             last = bool(self.snapshots) and math.isclose(
                 self.snapshots[-1].positioning.target_m, self.setup.last_target_m, rel_tol=1e-6
             )
+            patience_s = PATIENCE_S if self.snapshots else FIRST_PATIENCE_S
             try:
                 # Without an end, silence is part of the show.
-                async with asyncio.timeout(QUIET_S if last else None if self.cycles is None else PATIENCE_S):
+                async with asyncio.timeout(QUIET_S if last else None if self.cycles is None else patience_s):
                     await news.wait()
             except TimeoutError:
                 stop.set()
@@ -146,7 +153,7 @@ class _DemoRun:
                     return
                 reason = "" if self._status is None else self._status.reason
                 raise ImpactCellError(
-                    f"no cycle for {PATIENCE_S:g} s: {reason or 'the module is silent'}"
+                    f"no cycle for {patience_s:g} s: {reason or 'the module is silent'}"
                 ) from None
 
     @property
@@ -168,6 +175,7 @@ class _DemoRun:
             messages[-1] if messages else "",
             list(self.snapshots),
             link,
+            time.monotonic() - self.began_s,
         )
 
     def table(self) -> RenderableType | None:
@@ -237,8 +245,16 @@ async def _live(show: _DemoRun) -> bool:
             def draw(now: _DemoRun, _: Snapshot | None = None) -> None:
                 live.update(_rendered(now.scene()), refresh=True)
 
-            draw(show)
-            interrupted = await show.run(draw)
+            async def draw_waiting() -> None:
+                while not show.snapshots:
+                    draw(show)
+                    await asyncio.sleep(REDRAWN_S)
+
+            waiting = asyncio.create_task(draw_waiting())
+            try:
+                interrupted = await show.run(draw)
+            finally:
+                waiting.cancel()
     finally:
         logging.disable(logging.NOTSET)
     if show.snapshots:

@@ -34,6 +34,8 @@ class Scene:
         The last cycles, oldest first.
     link : str
         State of the link to the module; empty once the cell has ended, so that nobody tries to connect.
+    waited_s : float
+        Since the beginning.
     """
 
     cell: str
@@ -41,12 +43,16 @@ class Scene:
     story: str
     snapshots: Sequence[Snapshot]
     link: str = "connected"
+    waited_s: float = 0.0
 
 
 def render(scene: Scene, width: int = 100, height: int = 40) -> RenderableType:
     """Draw the scene for a terminal of `width` columns and `height` lines; the chart gets what is left."""
     if not scene.snapshots:
-        waiting = f"waiting for the first cycle ({scene.link})"
+        waiting = (
+            f"waiting for the first cycle for {scene.waited_s:.0f} s ({scene.link}); "
+            "on a new machine much is compiled before, which takes a minute or two"
+        )
         return Panel(waiting, title=f"impactcell · {scene.cell}", width=width)
     last = scene.snapshots[-1]
     parts: list[RenderableType] = [Text(scene.story, style="italic"), _facts(last, wide=width >= WIDE)]

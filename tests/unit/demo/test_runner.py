@@ -10,6 +10,7 @@ import pytest
 
 from impactcell.demo import runner
 from impactcell.demo.scenario_setup import DemoSetup, last_target_m
+from impactcell.errors import ImpactCellError
 from impactcell.records import PositioningState
 from tests.snapshots import make_capture, make_snapshot
 
@@ -33,3 +34,18 @@ async def test_a_demo_with_a_last_part_ends_with_it(
     assert (watch.done(), stop.is_set()) == (over, over)
     assert playing.messages == ([(7, "that was the last part")] if over else [])
     watch.cancel()
+
+
+@pytest.mark.parametrize("seen", [0, 1])
+async def test_the_first_cycle_is_waited_for_longer_than_the_next(
+    monkeypatch: pytest.MonkeyPatch, seen: int
+) -> None:
+    monkeypatch.setattr(runner, "PATIENCE_S", 0.02)
+    monkeypatch.setattr(runner, "FIRST_PATIENCE_S", 0.03)
+    stage = cast("DemoSetup", SimpleNamespace(last_target_m=math.nan))
+    playing = runner._DemoRun(stage, cycles=5)
+    playing.snapshots.extend(make_snapshot(make_capture(cycle)) for cycle in range(1, 1 + seen))
+    with pytest.raises(
+        ImpactCellError, match=f"no cycle for {0.02 if seen else 0.03} s: the module is silent"
+    ):
+        await playing._watch(asyncio.Event(), asyncio.Event())

@@ -136,3 +136,11 @@ def test_nothing_known_is_drawn_as_such() -> None:
     assert "none" in text
     assert "nan" not in text
     assert "by none" not in text
+
+
+def test_before_the_first_cycle_it_says_how_long_and_what_is_waited_for() -> None:
+    console = Console(width=100, file=io.StringIO(), record=True)
+    console.print(render(Scene("press-1", "", "", [], "not connected", waited_s=34.2)))
+    text = " ".join(console.export_text().split())
+    assert "waiting for the first cycle for 34 s (not connected)" in text
+    assert "compiled" in text
