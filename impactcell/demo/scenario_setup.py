@@ -102,11 +102,18 @@ def fit_events(content: dict, cycles: int | None) -> dict:  # type: ignore[type-
     last = max([1, *(entry[key] for section, key in EVENT_SECTIONS for entry in content.get(section, []))])
     scale = min(1.0, 0.9 * cycles / last)
     moved = {
-        section: [{**entry, key: max(1, round(entry[key] * scale))} for entry in content[section]]
-        for section, key in EVENT_SECTIONS
-        if section in content
+        section: _moved(content[section], key, scale) for section, key in EVENT_SECTIONS if section in content
     }
     return {**content, **moved}
+
+
+def _moved(entries: list, key: str, scale: float) -> list:  # type: ignore[type-arg]
+    """Move entries by a factor, each behind the one before, as a scenario wants its batches."""
+    moved, cycle = [], 0
+    for entry in entries:
+        cycle = max(cycle + 1, round(entry[key] * scale))
+        moved.append({**entry, key: cycle})
+    return moved
 
 
 def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-arg]

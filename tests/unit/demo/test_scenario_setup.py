@@ -1,6 +1,8 @@
 """The demo tells what its scenario does, and what the cell has to find out by itself."""
 
-from impactcell.demo.scenario_setup import story
+import pytest
+
+from impactcell.demo.scenario_setup import fit_events, story
 
 
 def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
@@ -14,3 +16,9 @@ def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
         (40, "batch B is on the table"),
         (90, "batch C is on the table, and the PLC says nothing of it"),
     )
+
+
+@pytest.mark.parametrize(("cycles", "begins"), [(None, [1, 40, 90]), (50, [1, 20, 45]), (1, [1, 2, 3])])
+def test_batches_stay_in_their_order_however_short_the_demo_is(cycles: int | None, begins: list[int]) -> None:
+    content = {"batches": [{"from_cycle": cycle, "id": str(cycle)} for cycle in (1, 40, 90)]}
+    assert [batch["from_cycle"] for batch in fit_events(content, cycles)["batches"]] == begins
