@@ -65,10 +65,13 @@ def demo(
 def run(cells: Cells) -> None:
     """Run the service; SIGTERM ends it cleanly, SIGHUP reloads what can be reloaded."""
     gc.disable()  # until it has started: what is loaded and built by then stays, and is much to look through
-    from impactcell.service import run as run_service
-    from impactcell.settings import read_cells
+    try:
+        from impactcell.service import run as run_service
+        from impactcell.settings import read_cells
 
-    run_service(read_cells(cells))
+        run_service(read_cells(cells))
+    finally:
+        gc.enable()
 
 
 @verb(app)
