@@ -6,7 +6,6 @@ from typing import Final
 from urllib.parse import quote
 
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route
@@ -110,15 +109,16 @@ def page_app(
         *(Route(upload.path, _received(context, upload), methods=["PUT"]) for upload in UPLOADS),
         Mount(f"/static/{STATIC_VERSION}", StaticFiles(directory=STATIC)),
     ]
-    return Starlette(
+    app = Starlette(
         routes=routes,
-        middleware=[Middleware(SecurityHeaders)],
         exception_handlers={
             RequestRefusedError: _refused(context),
             404: _not_found(context),
             405: _not_found(context),
+            Exception: _failed(context),
         },
     )
+    return SecurityHeaders(app)  # around all of it: what says that something failed has them too
 
 
 def _logged_out(context: PageContext) -> Callable[[Request], Awaitable[Response]]:
@@ -197,5 +197,14 @@ def _refused(context: PageContext) -> Callable[[Request, Exception], Awaitable[R
 def _not_found(context: PageContext) -> Callable[[Request, Exception], Awaitable[Response]]:
     async def handle(request: Request, error: Exception) -> Response:
         return context.error_page(request, getattr(error, "status_code", 404), "error_not_found")
+
+    return handle
+
+
+def _failed(context: PageContext) -> Callable[[Request, Exception], Awaitable[Response]]:
+    """Say that a fault of the page is none of who asked; the server logs it with its traceback."""
+
+    async def handle(request: Request, error: Exception) -> Response:  # noqa: ARG001 - as Starlette calls it
+        return context.error_page(request, 500, "error_internal")
 
     return handle

@@ -5,6 +5,7 @@ import os
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 import pytest_asyncio
@@ -12,7 +13,8 @@ from asyncua import ua
 
 from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, with_password, write_users
-from tests.browser.chromium import DESK, PHONE, Browser, need_chromium
+from impactcell.web import system_page
+from tests.browser.chromium import DESK, PHONE, WALL, Browser, need_chromium
 from tests.browser.shop import CELL, PASSWORDS, Shop, at_work, enter, judge
 from tests.opcua_server import PatientClient
 
@@ -194,6 +196,82 @@ async def test_every_page(
             assert hosts == {shop.page.removeprefix("http://")}
             assert 1_000 < length < MOST_BYTES
             faults += judge(browser, name, pictures / f"page-{name}-{suffix}.png", size[0])
+        assert not faults, json.dumps(faults, indent=1)
+
+    await shop.beside(look)
+
+
+SUBMIT = """
+    const [path, fields] = arguments;
+    const form = Object.assign(document.createElement("form"), {method: "post", action: path});
+    for (const [name, value] of Object.entries(fields))
+        form.append(Object.assign(document.createElement("input"), {name, value}));
+    document.body.append(form);
+    form.submit();
+"""
+"""Sends a form that no page of ours offers."""
+
+
+@pytest.mark.parametrize(
+    ("theme", "size", "language"), [("dark", DESK, "en"), ("light", PHONE, "de")], ids=str
+)
+async def test_every_page_of_a_refusal(
+    shop: Shop,
+    browser: Browser,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    theme: str,
+    size: tuple[int, int],
+    language: str,
+) -> None:
+    """Not found, not allowed, too long, a fault of the page, a session that is over: each can be read."""
+    pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
+    suffix = f"{'phone' if size == PHONE else theme}{'' if language == 'en' else f'-{language}'}"
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("a disk that is gone")
+
+    def look() -> None:
+        browser.show_as(theme, size)
+        browser.open(f"{shop.page}/login?lang={language}")
+        browser.log_in("olga", PASSWORDS["olga"])
+        browser.until(lambda: browser.path == "/", "the cells")
+        token = browser.all("input[name=csrf]")[0].get_attribute("value")
+        ways = {
+            "404": lambda: browser.open(f"{shop.page}/nothing"),
+            "403": lambda: browser.run(SUBMIT, "/alarms/act", {"csrf": token, "cell": CELL}),
+            "413": lambda: browser.run(SUBMIT, "/alarms/act", {"csrf": token, "comment": "long " * 5000}),
+            "500": lambda: browser.open(f"{shop.page}/system"),
+        }
+        faults = []
+        for code, go in ways.items():
+            go()
+            browser.until(lambda code=code: f"({code})" in browser.text, f"the page of {code}")
+            seen = judge(browser, code, pictures / f"page-{code}-{suffix}.png", size[0])
+            faults += [fault for fault in seen if f"status of {code}" not in fault]
+        browser.driver.add_cookie({"name": f"impactcell_{urlsplit(shop.page).port}", "value": "over"})
+        browser.open(f"{shop.page}/alarms")
+        over = {"en": "The session is over", "de": "Die Sitzung ist zu Ende"}[language]
+        browser.until(lambda: over in browser.text, "that the session is over")
+        faults += judge(browser, "over", pictures / f"page-over-{suffix}.png", size[0])
+        assert not faults, json.dumps(faults, indent=1)
+
+    monkeypatch.setattr(system_page, "_cell_system", fail)
+    await shop.beside(look)
+
+
+async def test_a_screen_on_the_wall(shop: Shop, browser: Browser, tmp_path: Path) -> None:
+    """Has larger letters, and nothing that keeps people from reading it."""
+    pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
+
+    def look() -> None:
+        browser.show_as("dark", WALL)
+        enter(browser, shop, "olga")
+        browser.find(f'[data-cell="{CELL}"][data-cycle]')
+        faults = judge(browser, "wall", pictures / "page-wall-dark.png", WALL[0])
+        letters = browser.run("return parseFloat(getComputedStyle(document.documentElement).fontSize)")
+        assert letters >= 24
+        assert browser.run("return document.querySelector('main').clientWidth") == WALL[0]
         assert not faults, json.dumps(faults, indent=1)
 
     await shop.beside(look)

@@ -123,7 +123,13 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
 
         def look(theme: str = theme, size: tuple[int, int] = size, suffix: str = suffix) -> list[str]:
             browser.show_as(theme, size)
-            return judge(browser, "study", pictures / f"page-study-{suffix}.png", size[0])
+            found = judge(browser, "study", pictures / f"page-study-{suffix}.png", size[0])
+            # As a file: the page shows it in a sandbox in which nothing runs, not even what judges it.
+            browser.open(next(shop.directory.rglob("report.html")).as_uri())
+            found += judge(browser, "report", pictures / f"report-{suffix}.png", size[0])
+            browser.driver.back()
+            browser.find("iframe.report")
+            return found
 
         faults += await shop.beside(look)
     assert not faults

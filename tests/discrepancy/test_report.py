@@ -14,6 +14,7 @@ from impactcell.discrepancy.report.page import (
     page_context,
     write_report,
 )
+from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import headline, phrase
 from impactcell.discrepancy.search.conclusion import Place, Remaining
 from impactcell.discrepancy.workflow import DiscrepancyResult
@@ -95,6 +96,9 @@ def test_the_first_screen_says_what_it_means_and_what_to_do(tied: DiscrepancyRes
     for effect in ("mass_error", "force_sensor_gain"):
         assert LIBRARY[effect].meaning in first_screen
         assert f"Look at {LIBRARY[effect].look_at}." in first_screen
+    for effect in result_document(tied)["effects"]:
+        assert effect["meaning"] == LIBRARY[effect["effect"]].meaning
+        assert effect["look_at"] in first_screen
     assert "impactcell model accept CELL.yaml model.extended.yaml" in first_screen
     assert "weigh the part" in first_screen
 

@@ -157,6 +157,8 @@ def _effect(result: DiscrepancyResult, effect: str) -> dict[str, Any]:
     change = result.validation.of_effects[effect]
     return {
         "effect": effect,
+        "meaning": LIBRARY[effect].meaning,
+        "look_at": LIBRARY[effect].look_at,
         "tied_with": list(result.selection.ties.get(effect, ())),
         "p_value": round_digits(change.p_value),
         "p_search": round_digits(result.selection.p_values.get(effect, 1.0)),

@@ -33,6 +33,10 @@ PAGE_TEXTS: Texts = {
     "error": ("That did not work", "Das ging nicht"),
     "error_not_found": ("There is nothing here.", "Hier ist nichts."),
     "error_role": ("Your role does not allow this.", "Ihre Rolle erlaubt das nicht."),
+    "error_internal": (
+        "Something failed in this page, and it is in the service's log. Cells and OPC UA go on.",
+        "Ein Fehler dieser Seite; er steht im Log des Dienstes. Zellen und OPC UA laufen weiter.",
+    ),
     "error_foreign": ("This request came from another page.", "Diese Anfrage kam von einer anderen Seite."),
     "error_form": ("This form cannot be read.", "Dieses Formular ist nicht lesbar."),
     "error_too_long": ("This form is too long.", "Dieses Formular ist zu lang."),

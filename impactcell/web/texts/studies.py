@@ -69,6 +69,8 @@ STUDY_TEXTS: Texts = {
     "accept_engineers": ("Engineers can put it into service.", "Ingenieure können es in Betrieb nehmen."),
     "did_accept": ("Put into service", "In Betrieb genommen"),
     "did_restore": ("Put back", "Zurückgenommen"),
+    "look_at": ("Look at:", "Nachsehen:"),
+    "tied_with": ("These shots cannot tell it from", "Diese Stöße unterscheiden es nicht von"),
     "report": ("Report", "Bericht"),
     "report_alone": ("Report alone", "Bericht allein"),
     "remove": ("Remove this measurement", "Diese Messung entfernen"),

@@ -11,6 +11,7 @@ import pytest
 from impactcell.alarms import EventKind
 from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, write_users
+from impactcell.web import system_page
 from impactcell.web.app import ACTIONS, VIEWS, Action, View
 from impactcell.web.interface import CellNews
 from impactcell.web.requests import MAX_FORM_BYTES
@@ -317,6 +318,21 @@ async def test_every_answer_has_the_headers(page: Page, path: str) -> None:
     assert {name: answer.headers.get(name) for name in HEADERS} == HEADERS
     assert answer.headers["cache-control"] == "no-store"
     assert "unsafe" not in HEADERS["content-security-policy"]
+
+
+async def test_a_fault_of_the_page_is_said_in_a_page(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("a secret of the program")
+
+    async with page.logged_in(Role.OBSERVER) as client:
+        monkeypatch.setattr(system_page, "_cell_system", fail)
+        monkeypatch.setattr(client._transport, "raise_app_exceptions", False)
+        answer = await client.get("/system?lang=de")
+    assert answer.status_code == 500
+    assert "Zellen und OPC UA laufen weiter." in answer.text
+    assert "secret" not in answer.text
+    assert {name: answer.headers.get(name) for name in HEADERS} == HEADERS
+    assert answer.headers["cache-control"] == "no-store"
 
 
 async def test_other_methods_are_refused(page: Page) -> None:

@@ -27,7 +27,15 @@ from tests.unit.web.page import CELL, Page, Verbs, csrf_of, make_page
 RESULT = {
     "verdict": "named",
     "headline": "Missing: viscous friction.",
-    "effects": [{"effect": "viscous_friction", "parameters": {"c": {"value": 60.1, "ci95": [57.0, 63.0]}}}],
+    "effects": [
+        {
+            "effect": "viscous_friction",
+            "meaning": "Friction grows with speed.",
+            "look_at": "the <oil>",
+            "tied_with": ["quadratic_drag"],
+            "parameters": {"c": {"value": 60.1, "ci95": [57.0, 63.0]}},
+        }
+    ],
     "model": "model.extended.yaml",
 }
 CHANGES = {"before": "old", "after": "new", "changes": [{"parameter": "mu_s", "before": 0.2, "after": 0.21}]}
@@ -110,6 +118,9 @@ async def test_a_campaign_is_dropped_confirmed_and_studied(page: Page, verbs: Ve
     ]
     assert "Missing: viscous friction." in text
     assert 'data-effect="viscous_friction"' in text
+    assert "Friction grows with speed." in text
+    assert "the &lt;oil&gt;" in text
+    assert "These shots cannot tell it from quadratic drag" in text
     assert "<code>mu_s</code>" in text
     assert "/accept" not in text, "an operator accepts nothing"
 
