@@ -15,6 +15,7 @@ from impactcell.records.quantity import Quantity, S
 from impactcell.scada.alarm_events import event_id
 from impactcell.web.curves import Curve, decimate, envelope
 from impactcell.web.interface import CellNews, Freshness
+from impactcell.web.texts.reasons import german_reason
 
 RECENT_CYCLES = 120
 """Cycles of the small curve on a card."""
@@ -240,14 +241,15 @@ def _published(quantities: Iterable[Quantity[S]], source: S) -> tuple[dict[str, 
 
 def _beside_values(snapshot: Snapshot) -> dict[str, Any]:
     """Give what is said of a cycle beside its published values."""
+    reasons = {
+        "mu_s": snapshot.friction.mu_s.reason,
+        "wear": snapshot.wear.reason,
+        "signature": snapshot.signature.reason,
+        "positioning": snapshot.positioning.reason,
+    }
     return {
         "time_ms": snapshot.time_ns // 1_000_000,
         "mass": number(snapshot.mass_kg),
         "estimator": snapshot.friction.estimator.value,
-        "reasons": {
-            "mu_s": snapshot.friction.mu_s.reason,
-            "wear": snapshot.wear.reason,
-            "signature": snapshot.signature.reason,
-            "positioning": snapshot.positioning.reason,
-        },
+        "reasons": {"en": reasons, "de": {name: german_reason(text) for name, text in reasons.items()}},
     }

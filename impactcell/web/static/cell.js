@@ -47,9 +47,10 @@ function showDetail(detail) {
 }
 
 function showCard(card) {
-  const { values, reasons } = card;
+  const { values } = card;
   showState(root, card);
   if (!hasCycle(card)) return;
+  const reasons = card.reasons[document.documentElement.lang];
   limit = values["Wear/Limit"];
   showFriction(root, card);
   showValues(root, card);

@@ -64,7 +64,7 @@ export function showFriction(root, card) {
   const std = values["Friction/StaticFrictionStdDev"], kind = quality(card, "Friction/StaticFriction");
   set(root, "mu_s", coefficient(values["Friction/StaticFriction"]));
   set(root, "mu_s_band", std === null ? "" : `± ${number(2 * std, 2)}`);
-  set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons.mu_s}`);
+  set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons[language].mu_s}`);
   set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}`);
   for (const meter of root.querySelectorAll('[data-field="wear_meter"]')) {
     Object.assign(meter, { max: limit, value: level ?? 0, high: 0.9 * limit, optimum: 0 });
