@@ -18,6 +18,8 @@ BANDS = 6  # of velocity, in each of which the best taps for a displacement are 
 CRITERIA = 3  # least spread, least reach upwards, least reach downwards
 MULTIPLIERS = (25.0, 60.0, 120.0, 250.0, 500.0, 2000.0)
 Z = np.linspace(-4.2, 4.2, 21)
+VELOCITIES = np.geomspace(0.004, 0.1, 40)
+STROKES = np.concatenate([np.linspace(4e-6, 3e-4, 50, endpoint=False), np.linspace(3e-4, 1.5e-3, 50)])
 
 
 @compiled
@@ -114,13 +116,15 @@ def value_of(
 
 @compiled
 def solve(
-    grid: Samples, wanted: Samples, kept: Samples, z: Samples, tolerance: float, multiplier: float
-) -> tuple[Samples, Samples]:
+    grid: Samples, wanted: Samples, every: Samples, which: NDArray[np.int64], z: Samples, tolerance: float,
+    multiplier: float,
+) -> tuple[Samples, Samples]:  # fmt: skip
     cost, taps, over = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
     row = np.empty(z.size)
     aims = np.array([-0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.3, 1.8, 2.4])
     for n in range(grid.size):
         r = grid[n]
+        kept = every[which[n]]
         best, count, risk = np.inf, np.inf, 1.0
         last = np.searchsorted(wanted, r + tolerance)
         for back in range(last):
@@ -158,11 +162,19 @@ def fewest_taps(
     remaining_m: float, mass_kg: float, plant: Samples, scatter: float, tolerance_m: float, bound: float
 ) -> tuple[float, float]:
     """Expected taps of the best policy within `bound` on overshoot, and its overshoot probability."""
-    velocities = np.geomspace(0.004, 0.1, 40)
-    strokes = np.concatenate([np.linspace(4e-6, 3e-4, 50, endpoint=False), np.linspace(3e-4, 1.5e-3, 50)])
-    table = outcomes(velocities, strokes, 1.0 + scatter * Z, plant, mass_kg)
+    table = outcomes(VELOCITIES, STROKES, 1.0 + scatter * Z, plant, mass_kg)
+    return fewest_of(table[None], np.array([remaining_m]), remaining_m, tolerance_m, bound)
+
+
+def fewest_of(
+    tables: Samples, distances_m: Samples, remaining_m: float, tolerance_m: float, bound: float
+) -> tuple[float, float]:
+    """The same by the outcomes of taps, shape (p, velocities, strokes, nodes), at p remaining distances.
+
+    A part that lies elsewhere is struck with the outcomes of the nearest of these distances.
+    """
     half = Z.size // 2
-    furthest = float(np.nanmax(table[:, :, half]))
+    furthest = float(np.nanmax(tables[:, :, :, half]))
 
     def grown(first: float, last: float, step: float, ratio: float) -> Samples:
         points = [first]
@@ -172,11 +184,13 @@ def fewest_taps(
 
     grid = grown(1.05 * tolerance_m, remaining_m, 0.3 * tolerance_m, 0.012)
     grid[-1] = max(remaining_m, grid[-2] * 1.0001)
+    which = np.abs(np.log(grid[:, None] / distances_m)).argmin(axis=1)
     wanted = grown(min(3e-6, 0.3 * tolerance_m), furthest, 0.2 * tolerance_m, 0.02)
-    kept = best_taps(table, wanted[wanted <= furthest])
+    wanted = wanted[wanted <= furthest]
+    kept = np.array([best_taps(table, wanted) for table in tables])
     before = (math.nan, math.nan)
     for multiplier in MULTIPLIERS:
-        every, over = solve(grid, wanted[wanted <= furthest], kept, Z, tolerance_m, multiplier)
+        every, over = solve(grid, wanted, kept, which, Z, tolerance_m, multiplier)
         taps, risk = float(every[-1]), float(over[-1])
         if risk <= bound:
             if math.isfinite(before[0]) and before[0] < taps:
