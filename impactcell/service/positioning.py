@@ -203,7 +203,8 @@ class PositioningTask:
             await self.begin(status_block.target_m)
         except PositioningError as error:
             self._log.warning("the PLC's target is refused: %s", error)
-            self._set_sequence(TaskState(TaskPhase.FAULTED, reason=str(error), evidence=Evidence()))
+            if not self._sequence.running:  # somebody else may have set a target meanwhile
+                self._set_sequence(TaskState(TaskPhase.FAULTED, reason=str(error), evidence=Evidence()))
 
     async def _drive(self) -> None:
         """Command and observe, tap by tap, until the task no longer runs."""

@@ -1,5 +1,6 @@
 """A PLC that takes a part away before the outcome of its last tap has been read."""
 
+import asyncio
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -105,4 +106,19 @@ async def test_a_target_that_came_while_the_link_was_down_is_begun_once_it_is_up
     module.connected = True
     await task._read_plc_target()
     assert task.state.running
+    await worker.close()
+
+
+async def test_a_refused_target_of_the_plc_ends_no_task_that_a_person_has_started_meanwhile(
+    tmp_path: Path, cell: CellConfig
+) -> None:
+    design = cell_design(cell)
+    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    module = Module(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
+    task = PositioningTask(cell, design, module, worker, lambda: None)
+    await module.read_status()
+    await asyncio.gather(task.begin(0.005), task._read_plc_target())
+    assert task.state.running
+    assert task.state.target_m == 0.005
+    assert task.fault is None
     await worker.close()
