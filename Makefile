@@ -22,7 +22,7 @@ demo: install
 	$(BIN)/impactcell demo $(ARGS)
 
 test: install
-	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal $(ARGS)
 
 lint: install
 	$(BIN)/ruff format --check .

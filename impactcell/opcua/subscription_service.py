@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from asyncua import ua
 
-from impactcell.opcua import notification_encoding
-from impactcell.opcua.binary_codec import StatusCodeError, service_fault
+from impactcell.opcua import notification_encoding, publish_queue
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.fan_out import FanOut
 from impactcell.opcua.host_interface import ServerLimits
@@ -25,9 +25,6 @@ from impactcell.opcua.ready_items import MonitoredItem
 from impactcell.opcua.request_dispatch import RequestContext, Service, apply_to_each, check_operations
 from impactcell.opcua.session_table import PublishRequest, Session
 from impactcell.opcua.subscription import Subscription
-
-MAX_PUBLISH_REQUESTS: Final = 100
-"""Publish requests of one session that wait; beyond, the oldest is answered with a fault."""
 
 MAX_ACKNOWLEDGEMENTS: Final = 1_000
 """Acknowledgements in one Publish request."""
@@ -211,15 +208,8 @@ class SubscriptionService:
             lambda number: self._remove(self.find(number, context.session)),
         )
         if not self.subscriptions_of(context.session):
-            self._return_requests(context.session)
+            publish_queue.return_all(context.session)
         return response
-
-    @staticmethod
-    def _return_requests(session: Session) -> None:
-        while session.publish_requests and session.connection is not None:
-            request = session.publish_requests.popleft()
-            fault = service_fault(request.handle, ua.StatusCodes.BadNoSubscription)
-            session.connection.respond(request.request_id, request.handle, fault)
 
     async def transfer_subscriptions(
         self, context: RequestContext, parameters: ua.TransferSubscriptionsParameters
@@ -276,12 +266,8 @@ class SubscriptionService:
             raise StatusCodeError(ua.StatusCodes.BadNoSubscription)
         hint = context.header.TimeoutHint
         expires = time.monotonic() + hint / 1e3 if hint else float("inf")
-        self._drop_expired(session)
-        session.publish_requests.append(
-            PublishRequest(context.request_id, context.header.RequestHandle, results, expires)
-        )
-        if len(session.publish_requests) > MAX_PUBLISH_REQUESTS:
-            self._fault_oldest(session, ua.StatusCodes.BadTooManyPublishRequests)
+        request = PublishRequest(context.request_id, context.header.RequestHandle, results, expires)
+        publish_queue.wait_in_line(session, request)
         for subscription in sorted(subscriptions, key=lambda s: -s.priority):
             subscription.serve()
 
@@ -291,17 +277,6 @@ class SubscriptionService:
         except StatusCodeError as fault:
             return fault.code
         return subscription.acknowledge(parameters.SequenceNumber)
-
-    def _drop_expired(self, session: Session) -> None:
-        now = time.monotonic()
-        while session.publish_requests and session.publish_requests[0].expires < now:
-            self._fault_oldest(session, ua.StatusCodes.BadTimeout)
-
-    @staticmethod
-    def _fault_oldest(session: Session, code: int) -> None:
-        oldest = session.publish_requests.popleft()
-        if session.connection is not None:
-            session.connection.respond(oldest.request_id, oldest.handle, service_fault(oldest.handle, code))
 
     async def republish(self, context: RequestContext, parameters: ua.RepublishParameters) -> bytes:
         """Send a message again that was not acknowledged."""
