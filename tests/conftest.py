@@ -27,6 +27,7 @@ _is_local = providers.is_local_module_file
 providers.is_local_module_file = lambda path: settings.default.derandomize is False and _is_local(path)
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Run one worker more than there are processors: many tests wait for a browser, a kill or a child."""
     return (os.cpu_count() or 1) + 1

@@ -18,7 +18,7 @@ from tests.unit.physics.test_outside_effects import OWN
 @pytest.mark.filterwarnings("default")
 def test_two_worker_processes_change_nothing(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    campaigns.write(make("viscous_friction", shots=24), tmp_path / "campaign")
+    campaigns.write(make("viscous_friction", shots=18), tmp_path / "campaign")
     discrepancy(tmp_path / "campaign", tmp_path / "here")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None

@@ -13,9 +13,9 @@ from impactcell.opcua.tcp_connection import MAX_QUEUED_BYTES
 from tests.integration.processes import ROOT
 from tests.opcua_wire import Raw, frame
 
-CONNECTIONS = 60
+CONNECTIONS = 24
 UNFINISHED = 56
-"""Chunks of 60 000 bytes of a message that never ends: the 3.5 MB of which sixty once held 224 MB."""
+"""Chunks of 60 000 bytes of a message that never ends: 3.5 MB, of which sixty once held 224 MB."""
 MB = 1024 * 1024
 
 
