@@ -101,7 +101,8 @@ class Listener:
 
 
 async def connected(site: dict[str, str]) -> Client:
-    client = Client(site["endpoint"], timeout=30)
+    # Looked after once a second, it gives up where a busy machine is late for that.
+    client = Client(site["endpoint"], timeout=30, watchdog_intervall=30.0)
     client.session_timeout = 10_000
     client.application_uri = CLIENT_URI
     client.set_user(site.get("user", "observer"))
