@@ -1,4 +1,4 @@
-"""Overshoot and taps by hidden effect, before the planner learned what its model lacks and since.
+"""Overshoot and taps by hidden effect, of the planner before its last change and since.
 
 Drawn from stored rows: closed loops on a plant that the planner's model does not describe, a row a condition
 and version, as `python -m tests.benchmarks.positioning_hidden` gathers and stores them beside this file.
@@ -19,7 +19,7 @@ STORED: Final = "hidden_effects.csv"
 """Beside this file."""
 PROMISED: Final = 1e-3
 """Overshoots a task that the planner promises at most."""
-VERSIONS: Final = (("before", "before", PALE), ("now", "with hypotheses of what is missing", COLOURS[0]))
+VERSIONS: Final = (("before", "before", PALE), ("now", "now", COLOURS[0]))
 """Name in the rows, what it is called, and its colour."""
 
 
