@@ -22,10 +22,10 @@ SETTLE_S = 8
 
 
 @contextlib.asynccontextmanager
-async def page() -> AsyncIterator[tuple[str, asyncio.StreamReader]]:
-    """Start the process with the page."""
+async def page(rate_hz: float = RATE_HZ) -> AsyncIterator[tuple[str, asyncio.StreamReader]]:
+    """Start the process with the page; each cell makes so many cycles a second."""
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "tests.benchmarks._page_feed", str(CELLS), str(RATE_HZ)),
+        *(sys.executable, "-m", "tests.benchmarks._page_feed", str(CELLS), str(rate_hz)),
         stdout=PIPE,
         cwd=ROOT,
     )
