@@ -15,7 +15,7 @@ from impactcell.discrepancy.data import (
     shot_set,
     split_held_out,
 )
-from impactcell.discrepancy.laws import LawFinding, find_law
+from impactcell.discrepancy.laws import LawFinding, find_law, hold_against_free_forms
 from impactcell.discrepancy.model import (
     Fit,
     ParameterEstimate,
@@ -172,6 +172,9 @@ def investigate(
     )
     report_step("locating the gap and naming effects")
     selection = only_test(context, nominal) if missing else select_model(context, nominal)
+    if not missing:
+        report_step("holding names against free forms")
+        selection = hold_against_free_forms(context, selection)
     nested = nested_models(context, selection)
     report_step("proving on held-out shots")
     held_problem = _problem(prepared, floor, held_out)

@@ -96,7 +96,7 @@ _CONTACT = (Phase.LOADING, Phase.UNLOADING)
 _SLIP = (Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN)
 
 
-def _form(
+def declare_form(
     identifier: str,
     law: Law,
     covariate: tuple[str, str, str],
@@ -136,7 +136,7 @@ def _form(
 
 
 _DECLARED = (
-    _form(
+    declare_form(
         "free_friction_over_speed",
         _friction_over_speed,
         ("speed", "m/s", "a"),
@@ -146,7 +146,7 @@ _DECLARED = (
         dissipates="mu_k",
     ),
     *(
-        _form(
+        declare_form(
             f"free_friction_over_position{end}",
             law,
             ("position", "m", "a"),
@@ -161,7 +161,7 @@ _DECLARED = (
         )
     ),
     *(
-        _form(
+        declare_form(
             f"free_force_over_position{end}",
             law,
             ("position", "m", "a"),
@@ -174,7 +174,7 @@ _DECLARED = (
             (FINE, _force_over_position_fine, FINE_SPANS),
         )
     ),
-    _form(
+    declare_form(
         "free_drag_over_speed",
         _drag_over_speed,
         ("speed", "m/s", "abs(b)"),
@@ -182,7 +182,7 @@ _DECLARED = (
         "-x' s(|x'|)",
         dissipates="0",
     ),
-    _form(
+    declare_form(
         "free_stiffness_over_indentation",
         _stiffness_over_indentation,
         ("indentation", "m", "a"),
@@ -190,7 +190,7 @@ _DECLARED = (
         "d s(d)",
         constant_is="stiffness_n_per_m",
     ),
-    _form(
+    declare_form(
         "free_damping_over_indentation",
         _damping_over_indentation,
         ("indentation", "m", "a"),
@@ -199,7 +199,7 @@ _DECLARED = (
         constant_is="damping_n_s_per_m",
         dissipates="damping_n_s_per_m",
     ),
-    _form(
+    declare_form(
         "free_damping_over_rate",
         _damping_over_rate,
         ("indentation_rate", "m/s", "b"),
@@ -208,7 +208,7 @@ _DECLARED = (
         constant_is="damping_n_s_per_m",
         dissipates="damping_n_s_per_m",
     ),
-    _form(
+    declare_form(
         "free_pull_over_gap",
         _pull_over_gap,
         ("gap", "m", "a"),
@@ -216,14 +216,14 @@ _DECLARED = (
         "pull s(gap), gap < l",
         extra={LawKind.REACH: _reach},
     ),
-    _form(
+    declare_form(
         "free_speed_over_time",
         _speed_over_time,
         ("time", "s", "a"),
         (LawKind.SPEED, Kind.ACTUATOR, "1.0 + s", "1", 0.05),
         "y' = v (1 + s(t))",
     ),
-    _form(
+    declare_form(
         "free_reading_over_force",
         _reading_over_force,
         ("force", "N", "a"),

@@ -45,12 +45,23 @@ def run(job: Job) -> dict[str, Any]:
         "p_nominal": found.selection.nominal.p_value,
         "p_final": found.selection.final.p_value,
         "covered": covered(job, multiples, outcome),
+        "intervals": intervals(job, multiples, outcome),
         "tried": [
             [*one.effects, round(one.deficit, 1), round(one.deficit_std, 1)]
             for one in found.selection.alternatives[:6]
         ],
         "seconds": round(time.process_time() - started, 2),
     }
+
+
+def intervals(job: Job, multiples: tuple[float, ...], outcome: dict[str, Any]) -> list[list[Any]]:
+    """Effect, parameter, truth, estimate and the ends of its interval, of whatever was rightly named."""
+    truths = hidden(job, multiples)
+    return [
+        [one["effect"], name, truth, one["parameters"][name]["value"], one["parameters"][name]["ci95"]]
+        for one in outcome["effects"]
+        for name, truth in truths.get(one["effect"], {}).items()
+    ]
 
 
 def covered(job: Job, multiples: tuple[float, ...], outcome: dict[str, Any]) -> dict[str, list[bool]]:

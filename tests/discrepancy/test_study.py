@@ -16,9 +16,9 @@ from simulator.effects import UNLISTED, check
 from tests.benchmarks import _discrepancy_judge as judge
 from tests.benchmarks._discrepancy_plan import CONFOUNDED, calibrated, jobs
 from tests.benchmarks._discrepancy_rivals import answered, generous, subset
-from tests.benchmarks._discrepancy_run import covered, rows, study
+from tests.benchmarks._discrepancy_run import covered, intervals, rows, study
 from tests.benchmarks._discrepancy_sindy import selected
-from tests.discrepancy.study import Job, scenario, strengths
+from tests.discrepancy.study import Job, hidden, scenario, strengths
 
 
 def row(
@@ -194,6 +194,28 @@ def _only_key(job: Job) -> dict[str, Any]:
     if job.seed == 2:
         raise ZeroDivisionError("of this campaign")
     return {"key": job.key}
+
+
+def test_a_later_plan_has_the_same_campaigns_of_seeds_never_seen_and_three_effects_where_asked() -> None:
+    plan, later = jobs(), jobs(later=8_000_000, three=12)
+    assert not {job.seed for job in plan} & {job.seed for job in later}
+    assert Counter(job.kind for job in later) == Counter(job.kind for job in plan) + Counter(three=12)
+    threes = [job.hidden for job in later if job.kind == "three"]
+    assert all(len(set(three)) == 3 and not set(three) >= CONFOUNDED for three in threes)
+    assert len(set(threes)) == 12
+
+
+def test_a_row_keeps_truth_estimate_and_interval_of_what_was_rightly_named() -> None:
+    job = Job("single", ("restoring_force",), 1, strength=2.0)
+    ((name, truth),) = hidden(job, (2.0,))["restoring_force"].items()
+    numbers = {name: {"value": 230.0, "ci95": [210.0, 250.0]}}
+    outcome = {
+        "effects": [
+            {"effect": "restoring_force", "parameters": numbers},
+            {"effect": "friction_patch", "parameters": {}},
+        ]
+    }
+    assert intervals(job, (2.0,), outcome) == [["restoring_force", name, truth, 230.0, [210.0, 250.0]]]
 
 
 def test_rivals_get_every_third_campaign_of_each_kind_with_its_strengths() -> None:

@@ -2,6 +2,7 @@
 
 from impactcell.discrepancy.laws.condense import RankedForm, Tangent, rank_forms
 from impactcell.discrepancy.laws.finding import FittedFunction, LawFinding, find_law
+from impactcell.discrepancy.laws.free_rivals import hold_against_free_forms
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
 from impactcell.discrepancy.laws.grammar import ATOMS, Atom, Shaped
 from impactcell.discrepancy.laws.grammar import name as form_name
@@ -22,5 +23,6 @@ __all__ = [
     "find_law",
     "fit_free_terms",
     "form_name",
+    "hold_against_free_forms",
     "rank_forms",
 ]

@@ -130,7 +130,7 @@ def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
         smoothness = _best(errors)
         if not np.isfinite(errors[smoothness]).all():
             continue
-        extended, whole = _fit(problem, base, form, span, smoothness)
+        extended, whole = fit_free_term(problem, base, form, span, smoothness)
         terms.append(FreeTerm(form, span, extended, whole, smoothness, errors[smoothness]))
     return sorted(terms, key=lambda term: term.check)
 
@@ -156,7 +156,7 @@ def _check(
 ) -> Samples:
     """Mean squared residual, and factor, of each shot of the second part after a fit to the first; or inf."""
     try:
-        extended, fitted = _fit(parts[0], base, form, span, smoothness)
+        extended, fitted = fit_free_term(parts[0], base, form, span, smoothness)
     except DiscrepancyError:
         return np.full(parts[1].count, np.inf)
     held = refit_shot_parameters(parts[1].constrained(extended.effects, extended.constraints), fitted)
@@ -212,9 +212,10 @@ def equations(problem: Problem, state: FitState) -> tuple[Samples, Samples]:
     return H, g
 
 
-def _fit(
+def fit_free_term(
     problem: Problem, base: Fit, form: FreeForm, span: Visited, smoothness: float
 ) -> tuple[Problem, Fit]:
+    """Fit a model with one free-form term more, from where it stands without."""
     extended, state = _start(problem, base, form, span, smoothness)
     fitted = fit(extended, state.theta, state.shot_parameters, spread=base.spread, most_steps=MOST_STEPS)
     return extended, fitted

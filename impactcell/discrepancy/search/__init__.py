@@ -1,7 +1,13 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
-from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged
+from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged, reject
 from impactcell.discrepancy.search.between_shots import chance_of_narrowing
+from impactcell.discrepancy.search.candidate_fits import (
+    fit_all_samples,
+    is_at_bound,
+    refine,
+    screen,
+)
 from impactcell.discrepancy.search.conclusion import (
     NAMED,
     NO_GAP,
@@ -15,9 +21,10 @@ from impactcell.discrepancy.search.conclusion import (
     missing_shots,
 )
 from impactcell.discrepancy.search.context import Mapper, SearchContext
-from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
+from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan, ModelEvidence, scan_candidates
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
 from impactcell.discrepancy.search.held_out import HeldOutOutcome, OpenedShots
+from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits
 from impactcell.discrepancy.search.model_error import ModelError, estimate_model_error, shared_error
 from impactcell.discrepancy.search.model_selection import nested_models, only_test, select_model
 from impactcell.discrepancy.search.open_loop import Simulation, SimulationError, simulate_held_out
@@ -41,6 +48,8 @@ __all__ = [
     "TIED",
     "UNKNOWN",
     "UNTESTED",
+    "CandidateFit",
+    "CandidateScan",
     "Conclusion",
     "Gap",
     "GapChange",
@@ -61,14 +70,21 @@ __all__ = [
     "UnexplainedGap",
     "Validation",
     "chance_of_narrowing",
+    "compare_fits",
     "conclude",
     "describe_gap",
     "estimate_model_error",
     "exchanged",
+    "fit_all_samples",
+    "is_at_bound",
     "missing_shots",
     "nested_models",
     "only_test",
     "propose_experiments",
+    "refine",
+    "reject",
+    "scan_candidates",
+    "screen",
     "select_model",
     "shared_error",
     "simulate_held_out",

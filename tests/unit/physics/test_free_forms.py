@@ -13,6 +13,7 @@ from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.physics.bspline import spline, spline_basis
 from impactcell.physics.effects import LIBRARY, add_effect, find_effect
 from impactcell.physics.free_forms import FREE_FORMS, SPANS, SPANS_OF_TABLE
+from impactcell.physics.remainder_forms import REMAINDER_FORMS
 
 TAP = TapInput(velocity_m_s=0.075, mass_kg=12.0, stroke_m=0.004, start_m=0.01)
 LOWER, UPPER = 0.0, 0.2
@@ -85,6 +86,11 @@ def test_spline_is_scipys_inside_and_its_tangent_beyond(
             {"hunt_crossley_damping": {"damping_n_s_per_m2": 4e5}},
         ),
         ("free_reading_over_force", np.full(10, 0.03), {"force_sensor_gain": {"relative_error": 0.03}}),
+        (
+            "free_force_over_speed",
+            -60.0 * GREVILLE,
+            {"viscous_friction": {"viscous_coefficient_n_s_per_m": 60.0}},
+        ),
     ],
 )
 def test_a_free_form_is_the_named_law_that_it_has_become(
@@ -98,8 +104,16 @@ def test_a_free_form_is_the_named_law_that_it_has_become(
 
 
 def test_constant_stiffness_and_damping_are_the_plants_own() -> None:
-    stiffer = simulate_tap(_free("free_stiffness_over_indentation", np.full(10, 1e5)), TAP)
-    expected = simulate_tap(Plant(7e5, 465.0, 0.2, 0.15), TAP)
+    _are_alike("free_stiffness_over_indentation", np.full(10, 1e5), 1e5)
+
+
+def test_a_force_that_grows_with_the_indentation_is_stiffness() -> None:
+    _are_alike("free_force_over_indentation", 1e4 * GREVILLE, 1e4)
+
+
+def _are_alike(identifier: str, values: np.ndarray, stiffness_n_per_m: float) -> None:
+    stiffer = simulate_tap(_free(identifier, values), TAP)
+    expected = simulate_tap(Plant(6e5 + stiffness_n_per_m, 465.0, 0.2, 0.15), TAP)
     assert stiffer.peak_force_n == pytest.approx(expected.peak_force_n, rel=1e-9)
     assert stiffer.displacement_m == pytest.approx(expected.displacement_m, rel=1e-9)
 
@@ -119,8 +133,9 @@ def test_pull_of_a_straight_line_is_adhesion() -> None:
 
 
 def test_no_free_form_is_offered_as_an_effect() -> None:
-    assert not set(FREE_FORMS) & set(LIBRARY)
-    for identifier, form in FREE_FORMS.items():
+    assert set(FREE_FORMS) < set(REMAINDER_FORMS)
+    assert not set(REMAINDER_FORMS) & set(LIBRARY)
+    for identifier, form in REMAINDER_FORMS.items():
         assert find_effect(identifier) is form.effect
 
 
