@@ -291,6 +291,26 @@ async def test_too_large_too_much_and_twice(page: Page, monkeypatch: pytest.Monk
     assert [path.name for path in kept.iterdir()] == ["a.csv"]
 
 
+async def test_two_gigabytes_are_refused_before_any_of_them_is_read(page: Page) -> None:
+    asked: list[int] = []
+
+    async def body() -> AsyncIterator[bytes]:
+        for number in range(2000):
+            asked.append(number)
+            yield b"x" * 1_000_000
+
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "a.csv", b"x", read=False)
+        headers = {"x-csrf-token": await csrf_of(client), "content-length": "2000000000"}
+        send: dict[str, Any] = {"url": f"/studies/{study}/files", "params": {"name": "b.csv"}}
+        answer = await client.put(**send, headers=headers, content=body())
+        assert answer.status_code == 413
+        assert "500 MB" in answer.json()["error"]
+    assert asked == []
+    kept = page.users.parent / "studies" / study / "files"
+    assert [path.name for path in kept.iterdir()] == ["a.csv"]
+
+
 async def test_an_upload_that_stalls_or_breaks_off_leaves_nothing(
     page: Page, monkeypatch: pytest.MonkeyPatch
 ) -> None:
