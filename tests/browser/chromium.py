@@ -11,7 +11,11 @@ from urllib.parse import urlsplit
 
 import pytest
 from selenium import webdriver
-from selenium.common.exceptions import StaleElementReferenceException, TimeoutException
+from selenium.common.exceptions import (
+    ElementNotInteractableException,
+    StaleElementReferenceException,
+    TimeoutException,
+)
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
@@ -77,12 +81,24 @@ class Browser:
         shown = lambda: next((e for e in self.all(css) if e.is_displayed()), None)  # noqa: E731
         return self.until(shown, css, patience_s)
 
+    def write(self, css: str, text: str) -> None:
+        """Write into a field; on a page that is just being renewed, into the one that takes its place."""
+
+        def written() -> bool:
+            field = self.find(css)
+            field.clear()
+            field.send_keys(text)
+            return True
+
+        self.until(written, css)
+
     def all(self, css: str) -> list[Any]:
         return self.driver.find_elements(By.CSS_SELECTOR, css)
 
     def until(self, condition: Any, what: str = "", patience_s: float = PATIENCE_S) -> Any:
         """Wait until a condition gives something."""
-        changing = (StaleElementReferenceException,)  # a page that gives way to the next one
+        # A page that gives way to the next one, or renews a part of itself.
+        changing = (StaleElementReferenceException, ElementNotInteractableException)
         wait = WebDriverWait(self.driver, patience_s, poll_frequency=0.02, ignored_exceptions=changing)
         try:
             return wait.until(lambda _: condition())

@@ -76,7 +76,7 @@ async def test_an_alarm_that_is_acknowledged_here_is_acknowledged_over_opc_ua(
         enter(browser, shop, "otto")
         browser.open(f"{shop.page}/alarms")
         form = f'[data-alarm="{CELL}-WearLimit"] form'
-        browser.find(f"{form} input[name=comment]").send_keys(comment)
+        browser.write(f"{form} input[name=comment]", comment)
         browser.find(f"{form} button[value=acknowledge]").click()
         browser.find(f'[data-alarm="{CELL}-WearLimit"] .said')
 
