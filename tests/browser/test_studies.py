@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 import yaml
+from matplotlib.image import imread
 
 from simulator.campaign_files import write
 from simulator.campaign_scenario import CampaignScenario
@@ -71,6 +72,17 @@ def gap(browser: Browser) -> float:
     return float("nan") if text == "–" else float(text.split()[0])
 
 
+def is_report_painted(browser: Browser, picture: Path) -> bool:
+    """Take the picture again, and say whether anything of the report is to be seen in it."""
+    browser.screenshot(picture)
+    place = "const box = document.querySelector('iframe.report').getBoundingClientRect();"
+    x, y, width, height = browser.run(
+        f"{place} return [box.x, box.y + scrollY, box.width, box.height].map(Math.round)"
+    )
+    inside = imread(picture)[y + 10 : y + height - 10, x + 10 : x + width - 10, :3]
+    return inside.size > 0 and float(inside.std()) > 0.0
+
+
 async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Browser, tmp_path: Path) -> None:
     table = write_measurement(tmp_path)
     pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
@@ -123,7 +135,9 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
 
         def look(theme: str = theme, size: tuple[int, int] = size, suffix: str = suffix) -> list[str]:
             browser.show_as(theme, size)
-            found = judge(browser, "study", pictures / f"page-study-{suffix}.png", size[0])
+            picture = pictures / f"page-study-{suffix}.png"
+            found = judge(browser, "study", picture, size[0])
+            browser.until(lambda: is_report_painted(browser, picture), "the report in its frame")
             # As a file: the page shows it in a sandbox in which nothing runs, not even what judges it.
             browser.open(next(shop.directory.rglob("report.html")).as_uri())
             found += judge(browser, "report", pictures / f"report-{suffix}.png", size[0])
