@@ -46,7 +46,7 @@ async def test_identity_status_and_one_tap_are_shown(tmp_path: Path) -> None:
 )
 async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object], told: str) -> None:
     async with simulator(tmp_path, strikes={"period_s": 0.1}) as module:
-        cell = write_cell(tmp_path, module["port"], module=change)
+        cell = write_cell(tmp_path, module["port"], module={"timeout_ms": 4000, **change})
         code, out, err = await probed(cell)
     assert (code, out) == (1, "")
     assert told in err
