@@ -1,9 +1,12 @@
 """What acts between shots is judged by shots: by chance as often as it says."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from impactcell.discrepancy.search import chance_of_narrowing
+from impactcell.discrepancy.search import chance_of_narrowing, trace_rivals
 
 
 @pytest.mark.parametrize("parameters", [1, 3])
@@ -23,3 +26,19 @@ def test_factors_without_an_effect_are_narrowed_by_chance_as_often_as_said(param
 def test_factors_that_an_effect_explains_are_not_narrowed_by_chance() -> None:
     assert chance_of_narrowing(0.05, 0.02, 30, 1) < 1e-8
     assert chance_of_narrowing(0.05, 0.05, 30, 1) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("rival", "spread", "tied", "explains"),
+    [
+        ("friction_patch", 0.01, True, True),
+        ("friction_patch", 0.021, True, False),
+        ("friction_patch", 0.03, False, False),
+        ("friction_drift", 0.01, False, False),
+    ],
+)
+def test_a_name_between_shots_gives_way_to_what_narrows_the_factors_within_them(
+    rival: str, spread: float, tied: bool, explains: bool
+) -> None:
+    fitted: Any = SimpleNamespace(effects=("viscous_friction", rival), spread=spread)
+    assert trace_rivals(0.02, [fitted], 30) == ((rival,) if tied else (), explains)

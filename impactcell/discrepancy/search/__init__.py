@@ -1,7 +1,7 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
 from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged, reject
-from impactcell.discrepancy.search.between_shots import chance_of_narrowing
+from impactcell.discrepancy.search.between_shots import chance_of_narrowing, trace_rivals
 from impactcell.discrepancy.search.candidate_fits import (
     fit_all_samples,
     is_at_bound,
@@ -88,4 +88,5 @@ __all__ = [
     "select_model",
     "shared_error",
     "simulate_held_out",
+    "trace_rivals",
 ]

@@ -2,8 +2,11 @@
 
 What remains in the traces says nothing of them: they show in the friction factors, one a shot, and shots are
 independent. One is taken if it explains more of the variance of the factors than one without part in it would
-by chance.
+by chance, and if nothing in the traces explains more of it: parts that slide apart by direction make
+friction by position look like friction by direction, and a fit of the traces narrows the factors then.
 """
+
+from collections.abc import Sequence
 
 from scipy.stats import f as fisher
 
@@ -19,8 +22,20 @@ from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
 
 
-def accept_between_shots(context: SearchContext, evidence: ModelEvidence) -> SelectionResult | None:
-    """Accept the effect between shots that narrows the friction factors most, if that is not by chance."""
+def accept_between_shots(
+    context: SearchContext, evidence: ModelEvidence, rivals: Sequence[Fit]
+) -> SelectionResult | None:
+    """Accept the effect between shots that narrows the friction factors most, if that is not by chance.
+
+    Parameters
+    ----------
+    evidence : ModelEvidence
+        Against the nominal model.
+    rivals : sequence of Fit
+        Models with one effect more that were fitted to the traces, at the end of their range or not,
+        converged or not: where one of them leaves the factors narrower, nothing between shots has a name,
+        and one that leaves them about as narrow is tied.
+    """
     nominal = evidence.fit
     fits = sorted(_fits(context, evidence), key=lambda fitted: fitted.spread)
     if not fits:
@@ -34,8 +49,11 @@ def accept_between_shots(context: SearchContext, evidence: ModelEvidence) -> Sel
     if p_value > POLICY.between_shots_error or best.spread > POLICY.max_spread_ratio * nominal.spread:
         return None
     shots = context.problem.count
-    limit = float(fisher.ppf(POLICY.rival_probability, shots, shots))
-    tied = tuple(rival.effects[-1] for rival in fits[1:] if rival.spread**2 <= limit * best.spread**2)
+    limit = widest_rival(best.spread, shots)
+    in_traces, explained = trace_rivals(best.spread, rivals, shots)
+    if explained:
+        return None
+    tied = (*(rival.effects[-1] for rival in fits[1:] if rival.spread <= limit), *in_traces)
     alternatives = compare_fits(
         [CandidateFit(fitted, fitted.log_likelihood(context.problem.shots)) for fitted in fits]
     )
@@ -43,6 +61,20 @@ def accept_between_shots(context: SearchContext, evidence: ModelEvidence) -> Sel
     return SelectionResult(
         evidence, final, best, (effect,), {effect: tied}, {effect: p_value}, alternatives, remains=True
     )
+
+
+def trace_rivals(spread: float, rivals: Sequence[Fit], shots: int) -> tuple[tuple[str, ...], bool]:
+    """Effects within shots that leave the factors about as narrow, and whether one leaves them narrower."""
+    within = [rival for rival in rivals if LIBRARY[rival.effects[-1]].kind is not Kind.BETWEEN_SHOTS]
+    limit = widest_rival(spread, shots)
+    alike = {rival.effects[-1]: None for rival in within if rival.spread <= limit}
+    return tuple(alike), any(rival.spread <= spread for rival in within)
+
+
+def widest_rival(spread: float, shots: int) -> float:
+    """Spread of the factors up to which a rival is not told from a model that leaves `spread`."""
+    limit: float = spread * float(fisher.ppf(POLICY.rival_probability, shots, shots)) ** 0.5
+    return limit
 
 
 def _fits(context: SearchContext, evidence: ModelEvidence) -> list[Fit]:

@@ -93,11 +93,14 @@ def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
 def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionResult:
     """Accept what stands out between shots or in the traces where nothing suffices, else nothing.
 
-    Shots are independent; what is left in the traces is not. So the friction factors are asked first.
+    Shots are independent; what is left in the traces is not. So the friction factors are asked first, and
+    give a name only where no fit of the traces explains them better.
     """
     if state.result is None:
         raise AssertionError("only a search that has ended")
-    between = accept_between_shots(context, state.evidence)
+    trials = [*(single.fit for single in state.singles), *state.screened, *state.unconverged]
+    with_one_more = [trial for trial in trials if len(trial.effects) == len(state.evidence.fit.effects) + 1]
+    between = accept_between_shots(context, state.evidence, with_one_more)
     if between is not None:
         return between
     dominant = accept_dominant(
