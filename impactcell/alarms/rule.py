@@ -116,6 +116,8 @@ class CycleInputs:
         Of the model's residual; `gap_exceeds` None while the usual one is being learned.
     predictions : TapPredictions or None
         What positioning taps say of the model.
+    probability_at_horizon, horizon : float
+        That the level will be above the wear limit so many cycles from now; nan where there is no limit.
     false_alarm_cycles, period_s : float
         Designed mean number of cycles between false alarms, mean time between cycles; nan: not known.
     """
@@ -132,6 +134,8 @@ class CycleInputs:
     gap: Evidence = NO_EVIDENCE
     gap_exceeds: bool | None = None
     predictions: TapPredictions | None = None
+    probability_at_horizon: float = math.nan
+    horizon: float = math.nan
     false_alarm_cycles: float = math.nan
     period_s: float = math.nan
 

@@ -205,6 +205,8 @@ def step(
         gap=gapped.evidence,
         gap_exceeds=gapped.exceeds,
         predictions=positioning.predictions,
+        probability_at_horizon=tracked.probability_at_horizon,
+        horizon=tracked.horizon,
         false_alarm_cycles=design.false_alarm_cycles,
         period_s=period_s or math.nan,
     )

@@ -55,6 +55,8 @@ class TrackedSeries:
     cycle, level, level_std, batch_offset : ndarray, shape (cycles,)
         What was known after each cycle: mu_s at the reference batch, its standard deviation, and the offset
         of the batch from it.
+    cycles_to_limit : ndarray, shape (cycles, 3)
+        What was known after each cycle of the cycles left, and both ends of their 95 % interval.
     used : int
         Cycles that went into the state.
     notes : tuple of (int, str)
@@ -68,6 +70,7 @@ class TrackedSeries:
     level: Samples
     level_std: Samples
     batch_offset: Samples
+    cycles_to_limit: Samples
     used: int
     notes: tuple[tuple[int, str], ...]
 
@@ -83,7 +86,7 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
     rules = AlarmSettings()
     state, alarm_set = initial_state(), alarms.initial_state(rules)
     raised: list[RaisedAlarm] = []
-    course: list[tuple[float, float, float, float]] = []
+    course: list[tuple[float, ...]] = []
     notes: list[tuple[int, str]] = []
     result: TrackingResult | None = None
     used, open_shift = 0, -1
@@ -92,8 +95,17 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
         state = result.state
         used += result.used
         notes.extend((observation.cycle, note) for note in result.notes)
-        course.append((observation.cycle, result.wear.level, result.wear.level_std, result.batch.offset))
-        inputs = CycleInputs(observation.cycle, result.wear, result.batch, shift=result.shift)
+        wear = result.wear
+        left = wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high
+        course.append((observation.cycle, wear.level, wear.level_std, result.batch.offset, *left))
+        inputs = CycleInputs(
+            observation.cycle,
+            result.wear,
+            result.batch,
+            shift=result.shift,
+            probability_at_horizon=result.probability_at_horizon,
+            horizon=result.horizon,
+        )
         rule_results = alarms.evaluate(rules, alarm_set, inputs)
         alarm_set, transitions = alarms.update(
             rules,
@@ -116,7 +128,7 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
             raised[open_shift] = _refined(raised[open_shift], result.batch)
     if result is None:
         raise SeriesError("the series has no cycles")
-    cycle, level, level_std, batch_offset = np.array(course).T
+    cycle, level, level_std, batch_offset, *cycles_to_limit = np.array(course).T
     return TrackedSeries(
         wear=result.wear,
         batch=result.batch,
@@ -125,6 +137,7 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
         level=level,
         level_std=level_std,
         batch_offset=batch_offset,
+        cycles_to_limit=np.column_stack(cycles_to_limit),
         used=used,
         notes=tuple(notes),
     )

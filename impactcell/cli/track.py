@@ -175,8 +175,7 @@ def _as_text(series: TrackedSeries) -> str:
         lines.append(f"limit   {wear.limit:g}, cycles to it: {left}, 95 %: {low} .. {high}")
     for r in series.alarms:
         e = r.evidence
-        lines.append(
-            f"{r.alarm} at cycle {r.cycle}: changed at {e.change_cycle}, {e.size:+.5f} ± {e.size_std:.5f}"
-        )
+        changed = f"changed at {e.change_cycle}, " if e.change_cycle else ""
+        lines.append(f"{r.alarm} at cycle {r.cycle}: {changed}{e.size:+.5f} ± {e.size_std:.5f}")
     lines.extend(f"cycle {cycle}: {note}" for cycle, note in series.notes)
     return "\n".join(lines)

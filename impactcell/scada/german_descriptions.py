@@ -129,6 +129,9 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     "The filtered friction has probably passed the wear limit.": (
         "Die gefilterte Reibung hat wahrscheinlich die Verschleißgrenze überschritten."
     ),
+    "The filtered friction will probably pass the wear limit soon.": (
+        "Die gefilterte Reibung überschreitet wahrscheinlich bald die Verschleißgrenze."
+    ),
     "The last cycle differs from the cycles the cell has learned.": (
         "Der letzte Zyklus weicht von den gelernten ab."
     ),

@@ -1,10 +1,11 @@
 """From a cell's files to the values that the parts of the service are made with."""
 
+import math
 from dataclasses import replace
 
 from impactcell import __version__
 from impactcell.alarms import RULES, AlarmSettings
-from impactcell.alarms.rules import wear_limit
+from impactcell.alarms.rules import wear_limit, wear_warning
 from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
@@ -37,6 +38,7 @@ def cell_design(cell: CellConfig) -> CellDesign:
         model=cell.model,
         tracker=TrackerSettings(
             wear_limit=settings.alarms.wear_limit,
+            horizon_cycles=float(settings.alarms.wear_warning_cycles),
             batch=BatchKnowledge(settings.tracking.batch),
             false_alarm_cycles=settings.alarms.false_alarm_cycles,
         ),
@@ -74,6 +76,12 @@ def alarm_settings(cell: CellConfig) -> AlarmSettings:
         rules[wear_limit.NAME],
         activate_above=chosen.wear_probability_on,
         clear_below=chosen.wear_probability_off,
+    )
+    warns = chosen.wear_warning_cycles > 0
+    rules[wear_warning.NAME] = replace(
+        rules[wear_warning.NAME],
+        activate_above=chosen.wear_warning_probability_on if warns else math.inf,
+        clear_below=chosen.wear_warning_probability_off if warns else math.inf,
     )
     return AlarmSettings(rules)
 

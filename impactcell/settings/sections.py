@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from impactcell.alarms.rules import wear_limit
+from impactcell.alarms.rules import wear_limit, wear_warning
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.journal.retention import Retention
@@ -25,10 +25,12 @@ from impactcell.settings.fields import (
 )
 from impactcell.settings.web_section import WebSection
 from impactcell.tracking.signature.tracker import SignatureSettings
+from impactcell.tracking.wear_batch import TrackerSettings
 
-_LINK, _CAPTURE, _WEAR_LIMIT, _SIGNATURE, _RETENTION = (
-    ModuleLink(), CaptureDefaults(), wear_limit.RULE.settings, SignatureSettings(), Retention()
+_LINK, _CAPTURE, _TRACKER, _SIGNATURE, _RETENTION = (
+    ModuleLink(), CaptureDefaults(), TrackerSettings(), SignatureSettings(), Retention()
 )  # fmt: skip
+_WEAR_LIMIT, _WEAR_WARNING = wear_limit.RULE.settings, wear_warning.RULE.settings
 """What the parts of the service do by themselves; a key that is left out means that."""
 
 
@@ -160,6 +162,12 @@ class AlarmSection(Section):
     """The wear alarm comes when P(level > limit) passes this ..."""
     wear_probability_off: Probability = _WEAR_LIMIT.clear_below
     """... and goes when it falls below this."""
+    wear_warning_cycles: Annotated[int, Field(ge=0)] = int(_TRACKER.horizon_cycles)
+    """The wear warning looks this many cycles ahead: there is time to plan; 0 for no warning."""
+    wear_warning_probability_on: Probability = _WEAR_WARNING.activate_above
+    """It comes when P(level > limit, so many cycles from now) passes this ..."""
+    wear_warning_probability_off: Probability = _WEAR_WARNING.clear_below
+    """... and goes when it falls below this, or when the wear alarm comes."""
     false_alarm_cycles: Annotated[float, Field(ge=100)] = _SIGNATURE.false_alarm_cycles
     """Designed mean number of cycles between two false alarms of one rule."""
     on_delay_cycles: Annotated[int, Field(ge=0)] | None = None
@@ -169,8 +177,9 @@ class AlarmSection(Section):
 
     @model_validator(mode="after")
     def _hysteresis(self) -> Self:
-        if self.wear_probability_off >= self.wear_probability_on:
-            raise ValueError("wear_probability_off must be below wear_probability_on")
+        for of in ("wear", "wear_warning"):
+            if getattr(self, f"{of}_probability_off") >= getattr(self, f"{of}_probability_on"):
+                raise ValueError(f"{of}_probability_off must be below {of}_probability_on")
         return self
 
 

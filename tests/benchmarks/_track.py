@@ -10,16 +10,17 @@ import hashlib
 import json
 import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from scipy.special import ndtr
-from scipy.stats import binomtest, poisson
+from scipy.stats import poisson
 
 import impactcell
-from impactcell.alarms.rules import RULES, wear_limit
+from impactcell.alarms.rules import RULES, wear_limit, wear_warning
 from impactcell.tracking import wear_batch
-from tests.benchmarks import _charts, _steps, _streams
+from tests.benchmarks import _charts, _steps, _streams, _warning
 from tests.benchmarks.table import Table
 
 UNIT, MEAN = 0.002, 0.2  # of a series in mu_s
@@ -29,7 +30,8 @@ BARS = {0.5: "1.4", 1.0: "1.25", 2.0: "1.2", 3.0: "1.2"}
 SURE = 0.98  # of the oracle
 ROOM = 500  # cycles that there must be after a step, for its delay to count
 SLOPE_STD, UNKNOWN_STD = 0.1, 1e4  # the oracle's priors: of the slope as ours, of level and steps flat
-SOURCES = [*Path(wear_batch.__file__).parent.glob("*.py"), Path(wear_limit.__file__)]
+RULE_FILES = [Path(str(rule.__file__)) for rule in (wear_limit, wear_warning)]
+SOURCES = [*Path(wear_batch.__file__).parent.glob("*.py"), *RULE_FILES]
 CODE = hashlib.sha256(b"".join(source.read_bytes() for source in sorted(SOURCES))).hexdigest()[:12]
 KEPT = Path(f"bench-results/track-{CODE}.jsonl")
 
@@ -39,10 +41,10 @@ def crossing(seed: int) -> float:
     return float(np.random.default_rng([5, seed]).uniform(0.8, 2.8))
 
 
-def oracle_alarm(truth: _streams.Stream, limit: float) -> float:
-    """Cycle at which who knows all but level and slope has been sure for long enough; inf if never."""
-    mean, covariance = np.zeros(3), np.diag([UNKNOWN_STD**2, SLOPE_STD**2, 0.0])  # level, slope, offset
-    changes, held = set(truth.changes.tolist()), 0
+def oracle_moments(truth: _streams.Stream) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Mean and covariance of level, slope and offset after each cycle, of who knows all else."""
+    mean, covariance = np.zeros(3), np.diag([UNKNOWN_STD**2, SLOPE_STD**2, 0.0])
+    changes = set(truth.changes.tolist())
     for t, value in enumerate(truth.values.tolist()):
         if t:
             mean[0] += mean[1]
@@ -55,10 +57,13 @@ def oracle_alarm(truth: _streams.Stream, limit: float) -> float:
             spread = gain[0] + gain[2] + 1.0
             mean = mean + gain / spread * (value - mean[0] - mean[2])
             covariance = covariance - np.outer(gain, gain) / spread
-        held = held + 1 if ndtr((mean[0] - limit) / math.sqrt(covariance[0, 0])) > SURE else 0
-        if held > RULES["WearLimit"].settings.on_delay:
-            return float(t)
-    return math.inf
+        yield mean.copy(), covariance.copy()
+
+
+def oracle_alarm(known: list[tuple[np.ndarray, np.ndarray]], limit: float) -> float:
+    """Cycle at which who knows all but level and slope has been sure for long enough; inf if never."""
+    sure = (ndtr((mean[0] - limit) / math.sqrt(covariance[0, 0])) > SURE for mean, covariance in known)
+    return _warning.first_sure(sure, RULES["WearLimit"].settings.on_delay)
 
 
 def run(seed: int) -> dict:
@@ -76,6 +81,7 @@ def run(seed: int) -> dict:
         limit=MEAN + UNIT * limit,
     )
     best, _ = _streams.oracle_slope(truth)
+    known = list(oracle_moments(truth))
     outcome = {
         "seed": seed,
         "error": series.wear.rate_per_cycle / UNIT - _streams.SLOPE,
@@ -83,7 +89,8 @@ def run(seed: int) -> dict:
         "oracle": best - _streams.SLOPE,
         "shifts": [alarm.cycle for alarm in series.alarms if alarm.alarm == "BatchShift"],
         "worn": [alarm.cycle for alarm in series.alarms if alarm.alarm == "WearLimit"],
-        "oracle_worn": oracle_alarm(truth, limit),
+        "oracle_worn": oracle_alarm(known, limit),
+        **_warning.outcome(series, known, limit),
     }
     KEPT.parent.mkdir(exist_ok=True)
     with KEPT.open("a") as file:
@@ -106,11 +113,15 @@ def delays(found: np.ndarray, truth: _streams.Stream) -> list[tuple[float, float
 
 def tables(*, quick: bool, streams: int = 200) -> list[Table]:
     done = [run(SEEDS + i) for i in range(4 if quick else streams)]
-    return [_alarm_table(done), _shift_table(done)]
+    return [_alarm_table(done), _warning.table(done, _crossed(done)), _shift_table(done)]
+
+
+def _crossed(done: list[dict]) -> np.ndarray:
+    return np.array([crossing(d["seed"]) / _streams.SLOPE for d in done])
 
 
 def _alarm_table(done: list[dict]) -> Table:
-    crossed = np.array([crossing(d["seed"]) / _streams.SLOPE for d in done])
+    crossed = _crossed(done)
     columns = []
     for first in (
         [d["worn"][0] if d["worn"] else math.inf for d in done],
@@ -122,10 +133,10 @@ def _alarm_table(done: list[dict]) -> Table:
         came = delay[~never & ~early]
         columns.append(
             [
-                _share(never),
+                _warning.share(never),
                 f"{np.median(delay):.0f}",
                 f"{np.median(came):.0f} of {len(came)}" if len(came) else "none came",
-                _share(early),
+                _warning.share(early),
                 "",
             ]
         )
@@ -208,11 +219,6 @@ def _shift_table(done: list[dict]) -> Table:
     return Table(
         "Batches and slope through `track`, batch unknown", ["what", "bar", "measured", ""], rows, note
     )
-
-
-def _share(of: np.ndarray) -> str:
-    interval = binomtest(int(of.sum()), len(of)).proportion_ci(method="wilson")
-    return f"{100 * of.mean():.1f} % ({100 * interval.low:.1f}-{100 * interval.high:.1f})"
 
 
 if __name__ == "__main__":

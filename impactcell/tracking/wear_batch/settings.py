@@ -20,6 +20,8 @@ class TrackerSettings:
     ----------
     wear_limit : float
         mu_s at the reference batch at which the surface is worn; inf for none.
+    horizon_cycles : float
+        Cycles that are looked ahead at the limit, but no more than have been seen.
     batch : BatchKnowledge
         KNOWN: the batch id of each cycle is believed, a change within a batch is looked for all the same,
         and cycles without an id fall back on the bank.
@@ -48,6 +50,7 @@ class TrackerSettings:
     """
 
     wear_limit: float = math.inf
+    horizon_cycles: float = 2000.0
     batch: BatchKnowledge = BatchKnowledge.KNOWN
     false_alarm_cycles: float = 100_000.0
     hazard: float = 3e-3

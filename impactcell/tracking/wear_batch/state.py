@@ -152,6 +152,9 @@ class TrackingResult:
         Set at the one cycle at which a batch shift is detected.
     expected : bool
         The PLC announced a batch change with this cycle: the alarm is to stay silent.
+    horizon, probability_at_horizon : float
+        Cycles that are looked ahead, and the probability that the level will be above the limit then; nan
+        without a limit.
     innovation : float
         Measurement minus prediction in standard deviations; nan if not used.
     used : bool
@@ -165,6 +168,8 @@ class TrackingResult:
     batch: BatchState
     shift: Evidence | None
     expected: bool
+    horizon: float
+    probability_at_horizon: float
     innovation: float
     used: bool
     notes: tuple[str, ...]

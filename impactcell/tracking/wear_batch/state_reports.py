@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
 from impactcell.tracking.wear_batch import (
     batch_filter,
+    noise_scale,
     run_length_bank,
     wear_blocks,
     wear_filter,
@@ -43,7 +44,16 @@ def empty_result(
     wear = WearState(nan, nan, nan, nan, settings.wear_limit, nan, nan, nan, nan, Quality.BAD, reason)
     batch = BatchState(observation.batch_id or "", nan, nan, nan, nan, 0, Quality.BAD, reason)
     return TrackingResult(
-        state, wear, batch, None, expected=False, innovation=nan, used=False, notes=tuple(outcome.notes)
+        state,
+        wear,
+        batch,
+        None,
+        expected=False,
+        horizon=nan,
+        probability_at_horizon=nan,
+        innovation=nan,
+        used=False,
+        notes=tuple(outcome.notes),
     )
 
 
@@ -89,10 +99,22 @@ def tracking_result(
         batch,
         None if outcome.change is None else _evidence(settings, state, outcome.change),
         outcome.expected,
+        *_at_horizon(settings, state, moments),
         outcome.innovation,
         outcome.used,
         tuple(notes),
     )
+
+
+def _at_horizon(settings: TrackerSettings, state: TrackerState, moments: WearMoments) -> tuple[float, float]:
+    """Give the cycles that are looked ahead, no more than have been seen, and P(level > limit) then."""
+    if not math.isfinite(settings.wear_limit):
+        return math.nan, math.nan
+    walks = state.level_variance, state.slope_variance
+    ahead = wear_report.extrapolation(moments, walks, settings.wear_limit)
+    prior = settings.slope_std**2 * noise_scale.usual_variance(state.noise)
+    horizon = min(settings.horizon_cycles, float(state.clock.last - state.first_index))
+    return horizon, wear_report.probability_after(ahead, horizon, prior)
 
 
 def _filter_moments(known: wear_filter.WearFilter) -> tuple[WearMoments, float, float]:

@@ -8,6 +8,7 @@ from scipy.special import ndtr, ndtri
 
 from impactcell.numerics.jit import compiled
 from impactcell.records import Quality, WearState
+from impactcell.tracking.wear_batch.run_length_model import SLOPES
 
 INTERVAL = 0.95
 """Coverage of `WearState.cycles_to_limit_low` to `cycles_to_limit_high`."""
@@ -41,6 +42,53 @@ class Extrapolation(NamedTuple):
     slope_walk: float
 
 
+def extrapolation(moments: WearMoments, walks: tuple[float, float], limit: float) -> Extrapolation:
+    """Level and slope as they go on from now, beside a limit."""
+    return Extrapolation(
+        moments.level - limit,
+        moments.slope,
+        max(moments.level_variance, 0.0),
+        moments.level_slope_covariance,
+        max(moments.slope_variance, 0.0),
+        float(walks[0]),
+        float(walks[1]),
+    )
+
+
+@compiled
+def probability_after(ahead: Extrapolation, cycles: float, slope_prior: float) -> float:
+    """Probability that the level is above the limit after so many cycles.
+
+    Level and slope were estimated under a slope that is normal with variance `slope_prior`, wide enough for
+    the fastest wear: by it a young cell, which has told little of its slope, would pass any limit soon at
+    nearly even odds. Here wear may go on on any of `SLOPES`, each as likely before the data. A prior that is
+    `scale` times as wide is one more observation of a slope of nought, and the density of that observation
+    the scale's evidence.
+    """
+    above = evidence = 0.0
+    for scale in SLOPES:
+        information = (1.0 / scale**2 - 1.0) / slope_prior
+        spread = 1.0 + information * ahead.slope_variance
+        likelihood = math.exp(-0.5 * information * ahead.slope**2 / spread) / (scale * math.sqrt(spread))
+        pulled = ahead.level_slope_covariance * information / spread
+        narrower = Extrapolation(
+            ahead.excess - pulled * ahead.slope,
+            ahead.slope / spread,
+            max(ahead.level_variance - pulled * ahead.level_slope_covariance, 0.0),
+            ahead.level_slope_covariance / spread,
+            ahead.slope_variance / spread,
+            ahead.level_walk,
+            ahead.slope_walk,
+        )
+        mean = _quantile_above_limit(narrower, 0.0, cycles)
+        std = _quantile_above_limit(narrower, 1.0, cycles) - mean
+        evidence += likelihood
+        above += likelihood * (
+            0.5 * math.erfc(-mean / (math.sqrt(2.0) * std)) if std > 0.0 else 1.0 * (mean > 0.0)
+        )
+    return above / evidence
+
+
 def forecast(
     moments: WearMoments,
     walks: tuple[float, float],
@@ -64,16 +112,7 @@ def forecast(
         above, cycles, low, high = 0.0, math.inf, math.inf, math.inf
     else:
         above = float(ndtr(excess / std)) if std > 0.0 else float(excess > 0.0)
-        ahead = Extrapolation(
-            excess,
-            moments.slope,
-            level_variance,
-            moments.level_slope_covariance,
-            slope_variance,
-            float(walks[0]),
-            float(walks[1]),
-        )
-        cycles, low, high = _cycles_to_limit(ahead)
+        cycles, low, high = _cycles_to_limit(extrapolation(moments, walks, limit))
     slope_std = math.sqrt(slope_variance)
     return WearState(
         moments.level,

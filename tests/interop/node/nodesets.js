@@ -20,7 +20,7 @@ async function main() {
         unit: friction.getChildByName("EngineeringUnits").readValue().value.value.unitId,
         high: friction.getChildByName("EURange").readValue().value.value.high,
         methods: ["StartBatch", "ResetWear", "SetTarget", "AbortPositioning"].filter((name) => found(name)),
-        alarms: ["WearLimit", "BatchShift", "DeviantCycle", "ModuleConnection", "ModelGap", "PositioningFault", "JournalFault"].filter((name) => found(name)),
+        alarms: ["WearLimit", "BatchShift", "DeviantCycle", "ModuleConnection", "ModelGap", "PositioningFault", "JournalFault", "WearWarning"].filter((name) => found(name)),
         identification: !!found("Identification/SerialNumber"),
     }));
     space.dispose();

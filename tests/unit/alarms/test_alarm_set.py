@@ -11,6 +11,7 @@ from impactcell.serialization import pack, unpack
 
 WEAR = "WearLimit"
 BATCH = "BatchShift"
+WARNING = "WearWarning"
 SECOND = 1_000_000_000
 
 
@@ -50,6 +51,44 @@ def test_wear_has_hysteresis_in_probability():
         state, _ = alarms.update(settings, state, [found], i, 0)
         active.append(state.alarm(WEAR).active)
     assert active == [False, False, True, True, True, False, False, True]
+
+
+def rising(left, probability):
+    """Wear that will be at its limit in so many cycles, and the inputs of a rule that looks ahead."""
+    state = WearState(0.2, 0.001, 1e-5, 1e-6, 0.21, 0.001, left, 0.6 * left, 1.5 * left, Quality.GOOD)
+    return CycleInputs(100, state, probability_at_horizon=probability, horizon=2000.0)
+
+
+def test_a_warning_comes_ahead_of_the_limit_and_says_what_is_left():
+    found = judge(SETTINGS, NORMAL, rising(1000.0, 0.91), WARNING)
+    assert found.holds
+    assert (found.evidence.statistic, found.evidence.threshold) == (0.91, 0.9)
+    assert found.evidence.change_cycle == 0
+    assert found.evidence.size == 0.2 - 0.21
+    for said in (found.message.english, found.message.german):
+        for number in ("1000 (600", "1500; 95 %", "2000", "91 %"):
+            assert number in said
+    assert "0.2100" in found.message.english
+    assert "0,2100" in found.message.german
+    endless = rising(1000.0, 0.91)
+    endless = replace(endless, wear=replace(endless.wear, cycles_to_limit_high=math.inf))
+    assert "(600 or more; 95 %)" in judge(SETTINGS, NORMAL, endless, WARNING).message.english
+    assert judge(SETTINGS, NORMAL, rising(1000.0, 0.89), WARNING).holds is False
+    assert judge(SETTINGS, ACTIVE, rising(1000.0, 0.51), WARNING).holds is True
+    assert judge(SETTINGS, ACTIVE, rising(1000.0, 0.49), WARNING).holds is False
+    assert judge(SETTINGS, NORMAL, rising(1000.0, math.nan), WARNING).holds is None
+
+
+def test_the_alarm_of_the_limit_takes_the_place_of_the_warning():
+    state, events = run(SETTINGS, NORMAL, WARNING, [True] * 6)
+    assert [active for _, active, _ in events] == [True]
+    worn = RuleResult(WEAR, holds=True)
+    seen = []
+    for cycle in range(6, 40):
+        state, _ = alarms.update(SETTINGS, state, [worn, RuleResult(WARNING, holds=True)], cycle, 0)
+        seen.append((state.alarm(WEAR).active, state.alarm(WARNING).active))
+    assert (False, True) in seen
+    assert seen[-1] == (True, False)
 
 
 def test_wear_says_when_the_limit_was_crossed():

@@ -49,7 +49,9 @@ def test_slope_and_shift_of_a_known_series(tmp_path, capsys, batch):
 def test_the_wear_limit(tmp_path, capsys):
     mu_s = truth(4000, slope=5e-6, step=0.0)
     found = run(capsys, write(tmp_path / "s.csv", mu_s), limit=0.21)
-    (worn,) = found["alarms"]
+    warned, worn = found["alarms"]
+    assert warned["alarm"] == "WearWarning"
+    assert 0 <= warned["cycle"] < 2000
     assert worn["alarm"] == "WearLimit"
     assert 2000 <= worn["cycle"] < 2400
     assert abs(worn["change_cycle"] - 2000) < 250

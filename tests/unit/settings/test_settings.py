@@ -63,6 +63,12 @@ def test_every_fault_at_once_with_its_place(config: Path) -> None:
             "wear_limit: 0.2\n  wear_probability_on: 0.4",
             "wear_probability_off must be below",
         ),
+        (
+            "wear_limit: 0.25",
+            "wear_limit: 0.2\n  wear_warning_probability_off: 0.9",
+            "wear_warning_probability_off must be below",
+        ),
+        ("wear_limit: 0.25", "wear_limit: 0.2\n  wear_warning_cycles: -1", "wear_warning_cycles"),
         ("format: 1", "format: 2", "format"),
         ("cell: prototype", "cell: 7", "valid string"),
         ("../models/prototype.yaml", "none.yaml", "no file"),

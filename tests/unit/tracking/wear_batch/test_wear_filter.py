@@ -107,3 +107,29 @@ def test_a_limit_that_is_not_reached():
     assert (worn.cycles_to_limit, worn.cycles_to_limit_high) == (0.0, 0.0)
     none = wear_report.forecast(WearMoments(0.3, 1e-5, 1e-8, 0.0, 1e-16), (0.0, 0.0), math.inf)
     assert none.probability_above_limit == 0.0
+
+
+@pytest.mark.parametrize(
+    ("slope", "slope_std", "correlation"),
+    [(0.0, 5e-6, -0.6), (1e-5, 5e-6, 0.5), (4e-5, 5e-6, -0.6), (2e-6, 4e-7, 0.8), (0.0, 1.9e-4, 0.0)],
+)
+def test_the_probability_of_being_above_the_limit_later(slope, slope_std, correlation):
+    """Against integration over the slope: its likelihood, a prior of four scales, the level given it."""
+    level_std, prior_std, excess, cycles, walk = 5e-4, 2e-4, -0.01, 2000.0, 1e-12
+    covariance = correlation * level_std * slope_std
+    moments = WearMoments(0.2 + excess, slope, level_std**2, covariance, slope_std**2)
+    ahead = wear_report.extrapolation(moments, (walk, 0.0), 0.2)
+    scales = prior_std * np.array([1.0, 0.3, 0.03, 0.003])
+
+    def density(x):
+        prior = np.mean([norm.pdf(x, 0.0, scale) for scale in scales], axis=0)
+        return norm.pdf(x, slope, slope_std) / norm.pdf(x, 0.0, prior_std) * prior
+
+    def above(x):
+        mean = excess + covariance / slope_std**2 * (x - slope) + x * cycles
+        return norm.sf(0.0, mean, math.sqrt(level_std**2 * (1.0 - correlation**2) + walk * cycles))
+
+    fine = np.concatenate([s * np.linspace(-12.0, 12.0, 4001) for s in (*scales, slope_std)])
+    x = np.unique(np.concatenate([fine, fine + slope]))
+    expected = np.trapezoid(density(x) * above(x), x) / np.trapezoid(density(x), x)
+    assert wear_report.probability_after(ahead, cycles, prior_std**2) == pytest.approx(expected, abs=1e-5)

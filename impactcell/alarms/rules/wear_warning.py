@@ -1,0 +1,76 @@
+"""WearWarning: the surface will be worn soon; there is time to plan its renewal.
+
+It watches the probability that the level will be above the limit a number of cycles from now, the horizon,
+with hysteresis in probability. What is promised: when it comes, the limit is passed within the horizon with
+at least the probability that is asked for. Once the limit itself is passed `WearLimit` takes its place.
+"""
+
+import math
+
+from impactcell.alarms.rule import (
+    AlarmRule,
+    ConditionClass,
+    CycleInputs,
+    Message,
+    RuleContext,
+    RuleResult,
+    RuleSettings,
+    german,
+)
+from impactcell.alarms.rules import wear_limit
+from impactcell.records import Evidence, WearState
+
+NAME = "WearWarning"
+"""Published name."""
+
+
+def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
+    """Compare P(level > limit) at the horizon with the threshold."""
+    probability = inputs.probability_at_horizon
+    if not inputs.wear_is_known or math.isnan(probability):
+        return RuleResult(NAME, None)
+    if probability <= context.threshold:
+        return RuleResult(NAME, holds=False)
+    wear, threshold = inputs.wear, context.settings.activate_above
+    evidence = Evidence(probability, threshold, size=wear.level - wear.limit, size_std=wear.level_std)
+    return RuleResult(
+        NAME, holds=True, message=_message(wear, probability, inputs.horizon), evidence=evidence
+    )
+
+
+def _message(wear: WearState, probability: float, horizon: float) -> Message:
+    sure, rate = 100.0 * probability, 1000.0 * wear.rate_per_cycle
+    english, german_words = (_cycles(wear, words) for words in (("to", "or more"), ("bis", "oder mehr")))
+    return Message(
+        f"The surface will be worn soon: friction is {wear.level:.4f} ± {wear.level_std:.4f} and rises by "
+        f"{rate:.4f} per 1000 cycles; about {english} cycles are left to its limit {wear.limit:.4f}. It is "
+        f"{sure:.0f} % sure to be passed within {horizon:.0f} cycles. Plan to renew the surface.",
+        f"Die Oberfläche ist bald verschlissen: Reibung {german(wear.level, '.4f')} ± "
+        f"{german(wear.level_std, '.4f')}, sie steigt um {german(rate, '.4f')} je 1000 Zyklen; bis zur "
+        f"Grenze {german(wear.limit, '.4f')} bleiben etwa {german_words} Zyklen. Zu {sure:.0f} % wird sie "
+        f"innerhalb von {horizon:.0f} Zyklen überschritten. Erneuern der Oberfläche einplanen.",
+    )
+
+
+def _cycles(wear: WearState, words: tuple[str, str]) -> str:
+    """Write cycles left and their 95 % interval with words for "to" and "or more"."""
+    left, low, high = wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high
+    end = f"{words[0]} {high:.0f}" if math.isfinite(high) else words[1]
+    return f"{left:.0f} ({low:.0f} {end}; 95 %)"
+
+
+RULE = AlarmRule(
+    name=NAME,
+    node_number=5017,
+    type_number=1010,
+    title=Message("Wear warning", "Verschleißwarnung"),
+    description="The filtered friction will probably pass the wear limit soon.",
+    settings=RuleSettings(
+        severity=350, on_delay=5, off_delay=20, activate_above=0.9, clear_below=0.5, told_step=1.0
+    ),
+    condition_class=ConditionClass.MAINTENANCE,
+    input_node="Wear/CyclesToLimit",
+    evaluate=evaluate,
+    explained_by=(wear_limit.NAME,),
+)
+"""The rule."""
