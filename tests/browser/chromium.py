@@ -61,8 +61,9 @@ class Browser:
 
     def forget(self) -> None:
         """Leave the page, and nothing of what was seen before: as a new browser with an empty profile."""
-        if self.driver.current_url.startswith("http"):
-            self.run("localStorage.clear(); sessionStorage.clear()")
+        self.driver.switch_to.default_content()
+        # A page in a sandbox has no origin, and so nothing of its own to forget.
+        self.run("if (self.origin !== 'null') { localStorage.clear(); sessionStorage.clear(); }")
         self.open("about:blank")
         for command in (
             *("Network.clearBrowserCookies", "Network.clearBrowserCache"),

@@ -187,4 +187,4 @@ def test_numbers_are_told_as_one_reads_them(tied: DiscrepancyResult) -> None:
 def test_a_phone_scrolls_tables_and_not_the_page(tied: DiscrepancyResult, tmp_path: Path) -> None:
     write_report(tied, "a campaign", tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert page.count("<table>") == page.count('<div class="wide"><table>') > 3
+    assert page.count("<table>") == page.count('<div class="wide" tabindex="0"><table>') > 3
