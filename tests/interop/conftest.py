@@ -2,7 +2,8 @@
 
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
@@ -24,11 +25,27 @@ def libmodbus_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return program
 
 
+LibmodbusServer = Callable[..., AbstractContextManager[str]]
+"""Runs the server, on TCP or on the serial device that is named; gives its port, or the device."""
+
+
 @pytest.fixture
-def libmodbus_port(libmodbus_program: Path) -> Iterator[int]:
-    with subprocess.Popen(
-        [libmodbus_program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        yield int(process.stdout.readline())
-        process.terminate()
+def libmodbus_server(libmodbus_program: Path) -> LibmodbusServer:
+    @contextmanager
+    def running(*device: str) -> Iterator[str]:
+        with subprocess.Popen(
+            [libmodbus_program, *device], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as process:
+            assert process.stdout is not None
+            try:
+                yield process.stdout.readline().strip()
+            finally:
+                process.terminate()
+
+    return running
+
+
+@pytest.fixture
+def libmodbus_port(libmodbus_server: LibmodbusServer) -> Iterator[int]:
+    with libmodbus_server() as port:
+        yield int(port)

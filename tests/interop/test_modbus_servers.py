@@ -2,20 +2,23 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+import os
+import tty
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 
 import numpy as np
 import pytest
-from pymodbus import ModbusDeviceIdentification
-from pymodbus.server import ModbusTcpServer
+from pymodbus import FramerType, ModbusDeviceIdentification
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from impactcell.errors import LinkError, ModbusExceptionError
-from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.link import ModuleLink, SerialLine
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE
 from impactcell.fieldbus.transports import transport_for
+from tests.interop.conftest import LibmodbusServer
 
 pytestmark = pytest.mark.interop
 TIMEOUT_S = 10.0
@@ -58,17 +61,19 @@ async def test_pymodbus_server_one_at_a_time() -> None:
 BITS = [bool(bit) for bit in np.random.default_rng(4).integers(0, 2, 4_000)]
 
 
+TABLES = (
+    [SimData(0, values=BITS, datatype=DataType.BITS)],
+    [SimData(0, values=BITS[::-1], datatype=DataType.BITS)],
+    [SimData(0, values=list(range(1000)), datatype=DataType.REGISTERS)],
+    [SimData(0, values=list(range(1000, 2000)), datatype=DataType.REGISTERS)],
+)
+"""Coils, discrete inputs, holding and input registers, each with values of its own."""
+IDENTITY = ModbusDeviceIdentification(info={0x00: "Others", 0x01: "PM", 0x02: "3", 0x04: "Server"})
+
+
 @asynccontextmanager
 async def pymodbus_server_with_bits() -> AsyncIterator[int]:
-    """Coils, discrete inputs, holding and input registers, each table with values of its own."""
-    data = (
-        [SimData(0, values=BITS, datatype=DataType.BITS)],
-        [SimData(0, values=BITS[::-1], datatype=DataType.BITS)],
-        [SimData(0, values=list(range(1000)), datatype=DataType.REGISTERS)],
-        [SimData(0, values=list(range(1000, 2000)), datatype=DataType.REGISTERS)],
-    )
-    identity = ModbusDeviceIdentification(info={0x00: "Others", 0x01: "PM", 0x02: "3", 0x04: "Server"})
-    server = ModbusTcpServer(SimDevice(1, simdata=data), address=("127.0.0.1", 0), identity=identity)
+    server = ModbusTcpServer(SimDevice(1, simdata=TABLES), address=("127.0.0.1", 0), identity=IDENTITY)
     await server.serve_forever(background=True)
     try:
         yield server.transport.sockets[0].getsockname()[1]
@@ -130,22 +135,83 @@ async def test_libmodbus_server(libmodbus_port: int, window: int | None) -> None
 
 @pytest.mark.parametrize("window", [1, 16])
 async def test_bits_and_other_functions_of_libmodbus_server(libmodbus_port: int, window: int) -> None:
-    coils = [address % 3 == 0 or address % 7 == 0 for address in range(30_000)]
     async with connected(libmodbus_port, window) as client:
-        assert (await client.read(3, 20_000, "coil")).tolist() == coils[3:20_003]
-        assert (await client.read(1, 2_500, "discrete")).tolist() == [not i % 5 for i in range(1, 2_501)]
-        await client.write(5, np.array([1], dtype=WIRE), "coil")
-        await client.write(11, np.array([1, 1, 0, 0, 1, 0, 1, 0, 1], dtype=WIRE), "coil")
-        coils[5], coils[11:20] = True, [bool(int(digit)) for digit in "110010101"]
-        assert (await client.read(0, 40, "coil")).tolist() == coils[:40]
-        await client.write_bits(0x0034, keep=0xFFFF ^ 0x0830, put=0x0820)
-        assert (await client.read(0x33, 3)).tolist() == [0x33, 0x0824, 0x35]
-        block = client.block(100, 10)
-        await client.complete(block, write=(102, np.array([7, 8], dtype=WIRE)), at_once=True)
-        assert block.words().tolist() == [100, 101, 7, 8, *range(104, 110)]
+        await bits_and_other_functions_of_libmodbus(client)
         with pytest.raises(ModbusExceptionError, match="illegal function"):
-            await client.identification()
+            await client.identification()  # on a serial line it does not answer: it cannot know its length
         assert (await client.read(2, 2)).tolist() == [2, 3]
+
+
+async def bits_and_other_functions_of_libmodbus(client: ModbusClient) -> None:
+    coils = [address % 3 == 0 or address % 7 == 0 for address in range(30_000)]
+    assert (await client.read(3, 20_000, "coil")).tolist() == coils[3:20_003]
+    assert (await client.read(1, 2_500, "discrete")).tolist() == [not i % 5 for i in range(1, 2_501)]
+    await client.write(5, np.array([1], dtype=WIRE), "coil")
+    await client.write(11, np.array([1, 1, 0, 0, 1, 0, 1, 0, 1], dtype=WIRE), "coil")
+    coils[5], coils[11:20] = True, [bool(int(digit)) for digit in "110010101"]
+    assert (await client.read(0, 40, "coil")).tolist() == coils[:40]
+    await client.write_bits(0x0034, keep=0xFFFF ^ 0x0830, put=0x0820)
+    assert (await client.read(0x33, 3)).tolist() == [0x33, 0x0824, 0x35]
+    block = client.block(100, 10)
+    await client.complete(block, write=(102, np.array([7, 8], dtype=WIRE)), at_once=True)
+    assert block.words().tolist() == [100, 101, 7, 8, *range(104, 110)]
+
+
+@contextlib.contextmanager
+def null_modem() -> Iterator[tuple[str, str]]:
+    """Both ends of a serial line: what goes into one comes out of the other."""
+    loop, pairs = asyncio.get_running_loop(), [os.openpty(), os.openpty()]
+    for _, end in pairs:
+        tty.setraw(end)
+    masters = [master for master, _ in pairs]
+    for here, there in (masters, reversed(masters)):
+        loop.add_reader(here, lambda here=here, there=there: os.write(there, os.read(here, 4096)))
+    try:
+        yield os.ttyname(pairs[0][1]), os.ttyname(pairs[1][1])
+    finally:
+        for master, end in pairs:
+            loop.remove_reader(master)
+            os.close(master)
+            os.close(end)
+
+
+@asynccontextmanager
+async def on_line(device: str) -> AsyncIterator[ModbusClient]:
+    line = SerialLine(device, 115_200, parity="N", stop_bits=2)
+    client = ModbusClient(transport_for(ModuleLink(transport="rtu", serial=line, timeout_s=TIMEOUT_S)))
+    await client.connect()
+    try:
+        yield client
+    finally:
+        await client.close()
+
+
+async def test_bits_and_other_functions_of_pymodbus_server_on_a_serial_line() -> None:
+    with null_modem() as (ours, theirs):
+        device = SimDevice(1, simdata=TABLES)
+        server = ModbusSerialServer(
+            device, framer=FramerType.RTU, port=theirs, baudrate=115_200, stopbits=2, identity=IDENTITY
+        )
+        await server.serve_forever(background=True)
+        try:
+            async with on_line(ours) as client:
+                await bits_and_other_functions(client)
+                assert (await client.identification())["vendor"] == "Others"
+                with pytest.raises(ModbusExceptionError, match="illegal data address"):
+                    await client.read(990, 20)
+                assert (await client.read(0, 3, "input")).tolist() == [1000, 1001, 1002]
+        finally:
+            await server.shutdown()
+
+
+async def test_bits_and_other_functions_of_libmodbus_server_on_a_serial_line(
+    libmodbus_server: LibmodbusServer,
+) -> None:
+    with null_modem() as (ours, theirs), libmodbus_server(theirs) as device:
+        assert device == theirs
+        async with on_line(ours) as client:
+            await bits_and_other_functions_of_libmodbus(client)
+            assert np.array_equal(await client.read(0, 500, "input"), 65_535 - np.arange(500))
 
 
 async def test_libmodbus_server_with_any_device_id(libmodbus_port: int) -> None:

@@ -1,7 +1,8 @@
-/* A Modbus TCP server by libmodbus: 65 536 holding registers with their own address in them, and as many coils and
+/* A Modbus server by libmodbus, on TCP or, given a serial device, RTU: 65 536 holding registers with their own address in them, and as many coils and
  * discrete inputs: a coil is on where its address divides by 3 or by 7, a discrete input where by 5.
  *
- * Prints its port, then serves one client after another until standard input closes.
+ * On TCP it prints its port, then serves one client after another until standard input closes. On a serial line it
+ * prints the device, and serves unit 1 until it is ended.
  */
 #include <errno.h>
 #include <modbus.h>
@@ -12,9 +13,26 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-int main(void)
+static int serve_line(modbus_t *ctx, modbus_mapping_t *map, const char *device)
 {
-    modbus_t *ctx = modbus_new_tcp("127.0.0.1", 0);
+    uint8_t query[MODBUS_RTU_MAX_ADU_LENGTH];
+
+    if (modbus_set_slave(ctx, 1) < 0 || modbus_connect(ctx) < 0) {
+        fprintf(stderr, "%s: %s\n", device, modbus_strerror(errno));
+        return 1;
+    }
+    printf("%s\n", device);
+    fflush(stdout);
+    for (;;) {
+        int length = modbus_receive(ctx, query);
+        if (length > 0)
+            modbus_reply(ctx, query, length, map);
+    }
+}
+
+int main(int count, char **arguments)
+{
+    modbus_t *ctx = count > 1 ? modbus_new_rtu(arguments[1], 115200, 'N', 8, 2) : modbus_new_tcp("127.0.0.1", 0);
     modbus_mapping_t *map = modbus_mapping_new(65536, 65536, 65536, 65536);
     struct sockaddr_in address;
     socklen_t size = sizeof address;
@@ -29,6 +47,8 @@ int main(void)
         map->tab_bits[i] = i % 3 == 0 || i % 7 == 0;
         map->tab_input_bits[i] = i % 5 == 0;
     }
+    if (count > 1)
+        return serve_line(ctx, map, arguments[1]);
     listening = modbus_tcp_listen(ctx, 4);
     if (listening < 0 || getsockname(listening, (struct sockaddr *) &address, &size) < 0) {
         fprintf(stderr, "listen: %s\n", modbus_strerror(errno));
