@@ -167,6 +167,29 @@ def test_a_rejected_certificate_is_kept_whatever_its_subject(tmp_path: Path) -> 
         assert len(list((pki / "rejected").iterdir())) == number + 1, repr(name)
 
 
+def test_a_name_in_the_folder_of_rejected_ones_has_80_characters_of_its_subject(pki: Path) -> None:
+    common_name, organization = "x" * 60, "y" * 60
+    names = [(NameOID.COMMON_NAME, common_name), (NameOID.ORGANIZATION_NAME, organization)]
+    subject = x509.Name([x509.NameAttribute(oid, text) for oid, text in names])
+    now = dt.datetime.now(dt.UTC)
+    stranger = (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(subject)
+        .public_key(key(0).public_key())
+        .serial_number(1)
+        .not_valid_before(now)
+        .not_valid_after(now + dt.timedelta(days=1))
+        .sign(key(0), hashes.SHA256())
+    )
+    with pytest.raises(UntrustedError):
+        TrustList(pki, URI).check(der(stranger))
+    (file,) = (pki / "rejected").iterdir()
+    shown = file.name.partition(" [")[0]
+    assert shown == subject.rfc4514_string()[:80]
+    assert len(subject.rfc4514_string()) > 80
+
+
 def test_rejected_certificates_do_not_pile_up(pki: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("impactcell.opcua.trust_list.MAX_REJECTED", 3)
     trust = TrustList(pki, URI)

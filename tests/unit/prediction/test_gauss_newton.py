@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from impactcell.errors import PhysicsError
-from impactcell.prediction.gauss_newton import Step, StopRule, fit
+from impactcell.prediction.gauss_newton import RAISED_DAMPING, Step, StopRule, fit
 
 STOP = StopRule(max_steps=200, length=1e-6, cost=1e-12, refused_cost=1e-10)
 Array = NDArray[np.float64]
@@ -73,6 +73,34 @@ def test_a_step_into_what_the_model_does_not_know_is_refused() -> None:
     assert minimum.theta == pytest.approx(expected.x, abs=1e-5)
     with pytest.raises(PhysicsError, match="behind the wall"):
         fit(problem, np.array([-1.4, 0.0]), STOP)
+
+
+def test_rest_counts_where_steps_are_damped_little_or_more_damped_ones_were_refused_for_little() -> None:
+    """With the least damping that is raised, no more than noise to gain is the end."""
+
+    class Plain:
+        """A first step that is refused, one that gains nothing, and all others that gain much."""
+
+        def __init__(self) -> None:
+            self.dampings = list[float]()
+
+        def linearise(self, theta: Array) -> Place:
+            costs = {0.0: 1.0, 1.0: 2.0, 2.0: 1.0}
+            return Place(theta, theta, costs.get(float(theta[0]), 0.0))
+
+        def step(self, start: Place, damping: float) -> Step:
+            assert start.cost >= 0.0
+            self.dampings.append(damping)
+            return Step(np.array([float(len(self.dampings))]), 1.0, np.eye(1))
+
+        def noise(self, at: Place) -> float:
+            assert at.cost >= 0.0
+            return 1.0
+
+    problem = Plain()
+    minimum, _, converged = fit(problem, np.zeros(1), STOP)
+    assert converged
+    assert (minimum.theta[0], problem.dampings) == (2.0, [0.0, RAISED_DAMPING])
 
 
 def test_steps_that_come_to_an_end_first_are_not_called_a_minimum() -> None:

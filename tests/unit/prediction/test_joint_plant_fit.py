@@ -68,6 +68,19 @@ def test_contact_constants_and_mass_need_no_law_of_friction() -> None:
             assert estimate_mass(tap) == pytest.approx(capture.mass_kg, rel=0.03)
 
 
+def test_what_the_part_does_late_in_its_slide_says_nothing_of_its_mass() -> None:
+    for capture in campaign(5, {})[4:8]:
+        tap = extract(capture)
+        assert tap.slide is not None
+        assert capture.position is not None
+        late = tap.slide.separation_s + 0.3 * (tap.slide.stop_s - tap.slide.separation_s)
+        values = capture.position.values.copy()
+        values[capture.position.time_s > late] += 5e-4  # somebody knocks against the sensor
+        knocked = replace(tap, capture=replace(capture, position=replace(capture.position, values=values)))
+        knocked = replace(knocked, position=knocked.capture.position)
+        assert estimate_mass(knocked) == estimate_mass(tap)
+
+
 def test_bad_shots_are_left_out_and_a_campaign_of_them_is_refused() -> None:
     captures = campaign(4, {})
     captures[2] = replace(captures[2], position=None)
