@@ -24,7 +24,7 @@ from tests.benchmarks import _charts, _steps, _streams, _warning
 from tests.benchmarks.table import Table
 
 UNIT, MEAN = 0.002, 0.2  # of a series in mu_s
-SEEDS = _streams.REPORTED + 60_000
+SEEDS = _streams.REPORTED + 120_000
 SIZES = (0.5, 1.0, 2.0, 3.0)
 BARS = {0.5: "1.4", 1.0: "1.25", 2.0: "1.2", 3.0: "1.2"}
 SURE = 0.98  # of the oracle
