@@ -124,13 +124,14 @@ async def _subscription(client: Client, *, enabled: bool = True) -> int:
 
 
 async def _items(client: Client, number: int, size: int, attribute: int = 13, filter_: object = None) -> None:
+    """Listen; no queue is so short that it runs over, which would cost some step more."""
     request = ua.CreateMonitoredItemsRequest()
     request.Parameters.SubscriptionId = number
     node = await (_level if attribute == ua.AttributeIds.Value else _cell)(client)
     request.Parameters.ItemsToCreate = [
         ua.MonitoredItemCreateRequest(
             ua.ReadValueId(NodeId=node, AttributeId=attribute), ua.MonitoringMode.Reporting,
-            ua.MonitoringParameters(1, 0.0, filter_, 100, True),
+            ua.MonitoringParameters(1, 0.0, filter_, 1_000 if filter_ else 100, True),
         )
     ] * size  # fmt: skip
     await _send(client, request)
@@ -256,7 +257,7 @@ async def refresh(_here: Site, client: Client, size: int) -> None:
         ua.SimpleAttributeOperand(
             ua.NodeId(ids.BaseEventType), [ua.QualifiedName("Message", 0)], ua.AttributeIds.Value
         )
-    ] * 20
+    ] * 5
     await _items(client, number, 5, ua.AttributeIds.EventNotifier, filter_)
     request = ua.CallRequest()
     request.Parameters.MethodsToCall = [
