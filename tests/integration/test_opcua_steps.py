@@ -250,7 +250,7 @@ async def acknowledge(_here: Site, client: Client, size: int) -> None:
 
 
 async def refresh(_here: Site, client: Client, size: int) -> None:
-    """Have all alarms told again, in one request so often that steps are full, to as many as may listen."""
+    """Have all alarms told again, in one request many times, to as many as may listen."""
     number = await _subscription(client)
     filter_ = ua.EventFilter()
     filter_.SelectClauses = [
@@ -265,7 +265,7 @@ async def refresh(_here: Site, client: Client, size: int) -> None:
             ua.NodeId(ids.ConditionType), ua.NodeId(ids.ConditionType_ConditionRefresh),
             [ua.Variant(number, ua.VariantType.UInt32)],
         )
-    ] * (size // 12)  # fmt: skip
+    ] * (size // 50)  # fmt: skip
     await _send(client, request)
     await _delete(client, number)
 
