@@ -4,6 +4,7 @@ import json
 import os
 import re
 import shutil
+import socket
 import subprocess
 from pathlib import Path
 
@@ -38,6 +39,12 @@ ELSEWHERE = {
 }
 
 
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
 def blocks() -> list[str]:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     found = re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL)
@@ -55,6 +62,9 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
         else:
             shutil.copy2(source, directory / name)  # make looks at the times
     (directory / ".venv").symlink_to(ROOT / ".venv")
+    cell = directory / "config" / "cells" / "prototype.yaml"  # another test may be at the usual port
+    with cell.open("a", encoding="utf-8") as file:
+        file.write(f"opcua:\n  endpoint: opc.tcp://127.0.0.1:{free_port()}/impactcell\n")
     campaign = directory / "config" / "sim" / "campaign.yaml"  # the same in less time, with half the shots
     text = campaign.read_text(encoding="utf-8")
     assert text.count("replicates: 2") == 1
