@@ -1,7 +1,7 @@
 """A law that nobody had listed: a free-form term where something remains, then the laws that it may be."""
 
 from impactcell.discrepancy.laws.condense import RankedForm, Tangent, rank_forms
-from impactcell.discrepancy.laws.finding import FittedFunction, LawFinding, find_law
+from impactcell.discrepancy.laws.finding import BAND, DRAWN, FittedFunction, LawFinding, find_law
 from impactcell.discrepancy.laws.free_rivals import hold_against_free_forms
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
 from impactcell.discrepancy.laws.grammar import ATOMS, Atom, Shaped
@@ -11,6 +11,8 @@ from impactcell.discrepancy.laws.refit import FittedLaw
 
 __all__ = [
     "ATOMS",
+    "BAND",
+    "DRAWN",
     "Atom",
     "FittedFunction",
     "FittedLaw",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.laws import FittedFunction, Tangent
+from impactcell.discrepancy.laws import BAND, DRAWN, FittedFunction, Tangent
 from impactcell.discrepancy.machine.equations import Column, IndexArray
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.free_forms import SPLINE_PIECES, splines
@@ -18,10 +18,6 @@ SMOOTHNESS = (1e-4, 1e-2, 1.0, 1e2)
 """Weights of the roughness that are tried, over the information that the blocks have of a coefficient [1]."""
 RIDGE = 1e-6
 """Weight of the size of a spline, over the same: what no block sees of it stays at zero [1]."""
-DRAWN = 60
-"""Points of the range at which a spline is drawn."""
-BAND_STDS = 1.96
-"""Standard deviations of a 95 % band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,4 +149,4 @@ def spline_function(tangent: Tangent, penalty: Samples, tested: tuple[float, flo
     moving = basis - basis.mean(axis=0)
     std = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", moving, covariance, moving), 0.0))
     value = basis @ tangent.fitted
-    return FittedFunction(u, value, value - BAND_STDS * std, value + BAND_STDS * std)
+    return FittedFunction(u, value, value - BAND * std, value + BAND * std)
