@@ -231,7 +231,6 @@ _DECLARED = (
         "F (1 + s(F)) is shown",
     ),
 )
-
 """Friction, forces on the part, contact, actuator and sensor: wherever a law of one covariate may act."""
 
 _BY_NAME = {form.effect.identifier: form for form in _DECLARED}

@@ -1,11 +1,13 @@
 """A PLC that takes a part away before the outcome of its last tap has been read."""
 
 import asyncio
+from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import pytest_asyncio
 
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ModuleStatus
 from impactcell.fieldbus.modbus_client import ModbusClient
@@ -47,6 +49,19 @@ class Module(ModuleAcquisition):
         return self.shown
 
 
+@pytest.fixture
+def module(cell: CellConfig) -> Module:
+    return Module(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
+
+
+@pytest_asyncio.fixture
+async def task(tmp_path: Path, cell: CellConfig, module: Module) -> AsyncIterator[PositioningTask]:
+    design = cell_design(cell)
+    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    yield PositioningTask(cell, design, module, worker, lambda: None)
+    await worker.close()
+
+
 class Tapper:
     """Moves the part as foretold; the PLC puts another down after the first tap, or lets it lie."""
 
@@ -70,12 +85,8 @@ class Tapper:
 
 @pytest.mark.parametrize("taken_away", [True, False])
 async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
-    tmp_path: Path, cell: CellConfig, taken_away: bool
+    module: Module, task: PositioningTask, taken_away: bool
 ) -> None:
-    design = cell_design(cell)
-    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
-    module = Module(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
-    task = PositioningTask(cell, design, module, worker, lambda: None)
     tapper = Tapper(module, task, taken_away=taken_away)
     task._positioner = tapper  # type: ignore[assignment]
     await module.read_status()
@@ -88,16 +99,11 @@ async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
     assert task.fault is None
     assert tapper.taps == 1 or not taken_away
     assert task.belief.taps == (0 if taken_away else tapper.taps)
-    await worker.close()
 
 
 async def test_a_target_that_came_while_the_link_was_down_is_begun_once_it_is_up(
-    tmp_path: Path, cell: CellConfig
+    module: Module, task: PositioningTask
 ) -> None:
-    design = cell_design(cell)
-    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
-    module = Module(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
-    task = PositioningTask(cell, design, module, worker, lambda: None)
     await module.read_status()
     module.connected = False
     await task._read_plc_target()
@@ -106,19 +112,13 @@ async def test_a_target_that_came_while_the_link_was_down_is_begun_once_it_is_up
     module.connected = True
     await task._read_plc_target()
     assert task.state.running
-    await worker.close()
 
 
 async def test_a_refused_target_of_the_plc_ends_no_task_that_a_person_has_started_meanwhile(
-    tmp_path: Path, cell: CellConfig
+    module: Module, task: PositioningTask
 ) -> None:
-    design = cell_design(cell)
-    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
-    module = Module(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
-    task = PositioningTask(cell, design, module, worker, lambda: None)
     await module.read_status()
     await asyncio.gather(task.begin(0.005), task._read_plc_target())
     assert task.state.running
     assert task.state.target_m == 0.005
     assert task.fault is None
-    await worker.close()
