@@ -1,10 +1,17 @@
 """Named effects held against free forms: what a smooth force of no name leaves is not named after it."""
 
+from types import SimpleNamespace
+from typing import Any
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 
+from impactcell.discrepancy.laws.scored_model import ScoredModel
+from impactcell.discrepancy.laws.standing import is_in_its_place, outdoes
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
+from impactcell.physics.effects import LIBRARY as EFFECTS
+from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
 from tests.discrepancy.study import Job, campaign
 
 SHOTS = 16
@@ -29,5 +36,68 @@ def test_an_effect_is_named_beside_a_force_of_which_nobody_knows_the_form() -> N
 @pytest.mark.parametrize("seed", [600_000])
 def test_a_force_of_which_nobody_knows_the_form_is_named_after_nothing(seed: int) -> None:
     found = _investigated(("wandering_force",), (0.2,), seed)
+    assert found.verdict == "unknown"
+    assert found.added == ()
+
+
+def _leaving(mean_square: float) -> Any:
+    return SimpleNamespace(residual=np.full(4000, mean_square**0.5))
+
+
+def _scored(effect: str, place: str, mean_square: float, ahead: float = 0.0) -> ScoredModel:
+    """Model that leaves so much, and that each of twenty shots finds so much likelier, more or less."""
+    each = ahead * (1.0 + 0.2 * np.cos(np.arange(20)))
+    return ScoredModel(effect, place, _leaving(mean_square), each, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("place", "left", "ahead", "falls"),
+    [
+        ("free_force_over_position", 1.0, 50.0, True),
+        ("free_force_over_position", 3.1, 0.0, True),
+        ("free_force_over_position", 3.2, -1.0, False),
+        ("free_friction_over_position", 1.0, 50.0, True),
+        ("free_friction_over_position", 1.0, 1.0, False),
+        ("free_friction_over_position", 2.0, 50.0, False),
+        ("free_friction_over_position", 0.5, -50.0, True),
+    ],
+)
+def test_a_name_that_leaves_something_falls_to_free_forms(
+    place: str, left: float, ahead: float, *, falls: bool
+) -> None:
+    named = _scored("friction_patch", "", 2.5)
+    assert outdoes(_scored("", place, left, ahead), named, _leaving(20.0)) is falls
+
+
+def test_a_name_that_leaves_nothing_falls_to_no_form_that_leaves_as_little() -> None:
+    named = _scored("friction_patch", "", 1.1)
+    assert not outdoes(_scored("", "free_force_over_position", 1.0, 50.0), named, _leaving(20.0))
+
+
+@pytest.mark.parametrize(
+    ("effect", "place"),
+    [
+        ("channel_skew", FORCE_FILTER.identifier),
+        ("force_sensor_lag", FORCE_FILTER.identifier),
+        ("friction_patch", "free_friction_over_position"),
+        ("viscous_friction", "free_drag_over_speed"),
+        ("hertz_contact", "free_stiffness_over_indentation"),
+        ("adhesion", "free_pull_over_gap"),
+    ],
+)
+def test_an_effect_has_its_place_among_the_free_forms(effect: str, place: str) -> None:
+    assert place in {*REMAINDER_FORMS, FORCE_FILTER.identifier}
+    assert effect in EFFECTS
+    assert is_in_its_place(effect, place)
+    assert not is_in_its_place(effect, "free_speed_over_time")
+
+
+def test_a_delay_is_not_established_in_the_place_of_a_lag() -> None:
+    job = Job(
+        "removed", ("force_sensor_lag",), 9_030_008, target=4.0, shots=SHOTS, removed="force_sensor_lag"
+    )
+    with patch("impactcell.discrepancy.workflow.find_law", lambda *_: None):
+        found = investigate(campaign(job, (2.0,)), seed=1, library=("channel_skew", "force_sensor_offset"))
+    assert found.selection.nominal.p_value < 0.01
     assert found.verdict == "unknown"
     assert found.added == ()

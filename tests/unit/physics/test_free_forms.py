@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from impactcell.errors import PhysicsError
-from impactcell.physics import Plant, TapInput, simulate_tap
+from impactcell.physics import Ensemble, Plant, TapInput, simulate_tap
 from impactcell.physics.bspline import spline, spline_basis
 from impactcell.physics.effects import LIBRARY, add_effect, find_effect
 from impactcell.physics.free_forms import FREE_FORMS, SPANS, SPANS_OF_TABLE
-from impactcell.physics.remainder_forms import REMAINDER_FORMS
+from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
 
+TIMES = np.linspace(1e-4, 0.02, 100)
 TAP = TapInput(velocity_m_s=0.075, mass_kg=12.0, stroke_m=0.004, start_m=0.01)
 LOWER, UPPER = 0.0, 0.2
 COEFFICIENTS = SPANS + 3
@@ -132,7 +133,24 @@ def test_pull_of_a_straight_line_is_adhesion() -> None:
     )
 
 
+@pytest.mark.parametrize("named", [("channel_skew", "delay_s"), ("force_sensor_lag", "time_constant_s")])
+def test_filter_of_force_is_a_delay_and_a_lag(named: tuple[str, str]) -> None:
+    effect, parameter = named
+    values = {"delay_s": 0.0, "time_constant_s": 0.0, parameter: 4e-4}
+    reading, expected = (
+        Ensemble([TAP], (identifier,), force_time_s=[TIMES]).samples(
+            np.array([6e5, 465.0, 0.2, 0.15, *numbers]), np.ones(1)
+        )
+        for identifier, numbers in (
+            (FORCE_FILTER.identifier, values.values()),
+            (effect, (values[parameter],)),
+        )
+    )
+    assert reading == pytest.approx(expected, rel=1e-12)
+
+
 def test_no_free_form_is_offered_as_an_effect() -> None:
+    assert FORCE_FILTER.identifier not in LIBRARY
     assert set(FREE_FORMS) < set(REMAINDER_FORMS)
     assert not set(REMAINDER_FORMS) & set(LIBRARY)
     for identifier, form in REMAINDER_FORMS.items():
