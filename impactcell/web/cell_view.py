@@ -15,7 +15,7 @@ from impactcell.records.quantity import Quantity, S
 from impactcell.scada.alarm_events import event_id
 from impactcell.web.curves import Curve, decimate, envelope
 from impactcell.web.interface import CellNews, Freshness
-from impactcell.web.texts.reasons import german_reason
+from impactcell.web.texts.reasons import english_reason, german_reason
 
 RECENT_CYCLES = 120
 """Cycles of the small curve on a card."""
@@ -251,5 +251,8 @@ def _beside_values(snapshot: Snapshot) -> dict[str, Any]:
         "time_ms": snapshot.time_ns // 1_000_000,
         "mass": number(snapshot.mass_kg),
         "estimator": snapshot.friction.estimator.value,
-        "reasons": {"en": reasons, "de": {name: german_reason(text) for name, text in reasons.items()}},
+        "reasons": {
+            "en": {name: english_reason(text) for name, text in reasons.items()},
+            "de": {name: german_reason(text) for name, text in reasons.items()},
+        },
     }

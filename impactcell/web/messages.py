@@ -52,6 +52,15 @@ class Messages:
         """Say why an alarm came."""
         return Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
 
+    def refusal(self, code: str) -> str:
+        """Say why something was not done, by OPC UA's name of it; what an address makes up is not repeated.
+
+        >>> Messages("en").refusal("BadConditionAlreadyShelved")
+        'somebody has shelved it already'
+        """
+        key = f"refused_{code}"
+        return self[key if key in CATALOGUE else "refused_other"]
+
     def number(self, value: float, digits: int) -> str:
         """Write a number with so many significant digits, and an exponent only where it is large or small.
 

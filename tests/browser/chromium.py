@@ -22,7 +22,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 PATIENCE_S = 30.0
 """A page that does not show what it should by then has failed."""
-DESK, PHONE, WALL = (1280, 900), (390, 844), (3840, 2160)
+DESK, PHONE, WALL = (1280, 900), (375, 812), (3840, 2160)
 """Widths and heights in pixels."""
 
 

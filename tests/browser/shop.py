@@ -28,6 +28,13 @@ PASSWORDS = {"eva": "engineer-1", "otto": "operator-1", "olga": "observer-1"}
 ROLES = {"eva": Role.ENGINEER, "otto": Role.OPERATOR, "olga": Role.OBSERVER}
 AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
 
+WRAPPED = """
+    const lines = (link) => link.clientHeight / parseFloat(getComputedStyle(link).lineHeight);
+    const entries = [...document.querySelectorAll("nav a")];
+    return entries.filter((link) => lines(link) > 2.2).map((link) => link.innerText);
+"""
+"""Entries of the navigation that take more than their line and the room around it."""
+
 
 @dataclass
 class Shop:
@@ -100,6 +107,7 @@ def judge(browser: Browser, name: str, picture: Path, width: int) -> list[str]:
     faults = [f"{name}: {fault}" for fault in browser.faults()]
     if browser.run("return Math.max(document.documentElement.scrollWidth, innerWidth)") > width:
         faults.append(f"{name}: is too wide")
+    faults += [f"{name}: {entry} takes two lines" for entry in browser.run(WRAPPED)]
     if not AXE.is_file():
         if os.environ.get("IMPACTCELL_CI"):
             pytest.fail("CI installs axe-core; it is missing")

@@ -30,6 +30,10 @@ PAGES = {
 SCRIPT = "<script>document.title='owned'</script>"
 MOST_BYTES = 200_000
 """What is asked of a page with all that belongs to it."""
+LIMIT_PASSED = """
+    const meter = document.querySelector("meter");
+    return [meter.value, meter.high, meter.low, meter.optimum];
+"""
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -188,6 +192,8 @@ async def test_every_page(
                 browser.find(f'[data-cell="{CELL}"][data-cycle]')
             if name == "cell":
                 browser.until(lambda: len(browser.all("canvas")) == 4, "four charts")
+                value, high, low, best = browser.run(LIMIT_PASSED)
+                assert value > high > low > best, "a limit that is passed is red, not amber"
             opening_s = 1e-3 * browser.run(
                 "return performance.getEntriesByType('navigation')[0].loadEventEnd"
             )

@@ -67,7 +67,8 @@ export function showFriction(root, card) {
   set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons[language].mu_s}`);
   set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}`);
   for (const meter of root.querySelectorAll('[data-field="wear_meter"]')) {
-    Object.assign(meter, { max: limit, value: level ?? 0, high: 0.9 * limit, optimum: 0 });
+    // Red from the limit on, amber from nine tenths of it: a value beyond `high` is far from an optimum below `low`.
+    Object.assign(meter, { max: limit, value: level ?? 0, low: 0.9 * limit, high: 0.999 * limit, optimum: 0 });
   }
   set(root, "cycles_left", cyclesLeft(values));
   set(root, "batch", values["Batch/BatchId"] || "–");

@@ -1,4 +1,4 @@
-"""Why a value is uncertain or missing, in German: reasons are published in English, as OPC UA has them."""
+"""Why a value is uncertain or missing, as the page says it; reasons are published in English over OPC UA."""
 
 import re
 from typing import Final
@@ -27,6 +27,15 @@ GERMAN: Final = {
 }  # fmt: skip
 """Reasons of which a value goes on being shown, as patterns; what is in none of them stays English."""
 WORDS: Final = {"force": "Kraft", "position": "Position"}
+
+
+def english_reason(reason: str) -> str:
+    """Write a published reason as the page writes its figures, with their symbols.
+
+    >>> english_reason("mu_s 0.3183 is outside the calibrated 0.15-0.26")
+    'µs 0.3183 is outside the calibrated 0.15-0.26'
+    """
+    return reason.replace("mu_s", "µs").replace("mu_k", "µk")
 
 
 def german_reason(reason: str) -> str:

@@ -7,6 +7,7 @@ import pytest
 
 import impactcell.web
 from impactcell.alarms import EventKind
+from impactcell.alarms.lifecycle import Refusal
 from impactcell.quantities import FOLDERS
 from impactcell.records import Estimator, Quality
 from impactcell.scada import Role
@@ -55,6 +56,8 @@ def test_no_text_is_left_over_or_missing() -> None:
         *(f"live_{estimator.value}" for estimator in Estimator),
         *(f"folder_{folder}" for folder in FOLDERS),
         *(f"stage_{stage.value}" for stage in Stage),
+        *(f"refused_{refusal.value}" for refusal in Refusal),
+        *("refused_BadOutOfRange", "refused_other"),
         *(
             "did_accept",
             "did_restore",
@@ -80,3 +83,12 @@ async def test_the_browser_says_which_language(tmp_path: Path, accepts: str, lan
         assert '<html lang="de"' in (await client.get("/login?lang=de")).text
         assert '<html lang="de"' in (await client.get("/login")).text  # it remembers
         assert '<html lang="de"' in (await client.get("/login?lang=xx")).text
+
+
+def test_a_refusal_is_a_sentence_and_never_what_the_address_says() -> None:
+    codes = [code.value for code in Refusal]
+    assert codes
+    for code in codes:
+        if code not in ("BadInvalidState", "BadConditionAlreadyEnabled", "BadConditionAlreadyDisabled"):
+            assert Messages("en").refusal(code) != Messages("en")["refused_other"], code
+    assert Messages("de").refusal("call 555-0100") == Messages("de")["refused_other"]
