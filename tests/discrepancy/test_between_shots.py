@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from impactcell.discrepancy.search import chance_of_narrowing, trace_rivals
+from impactcell.discrepancy.search import between_shots, chance_by_exchange, chance_of_narrowing, trace_rivals
 
 
 @pytest.mark.parametrize("parameters", [1, 3])
@@ -26,6 +27,52 @@ def test_factors_without_an_effect_are_narrowed_by_chance_as_often_as_said(param
 def test_factors_that_an_effect_explains_are_not_narrowed_by_chance() -> None:
     assert chance_of_narrowing(0.05, 0.02, 30, 1) < 1e-8
     assert chance_of_narrowing(0.05, 0.05, 30, 1) == pytest.approx(1.0)
+
+
+ORDER = np.linspace(-0.5, 0.5, 20)
+
+
+def test_exchange_of_shots_finds_what_scipy_finds() -> None:
+    rng = np.random.default_rng(12)
+    factors = 0.8 * ORDER + rng.standard_normal(20)
+    reference = stats.permutation_test(
+        (factors,),
+        lambda values: abs(float(values @ ORDER)),
+        permutation_type="pairings",
+        alternative="greater",
+        n_resamples=19_999,
+        rng=np.random.default_rng(13),
+    )
+    chance = chance_by_exchange(factors, 0.01 * ORDER[None] + 3.0, np.random.default_rng(14))
+    assert 0.01 < chance < 0.5
+    assert chance == pytest.approx(reference.pvalue, abs=4.0 * np.sqrt(2.0 * chance / 19_999))
+
+
+def test_shots_far_off_make_no_drift(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(between_shots, "EXCHANGES", 999)
+    rng = np.random.default_rng(15)
+    chances = []
+    for _ in range(150):
+        factors = rng.standard_t(1.0, 20)
+        chances.append(chance_by_exchange(factors, ORDER[None], rng))
+    for level in (0.5, 0.1):
+        share = np.mean(np.array(chances) <= level)
+        assert share == pytest.approx(level, abs=4.0 * np.sqrt(level * (1.0 - level) / 150))
+
+
+def test_the_best_of_several_patterns_is_as_likely_by_chance_as_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(between_shots, "EXCHANGES", 999)
+    rng = np.random.default_rng(16)
+    patterns = np.vstack([ORDER, ORDER**2, np.sin(9.0 * ORDER), np.zeros(20)])
+    chances = [chance_by_exchange(rng.standard_normal(20), patterns, rng) for _ in range(150)]
+    share = np.mean(np.array(chances) <= 0.1)
+    assert share == pytest.approx(0.1, abs=4.0 * np.sqrt(0.09 / 150))
+
+
+def test_a_drift_is_no_order_by_chance() -> None:
+    rng = np.random.default_rng(17)
+    assert chance_by_exchange(ORDER + 0.1 * rng.standard_normal(20), ORDER[None], rng) == 5e-5
+    assert chance_by_exchange(ORDER, np.zeros((1, 20)), rng) == 1.0
 
 
 @pytest.mark.parametrize(

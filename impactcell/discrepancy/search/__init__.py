@@ -1,7 +1,11 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
 from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged, reject
-from impactcell.discrepancy.search.between_shots import chance_of_narrowing, trace_rivals
+from impactcell.discrepancy.search.between_shots import (
+    chance_by_exchange,
+    chance_of_narrowing,
+    trace_rivals,
+)
 from impactcell.discrepancy.search.candidate_fits import (
     fit_all_samples,
     is_at_bound,
@@ -69,6 +73,7 @@ __all__ = [
     "SimulationError",
     "UnexplainedGap",
     "Validation",
+    "chance_by_exchange",
     "chance_of_narrowing",
     "compare_fits",
     "conclude",

@@ -2,12 +2,14 @@
 
 What remains in the traces says nothing of them: they show in the friction factors, one a shot, and shots are
 independent. One is taken if it explains more of the variance of the factors than one without part in it would
-by chance, and if nothing in the traces explains more of it: parts that slide apart by direction make
-friction by position look like friction by direction, and a fit of the traces narrows the factors then.
+by chance, by the F test and by shots exchanged at random, and if nothing in the traces explains more of it:
+parts that slide apart by direction make friction by position look like friction by direction, and a fit of
+the traces narrows the factors then.
 """
 
 from collections.abc import Sequence
 
+import numpy as np
 from scipy.stats import f as fisher
 
 from impactcell.discrepancy.model import Fit
@@ -20,6 +22,12 @@ from impactcell.discrepancy.search.indistinguishability import CandidateFit, com
 from impactcell.discrepancy.search.policy import POLICY
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
+from impactcell.records import Samples
+
+EXCHANGES = 19_999
+"""Orders of shots that are drawn [1]: the smallest probability is 5e-5, a twentieth of what is asked."""
+EXCHANGE_STREAM = 9
+"""Stream of random numbers of these draws [1], apart from those of the split and of other tests."""
 
 
 def accept_between_shots(
@@ -45,6 +53,11 @@ def accept_between_shots(
     number = sum(LIBRARY[name].kind is Kind.BETWEEN_SHOTS for name in context.library)
     parameters = len(best.coordinates) - len(nominal.coordinates)
     chance = chance_of_narrowing(nominal.spread, best.spread, context.problem.count, parameters)
+    patterns = _patterns(context, evidence, effect)
+    if len(patterns):
+        rng = np.random.default_rng([context.seed, EXCHANGE_STREAM])
+        factors = nominal.shot_parameters.log_factor
+        chance = max(chance, chance_by_exchange(factors, patterns, rng))
     p_value = min(number * chance, 1.0)
     if p_value > POLICY.between_shots_error or best.spread > POLICY.max_spread_ratio * nominal.spread:
         return None
@@ -107,3 +120,44 @@ def chance_of_narrowing(before: float, after: float, shots: int, parameters: int
     freedom = max(shots - parameters - 1, 1)
     explained = max((before / after) ** 2 - 1.0, 0.0)
     return float(fisher.sf(explained * freedom / parameters, parameters, freedom))
+
+
+def _patterns(context: SearchContext, evidence: ModelEvidence, effect: str) -> Samples:
+    """Logarithms of the factors by which an effect acts, one row a point of its grid, shape (Q, n).
+
+    No rows where it acts on static friction alone: the signs of the shots' scores were drawn for that.
+    """
+    candidates = evidence.candidate_scan.candidates
+    number = candidates.names.index(effect)
+    rows = [
+        candidate_scores.between_shot_factors(context.problem, effect, point)
+        for point, group in zip(candidates.points, candidates.group, strict=True)
+        if group == number
+    ]
+    acting = [row for row in rows if row is not None]
+    return np.array(acting).reshape(len(acting), context.problem.count)
+
+
+def chance_by_exchange(log_factor: Samples, patterns: Samples, rng: np.random.Generator) -> float:
+    """Probability that shots in another order are followed as well: a permutation test (Fisher 1935).
+
+    It holds whatever the distribution of the factors, as long as nothing tells their order: with a few shots
+    far off the F test finds a drift too easily.
+
+    Parameters
+    ----------
+    log_factor : ndarray, shape (n,)
+        One a shot.
+    patterns : ndarray, shape (Q, n)
+        What the factors may follow; the best of them counts, in every order anew.
+    """
+    deviation = log_factor - log_factor.mean()
+    centred = patterns - patterns.mean(1, keepdims=True)
+    length = np.sqrt(np.einsum("qi,qi->q", centred, centred))
+    units = centred[length > 0.0] / length[length > 0.0, None]
+    if not len(units):
+        return 1.0
+    reached = np.max((units @ deviation) ** 2)
+    orders = rng.permuted(np.tile(deviation, (EXCHANGES, 1)), axis=1)
+    best = np.max((orders @ units.T) ** 2, axis=1)
+    return float(1 + np.sum(best >= reached * (1.0 - 1e-12))) / (1 + EXCHANGES)
