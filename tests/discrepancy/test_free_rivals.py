@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.laws.scored_model import ScoredModel
-from impactcell.discrepancy.laws.standing import is_in_its_place, outdoes
+from impactcell.discrepancy.laws.standing import FreeForms, is_in_its_place, outdoes, stands
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY as EFFECTS
 from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
@@ -47,7 +47,7 @@ def _leaving(mean_square: float) -> Any:
 def _scored(effect: str, place: str, mean_square: float, ahead: float = 0.0) -> ScoredModel:
     """Model that leaves so much, and that each of twenty shots finds so much likelier, more or less."""
     each = ahead * (1.0 + 0.2 * np.cos(np.arange(20)))
-    return ScoredModel(effect, place, _leaving(mean_square), each, 1.0)
+    return ScoredModel(effect, place, _leaving(mean_square), each, 1.0, 5.0)
 
 
 @pytest.mark.parametrize(
@@ -72,6 +72,39 @@ def test_a_name_that_leaves_something_falls_to_free_forms(
 def test_a_name_that_leaves_nothing_falls_to_no_form_that_leaves_as_little() -> None:
     named = _scored("friction_patch", "", 1.1)
     assert not outdoes(_scored("", "free_force_over_position", 1.0, 50.0), named, _leaving(20.0))
+
+
+@pytest.mark.parametrize(
+    ("spread", "numbers", "chance", "falls"),
+    [
+        (0.010, 5.0, 0.3, True),
+        (0.010, 5.0, 1e-4, False),
+        (0.009, 10.0, 0.3, False),
+        (0.004, 15.0, 0.3, True),
+        (0.004, 15.0, None, True),
+        (0.0, 25.0, 0.3, False),
+    ],
+)
+def test_a_name_between_shots_falls_to_a_form_that_narrows_the_factors_as_much_for_its_numbers(
+    spread: float, numbers: float, chance: float | None, *, falls: bool
+) -> None:
+    own: Any = SimpleNamespace(log_factor=np.zeros(20))
+    fit: Any = SimpleNamespace(spread=spread, residual=np.ones(10), shot_parameters=own)
+    named: Any = SimpleNamespace(
+        spread=0.010,
+        residual=np.ones(10),
+        effects=("direction_asymmetry",),
+        coordinates=(None,) * 5,
+        log_likelihood=lambda _shots: np.zeros(20),
+    )
+    form = ScoredModel("", "free_force_over_position", fit, np.zeros(20), 1.0, numbers)
+    context: Any = SimpleNamespace(coarse=SimpleNamespace(count=20, shots=None))
+    selection: Any = SimpleNamespace(accepted=named, nominal=None)
+    with (
+        patch("impactcell.discrepancy.laws.standing.refine", lambda *_: [named]),
+        patch("impactcell.discrepancy.laws.standing.chance_of_order", lambda *_: chance),
+    ):
+        assert stands(context, selection, FreeForms(named, (form,), {})) is not falls
 
 
 @pytest.mark.parametrize(

@@ -63,21 +63,21 @@ def hold_against_free_forms(context: SearchContext, selection: SelectionResult) 
     forms = fit_free_forms(fewer, refit_shot_parameters(fewer.coarse, nominal))
     if not forms.alone:
         return selection
-    free = forms.alone[0]
-    beside = [model for model in _beside_terms(fewer, forms) if not is_at_bound(model.fit)]
-    best = max(beside, key=lambda model: model.score, default=free)
-    if best.leaves_nothing and best.is_told_from(free) and best.p_value <= MAX_P_VALUE:
-        return _accept(context, selection, best, _tied(best, beside))
-    if selection.accepted is not None and not stands(fewer, selection.accepted, forms):
+    if not any(LIBRARY[effect].kind is Kind.BETWEEN_SHOTS for effect in selection.added):
+        free = forms.alone[0]
+        beside = [model for model in _beside_terms(fewer, forms) if not is_at_bound(model.fit)]
+        best = max(beside, key=lambda model: model.score, default=free)
+        if best.leaves_nothing and best.is_told_from(free) and best.p_value <= MAX_P_VALUE:
+            return _accept(context, selection, best, _tied(best, beside))
+    if selection.accepted is not None and not stands(fewer, selection, forms):
         return reject(selection.nominal, selection.final, selection.alternatives)
     return selection
 
 
 def _asks(context: SearchContext, selection: SelectionResult) -> bool:
     """Whether something is left in the traces of taps that a term may explain."""
-    between = any(LIBRARY[effect].kind is Kind.BETWEEN_SHOTS for effect in selection.added)
     is_open = selection.accepted is None or selection.remains
-    return context.problem.shots.excitation.has_contact and is_open and not between
+    return context.problem.shots.excitation.has_contact and is_open
 
 
 def _beside_terms(context: SearchContext, forms: FreeForms) -> list[ScoredModel]:

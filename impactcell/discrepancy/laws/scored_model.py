@@ -34,6 +34,8 @@ class ScoredModel:
         (Schwarz 1978), those of the spline counted by what its roughness leaves of them.
     p_value : float
         That the term alone lacks nothing, by the test of this effect beside it, over the library.
+    numbers : float
+        Shared numbers of the model, those of the spline counted likewise.
     """
 
     effect: str
@@ -41,6 +43,13 @@ class ScoredModel:
     fit: Fit
     each: Samples
     p_value: float
+    numbers: float
+
+    @property
+    def variance_of_factors(self) -> float:
+        """Variance of the friction factors about their law, for each degree of freedom that is left."""
+        shots = len(self.each)
+        return self.fit.spread**2 * shots / (shots - self.numbers) if self.numbers < shots else math.inf
 
     @property
     def score(self) -> float:
@@ -83,4 +92,4 @@ def _scored(
 ) -> ScoredModel:
     cost = 0.5 * math.log(fitted.residual.size) * numbers
     each = fitted.log_likelihood(problem.shots) - cost / problem.count
-    return ScoredModel(*names, fitted, each, p_value)
+    return ScoredModel(*names, fitted, each, p_value, numbers)

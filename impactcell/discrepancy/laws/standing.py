@@ -5,7 +5,8 @@ of friction is drawn to a pull that ends somewhere. So each place at which the e
 force, a friction, a motion or a reading of no form gets a free form, fitted alone, and the force channel a
 filter. A name falls to a form elsewhere that explains as much. In its own place a form that explains more is
 to be expected beside other errors, as it takes a part of them; where it leaves nothing the place is right,
-and the law is not.
+and the law is not. What acts between shots falls to a form that leaves the friction factors as narrow, and in
+no order that they would go with it.
 """
 
 from dataclasses import dataclass
@@ -16,8 +17,16 @@ from impactcell.discrepancy.laws.covariates import visited
 from impactcell.discrepancy.laws.free_term import FIRST_TRY, MOST_STEPS, FreeTerm, fit_free_term
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_fit, score_term
 from impactcell.discrepancy.model import Fit, fit
-from impactcell.discrepancy.search import SearchContext, refine
+from impactcell.discrepancy.search import (
+    POLICY,
+    ModelEvidence,
+    SearchContext,
+    SelectionResult,
+    chance_of_order,
+    refine,
+)
 from impactcell.errors import DiscrepancyError
+from impactcell.physics import Kind
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_form import FreeForm
 from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
@@ -86,13 +95,27 @@ def _fit_filter(context: SearchContext, rough: Fit) -> Fit | None:
     return max(fits, key=lambda one: float(one.log_likelihood(problem.shots).sum()), default=None)
 
 
-def stands(context: SearchContext, accepted: Fit, forms: FreeForms) -> bool:
-    """Whether no free form takes the name away from the effect that was accepted."""
-    refitted = refine(context, [accepted])
+def stands(context: SearchContext, selection: SelectionResult, forms: FreeForms) -> bool:
+    """Whether no free form takes the name away from the effect that was accepted.
+
+    What acts between shots is compared by the friction factors, in which it shows; all others by the traces.
+    """
+    if selection.accepted is None:
+        return False
+    refitted = refine(context, [selection.accepted])
     if not refitted:
         return False
-    named = score_fit(context.coarse, refitted[0], accepted.effects[-1])
+    named = score_fit(context.coarse, refitted[0], selection.accepted.effects[-1])
+    if find_effect(named.effect).kind is Kind.BETWEEN_SHOTS:
+        narrower = [form for form in forms.alone if form.variance_of_factors <= named.variance_of_factors]
+        return all(_is_followed(context, selection.nominal, named.effect, form) for form in narrower)
     return not any(outdoes(form, named, forms.rough) for form in forms.alone)
+
+
+def _is_followed(context: SearchContext, nominal: ModelEvidence, effect: str, form: ScoredModel) -> bool:
+    """Whether the friction factors that a free form leaves go with an effect between shots all the same."""
+    chance = chance_of_order(context, nominal, effect, form.fit.shot_parameters.log_factor)
+    return chance is not None and chance <= POLICY.between_shots_error
 
 
 def outdoes(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:

@@ -4,6 +4,7 @@ from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged,
 from impactcell.discrepancy.search.between_shots import (
     chance_by_exchange,
     chance_of_narrowing,
+    chance_of_order,
     trace_rivals,
 )
 from impactcell.discrepancy.search.candidate_fits import (
@@ -32,6 +33,7 @@ from impactcell.discrepancy.search.indistinguishability import CandidateFit, com
 from impactcell.discrepancy.search.model_error import ModelError, estimate_model_error, shared_error
 from impactcell.discrepancy.search.model_selection import nested_models, only_test, select_model
 from impactcell.discrepancy.search.open_loop import Simulation, SimulationError, simulate_held_out
+from impactcell.discrepancy.search.policy import POLICY
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
 from impactcell.discrepancy.search.validation import (
@@ -49,6 +51,7 @@ __all__ = [
     "MAX_P_VALUE",
     "NAMED",
     "NO_GAP",
+    "POLICY",
     "TIED",
     "UNKNOWN",
     "UNTESTED",
@@ -75,6 +78,7 @@ __all__ = [
     "Validation",
     "chance_by_exchange",
     "chance_of_narrowing",
+    "chance_of_order",
     "compare_fits",
     "conclude",
     "describe_gap",

@@ -53,11 +53,8 @@ def accept_between_shots(
     number = sum(LIBRARY[name].kind is Kind.BETWEEN_SHOTS for name in context.library)
     parameters = len(best.coordinates) - len(nominal.coordinates)
     chance = chance_of_narrowing(nominal.spread, best.spread, context.problem.count, parameters)
-    patterns = _patterns(context, evidence, effect)
-    if len(patterns):
-        rng = np.random.default_rng([context.seed, EXCHANGE_STREAM])
-        factors = nominal.shot_parameters.log_factor
-        chance = max(chance, chance_by_exchange(factors, patterns, rng))
+    in_order = chance_of_order(context, evidence, effect, nominal.shot_parameters.log_factor)
+    chance = chance if in_order is None else max(chance, in_order)
     p_value = min(number * chance, 1.0)
     if p_value > POLICY.between_shots_error or best.spread > POLICY.max_spread_ratio * nominal.spread:
         return None
@@ -122,10 +119,22 @@ def chance_of_narrowing(before: float, after: float, shots: int, parameters: int
     return float(fisher.sf(explained * freedom / parameters, parameters, freedom))
 
 
-def _patterns(context: SearchContext, evidence: ModelEvidence, effect: str) -> Samples:
-    """Logarithms of the factors by which an effect acts, one row a point of its grid, shape (Q, n).
+def chance_of_order(
+    context: SearchContext, evidence: ModelEvidence, effect: str, log_factor: Samples
+) -> float | None:
+    """Probability that friction factors follow an effect so well by chance, by shots exchanged at random.
 
-    No rows where it acts on static friction alone: the signs of the shots' scores were drawn for that.
+    Parameters
+    ----------
+    evidence : ModelEvidence
+        Against a model without the effect: the points of its grid.
+    log_factor : ndarray, shape (n,)
+        Of whatever model.
+
+    Returns
+    -------
+    float or None
+        None where the effect acts on static friction alone: the signs of the shots' scores tell that.
     """
     candidates = evidence.candidate_scan.candidates
     number = candidates.names.index(effect)
@@ -134,8 +143,11 @@ def _patterns(context: SearchContext, evidence: ModelEvidence, effect: str) -> S
         for point, group in zip(candidates.points, candidates.group, strict=True)
         if group == number
     ]
-    acting = [row for row in rows if row is not None]
-    return np.array(acting).reshape(len(acting), context.problem.count)
+    patterns = [row for row in rows if row is not None]
+    if not patterns:
+        return None
+    rng = np.random.default_rng([context.seed, EXCHANGE_STREAM])
+    return chance_by_exchange(log_factor, np.array(patterns), rng)
 
 
 def chance_by_exchange(log_factor: Samples, patterns: Samples, rng: np.random.Generator) -> float:
