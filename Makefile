@@ -21,6 +21,8 @@ $(VENV)/.installed: requirements.lock pyproject.toml
 demo: install
 	$(BIN)/impactcell demo $(ARGS)
 
+# Each worker, and each process that a test starts, would compile all sources anew where bytecode is not kept.
+test: export PYTHONDONTWRITEBYTECODE =
 test: install
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal $(ARGS)
 

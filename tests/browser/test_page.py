@@ -18,7 +18,7 @@ from tests.browser.chromium import DESK, PHONE, WALL, Browser, need_chromium
 from tests.browser.shop import CELL, PASSWORDS, Shop, at_work, enter, judge
 from tests.opcua_server import PatientClient
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(300), pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="module")]
 
 PAGES = {
     "cells": "/",

@@ -17,7 +17,7 @@ from tests.browser.chromium import DESK, PHONE, Browser, need_chromium
 from tests.browser.shop import CELL, Shop, at_work, enter, judge
 from tests.integration.processes import CONFIG
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(900), pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="module")]
 
 MISSING = {"stribeck_friction": {"friction_increase": 0.03, "stribeck_velocity_m_s": 0.04}}
 KNOWN = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 85}}

@@ -8,6 +8,8 @@ import pytest
 INTERRUPTED_AT = """
 import os, signal, sys
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background is born to ignore it
+
 class CtrlC:
     def find_spec(self, name, *_):
         if name == sys.argv[2]:
