@@ -77,7 +77,9 @@ class Device:
         self._on_truth = on_truth
         self._tap: RunningTap | None = None
         self._made = 0
-        self._next_s = math.inf if scenario.strikes is None else scenario.strikes.period_s
+        self._next_s = math.inf
+        if scenario.strikes is not None and scenario.strikes.begin == "at_once":
+            self._next_s = scenario.strikes.period_s
         self._rested_s = 0.0
         self._busy_until_s = -math.inf
         self._announcements = BatchAnnouncer(scenario, self._image)
@@ -114,6 +116,12 @@ class Device:
                 self._now_s = target_s
                 return
             self._step()
+
+    def request_came(self, now_s: float) -> None:
+        """Be looked at from outside: a schedule that waits for it begins."""
+        self.update(now_s)
+        if self.scenario.strikes is not None and self._next_s == math.inf:
+            self._next_s = self._now_s + self.scenario.strikes.period_s
 
     @property
     def due_s(self) -> float:

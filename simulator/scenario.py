@@ -70,8 +70,12 @@ class Part(ScenarioModel):
 
 
 class Strikes(ScenarioModel):
-    """The schedule; velocities and directions are taken in turn, or drawn."""
+    """The schedule; velocities and directions are taken in turn, or drawn.
 
+    The first strike comes a period after the start of the module, or after the first request to it.
+    """
+
+    begin: Literal["at_once", "with_first_request"] = "at_once"
     period_s: Positive = 1.0
     velocities_mm_per_min: list[Positive] = Field([4000.0], min_length=1)
     directions: list[Literal[1, -1]] = Field([1], min_length=1)

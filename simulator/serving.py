@@ -88,7 +88,7 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
     loop = asyncio.get_running_loop()
     listen = scenario.listen
     faults = FaultInjector(scenario.seed)
-    server = server_of(listen, device, faults, before=lambda: device.update(loop.time()))
+    server = server_of(listen, device, faults, before=lambda: device.request_came(loop.time()))
 
     def restart() -> int:
         server.drop_clients()

@@ -12,7 +12,7 @@ import numpy as np
 
 from impactcell.fieldbus.registers import RegisterMap, Value, Words
 from impactcell.fieldbus.status_block import integer, number
-from impactcell.records import Capture, Channel, Summary, uniform_times
+from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 
 LIGHTEST_KG, HEAVIEST_KG = 0.01, 1e5
 """What a part can weigh; anything else is a wrong register, and would cost the estimators much time."""
@@ -20,6 +20,8 @@ LATEST_NS = 2**63 - 1
 """The year 2262."""
 OUT_OF_SCALE = 5.0
 """Factor between the module's own figure and its samples: no tap explains it, every wrong unit exceeds it."""
+AT_REST = 20
+"""One sample in so many, at either end: their median is where the part lay, and no noise is a slide [1]."""
 
 
 def sample_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, int]:
@@ -156,9 +158,8 @@ def _scale_faults(
         channel = channels.get(name)
         if channel is None or not (math.isfinite(value) and value > 0.0):
             continue
-        least, most = channel.values.min(), channel.values.max()
-        largest = most if name == "force" else most - least
-        if least == most or largest <= 0.0:
+        largest = channel.values.max() if name == "force" else _displacement(channel.values)
+        if channel.values.min() == channel.values.max() or largest <= 0.0:
             continue
         if not (largest - beside) / OUT_OF_SCALE < value < OUT_OF_SCALE * largest:
             where = f"register {figure} ({registers[figure].address})"
@@ -166,6 +167,12 @@ def _scale_faults(
                 f"{where}: {value:.3g} {unit}, but the samples of {name} show {largest:.3g} {unit}: "
                 "scale or unit of one of them is wrong in the map"
             )
+
+
+def _displacement(position: Samples) -> float:
+    """How far a part lies from where it lay, in metres."""
+    few = max(len(position) // AT_REST, 1)
+    return abs(float(np.median(position[-few:]) - np.median(position[:few])))
 
 
 def _never(_: float) -> bool:

@@ -107,6 +107,20 @@ async def test_a_part_that_is_only_pushed_has_no_wrong_scale(fpga: RegisterMap) 
     assert any("sliding_distance" in fault for fault in struck.faults), struck.faults
 
 
+async def test_the_noise_of_the_samples_is_no_slide(fpga: RegisterMap) -> None:
+    """After a slow push of the whole stroke a part slides by itself for half a micrometre, or hardly more."""
+    device = ScriptedDevice(fpga)
+    noise = 1.5e-6 * np.random.default_rng(1).standard_normal(2000)
+    header = HEADER | {"stroke": 1.5e-3, "peak_force": 30.0, "sliding_distance": 0.5e-6}
+    for pushed_m in (1.5e-3, 1.53e-3):
+        position = pushed_m * np.clip(np.linspace(-0.5, 1.5, 2000), 0.0, 1.0) + noise
+        device.complete({"force": np.linspace(0.0, 30.0, 50), "position": position}, **header)
+    async with running(fpga, device) as (_, _, receptions):
+        still, further = await anext(receptions), await anext(receptions)
+    assert still.faults == ()
+    assert any("sliding_distance" in fault for fault in further.faults), further.faults
+
+
 @pytest.mark.parametrize(
     ("register", "change", "told"),
     [

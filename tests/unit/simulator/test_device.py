@@ -22,6 +22,20 @@ def test_identity_before_the_first_cycle() -> None:
     assert client.device.due_s == pytest.approx(1.0)
 
 
+def test_a_schedule_that_waits_for_the_first_request() -> None:
+    waiting = Client(scenario(strikes={"period_s": 1.0, "begin": "with_first_request"}))
+    waiting.device.update(500.0)
+    assert waiting.get("cycle_counter") == 0
+    assert waiting.device.due_s == math.inf
+    waiting.device.request_came(700.0)
+    assert waiting.device.due_s == pytest.approx(701.0)
+    waiting.device.request_came(700.5)
+    assert waiting.device.due_s == pytest.approx(701.0)
+    at_once = Client(scenario(strikes={"period_s": 1.0}))
+    at_once.device.request_came(0.25)
+    assert at_once.device.due_s == pytest.approx(1.0)
+
+
 def test_a_cycle_from_contact_to_rest() -> None:
     client = Client(scenario(), epoch_ns=10**18, now_s=100.0)
     client.device.update(101.01)
