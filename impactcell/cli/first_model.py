@@ -3,10 +3,13 @@
 import json
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from impactcell.api.friction import with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact, read
@@ -15,7 +18,7 @@ from impactcell.cli.accept_model import previous_model
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.paths import note_damage, open_journal
 from impactcell.errors import CampaignError, PredictionError, SettingsError
-from impactcell.features import extract
+from impactcell.features import Features, extract
 from impactcell.prediction.joint_plant_fit import PlantFit, fit_plant
 from impactcell.process.console import print_note, print_result
 from impactcell.settings import CellConfig, read_cell
@@ -31,6 +34,10 @@ LARGEST_DAMPING_ERROR: Final = 0.2
 """Relative standard deviation of b, which matters less."""
 LARGEST_RATIO_ERROR: Final = 0.05
 """Standard deviation of mu_k/mu_s."""
+TOUCHING: Final = 0.1
+"""Share of the peak force above which actuator and part touch."""
+APART: Final = 0.1
+"""Share of the time until the last separation; apart for longer, they have met again."""
 LARGEST_GAP: Final = 1.5
 """Residuals in noise floors; above it something is missing in the model."""
 
@@ -77,10 +84,38 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     for note in notes:
         print_note(note)
     taps = with_masses([extract(shot) for shot in struck.shots])
-    fit = fit_plant(taps, struck.gravity_m_s2, name)
+    fit = fit_plant(_with_one_contact(taps), struck.gravity_m_s2, name)
     provenance = {"made by": "impactcell", "fitted to": f"{len(fit.used)} taps of {source}"}
     fit = replace(fit, model=replace(fit.model, provenance=provenance))
     return FirstModel(fit, len(taps), tuple(_shortcomings(fit)))
+
+
+def _with_one_contact(taps: Sequence[Features]) -> Sequence[Features]:
+    """Leave out taps in which the actuator caught up with the part, if enough others are there."""
+    simple = [tap for tap in taps if not _meets_again(tap)]
+    if len(simple) == len(taps):
+        return taps
+    way_out = "shorten the stroke, or strike faster, for a single contact"
+    if len(simple) < FEWEST_TAPS:
+        print_note(
+            f"in {len(taps) - len(simple)} of {len(taps)} taps the actuator meets the part again; {way_out}"
+        )
+        return taps
+    print_note(
+        f"{len(taps) - len(simple)} of {len(taps)} taps are not used, as the actuator meets the part again; "
+        f"{way_out}"
+    )
+    return simple
+
+
+def _meets_again(tap: Features) -> bool:
+    if isinstance(tap.force, Exception) or isinstance(tap.slide, Exception):
+        return False  # the fit says what is missing
+    force = tap.force
+    pushed = force.time_s[
+        (force.values > TOUCHING * force.values.max()) & (force.time_s < tap.slide.separation_s)
+    ]
+    return bool(np.diff(pushed).max(initial=0.0) > APART * tap.slide.separation_s)
 
 
 def _shortcomings(fit: PlantFit) -> list[str]:
@@ -93,7 +128,9 @@ def _shortcomings(fit: PlantFit) -> list[str]:
     if not prior.damping_std_n_s_per_m <= LARGEST_DAMPING_ERROR * max(plant.damping_n_s_per_m, 1.0):
         found.append("b is not known well enough; vary the velocity")
     if not prior.ratio_std <= LARGEST_RATIO_ERROR:
-        found.append("mu_k/mu_s is not known well enough; strike more taps")
+        found.append(
+            "mu_k/mu_s is not known well enough; strike more taps, slower ones too: they stick first"
+        )
     if not fit.gap <= LARGEST_GAP:
         found.append(
             f"the taps are {fit.gap:.2g} noise floors off the model: something is missing in it; "
@@ -162,7 +199,14 @@ def _taps(config: CellConfig, campaign: Path | None, taps: int) -> tuple[str, Ca
     path = config.settings.journal.file
     with open_journal(path) as journal:
         captures = list(islice(journal.captures(damaged=note_damage), taps))
-    mass_kg = config.settings.part.mass_kg
+    if not captures:
+        raise CampaignError(
+            f"{path.name}: no taps are in it yet; run the cell, and come back after {TAPS} taps"
+        )
+    mass_kg, stroke_mm = config.settings.part.mass_kg, config.settings.actuator.stroke_mm
     if mass_kg is not None:
         captures = [replace(c, mass_kg=mass_kg) if math.isnan(c.mass_kg) else c for c in captures]
+    if stroke_mm is not None:
+        stroke_m = 1e-3 * stroke_mm
+        captures = [replace(c, stroke_m=stroke_m) if math.isinf(c.stroke_m) else c for c in captures]
     return f"journal {path.name}", from_captures(captures, config.model.plant.gravity_m_s2).campaign

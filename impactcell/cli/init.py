@@ -109,10 +109,13 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
     for path in (cell, model):
         if path.exists():
             raise SettingsError(f"{path}: is there already; name another directory or another cell")
+    has_map = target_map.exists()
+    if has_map and target_map.read_bytes() != source.read_bytes():
+        raise SettingsError(f"{target_map}: is there already, and is another map than {source}")
     first = None if campaign is None else fit_first_model(read(campaign), answers.name, campaign.name)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        if not target_map.exists():
+        if not has_map:
             shutil.copyfile(source, target_map)
         cell.write_text(TOP + yaml.safe_dump(_cell(answers, target_map), sort_keys=False), encoding="utf-8")
     except OSError as error:
@@ -120,11 +123,14 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
     try:
         write_model(provisional_model(answers) if first is None else first.fit.model, model)
         config = read_cell(cell)
+        print_note(
+            f"{answers.name}: calibrating the equations of friction for its mass and stroke, some seconds"
+        )
         write_model(calibrated_model(config), model)
         findings = judge_cell(read_cell(cell))
     except Exception:
-        cell.unlink()  # what was not begun whole is not begun
-        model.unlink(missing_ok=True)
+        for begun in (cell, model, *([] if has_map else [target_map])):
+            begun.unlink(missing_ok=True)  # what was not begun whole is not begun
         raise
     for finding in findings:
         print_note(str(finding))

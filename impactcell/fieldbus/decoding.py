@@ -148,9 +148,10 @@ def _scale_faults(
 ) -> Iterator[str]:
     """Compare the module's own figures with the samples: a wrong scale or unit puts them far apart.
 
-    A part slides by itself only after it was pushed, along a part of the stroke or along all of it.
+    A part slides by itself only after it was pushed, along a part of the stroke or along all of it; where the
+    module does not know its stroke, all of the motion may have been that.
     """
-    pushed = stroke if math.isfinite(stroke) else 0.0
+    pushed = stroke if math.isfinite(stroke) else math.inf
     for name, figure, unit, value, beside in (
         ("force", "peak_force", "N", summary.peak_force_n, 0.0),
         ("position", "sliding_distance", "m", summary.sliding_distance_m, pushed),

@@ -1,5 +1,6 @@
 """A cell judged as a whole: files that are right each for itself, and do not fit each other."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,8 @@ from impactcell.settings.cells import CellConfig
 
 STROKE_TOLERANCE: Final = 0.01
 """A cell's stroke may differ from its model's by this share: less than a stroke is known to."""
+CONSTANT_TOLERANCE: Final = 1e-3
+"""A constant of a map may differ from what the cell file says by this share: rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +121,18 @@ def _of_map(cell: CellConfig) -> Iterator[_Remark]:
     registers = cell.register_map
     for text in (*unknown_names(registers.registers), *not_promised(registers)):
         yield _Remark(("module", "register_map"), f"{registers.name}: {text}", is_fault=False)
+    stroke_mm = cell.settings.actuator.stroke_mm
+    for name, section, key, value, unit, scale in (
+        ("mass", "part", "mass_kg", cell.settings.part.mass_kg, "kg", 1.0),
+        ("stroke", "actuator", "stroke_mm", stroke_mm, "mm", 1e3),
+    ):
+        said = scale * registers.constants.get(name, math.nan)
+        if value is not None and abs(said - value) > CONSTANT_TOLERANCE * value:
+            yield _Remark(
+                (section, key),
+                f"the {name} is {value:g} {unit} here and always {said:g} {unit} in the register map, which "
+                f"counts; put the constant of {registers.name} right, or take it out",
+            )
 
 
 def _of_service(cell: CellConfig) -> Iterator[_Remark]:

@@ -1,7 +1,9 @@
 """An own cell from nothing: init, check, the model of its first taps; cells that do not fit together."""
 
 import json
+import math
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ import pytest
 import yaml
 
 from impactcell.cli.app import run_verb
-from impactcell.errors import ImpactCellError, PredictionError, SettingsError
+from impactcell.errors import CampaignError, ImpactCellError, PredictionError, SettingsError
 from impactcell.journal.store import Journal
 from impactcell.process.shipped import shipped_config
 from impactcell.settings import read_cell
@@ -32,7 +34,7 @@ def shots(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Thirty taps on another plant, with another mass and stroke, written by the simulator."""
     scenario = {
         "format": 1, "excitation": "tap", "seed": 3, "plant": PLANT, "masses_kg": [4.2], "stroke_m": 0.002,
-        "velocities_mm_per_min": [3000, 4500, 6000], "replicates": 5,
+        "velocities_mm_per_min": [2000, 3000, 4500, 6000], "replicates": 5,
         "sensors": {
             "force": {"rate_hz": 20000, "noise_std": 0.4},
             "position": {"rate_hz": 20000, "noise_std": 1.5e-6},
@@ -76,6 +78,30 @@ def test_what_has_to_be_said_is_named(tmp_path: Path, monkeypatch: pytest.Monkey
     assert not list(tmp_path.rglob("*.yaml")) or not (tmp_path / "d" / "own.yaml").exists()
 
 
+def test_a_map_that_says_otherwise_is_named_and_another_map_is_not_taken_for_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A constant of the map counts more than the cell file; a map of an earlier try is not used silently."""
+    theirs = (shipped_config() / "maps" / "one-buffer.yaml").read_text()
+    own = tmp_path / "own-map.yaml"
+    answers = [str(tmp_path / "cell"), *ANSWERS, "--map", str(own)]
+    own.write_text(theirs.replace("address: 12,", "address: 70000,"))
+    with pytest.raises(SettingsError, match="70000"):
+        run_verb(["init", *answers])
+    assert not list((tmp_path / "cell").iterdir()), "nothing is left of what was not begun"
+    own.write_text(theirs)
+    run("init", *answers)
+    with pytest.raises(
+        SettingsError, match=r"the mass is 4\.2 kg here and always 18\.9 kg in the register map"
+    ):
+        run_verb(["check", str(tmp_path / "cell" / "own.yaml")])
+    (tmp_path / "cell" / "own.yaml").rename(tmp_path / "cell" / "other.yaml")
+    (tmp_path / "cell" / "own.model.yaml").unlink()
+    own.write_text(theirs.replace("value: 18.9", "value: 4.2"))
+    with pytest.raises(SettingsError, match="is another map than"):
+        run_verb(["init", *answers])
+
+
 def test_the_first_model_is_that_of_the_plant(
     shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,7 +120,11 @@ def test_the_first_taps_of_the_journal_make_the_model(
 
     shutil.copytree(begun, tmp_path / "own")
     cell = tmp_path / "own" / "own.yaml"
-    captures = read(shots).shots
+    captures = [replace(shot, stroke_m=math.inf) for shot in read(shots).shots]  # the cell file knows it
+    with Journal(tmp_path / "own" / "own.sqlite", "own"):
+        pass
+    with pytest.raises(CampaignError, match="no taps are in it yet"):
+        run_verb(["model", "fit", str(cell)])
     with Journal(tmp_path / "own" / "own.sqlite", "own") as journal:
         for capture in captures[:5]:
             journal.append(capture, make_snapshot(capture), b"", ())
@@ -110,6 +140,9 @@ def test_the_first_taps_of_the_journal_make_the_model(
     run("model", "fit", cell, "--json")
     told = json.loads(capsys.readouterr().out)
     assert told["good_enough"] is True
+    slow = sum(capture.velocity_m_s < 0.04 for capture in captures[:30])
+    assert 0 < slow < 10, "in these the actuator meets the part again"
+    assert (told["taps"], told["used"]) == (30, 30 - slow)
     assert abs(told["stiffness_n_per_m"]["value"] - 3e5) < 4 * told["stiffness_n_per_m"]["std"]
     assert read_cell(cell).model.name == "own"
     run("model", "restore", cell)
