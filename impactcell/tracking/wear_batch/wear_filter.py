@@ -1,19 +1,9 @@
-"""Friction over time with the batch known: a Kalman filter, state [level, slope, offsets].
+"""Friction over time with the batch known: a Kalman filter on filterpy, state [level, slope, offsets].
 
 Measurement of cycle n in batch i, and what passes between cycles::
 
     z_n = level_n + offset_i + e,   e ~ N(0, R)
     level_{n+1} = level_n + slope_n + w_1,   slope_{n+1} = slope_n + w_2
-
-and the filter, with F, Q of the second line and H, R of the first::
-
-    predict   m <- F m,   P <- F P F' + Q
-    update    S = H P H' + R,   K = P H' / S,   m <- m + K (z - H m),
-              P <- (I - K H) P (I - K H)' + K R K'
-
-The last line is Joseph's form, which rounding cannot make negative (Bucy & Joseph 1968, Filtering for
-Stochastic Processes). Tests hold both to the bits of filterpy, whose import would cost every start a
-quarter of a second.
 
 The first batch is the reference, its offset zero. Every later batch has an offset of its own in the
 state, so that a batch that comes back is recognised and the size of a shift has its exact variance.
@@ -25,6 +15,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from filterpy import kalman
 
 from impactcell.records import Samples
 
@@ -94,8 +85,7 @@ def predict(state: WearFilter, cycles: int, level_variance: float, slope_varianc
     noise[0, 0] = level_variance * cycles + slope_variance * cycles**3 / 3.0
     noise[0, 1] = noise[1, 0] = slope_variance * cycles**2 / 2.0
     noise[1, 1] = slope_variance * cycles
-    mean = np.dot(transition, state.mean)
-    covariance = np.dot(np.dot(transition, state.covariance), transition.T) + noise
+    mean, covariance = kalman.predict(state.mean, state.covariance, F=transition, Q=noise)
     return WearFilter(state.batches, state.current, mean, covariance)
 
 
@@ -145,18 +135,11 @@ def update(
         ratio *= max(1.0, 0.5 * ratio)
         # gain x innovation as if the innovation were at the threshold: P / (P + R) shrinks by 1 / ratio
         variance = (predicted + variance) * ratio - predicted
-    mean, covariance = _corrected(state, value, variance, design)
+    mean, covariance = kalman.update(
+        state.mean, state.covariance, np.array([value]), np.array([[variance]]), design
+    )
     symmetric = (covariance + covariance.T) / 2.0
     return WearFilter(state.batches, state.current, mean, symmetric), Innovation(innovation, std)
-
-
-def _corrected(state: WearFilter, value: float, variance: float, design: Samples) -> tuple[Samples, Samples]:
-    """Mean and covariance after a measurement with row `design`, shape (1, n), by Joseph's form."""
-    before = state.covariance
-    gain = np.dot(before, design.T) * (1.0 / (np.dot(np.dot(design, before), design.T) + variance))
-    mean = state.mean + gain[:, 0] * (value - np.dot(design, state.mean))
-    remains = np.eye(len(mean)) - gain * design
-    return mean, np.dot(np.dot(remains, before), remains.T) + (gain * variance) * gain.T
 
 
 def offset(state: WearFilter, batch: str) -> tuple[float, float]:

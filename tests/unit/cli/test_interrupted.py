@@ -15,7 +15,6 @@ class CtrlC:
         if name == sys.argv[2]:
             os.kill(os.getpid(), signal.SIGINT)
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 sys.meta_path.insert(0, CtrlC())
 main = __import__(sys.argv[1], fromlist=["main"]).main
 sys.exit(main(sys.argv[3:]))

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from filterpy import kalman
 from scipy.stats import norm
 
 from impactcell.tracking.wear_batch import wear_filter, wear_report
@@ -49,37 +48,6 @@ def test_equals_least_squares_with_batches_that_come_back():
     difference = np.array([0.0, 0.0, 1.0, -1.0])
     assert size == pytest.approx(difference @ expected, abs=2e-3)
     assert std == pytest.approx(math.sqrt(difference @ covariance @ difference), rel=1e-3)
-
-
-@pytest.mark.parametrize("size", [2, 3, 5, 14])
-def test_predicts_and_updates_to_the_bits_of_filterpy(size):
-    rng = np.random.default_rng(size)
-    names = tuple(f"batch {i}" for i in range(size - 1))
-    for current in names:
-        root = rng.normal(size=(size, size)) * 10.0 ** rng.uniform(-6.0, 0.0, size)[:, None]
-        state = wear_filter.WearFilter(names, current, rng.normal(size=size), root @ root.T)
-        cycles, lag = int(rng.integers(1, 50)), int(rng.integers(0, 5))
-        level, slope, variance = 10.0 ** rng.uniform(-12.0, -2.0, 3)
-        value = float(rng.normal())
-
-        transition, noise = np.eye(size), np.zeros((size, size))
-        transition[0, 1] = cycles
-        noise[:2, :2] = [
-            [level * cycles + slope * cycles**3 / 3.0, slope * cycles**2 / 2.0],
-            [slope * cycles**2 / 2.0, slope * cycles],
-        ]
-        design = np.zeros((1, size))
-        design[0, :2] = 1.0, -lag
-        if current != names[0]:
-            design[0, 1 + names.index(current)] = 1.0
-        mean, covariance = kalman.predict(state.mean, state.covariance, F=transition, Q=noise)
-        predicted = wear_filter.predict(state, cycles, level, slope)
-        assert np.array_equal(predicted.mean, mean)
-        assert np.array_equal(predicted.covariance, covariance)
-        mean, covariance = kalman.update(mean, covariance, np.array([value]), np.array([[variance]]), design)
-        updated, _ = wear_filter.update(predicted, value, variance, math.inf, lag)
-        assert np.array_equal(updated.mean, mean)
-        assert np.array_equal(updated.covariance, (covariance + covariance.T) / 2.0)
 
 
 def test_an_outlier_is_clipped():
