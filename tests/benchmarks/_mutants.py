@@ -150,14 +150,37 @@ def compiled_with(source: str, line: int) -> frozenset[str]:
     return frozenset()
 
 
-def users_of(names: frozenset[str], sources: list[str]) -> frozenset[str]:
-    """Names of all functions that use one of `names`, or a function that does, and so on."""
-    uses = [
-        (node.name, {n.id for n in ast.walk(node) if isinstance(n, ast.Name)})
-        for source in sources
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.FunctionDef)
-    ]
-    while names < (more := names | {name for name, used in uses if used & names}):
+Named = tuple[str, str]
+"""Stem of a file, and a name in it."""
+
+
+def users_of(names: frozenset[Named], sources: list[tuple[str, str]]) -> frozenset[Named]:
+    """Name all functions that use one of `names`, or a function that does, and so on.
+
+    `sources` are stems and texts of files; a function is used by its own name, or as `module.name`.
+    """
+    uses = [use for stem, text in sources for use in _uses(stem, ast.parse(text))]
+    while names < (more := names | {user for user, used in uses if used & names}):
         names = more
     return names
+
+
+def _uses(stem: str, tree: ast.Module) -> Iterator[tuple[Named, set[Named]]]:
+    """Name each function of a file, and what it uses."""
+    imported = {
+        alias.asname or alias.name: (node.module.split(".")[-1], alias.name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
+    for function in ast.walk(tree):
+        if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        used: set[Named] = set()
+        for node in ast.walk(function):
+            match node:
+                case ast.Name(name) | ast.arg(name):
+                    used.add(imported.get(name, (stem, name)))
+                case ast.Attribute(ast.Name(module), name):
+                    used.add((imported[module][1] if module in imported else module, name))
+        yield (stem, function.name), used

@@ -158,22 +158,27 @@ def _is_noticed(
 ) -> str:
     """Say how tests notice a mutant; empty if they do not."""
     source = (ROOT / file).read_text(encoding="utf-8")
-    product = [path.read_text(encoding="utf-8") for path in (ROOT / "impactcell").rglob("*.py")]
-    changed = compiled_with(source, mutant.line)
-    users = users_of(changed, product) if changed else frozenset[str]()
+    product = [(path.stem, path.read_text(encoding="utf-8")) for path in (ROOT / "impactcell").rglob("*.py")]
+    files = {name.split("::")[0] for name in profile}
+    beside = [(Path(name).stem, (ROOT / name).read_text(encoding="utf-8")) for name in sorted(files)]
+    changed = frozenset((Path(file).stem, name) for name in compiled_with(source, mutant.line))
+    users = users_of(changed, product + beside) if changed else changed
+    names_of_users = frozenset(name for _, name in users)
 
-    def goes_through(test: dict[str, Any]) -> bool:
-        names = (name.split(".<locals>")[0].split(".")[-1] for _, name in test["through"])
+    def goes_through(place: str, test: dict[str, Any]) -> bool:
+        itself = Path(place.partition("::")[0]).stem, place.rpartition("::")[2].partition("[")[0]
+        entered = (name.split(".<locals>")[0].split(".")[-1] for _, name in test["through"])
         return (
             [file, mutant.function] in test["through"]
-            or any(name in users for name in names)
+            or itself in users
+            or any(name in names_of_users for name in entered)
             or (not mutant.function and any(entered == file for entered, _ in test["through"]))
         )
 
-    tests = tuple(name for name, test in profile.items() if all_tests or goes_through(test))
+    tests = tuple(name for name, test in profile.items() if all_tests or goes_through(name, test))
     if not tests:
         return ""
-    process = start(target=with_fault, args=(tests, file, mutant.applied(source), users))
+    process = start(target=with_fault, args=(tests, file, mutant.applied(source), names_of_users))
     process.start()
     process.join(LONGEST_S + LONGER * sum(profile[name]["s"] for name in tests))
     code = process.exitcode

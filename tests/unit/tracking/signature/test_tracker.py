@@ -344,3 +344,14 @@ def test_a_gap_that_is_no_number_is_left_out():
         assert done.exceeds is None
         assert done.reason
         assert done.state == gap_cusum.GapState()
+
+
+def test_the_usual_scatter_of_a_gap_is_that_of_its_logarithms():
+    gaps, state = np.exp(0.1 * np.random.default_rng(4).normal(size=40)), gap_cusum.GapState()
+    for cycle, gap in enumerate(gaps.tolist()):
+        done = gap_cusum.update(state, gap, cycle, 1e5, 1.0)
+        state = done.state
+    logarithms = np.log(gaps)
+    usual = math.exp(logarithms.mean())
+    assert done.evidence.size == pytest.approx(gaps[-1] - usual)
+    assert done.evidence.size_std == pytest.approx(usual * logarithms.std(ddof=1))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import logsumexp
+from scipy.stats import norm
 
 from impactcell.tracking.wear_batch import declared_std_calibration, noise_scale
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
@@ -77,3 +79,41 @@ def test_a_belief_stays_one_and_leaves_the_usual_estimate_alone(differences, rat
     ]
     assert wide == sorted(wide)
     assert wide[-1] == pytest.approx(2.0 * wide[-2])  # far off: in proportion
+
+
+def test_exponents_go_from_no_belief_to_all_of_it_in_equal_steps():
+    """Each alone, sure: the usual standard deviation, the declared one, and geometric steps between them."""
+    usual, declared = 0.002, 0.005
+    calibrated = []
+    for row in range(5):
+        belief = declared_std_calibration.prior_posterior()
+        belief[:, declared_std_calibration.LOG_PROBABILITY] = -np.inf
+        belief[row, declared_std_calibration.LOG_PROBABILITY] = 0.0
+        calibrated.append(declared_std_calibration.calibrated_std(belief, declared, usual))
+    assert calibrated == pytest.approx(np.geomspace(usual, declared, 5))
+
+
+def test_a_difference_changes_the_belief_by_bayes_rule():
+    """The density of a difference: 98 % normal, 2 % with one of the two estimates ten times as wide."""
+    rng, usual, belief = np.random.default_rng(3), 0.002, declared_std_calibration.prior_posterior()
+    column = declared_std_calibration.LOG_PROBABILITY
+    for place in range(30):
+        std, last = usual * np.exp(rng.normal(size=2))
+        difference = usual * rng.normal() * (25.0 if place % 7 == 3 else 1.4)
+        # the difference of two usual estimates has twice the variance of one
+        squared = difference**2 / (2.0 * usual**2)
+        expected = []
+        for exponent, before in zip(np.linspace(0.0, 1.0, 5), belief, strict=True):
+            spread = math.sqrt(
+                0.5
+                * ((std / usual) ** (2.0 * exponent) + (last / usual) ** (2.0 * exponent))
+                * before[declared_std_calibration.SCALE]
+            )
+            density = 0.98 * norm.pdf(math.sqrt(squared), scale=spread) + 0.02 * norm.pdf(
+                math.sqrt(squared), scale=spread * math.sqrt((10.0**2 + 1.0) / 2.0)
+            )
+            # successive differences share an estimate: two thirds of what one says is new
+            expected.append(before[column] + 2.0 / 3.0 * math.log(density))
+        belief = declared_std_calibration.update(belief, squared, std, last, usual, place + 1.0)
+        floored = np.maximum(np.array(expected) - max(expected), -10.0)
+        assert belief[:, column] == pytest.approx(floored - logsumexp(floored))

@@ -1,5 +1,6 @@
 """The place of a cycle in time, whatever order cycles come in."""
 
+import math
 from dataclasses import replace
 
 from impactcell.tracking.wear_batch.input_validation import CycleClock, update_clock
@@ -68,3 +69,18 @@ def test_a_session_that_was_not_known_before_is_no_restart():
     # nor is one that says nothing
     clock, timing = update_clock(clock, 15, 0, LIMIT)
     assert (timing.passed, clock.session) == (1, 5)
+
+
+def test_a_cycle_without_a_time_leaves_the_period_as_it_was():
+    second, begin, clock = 10**9, 10**18, CycleClock()
+    for cycle, time_ns in ((1, begin), (2, begin + second), (3, 0), (4, begin + 3 * second)):
+        clock, timing = update_clock(clock, cycle, time_ns, LIMIT)
+        assert timing.note == ""
+    # the two cycles since the last that had a time took what two usual ones take
+    assert clock.period_s < 2.0
+    clock, timing = update_clock(CycleClock(), 1, 0, LIMIT)
+    clock, timing = update_clock(clock, 2, begin, LIMIT)
+    assert timing.note == ""
+    assert math.isnan(clock.period_s)
+    clock, _ = update_clock(clock, 3, begin + second, LIMIT)
+    assert clock.period_s == 1.0

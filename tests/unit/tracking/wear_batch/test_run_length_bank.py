@@ -15,6 +15,7 @@ from impactcell.tracking.wear_batch import (
     initial_state,
     run_length_bank,
     run_length_model,
+    state_reports,
 )
 from impactcell.tracking.wear_batch.run_length_model import BankModel, Measurement
 
@@ -255,3 +256,41 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
         assert abs(mine[0] - other[0]) <= 2
         assert abs(mine[1] - other[1]) <= 3
         assert mine[2] == pytest.approx(other[2], abs=0.15)
+
+
+def test_a_series_is_its_measurements_one_after_another():
+    rng = np.random.default_rng(7)
+    series = np.column_stack(
+        [
+            rng.normal(size=40), rng.uniform(0.5, 2.0, 40), np.ones(40), np.zeros(40), np.arange(40.0),
+            np.where(np.arange(40) == 25, 1.0, 0.0),
+        ]
+    )  # fmt: skip
+    model, banks = BankModel(1e-3, 16.0, 0.0, 0.0, 0.003, 0.01), []
+    for _ in range(2):
+        first = run_length_bank.initial_bank(series[0, 0], series[0, 1], 0.1, 0, 0.003)
+        banks.append((run_length_bank.workspace(first), np.zeros(2)))
+    (one, outliers_one), (other, outliers_other) = banks
+    count, total = 2, 0.0
+    for row in series[1:]:
+        count, density, *_ = run_length_bank.update(one, count, model, Measurement(*row), outliers_one, 0.0)
+        total += density
+    assert run_length_bank.update_series(other, 2, model, series, outliers_other, 0.0) == (count, total)
+    assert run_length_bank.stored(other, count).tolist() == run_length_bank.stored(one, count).tolist()
+
+
+def test_level_of_the_first_batch_is_total_less_offset_in_mean_and_covariance():
+    rng = np.random.default_rng(9)
+    rows, roots = np.zeros((5, run_length_bank.WIDTH)), rng.normal(size=(5, 4, 4))
+    rows[:, 0], rows[:, 2:6] = np.log(rng.dirichlet(np.ones(5))), rng.normal(size=(5, 4))
+    rows[:, 6:] = (roots @ roots.transpose(0, 2, 1)).reshape(5, 16)
+    moments, offset, offset_std = state_reports._bank_moments(rows)
+    share, means = np.exp(rows[:, 0]), rows[:, 2:6]
+    apart = means - share @ means
+    covariance = np.einsum("i,iab->ab", share, roots @ roots.transpose(0, 2, 1))
+    covariance += np.einsum("i,ia,ib->ab", share, apart, apart)
+    combined = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+    of_level_and_slope = combined @ covariance @ combined.T
+    assert moments[:2] == pytest.approx(combined @ (share @ means))
+    assert moments[2:] == pytest.approx(of_level_and_slope[np.triu_indices(2)])
+    assert (offset, offset_std**2) == pytest.approx(((share @ means)[2], covariance[2, 2]))

@@ -200,3 +200,17 @@ def test_blocks_are_kept_only_where_nobody_says_of_which_batch_a_cycle_is():
     untold = followed(told.state, values, first=40, settings=known)
     assert untold.state.wear_blocks is not None
     assert followed(untold.state, values, first=80, settings=known, batch="A").state.wear_blocks is None
+
+
+@pytest.mark.parametrize("hazard", [1e-3, 0.4, 1.0])
+def test_a_change_that_may_have_been_takes_its_probability_from_that_of_none(hazard):
+    grid = np.array([0.0])
+    wear = wear_blocks.WearBlocks(0.0, np.array([0.0, 0.2, 0.2]), np.diag([1e-10, 4.0, 4.0]))
+    _, segments = wear_blocks.before_blocks(wear, grid, STD**2)
+    present = np.empty(block_filter.ROOM, block_filter.SEGMENT)
+    count = block_filter.copy_present(segments[0], present)
+    count = block_filter.spawn(present, count, 8.0, hazard, 16.0 * STD**2)
+    changed = present[:count]["change"] == 8.0
+    probability = present[:count]["probability"]
+    assert probability.sum() == pytest.approx(1.0)
+    assert probability[changed].sum() == pytest.approx(hazard)
