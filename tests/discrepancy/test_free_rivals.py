@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.laws.scored_model import ScoredModel
-from impactcell.discrepancy.laws.standing import FreeForms, is_in_its_place, outdoes, stands
+from impactcell.discrepancy.laws.standing import (
+    FreeForms,
+    fit_free_forms,
+    is_in_its_place,
+    outdoes,
+    stands,
+)
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY as EFFECTS
 from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
@@ -123,6 +129,12 @@ def test_an_effect_has_its_place_among_the_free_forms(effect: str, place: str) -
     assert effect in EFFECTS
     assert is_in_its_place(effect, place)
     assert not is_in_its_place(effect, "free_speed_over_time")
+
+
+def test_no_filter_is_fitted_where_no_force_was_recorded() -> None:
+    context: Any = SimpleNamespace(coarse=SimpleNamespace(shots=SimpleNamespace(channel=np.ones(50))))
+    with patch("impactcell.discrepancy.laws.standing.REMAINDER_FORMS", {}):
+        assert fit_free_forms(context, _leaving(20.0)).alone == ()
 
 
 def test_a_delay_is_not_established_in_the_place_of_a_lag() -> None:

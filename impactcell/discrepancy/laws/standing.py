@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.discrepancy.data import FORCE
 from impactcell.discrepancy.laws.covariates import visited
 from impactcell.discrepancy.laws.free_term import FIRST_TRY, MOST_STEPS, FreeTerm, fit_free_term
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_fit, score_term
@@ -81,7 +82,9 @@ def fit_term(context: SearchContext, base: Fit, form: FreeForm) -> FreeTerm | No
 
 
 def _fit_filter(context: SearchContext, rough: Fit) -> Fit | None:
-    """Fit the filter of the force channel from several starts, and keep the likeliest."""
+    """Fit the filter of the force channel from several starts, and keep the likeliest; None without one."""
+    if not (context.coarse.shots.channel == FORCE).any():
+        return None
     problem = context.coarse.with_effects((*rough.effects, FORCE_FILTER.identifier))
     fits = []
     for start in FILTER_STARTS:
