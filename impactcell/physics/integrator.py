@@ -207,7 +207,7 @@ def integrate_tap(
         event, length = complete_step(t, length, phase, step)
         reaches_limit = reaches_limit and event < 0
         if length > 0.0:
-            accept_step(t, length, phase, step, record)
+            accept_step(t, length, phase, step, record, goal)
         t = limit if reaches_limit else t + length
         if not reaches_limit or following > h:
             h = min(following, MAX_STEP_S)

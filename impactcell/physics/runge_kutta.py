@@ -27,6 +27,10 @@ A[STAGES, :STAGES] = DOP853.B
 A[STAGES + 1 :] = DOP853.A_EXTRA
 C = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
 """Nodes of the tableau, in fractions of the step."""
+LATER = np.array([next((j for j in range(1, s) if A[s, j] != 0.0), max(s, 1)) for s in range(EXTENDED)])
+"""First stage after the first one that a stage is made of: those between have no weight in it."""
+LATER_WEIGHED: Final = 5
+"""First stage after the first one that has a weight in the step, its errors and its interpolant."""
 D = np.ascontiguousarray(DOP853.D)
 """Weights of the stages in the last four coefficients of the interpolant."""
 E3 = np.ascontiguousarray(DOP853.E3)
@@ -47,7 +51,13 @@ def evaluate_stages(first: int, last: int, t: float, h: float, phase: SmoothPhas
     for s in range(first, last):
         # The three components that every plant has are summed side by side, which is faster.
         advance, speed, travel = 0.0, 0.0, 0.0
-        for j in range(s):
+        if s > 0:
+            advance, speed, travel = (
+                A[s, 0] * K[at.ADVANCE],
+                A[s, 0] * K[at.PART_SPEED],
+                A[s, 0] * K[at.TRAVEL],
+            )
+        for j in range(LATER[s], s):
             weight = A[s, j]
             advance += weight * K[j * at.STATE_WIDTH + at.ADVANCE]
             speed += weight * K[j * at.STATE_WIDTH + at.PART_SPEED]
@@ -56,8 +66,8 @@ def evaluate_stages(first: int, last: int, t: float, h: float, phase: SmoothPhas
         trial[at.PART_SPEED] = state[at.PART_SPEED] + h * speed
         trial[at.TRAVEL] = state[at.TRAVEL] + h * travel
         for i in range(at.FIRST_EXTRA_STATE, phase.contact_mode[at.STATE_COUNT]):
-            total = 0.0
-            for j in range(s):
+            total = A[s, 0] * K[i] if s > 0 else 0.0
+            for j in range(LATER[s], s):
                 total += A[s, j] * K[j * at.STATE_WIDTH + i]
             trial[i] = state[i] + h * total
         derivative(t + C[s] * h, trial, phase, K, s * at.STATE_WIDTH)
@@ -70,9 +80,9 @@ def step_error(n: int, h: float, step: StepBuffers) -> float:
     third = 0.0
     for i in range(n):
         scale = ABSOLUTE[i] + RELATIVE * max(abs(step.state[i]), abs(step.next_state[i]))
-        e5 = 0.0
-        e3 = 0.0
-        for j in range(STAGES + 1):
+        e5 = E5[0] * step.stages[i]
+        e3 = E3[0] * step.stages[i]
+        for j in range(LATER_WEIGHED, STAGES + 1):
             e5 += E5[j] * step.stages[j * at.STATE_WIDTH + i]
             e3 += E3[j] * step.stages[j * at.STATE_WIDTH + i]
         fifth += (e5 / scale) ** 2
@@ -95,8 +105,8 @@ def build_interpolant(t: float, h: float, phase: SmoothPhase, step: StepBuffers)
         out[2 * at.STATE_WIDTH + i] = h * K[i] - delta
         out[3 * at.STATE_WIDTH + i] = 2.0 * delta - h * (K[STAGES * at.STATE_WIDTH + i] + K[i])
         for j in range(4):
-            total = 0.0
-            for s in range(EXTENDED):
+            total = D[j, 0] * K[i]
+            for s in range(LATER_WEIGHED, EXTENDED):
                 total += D[j, s] * K[s * at.STATE_WIDTH + i]
             out[(4 + j) * at.STATE_WIDTH + i] = h * total
 

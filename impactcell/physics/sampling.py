@@ -177,12 +177,18 @@ def fill_channel(
 
 
 @compiled
-def accept_step(t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
-    """Take peak force and samples of a step, carry the sensor's lag over it, and go on from its end."""
+def accept_step(
+    t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord, goal: int
+) -> None:
+    """Take samples of a step, and the peak force where outputs are wanted; go on from the step's end.
+
+    The sensor's lag is carried over it.
+    """
     sign = phase.parameters[at.DIRECTION]
     if phase.cache[at.LAG_S] > 0.0:
         fit_force(t, h, phase, step)
-    update_peak_force(t, h, phase, step, record.outputs)
+    if goal == at.TO_REST:
+        update_peak_force(t, h, phase, step, record.outputs)
     fill_force(t, h, phase, step, record)
     fill_channel(at.POSITION, at.ADVANCE, t, h, sign, step.interpolant, record)
     fill_channel(at.ACTUATOR, at.TRAVEL, t, h, sign, step.interpolant, record)
