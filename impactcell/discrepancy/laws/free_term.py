@@ -1,7 +1,7 @@
 """A free-form term fitted through the simulation, as smooth as shots that it was not fitted to want it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -102,10 +102,10 @@ def candidate_terms(problem: Problem, base: Fit, forms: Sequence[FreeForm] = ())
         span = visited(problem, base, form)
         if span is None or not _may_act(problem, base, form):
             continue
-        extended, state = _start(problem, base, form, span, FIRST_TRY)
-        H, g = equations(extended, state)
-        if np.isfinite(H).all() and np.isfinite(g).all():
-            gain = float(g @ np.linalg.lstsq(H + extended.penalty_matrix, g, rcond=1e-12)[0])
+        start = TermStart.at(problem, base, form, span)
+        if start.has_answer:
+            H, g = start.information + start.weighed(FIRST_TRY).penalty_matrix, start.gradient
+            gain = float(g @ np.linalg.lstsq(H, g, rcond=1e-12)[0])
             promise.append((gain, form))
     return [form for _, form in sorted(promise, key=lambda entry: -entry[0])]
 
@@ -115,54 +115,83 @@ def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
     inner, check = problem.shots.excitation.split(problem.shots.items, seed)
     parts = problem.select(inner), problem.select(check)
     inner_base = _of_shots(base, inner, parts[0])
-    first: list[tuple[FreeForm, Visited, dict[float, Samples]]] = []
+    trials: list[_Check] = []
     for form in candidate_terms(problem, base)[:PLACES]:
         span = visited(problem, base, form)
         if span is not None:
-            first.append((form, span, {FIRST_TRY: _check(parts, inner_base, form, span, FIRST_TRY)}))
-    nearest = min((float(np.mean(errors[FIRST_TRY])) for _, _, errors in first), default=np.inf)
+            trials.append(_Check(parts, inner_base, TermStart.at(parts[0], inner_base, form, span)))
+            trials[-1].try_weights((FIRST_TRY,))
+    nearest = min((trial.least for trial in trials), default=np.inf)
     terms = []
-    for coarse, span, tried in first:
-        if float(np.mean(tried[FIRST_TRY])) < WORTH_MORE * nearest:
-            for smoothness in set(SMOOTHNESS) - {FIRST_TRY}:
-                tried[smoothness] = _check(parts, inner_base, coarse, span, smoothness)
-        form, errors = _finer(parts, inner_base, (coarse, span, tried))
-        smoothness = _best(errors)
-        if not np.isfinite(errors[smoothness]).all():
+    for rough in trials:
+        if rough.least < WORTH_MORE * nearest:
+            rough.try_weights(SMOOTHNESS)
+        best = _finer(rough)
+        form, span, errors = best.start.form, best.start.visited, best.errors[best.best]
+        if not np.isfinite(errors).all():
             continue
-        extended, whole = fit_free_term(problem, base, form, span, smoothness)
-        terms.append(FreeTerm(form, span, extended, whole, smoothness, errors[smoothness]))
+        extended, whole = fit_free_term(problem, base, form, span, best.best)
+        terms.append(FreeTerm(form, span, extended, whole, best.best, errors))
     return sorted(terms, key=lambda term: term.check)
 
 
-def _finer(
-    parts: tuple[Problem, Problem], base: Fit, coarse: tuple[FreeForm, Visited, dict[float, Samples]]
-) -> tuple[FreeForm, dict[float, Samples]]:
+def _finer(rough: "_Check") -> "_Check":
     """Take more pieces where a term leaves something and they leave less."""
-    form, span, errors = coarse
-    finer, left = FINER.get(form.place), float(np.mean(errors[_best(errors)]))
-    if finer is None or left <= FINE_FROM:
-        return form, errors
-    fine = {weight: _check(parts, base, finer, span, weight) for weight in FINE_SMOOTHNESS}
-    return (finer, fine) if float(np.mean(fine[_best(fine)])) < left else (form, errors)
+    finer = FINER.get(rough.start.form.place)
+    if finer is None or rough.least <= FINE_FROM:
+        return rough
+    start = TermStart.at(rough.parts[0], rough.base, finer, rough.start.visited)
+    fine = _Check(rough.parts, rough.base, start)
+    fine.try_weights(FINE_SMOOTHNESS)
+    return fine if fine.least < rough.least else rough
 
 
-def _best(errors: dict[float, Samples]) -> float:
-    return min(errors, key=lambda weight: float(np.mean(errors[weight])))
+@dataclass(slots=True, eq=False)
+class _Check:
+    """How well a term predicts shots that it was not fitted to, by the weight of its roughness.
 
+    Attributes
+    ----------
+    parts : tuple of Problem
+        Shots to fit, and shots to check.
+    base : Fit
+        Model without the term, of the first part.
+    start : TermStart
+    errors : dict of float to ndarray, shape (n,)
+        Mean squared residual, and factor, of each shot of the second part; inf where there is no fit.
+    """
 
-def _check(
-    parts: tuple[Problem, Problem], base: Fit, form: FreeForm, span: Visited, smoothness: float
-) -> Samples:
-    """Mean squared residual, and factor, of each shot of the second part after a fit to the first; or inf."""
-    try:
-        extended, fitted = fit_free_term(parts[0], base, form, span, smoothness)
-    except DiscrepancyError:
-        return np.full(parts[1].count, np.inf)
-    held = refit_shot_parameters(parts[1].constrained(extended.effects, extended.constraints), fitted)
-    factors = (held.shot_parameters.log_factor / base.spread) ** 2
-    errors: Samples = (held.misfit(parts[1].shots) + factors) / (parts[1].sizes + 1)
-    return errors
+    parts: tuple[Problem, Problem]
+    base: Fit
+    start: "TermStart"
+    errors: dict[float, Samples] = field(default_factory=dict)
+
+    @property
+    def best(self) -> float:
+        """Weight that predicts best."""
+        return min(self.errors, key=lambda weight: float(np.mean(self.errors[weight])))
+
+    @property
+    def least(self) -> float:
+        """Mean error at that weight."""
+        return float(np.mean(self.errors[self.best]))
+
+    def try_weights(self, weights: Sequence[float]) -> None:
+        """Fit and check at weights that have not been tried."""
+        for weight in weights:
+            if weight not in self.errors:
+                self.errors[weight] = self._error(weight)
+
+    def _error(self, weight: float) -> Samples:
+        check = self.parts[1]
+        try:
+            extended, fitted = self.start.fit(weight)
+        except DiscrepancyError:
+            return np.full(check.count, np.inf)
+        held = refit_shot_parameters(check.constrained(extended.effects, extended.constraints), fitted)
+        factors = (held.shot_parameters.log_factor / self.base.spread) ** 2
+        errors: Samples = (held.misfit(check.shots) + factors) / (check.sizes + 1)
+        return errors
 
 
 def _may_act(problem: Problem, base: Fit, form: FreeForm) -> bool:
@@ -181,28 +210,64 @@ def _of_shots(base: Fit, indices: IndexArray, part: Problem) -> Fit:
     return Fit(base.effects, base.coordinates, base.theta, shot_parameters, base.spread, residual)
 
 
-def _start(
-    problem: Problem, base: Fit, form: FreeForm, span: Visited, smoothness: float
-) -> tuple[Problem, FitState]:
-    """Model with the term still at zero, its roughness weighed by what the data know of its coefficients."""
-    identifier, count = form.effect.identifier, len(form.coefficients)
-    held = {
-        **problem.constraints.held,
-        f"{identifier}.{LOWER}": span.lower,
-        f"{identifier}.{UPPER}": span.upper,
-    }
-    effects = (*base.effects, identifier)
-    bare = problem.constrained(effects, Constraints(held))
-    theta = np.concatenate([base.theta, np.zeros(count)])
-    state = bare.evaluate(theta, base.shot_parameters, base.spread)
-    if not np.isfinite(state.cost):
-        return bare, state
-    H, _ = equations(bare, state)
-    scale = float(np.trace(H[-count:, -count:])) / count
-    differences = np.diff(np.eye(count), n=2, axis=0)
-    rows = np.vstack([np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(count)])
-    weighed = Constraints(held, (Roughness(identifier, form.coefficients, rows),))
-    return problem.constrained(effects, weighed), state
+@dataclass(frozen=True, slots=True, eq=False)
+class TermStart:
+    """A model with a free-form term that is still at zero: where fits begin, whatever the roughness weighs.
+
+    Attributes
+    ----------
+    form : FreeForm
+    visited : Visited
+    problem : Problem
+        Nothing is said of the roughness.
+    state : FitState
+    information, gradient : ndarray, shapes (p, p) and (p,)
+        Of the shared coordinates, each shot's own eliminated.
+    """
+
+    form: FreeForm
+    visited: Visited
+    problem: Problem
+    state: FitState
+    information: Samples
+    gradient: Samples
+
+    @classmethod
+    def at(cls, problem: Problem, base: Fit, form: FreeForm, span: Visited) -> "TermStart":
+        """Add a term to a model."""
+        identifier, count = form.effect.identifier, len(form.coefficients)
+        held = {
+            **problem.constraints.held,
+            f"{identifier}.{LOWER}": span.lower,
+            f"{identifier}.{UPPER}": span.upper,
+        }
+        bare = problem.constrained((*base.effects, identifier), Constraints(held))
+        theta = np.concatenate([base.theta, np.zeros(count)])
+        state = bare.evaluate(theta, base.shot_parameters, base.spread)
+        return cls(form, span, bare, state, *equations(bare, state))
+
+    @property
+    def has_answer(self) -> bool:
+        """Whether the plant has one, and derivatives."""
+        return bool(np.isfinite(self.information).all() and np.isfinite(self.gradient).all())
+
+    def weighed(self, smoothness: float) -> Problem:
+        """Weigh the roughness by what the data know of the coefficients."""
+        if not np.isfinite(self.state.cost):
+            return self.problem
+        identifier, count = self.form.effect.identifier, len(self.form.coefficients)
+        scale = float(np.trace(self.information[-count:, -count:])) / count
+        differences = np.diff(np.eye(count), n=2, axis=0)
+        rows = np.vstack([np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(count)])
+        roughness = Roughness(identifier, self.form.coefficients, rows)
+        constraints = Constraints(self.problem.constraints.held, (roughness,))
+        return self.problem.constrained(self.problem.effects, constraints)
+
+    def fit(self, smoothness: float) -> tuple[Problem, Fit]:
+        """Fit the model, by a few steps."""
+        extended, state = self.weighed(smoothness), self.state
+        fitted = fit(extended, state.theta, state.shot_parameters, spread=state.spread, most_steps=MOST_STEPS)
+        return extended, fitted
 
 
 def equations(problem: Problem, state: FitState) -> tuple[Samples, Samples]:
@@ -216,6 +281,4 @@ def fit_free_term(
     problem: Problem, base: Fit, form: FreeForm, span: Visited, smoothness: float
 ) -> tuple[Problem, Fit]:
     """Fit a model with one free-form term more, from where it stands without."""
-    extended, state = _start(problem, base, form, span, smoothness)
-    fitted = fit(extended, state.theta, state.shot_parameters, spread=base.spread, most_steps=MOST_STEPS)
-    return extended, fitted
+    return TermStart.at(problem, base, form, span).fit(smoothness)

@@ -125,21 +125,34 @@ def _scaled(parameter: Parameter) -> tuple[str, float, float, float, float]:
     return "linear", typical, parameter.lower / typical, parameter.upper / typical, start / typical
 
 
-def plant_parameters(
-    coordinates: tuple[Coordinate, ...], theta: Samples, names: tuple[str, ...], typical: Samples
-) -> Samples:
-    """Parameter vector in the order of the plant's `names` from coordinates.
+def parameter_columns(coordinates: tuple[Coordinate, ...], names: tuple[str, ...]) -> tuple[int, ...]:
+    """Place of each coordinate's parameter among the plant's `names`; -1 for mu_s/mu_k, which is none."""
+    return tuple(
+        -1 if is_friction_ratio(coordinate) else names.index(parameter_name(coordinate))
+        for coordinate in coordinates
+    )
 
-    `typical` holds what is taken for parameters that are not free.
+
+def is_friction_ratio(coordinate: Coordinate) -> bool:
+    """Whether a coordinate is mu_s/mu_k of the plant."""
+    return coordinate.parameter == "ratio" and not coordinate.effect
+
+
+def plant_parameters(
+    coordinates: tuple[Coordinate, ...], theta: Samples, columns: tuple[int, ...], typical: Samples
+) -> Samples:
+    """Parameter vector of the plant from coordinates.
+
+    `columns` are those of `parameter_columns`; `typical` holds what is taken for what is not free.
     """
     parameters = typical.copy()
     ratio = math.nan
-    for coordinate, theta_value in zip(coordinates, theta, strict=True):
-        value = coordinate.value(float(theta_value))
-        if coordinate.parameter == "ratio" and not coordinate.effect:
+    for coordinate, theta_value, column in zip(coordinates, theta.tolist(), columns, strict=True):
+        value = coordinate.value(theta_value)
+        if column < 0:
             ratio = value
             continue
-        parameters[names.index(parameter_name(coordinate))] = value
+        parameters[column] = value
     if not math.isnan(ratio):
         parameters[2] = ratio * parameters[3]
     else:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,9 +13,13 @@ from impactcell.discrepancy.model.parameters import (
     Coordinate,
     default_parameters,
     effect_coordinates,
+    is_friction_ratio,
     nominal_coordinates,
+    parameter_columns,
     plant_parameters,
 )
+from impactcell.physics import LawKind
+from impactcell.physics.effects import find_effect
 from impactcell.records import Samples
 
 DIFFERENCE_STEP = 2e-5
@@ -134,9 +139,14 @@ class Problem:
 
     def plant_parameters(self, theta: Samples) -> Samples:
         """Parameter vector of the plant at some coordinates."""
+        return plant_parameters(self.coordinates, theta, *self._parameter_layout)
+
+    @cached_property
+    def _parameter_layout(self) -> tuple[tuple[int, ...], Samples]:
+        """Where the coordinates' parameters lie in the plant's vector, and what is held there."""
         names = self.forward.names(self.effects)
         held = self.constraints.hold(names, default_parameters(names))
-        return plant_parameters(self.coordinates, theta, names, held)
+        return parameter_columns(self.coordinates, names), held
 
     def penalty(self, theta: Samples) -> float:
         """Penalty of a free-form term's roughness, in squared standard deviations."""
@@ -156,12 +166,20 @@ class Problem:
 
     def linearise(self, state: FitState) -> tuple[Samples, Samples]:
         """Differentiate the whitened prediction: shared coordinates, shape (p, N), and shots' own, (q, N)."""
-        return self.shared_jacobian(state), self.shot_jacobian(state)
+        of_shots = self.shot_jacobian(state)
+        return self.shared_jacobian(state, of_shots[0]), of_shots
 
-    def shared_jacobian(self, state: FitState) -> Samples:
-        """Differentiate the whitened prediction by the shared coordinates, shape (p, N)."""
+    def shared_jacobian(self, state: FitState, by_factor: Samples | None = None) -> Samples:
+        """Differentiate the whitened prediction by the shared coordinates, shape (p, N).
+
+        Where `by_factor`, the derivative by the friction factors' logarithms, is at hand, and those multiply
+        all friction there is, it is that by the logarithm of mu_k as well.
+        """
         jacobian = np.empty((len(self.coordinates), state.residual.size))
         for column, coordinate in enumerate(self.coordinates):
+            if by_factor is not None and self._is_common_factor(coordinate, state):
+                jacobian[column] = by_factor
+                continue
             step = DIFFERENCE_STEP
             if coordinate.form != "log":
                 step *= max(abs(state.theta[column]), SMALLEST_SCALE)
@@ -172,6 +190,16 @@ class Problem:
             change = state.residual - self.residual(moved, state.shot_parameters)
             jacobian[column] = remove_jumps(change) / step
         return jacobian
+
+    def _is_common_factor(self, coordinate: Coordinate, state: FitState) -> bool:
+        """Whether a step of this coordinate is the same step of every shot's friction factor."""
+        return (
+            coordinate.parameter == "mu_k"
+            and not coordinate.effect
+            and any(map(is_friction_ratio, self.coordinates))
+            and not any(LawKind.KINETIC in find_effect(effect).laws for effect in self.effects)
+            and float(np.abs(state.shot_parameters.log_factor).max()) < LARGEST_LOG_FACTOR - DIFFERENCE_STEP
+        )
 
     def shot_jacobian(self, state: FitState, *, central: bool = False) -> Samples:
         """Differentiate the whitened prediction by each shot's own numbers, shape (q, N)."""
