@@ -1,8 +1,13 @@
 """Texts in the language of who reads them, numbers as that language writes them."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from impactcell.alarms import RULES, Message
 from impactcell.records import Alarm
 from impactcell.web.texts import CATALOGUE, LANGUAGES
+from impactcell.web.texts.effects import GERMAN_EFFECTS
+from impactcell.web.texts.findings import ENGLISH_STEPS, GERMAN_STEPS, german_effect, german_headline
 
 LARGE = 1e9
 """From here on a number is written with an exponent, in any unit."""
@@ -60,6 +65,24 @@ class Messages:
         """
         key = f"refused_{code}"
         return self[key if key in CATALOGUE else "refused_other"]
+
+    def headline(self, result: Mapping[str, Any]) -> str:
+        """Say what a study found."""
+        return german_headline(result) if self.language == "de" else str(result["headline"])
+
+    def effect(self, identifier: str) -> str:
+        """Name an effect."""
+        return german_effect(identifier) if self.language == "de" else identifier.replace("_", " ")
+
+    def advice(self, effect: Mapping[str, Any]) -> tuple[str, str]:
+        """Say what an effect of a result means and what to look at; empty where that is not known."""
+        if self.language == "de" and effect["effect"] in GERMAN_EFFECTS:
+            return GERMAN_EFFECTS[effect["effect"]][1:]
+        return effect.get("meaning", ""), effect.get("look_at", "")
+
+    def step(self, name: str) -> str:
+        """Name a step of a study."""
+        return (GERMAN_STEPS if self.language == "de" else ENGLISH_STEPS).get(name, name)
 
     def number(self, value: float, digits: int) -> str:
         """Write a number with so many significant digits, and an exponent only where it is large or small.

@@ -129,7 +129,18 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
     assert "versuch_b_3.csv" in shown
     study_s = await shop.beside(run)
     print(f"dropped to named: {time.monotonic() - begun:.1f} s, of that the study {study_s:.1f} s")
-    faults = []
+
+    def look_in_german() -> list[str]:
+        address = browser.driver.current_url
+        browser.show_as("light", PHONE)
+        browser.open(f"{address}?lang=de")
+        found = judge(browser, "study, German", pictures / "page-study-phone-de.png", PHONE[0])
+        assert "Es fehlt: Stribeck-Reibung" in browser.text
+        assert "Nachsehen: die Schmierung" in browser.text
+        browser.open(f"{address}?lang=en")
+        return found
+
+    faults = await shop.beside(look_in_german)
     for theme, size in (("light", DESK), ("dark", DESK), ("light", PHONE)):
         suffix = "phone" if size == PHONE else theme
 

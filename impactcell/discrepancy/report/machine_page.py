@@ -24,12 +24,21 @@ def write_machine_report(finding: MachineFinding, document: dict[str, Any], sour
     environment = Environment(
         loader=loader, autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["number"] = format_number
+    environment.filters.update(number=format_number, share=format_share)
     text, _, _ = loader.get_source(environment, "report.html.j2")
     style = re.search(r"<style>(.*?)</style>", text, re.DOTALL)
     context = machine_page_context(finding, document, source) | {"style": style.group(1) if style else ""}
     page = environment.get_template("machine.html.j2").render(**context)
     file.write_text(page, encoding="utf-8")
+
+
+def format_share(part: float, whole: float) -> str:
+    """Write a share in per cent, without a sign where it is none.
+
+    >>> format_share(0.123, 1.0), format_share(-1e-5, 1.0), format_share(1.0, 0.0)
+    ('12.3 %', '0.0 %', '0.0 %')
+    """
+    return f"{round(100.0 * part / whole if whole else 0.0, 1) + 0.0:.1f} %"
 
 
 def machine_page_context(finding: MachineFinding, document: dict[str, Any], source: str) -> dict[str, Any]:

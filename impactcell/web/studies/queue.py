@@ -153,12 +153,11 @@ class StudyQueue:
             study.result = overview | {"messages": list(outcome.messages)}
         else:
             arguments = ["discrepancy", campaign, "-o", str(results), "--json", *against]
-            result = _json((await self._verb(study, arguments)).output)
-            if cell is not None and result.get("effects"):
+            result = study.result = _json((await self._verb(study, arguments)).output)
+            if cell is not None and result.get("effects"):  # what it found is shown meanwhile
                 extended = str(results / result["model"])
                 arguments = ["model", "accept", str(cell), extended, "--dry-run", "--json"]
                 study.changes = _json((await self._verb(study, arguments)).output)
-            study.result = result
         study.stage = Stage.DONE
 
     async def _verb(

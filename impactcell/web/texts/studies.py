@@ -73,6 +73,8 @@ STUDY_TEXTS: Texts = {
     "tied_with": ("These shots cannot tell it from", "Diese Stöße unterscheiden es nicht von"),
     "report": ("Report", "Bericht"),
     "report_alone": ("Report alone", "Bericht allein"),
+    "report_language": ("All of it, with figures; to send on it is one file.",
+                        "Alles, mit Bildern und auf Englisch; zum Weitergeben eine einzige Datei."),
     "remove": ("Remove this measurement", "Diese Messung entfernen"),
     "error_kind": ("Files of this kind cannot be read.", "Dateien dieser Art sind nicht lesbar."),
     "error_file_too_large": ("The file is too large: 500 MB at most, all files together.",

@@ -8,6 +8,8 @@ import pytest
 import impactcell.web
 from impactcell.alarms import EventKind
 from impactcell.alarms.lifecycle import Refusal
+from impactcell.physics.effect import Phase
+from impactcell.physics.effects import LIBRARY
 from impactcell.quantities import FOLDERS
 from impactcell.records import Estimator, Quality
 from impactcell.scada import Role
@@ -17,6 +19,8 @@ from impactcell.web.page_context import THEMES
 from impactcell.web.past import SPANS_S
 from impactcell.web.studies.study import Stage
 from impactcell.web.texts import CATALOGUE, LANGUAGES
+from impactcell.web.texts.effects import GERMAN_EFFECTS
+from impactcell.web.texts.findings import GERMAN_PHASES, GERMAN_STEPS
 from tests.unit.web.page import make_page
 
 ROOM = Path(impactcell.web.__file__).parent
@@ -92,3 +96,48 @@ def test_a_refusal_is_a_sentence_and_never_what_the_address_says() -> None:
         if code not in ("BadInvalidState", "BadConditionAlreadyEnabled", "BadConditionAlreadyDisabled"):
             assert Messages("en").refusal(code) != Messages("en")["refused_other"], code
     assert Messages("de").refusal("call 555-0100") == Messages("de")["refused_other"]
+
+
+def test_every_effect_and_every_step_is_said_in_german() -> None:
+    assert set(GERMAN_EFFECTS) == set(LIBRARY)
+    assert all(text.strip() for texts in GERMAN_EFFECTS.values() for text in texts)
+    program = "\n".join(path.read_text() for path in ROOM.parent.rglob("*.py"))
+    steps = set(re.findall(r'report_step\("([^"]+)"\)', program))
+    assert len(steps) > 5
+    assert steps <= set(GERMAN_STEPS)
+    assert {phase.value for phase in Phase} == set(GERMAN_PHASES)
+
+
+GAP = {"held_out": {"before": 8.784, "after": 1.07}}
+FOUND = {
+    "verdict": "named",
+    "headline": "Missing: quadratic drag.",
+    "effects": [{"effect": "quadratic_drag", "meaning": "m", "look_at": "l"}],
+    "gap": GAP,
+    "remaining": {"explained": True},
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({}, "Es fehlt: Quadratischer Widerstand; damit fällt die Abweichung von 8,78 auf 1,07."),
+        ({"effects": [{"effect": "quadratic_drag", "tied_with": ["viscous_friction"]}]},
+         "Quadratischer Widerstand oder Viskose Reibung (diese Messungen unterscheiden es nicht)"),
+        ({"remaining": {"explained": False, "share": 0.12, "where": [{"phase": "stop"}]}},
+         "12 % der Abweichung bleiben (Phase: Stillstand)."),
+        ({"verdict": "no_gap"}, "Das Modell erklärt die Messungen: Abweichung 8,78."),
+        ({"verdict": "unknown", "unexplained": {"phase": "free_slide"}},
+         "Kein bekannter Effekt erklärt die Abweichung von 8,78 (Phase: freies Gleiten)."),
+        ({"verdict": "unknown", "unconfirmed": ["mass_error"]}, "Falsche Masse würde"),
+        ({"verdict": "untested"}, "Zu wenige Messungen"),
+        ({"law": {"equation": "m x'' = s(v)"}}, "passt dazu: m x'' = s(v)."),
+        ({"gap": {}}, "Missing: quadratic drag."),
+    ],
+)  # fmt: skip
+def test_what_was_found_is_said_in_german(change: dict[str, object], said: str) -> None:
+    result = FOUND | change
+    assert said in Messages("de").headline(result)
+    assert Messages("en").headline(result) == "Missing: quadratic drag."
+    assert Messages("en").advice(FOUND["effects"][0]) == ("m", "l")  # type: ignore[index]
+    assert "Flüssigkeit" in Messages("de").advice(FOUND["effects"][0])[1]  # type: ignore[index]

@@ -1,0 +1,100 @@
+"""What the discrepancy workflow found, said in German from its `result.json`, whose headline is English."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from impactcell.web.texts.effects import GERMAN_EFFECTS
+
+GERMAN_PHASES: Final = {
+    "preload": "Vorspannen",
+    "loading": "Belasten",
+    "unloading": "Entlasten",
+    "free_slide": "freies Gleiten",
+    "stop": "Stillstand",
+    "between_shots": "zwischen den Stößen",
+    "driven": "angetriebene Bewegung",
+}
+"""By the name of a phase in `result.json`."""
+GERMAN_STEPS: Final = {
+    "unpacking": "Auspacken",
+    "import": "Dateien lesen",
+    "estimate": "Reibung schätzen",
+    "discrepancy": "Abweichung suchen",
+    "model accept": "Vorhersagen, was das Annehmen ändert",
+    "fitting the nominal model": "Modell anpassen",
+    "locating the gap and naming effects": "Abweichung orten und Effekte nennen",
+    "holding names against free forms": "Namen gegen freie Formen halten",
+    "proving on held-out shots": "An zurückgehaltenen Stößen prüfen",
+    "looking for a law that nobody has listed": "Nach einem Gesetz suchen, das keine Liste hat",
+    "planning the next experiment": "Nächsten Versuch planen",
+    "writing the report": "Bericht schreiben",
+    "naming what the base model lacks": "Nennen, was dem Grundmodell fehlt",
+}
+"""By the name of a step; one that is not here is shown as it is called."""
+ENGLISH_STEPS: Final = {
+    "import": "reading the files",
+    "estimate": "estimating friction",
+    "discrepancy": "looking for what the model misses",
+    "model accept": "foretelling what accepting would change",
+}
+"""Steps whose own name is that of a command."""
+
+
+def german_effect(identifier: str) -> str:
+    """Name an effect; one of a base model, or of somebody's own, as it is called.
+
+    >>> german_effect("viscous_friction"), german_effect("own_effect")
+    ('Viskose Reibung', 'own effect')
+    """
+    return GERMAN_EFFECTS.get(identifier, (identifier.replace("_", " "),))[0]
+
+
+def german_headline(result: Mapping[str, Any]) -> str:
+    """Say the outcome in German; as it was said where its format does not have what it takes."""
+    gap = result.get("gap", {}).get("held_out")
+    if not gap:
+        return str(result.get("headline", ""))
+    before, after = (_number(gap[when]) for when in ("before", "after"))
+    match result["verdict"]:
+        case "untested":
+            said = f"Zu wenige Messungen für eine Aussage; Abweichung des Modells: {before}."
+        case "no_gap":
+            said = f"Das Modell erklärt die Messungen: Abweichung {before}."
+        case "unknown":
+            said = f"Kein bekannter Effekt erklärt die Abweichung von {before}{_where(result)}."
+            if result.get("unconfirmed"):
+                names = " und ".join(map(german_effect, result["unconfirmed"]))
+                said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht."
+        case _:
+            said = f"Es fehlt: {_missing(result)}; damit fällt die Abweichung von {before} auf {after}."
+            if not result.get("remaining", {}).get("explained", True):
+                share = 100.0 * (result["remaining"].get("share") or 0.0)
+                left = (
+                    f"{share:.0f} % der Abweichung bleiben" if share else "Etwas bleibt, das er nicht erklärt"
+                )
+                said += f" {left}{_where(result)}."
+    law = result.get("law")
+    if law:
+        said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {law['equation']}."
+    return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
+
+
+def _missing(result: Mapping[str, Any]) -> str:
+    groups = [
+        " oder ".join(map(german_effect, (effect["effect"], *effect.get("tied_with", ()))))
+        for effect in result["effects"]
+    ]
+    is_tied = any(effect.get("tied_with") for effect in result["effects"])
+    return " und ".join(groups) + (" (diese Messungen unterscheiden es nicht)" if is_tied else "")
+
+
+def _where(result: Mapping[str, Any]) -> str:
+    places = result.get("remaining", {}).get("where") or []
+    if not places and result.get("unexplained"):
+        places = [result["unexplained"]]
+    names = [GERMAN_PHASES.get(place["phase"], place["phase"].replace("_", " ")) for place in places]
+    return f" (Phase: {', '.join(names)})" if names else ""
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}".replace(".", ",")

@@ -1,0 +1,33 @@
+"""The report of a machine without a cell, in a real browser."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from impactcell.campaign import write
+from impactcell.cli.app import run_verb
+from tests.browser.chromium import DESK, PHONE, Browser
+from tests.browser.shop import judge
+from tests.discrepancy.test_machine_laws import SLIDE_FILE, slide
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
+
+
+def test_the_report_of_a_machine(browser: Browser, tmp_path: Path) -> None:
+    """It stands alone, says what a noise floor is, and can be read on a desk and on a phone."""
+    write(slide(0.6), tmp_path / "campaign")
+    (tmp_path / "base.yaml").write_text(SLIDE_FILE, encoding="utf-8")
+    options = ["--base", tmp_path / "base.yaml", "-o", tmp_path / "found"]
+    with pytest.raises(SystemExit) as ended:
+        run_verb(["discrepancy", "-q", *map(str, (tmp_path / "campaign", *options))])
+    assert ended.value.code == 0
+    pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
+    faults = []
+    for suffix, size in (("light", DESK), ("phone", PHONE)):
+        browser.show_as("light", size)
+        browser.open((tmp_path / "found" / "report.html").as_uri())
+        faults += judge(browser, "machine", pictures / f"report-machine-{suffix}.png", size[0])
+    assert not faults
+    assert "A noise floor is the difference" in browser.text
+    assert "-0.0 %" not in browser.text
