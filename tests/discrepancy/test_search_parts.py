@@ -1,0 +1,192 @@
+"""Parts of the search by themselves, against closed forms, exact refits and what they promise in words."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
+from impactcell.discrepancy.search import (
+    acceptance,
+    candidate_scores,
+    convergence,
+    dominance,
+    indistinguishability,
+    model_error,
+    residual_map,
+    wild_bootstrap,
+)
+from impactcell.discrepancy.search.conclusion import missing_shots
+from impactcell.discrepancy.search.policy import POLICY
+
+
+def test_the_error_that_shots_share_is_what_sizes_vary_by_beyond_chance() -> None:
+    """Eight shapes a cell and channel, of three times the square that chance gives, 1.8 times and once."""
+    count, information, chance = 8, 50.0, 0.01
+    sizes = {(0, 0): 3.0, (0, 1): 1.8, (1, 1): 1.0}
+    ratio = np.repeat([*sizes.values()], count)
+    cell, channel = (np.repeat([key[place] for key in sizes], count) for place in (0, 1))
+    each = np.full((4, len(ratio)), information * math.sqrt(chance / 4.0))
+    evidence: Any = SimpleNamespace(
+        map_scores=SimpleNamespace(
+            information=np.full(len(ratio), information), each=each, amplitude=np.sqrt(ratio * chance)
+        ),
+        map=SimpleNamespace(
+            cell=cell, channel=channel, products=SimpleNamespace(shared=np.zeros((1, len(ratio), 1)))
+        ),
+    )
+    # a mean of 8 squares scatters by sqrt(2 / 8): up to twice the chance is none
+    expected = np.where(ratio == 3.0, 2.0 * chance, 0.0)
+    assert model_error.shared_error(evidence).variance == pytest.approx(expected)
+
+
+def test_a_level_a_slope_and_a_bow_are_three_pieces() -> None:
+    place = np.linspace(-1.0, 1.0, 600)
+    residual = np.tile(5.0 + place + place**2, 40)
+    bounds = 600 * np.arange(41)
+    shots = SimpleNamespace(
+        values=residual,
+        channel=np.ones(residual.size, dtype=np.int64),
+        samples_of=lambda shot: slice(int(bounds[shot]), int(bounds[shot + 1])),
+    )
+    problem: Any = SimpleNamespace(shots=shots, count=40)
+    model: Any = SimpleNamespace(residual=residual)
+    assert model_error.estimate_model_error(problem, model).pieces == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(("promised", "expected"), [(3.9, True), (4.1, False)])
+def test_what_a_step_promises_counts_in_units_of_what_the_model_leaves(
+    monkeypatch: pytest.MonkeyPatch, promised: float, expected: bool
+) -> None:
+    """A model that leaves four times the noise's square has come to rest at four times the promise."""
+    problem: Any = SimpleNamespace(shots=SimpleNamespace(values=np.zeros(100)))
+    model: Any = SimpleNamespace(effects=("one",), misfit=lambda _: np.full(5, 80.0))
+    monkeypatch.setattr(convergence, "promised_fall", lambda *_: promised * POLICY.max_promise)
+    monkeypatch.setattr(convergence, "total_log_likelihood", lambda *_: 0.0)
+    assert convergence.is_converged(problem, model) is expected
+
+
+def test_no_shots_are_missing_where_there_are_just_enough() -> None:
+    assert missing_shots(MIN_TRAINING, MIN_HELD_OUT) == 0
+    assert missing_shots(MIN_TRAINING - 1, MIN_HELD_OUT) > 0
+    assert missing_shots(MIN_TRAINING, MIN_HELD_OUT - 1) > 0
+
+
+def test_likelihood_out_of_shot_is_that_of_an_exact_refit_of_quadratic_losses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(6)
+    shots, p = 9, 3
+    roots = rng.normal(size=(shots, p, 2 * p))
+    H, best = roots @ roots.transpose(0, 2, 1), rng.normal(size=(shots, p))
+    best -= np.linalg.solve(H.sum(0), np.einsum("iab,ib->a", H, best))  # so that all together are best at 0
+    group = [0, 0, 1, 2, 3, 4, 5, 6, 6]
+
+    def losses(theta: np.ndarray) -> np.ndarray:
+        return 0.5 * np.einsum("ia,iab,ib->i", theta - best, H, theta - best)
+
+    linearisation = SimpleNamespace(
+        information=H.sum(0), shot_information=H, shot_gradient=np.einsum("iab,ib->ia", H, best)
+    )
+    monkeypatch.setattr(indistinguishability, "linearise", lambda *_: linearisation)
+    monkeypatch.setattr(indistinguishability, "MAX_FOLD_SHARE", 0.5)
+    items = [SimpleNamespace(group=number) for number in group]
+    problem: Any = SimpleNamespace(shots=SimpleNamespace(items=items), count=shots)
+    model: Any = SimpleNamespace(log_likelihood=lambda _: -losses(np.zeros(p)))
+    each = indistinguishability.evaluate_out_of_shot(problem, model).each
+    for shot in range(shots):
+        others = np.array(group) != group[shot]
+        theta = np.linalg.solve(H[others].sum(0), np.einsum("iab,ib->a", H[others], best[others]))
+        assert each[shot] == pytest.approx(-losses(theta)[shot])
+
+
+def test_a_rival_fitted_to_fewer_samples_is_held_to_what_it_would_leave_on_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def problem(size: int) -> Any:
+        return SimpleNamespace(shots=SimpleNamespace(values=np.zeros(size)))
+
+    def fitted(effect: str, size: int, excess: float) -> Any:
+        return SimpleNamespace(effects=(effect,), residual=np.zeros(size), excess=excess)
+
+    context: Any = SimpleNamespace(problem=problem(100), coarse=problem(25))
+    monkeypatch.setattr(dominance, "estimate_model_error", lambda _, rival: rival)
+    monkeypatch.setattr(dominance, "largest_rival_excess", lambda *_: 5.0)
+    rivals = [fitted("a", 25, 1.2), fitted("b", 25, 1.3), fitted("c", 100, 4.9), fitted("d", 100, 5.1)]
+    left: Any = None
+    assert dominance._tied(context, fitted("best", 100, 4.0), left, rivals) == ("a", "c")
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_a_jump_of_a_single_sample_is_taken_out_of_small_steps_alone(scaled: bool) -> None:
+    change = np.concatenate([np.full(5, 0.1), [40.0], np.full(5, 0.1)])
+    fit: Any = SimpleNamespace(
+        effects=(), theta=np.zeros(0), shot_parameters=None, residual=np.linspace(0.0, 1.0, 11)
+    )
+    model = SimpleNamespace(residual=lambda theta, _: fit.residual - change * theta[0])
+    problem: Any = SimpleNamespace(with_effects=lambda _: model)
+    point: Any = SimpleNamespace(theta=np.ones(1), amplitude=0, sign=1, scaled=scaled)
+    direction = candidate_scores.effect_direction(problem, fit, "surface_tilt", point)
+    assert direction == pytest.approx(np.where(change > 1.0, 0.0, change) if scaled else change)
+
+
+def test_each_batch_has_a_factor_of_its_own() -> None:
+    batches, changes = np.array([0, 0, 1, 2, 1, 2]), (0.07, -0.12)
+    items = [
+        SimpleNamespace(
+            dwell_s=1.0, place=place, shots=6, batch=batch, direction=1, covariates={"batch": batch}
+        )
+        for place, batch in enumerate(batches.tolist(), start=1)
+    ]
+    problem: Any = SimpleNamespace(shots=SimpleNamespace(items=items), batches=3)
+    coordinates = candidate_scores.effect_coordinates("batch_shift", 3)
+    theta = [coordinate.coordinate(value) for coordinate, value in zip(coordinates, changes, strict=True)]
+    point: Any = SimpleNamespace(theta=np.array(theta))
+    factors = candidate_scores.between_shot_factors(problem, "batch_shift", point)
+    assert factors is not None
+    assert np.exp(factors) == pytest.approx(1.0 + np.array([0.0, *changes])[batches])
+
+
+def test_outcomes_with_a_tied_effect_exchanged_are_those_that_were_fitted() -> None:
+    def fitted(*effects: str) -> Any:
+        return SimpleNamespace(fit=SimpleNamespace(effects=effects))
+
+    nominal: Any = SimpleNamespace(
+        fit=SimpleNamespace(effects=()), candidate_scan=SimpleNamespace(p_value_of={"c": 0.02}.get)
+    )
+    selection = acceptance.SelectionResult(
+        nominal, nominal, None, ("a", "b"), {"a": ("c", "never fitted")}, {"a": 0.01}, (fitted("b", "c"),)
+    )
+    (variant,) = acceptance.exchanged(selection)
+    assert variant.added == ("c", "b")
+    assert variant.accepted is selection.alternatives[0].fit
+    assert variant.ties == {"c": ("a", "never fitted")}
+    assert variant.p_values["c"] == 0.02
+
+
+@pytest.mark.parametrize("count", [3, 10])
+def test_shapes_of_a_phase_add_up_to_one_and_stand_for_their_middle(count: int) -> None:
+    place, inside = np.linspace(0.0, 1.0, 91), np.arange(91) % 4 != 3
+    hats = residual_map._hat_functions(place, inside, count)
+    assert np.sum([hat for _, hat in hats], axis=0) == pytest.approx(inside.astype(float))
+    middles = np.array([middle for middle, _ in hats])
+    assert np.sum([middle * hat for middle, hat in hats], axis=0) == pytest.approx(place * inside)
+    assert middles == pytest.approx(np.linspace(0.0, 1.0, count))
+
+
+def test_mirrored_shots_tell_a_common_score_from_one_of_either_sign() -> None:
+    """A score that all of thirty shots share is rare under mirroring; of one that is noise p is uniform."""
+    rng, shots, noise = np.random.default_rng(8), 30, 40
+    scores: Any = SimpleNamespace(
+        each=np.column_stack([rng.normal(1.5, 1.0, shots), rng.normal(size=(shots, noise))]),
+        leverage=np.zeros((shots, noise + 1, 1)),
+    )
+    linearisation: Any = SimpleNamespace(information=np.eye(1), shot_gradient=np.zeros((shots, 1)))
+    tests = wild_bootstrap.wild_bootstrap(linearisation, scores, np.arange(noise + 1), (1,))
+    expected = scores.each.sum(0) ** 2 / (scores.each**2).sum(0)
+    assert tests.statistic == pytest.approx(expected)
+    assert tests.p_adjusted[0] < 0.02
+    assert 0.35 < tests.p_single[1:].mean() < 0.65
+    assert tests.p_single[1:].min() < 0.2
