@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -55,3 +56,21 @@ def test_more_pieces_are_of_the_same_place() -> None:
         assert finer.place == coarse.place == place
         assert finer.spans > coarse.spans
         assert finer.effect.equation == coarse.effect.equation
+
+
+@pytest.mark.parametrize("pair", [("u", "u^3")])
+def test_a_sum_of_two_powers_is_found_by_its_numbers(pair: tuple[str, str]) -> None:
+    """Where the data know the function well, the sum explains all of it, and one power alone does not."""
+    lower, upper, count = 0.0, 1.0, FINE_SPANS + 3
+    u = np.linspace(lower, upper, 900)
+    powers = {"1": np.ones_like(u), "u": u, "u^2": u**2, "u^3": u**3}
+    basis = spline_basis(u, lower, upper, FINE_SPANS)
+    fitted = np.linalg.lstsq(basis, 0.7 * powers[pair[0]] + 0.4 * powers[pair[1]])[0]
+    information = 1e4 * basis.T @ basis
+    known = Tangent(
+        information, information @ fitted, lower, upper, 900, True, fitted, np.zeros(2), np.zeros((2, count))
+    )
+    best = rank_forms(known)[0]
+    assert best.gain == pytest.approx(known.most, rel=1e-6)
+    assert best.score == pytest.approx(known.most - 0.5 * 2 * math.log(900), rel=1e-6)
+    assert sorted(best.amplitudes) == pytest.approx([0.4, 0.7], rel=1e-4)

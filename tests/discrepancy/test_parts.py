@@ -1,6 +1,7 @@
 """Parts of data, fits, laws, machines and report by themselves, against closed forms and their words."""
 
 import math
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -49,6 +50,36 @@ def test_a_drive_that_is_a_line_stays_one() -> None:
     time = np.arange(0.0, 0.3, 4e-4)
     drive = smooth_drive(time, 5.0 - 30.0 * time, 0.3)
     assert drive.force_n == pytest.approx(5.0 - 30.0 * drive.time_s, abs=1e-6)
+
+
+def test_friction_of_a_block_is_that_of_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coulomb friction, mu_k m g, is what the whitener of a driven block takes the part to lose."""
+
+    @dataclass
+    class Block:
+        times: Any
+        values: Any
+        drive: Any
+        covariates: dict[str, float]
+        whitener: Any = None
+
+    time = np.linspace(0.0, 0.5, 200)
+    position, empty, frictions = 0.02 * np.sin(12.0 * time), np.empty(0), []
+
+    def noted(drive: SmoothedDrive, speed: np.ndarray, mass: float, friction: float) -> np.ndarray:
+        frictions.append((mass, friction))
+        return position_response(drive, speed, mass, friction)
+
+    monkeypatch.setattr(measured_drive, "position_response", noted)
+    block: Any = Block(
+        (empty, time, empty),
+        (empty, position, empty),
+        np.vstack([time, 8.0 * np.cos(12.0 * time)]),
+        {"mass": 2.0},
+    )
+    whitened = measured_drive.whiten_block(block, 1e-6, 9.81, 0.25)
+    assert frictions == [(2.0, pytest.approx(0.25 * 2.0 * 9.81))]
+    assert whitened.whitener.shape == (len(whitened.times[1]),) * 2
 
 
 def test_a_slip_is_fast_and_of_one_direction() -> None:

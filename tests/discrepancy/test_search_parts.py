@@ -10,6 +10,7 @@ import pytest
 from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
 from impactcell.discrepancy.search import (
     acceptance,
+    between_shots,
     candidate_scores,
     convergence,
     dominance,
@@ -190,3 +191,27 @@ def test_mirrored_shots_tell_a_common_score_from_one_of_either_sign() -> None:
     assert tests.p_adjusted[0] < 0.02
     assert 0.35 < tests.p_single[1:].mean() < 0.65
     assert tests.p_single[1:].min() < 0.2
+
+
+def test_effects_between_shots_alone_are_fitted_to_the_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And of these only those that the factors speak for, from where a start was found."""
+    p_values = {"friction_drift": 0.001, "batch_shift": 0.9, "surface_tilt": 0.001, "stiction_ageing": 0.001}
+    starts = {"friction_drift": (np.zeros(1),), "surface_tilt": (np.zeros(1),), "batch_shift": (np.zeros(1),)}
+    fit = SimpleNamespace(effects=("viscous_friction",))
+    scan = SimpleNamespace(
+        gains=lambda: dict.fromkeys(p_values, 1.0),
+        p_value_of=p_values.get,
+        fit=fit,
+        candidates=None,
+        scores=None,
+    )
+    monkeypatch.setattr(
+        candidate_scores,
+        "starting_points",
+        lambda _candidates, _scores, effect, _most: starts.get(effect, ()),
+    )
+    monkeypatch.setattr(between_shots, "run_tasks", lambda _, tasks: tasks)
+    context: Any = SimpleNamespace(problem=SimpleNamespace(with_effects=lambda effects: effects))
+    evidence: Any = SimpleNamespace(candidate_scan=scan)
+    (task,) = between_shots._fits(context, evidence)
+    assert (task.problem, task.starts) == (("viscous_friction", "friction_drift"), starts["friction_drift"])
