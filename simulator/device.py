@@ -77,9 +77,7 @@ class Device:
         self._on_truth = on_truth
         self._tap: RunningTap | None = None
         self._made = 0
-        self._next_s = math.inf
-        if scenario.strikes is not None and scenario.strikes.begin == "at_once":
-            self._next_s = scenario.strikes.period_s
+        self._next_s = math.inf if scenario.strikes is None else scenario.strikes.first_s
         self._rested_s = 0.0
         self._busy_until_s = -math.inf
         self._announcements = BatchAnnouncer(scenario, self._image)
@@ -140,20 +138,15 @@ class Device:
 
     def _step(self) -> None:
         self._now_s = max(self._now_s, self._due_s())
+        strikes = self.scenario.strikes
         if self._tap is not None:
             self._finish(self._tap)
-        elif self.scenario.strikes is None:
+        elif strikes is None:
             self._parts.advance(self._now_s)
             self._show_part()
         else:
-            self._strike_on_schedule()
-
-    def _strike_on_schedule(self) -> None:
-        strikes = self.scenario.strikes
-        if strikes is None:
-            return
-        self._next_s += strikes.period_s
-        self._strike(scheduled_tap(self.scenario, strikes, self._made), sequence=0)
+            self._next_s += strikes.period_s
+            self._strike(scheduled_tap(self.scenario, strikes, self._made), sequence=0)
 
     def _strike(self, commanded: TapInput, sequence: int) -> None:
         self._made += 1

@@ -1,5 +1,6 @@
 """What a served cell does: plant, strikes, wear, batches, deviant cycles, sensors, and positioning tasks."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -82,6 +83,11 @@ class Strikes(ScenarioModel):
     order: Literal["in_turn", "random"] = "in_turn"
     stroke_m: Positive = 0.0015
     cycles: Annotated[int, Field(ge=0)] | None = None
+
+    @property
+    def first_s(self) -> float:
+        """Time of the first strike after the start, s; inf where it waits for a request."""
+        return self.period_s if self.begin == "at_once" else math.inf
 
 
 class Scatter(ScenarioModel):
