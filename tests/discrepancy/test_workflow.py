@@ -23,7 +23,6 @@ from impactcell.discrepancy.search.indistinguishability import (
 )
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError
-from impactcell.physics.effects import LIBRARY
 from impactcell.records import Channel
 from impactcell.settings.model_file import read_model
 from tests.discrepancy import study
@@ -140,8 +139,8 @@ def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
 
 def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
     # Friction then differs by direction too, for the parts slide apart: that is no name either.
-    campaign = make("position_dependent_friction", seed=920030)
-    library = [one for one in LIBRARY if one != "position_dependent_friction"]
+    campaign = make("position_dependent_friction", seed=920030, shots=18)
+    library = ("friction_patch", "periodic_friction", "direction_asymmetry", "viscous_friction")
     found = study.name_effects(campaign, library=library)
     assert found.selection.alternatives[0].effects == ("friction_patch",)
     assert answer(found) == ("unknown", set())
@@ -156,8 +155,8 @@ def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
 
 
 def test_a_gap_between_shots_is_unknown_with_the_covariate_that_it_goes_with() -> None:
-    rivals = {"surface_tilt", "direction_asymmetry"}
-    found = study.name_effects(make("surface_tilt"), library=[one for one in LIBRARY if one not in rivals])
+    others = ("friction_drift", "batch_shift", "viscous_friction", "hertz_contact", "friction_patch")
+    found = study.name_effects(make("surface_tilt"), library=others)
     assert answer(found) == ("unknown", set())
     assert found.unexplained is not None
     assert found.unexplained.phase == "between_shots"
