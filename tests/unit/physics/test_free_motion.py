@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from impactcell.physics import Plant, TapInput, free_motion, simulate_free_slide
+from impactcell.physics.effect import LawKind
+from impactcell.physics.effects import LIBRARY
 
 NOMINAL = (6.5e5, 465.0, 0.2, 0.15)
 
@@ -36,3 +38,19 @@ def test_acceleration_is_that_of_the_motion(direction: int) -> None:
     measured = np.gradient(speed, time, edge_order=2)[1:-1]
     own = free_motion.acceleration(plant, tap, speed)[1:-1]
     np.testing.assert_allclose(measured, own - 0.15 * plant.gravity_m_s2, rtol=2e-4)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("identifier", [name for name in LIBRARY if free_motion.acts_on_speed(name)])
+def test_acceleration_is_the_law_in_python_to_the_bit(identifier: str, direction: int) -> None:
+    effect = LIBRARY[identifier]
+    given = {parameter.name: parameter.typical for parameter in effect.parameters}
+    plant = Plant(*NOMINAL, effects={identifier: given})
+    tap = TapInput(1.0, 19.3, direction=direction, start_m=0.0123)
+    speed = np.linspace(0.0, 0.2, 50)
+    flat, expected, g = list(given.values()), np.zeros(50), plant.gravity_m_s2
+    if (body := effect.laws.get(LawKind.BODY)) is not None:
+        expected += [direction * body(0.0123, direction * v, 19.3, g, flat) / 19.3 for v in speed.tolist()]
+    if (kinetic := effect.laws.get(LawKind.KINETIC)) is not None:
+        expected -= [g * kinetic(v, 0.0, 0.0, 0.0, flat) for v in speed.tolist()]
+    np.testing.assert_array_equal(free_motion.acceleration(plant, tap, speed), expected)

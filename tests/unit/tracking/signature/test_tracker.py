@@ -355,3 +355,13 @@ def test_the_usual_scatter_of_a_gap_is_that_of_its_logarithms():
     usual = math.exp(logarithms.mean())
     assert done.evidence.size == pytest.approx(gaps[-1] - usual)
     assert done.evidence.size_std == pytest.approx(usual * logarithms.std(ddof=1))
+
+
+@pytest.mark.parametrize("samples", [4, 5, 40, 221, 900])
+def test_speed_of_the_cubic_is_numpys_to_the_bit(samples):
+    rng = np.random.default_rng(samples)
+    time = 1e-4 * np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, samples - 1))])
+    distance = 0.07 * time - 1.2 * time**2 + NOISE * rng.normal(size=samples)
+    cubic = np.polynomial.Polynomial.fit(time, distance, 3, domain=[0.0, time[-1]], window=[0.0, 1.0])
+    speed = friction_profile._speed_of_cubic(time, distance)
+    np.testing.assert_array_equal(speed, cubic.deriv()(time))
