@@ -7,7 +7,13 @@ from impactcell.alarms import RULES, Message
 from impactcell.records import Alarm
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 from impactcell.web.texts.effects import GERMAN_EFFECTS
-from impactcell.web.texts.findings import ENGLISH_STEPS, GERMAN_STEPS, german_effect, german_headline
+from impactcell.web.texts.findings import (
+    ENGLISH_STEPS,
+    GERMAN_QUANTITIES,
+    GERMAN_STEPS,
+    german_effect,
+    german_headline,
+)
 
 LARGE = 1e9
 """From here on a number is written with an exponent, in any unit."""
@@ -79,6 +85,10 @@ class Messages:
         if self.language == "de" and effect["effect"] in GERMAN_EFFECTS:
             return GERMAN_EFFECTS[effect["effect"]][1:]
         return effect.get("meaning", ""), effect.get("look_at", "")
+
+    def quantity(self, name: str) -> str:
+        """Name what a column means."""
+        return GERMAN_QUANTITIES.get(name, name) if self.language == "de" else name
 
     def step(self, name: str) -> str:
         """Name a step of a study."""

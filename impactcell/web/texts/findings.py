@@ -15,6 +15,12 @@ GERMAN_PHASES: Final = {
     "driven": "angetriebene Bewegung",
 }
 """By the name of a phase in `result.json`."""
+GERMAN_QUANTITIES: Final = {
+    "time": "Zeit", "force": "Kraft", "position": "Position", "actuator": "Antrieb", "shot": "Stoß",
+    "velocity": "Geschwindigkeit", "mass": "Masse", "direction": "Richtung", "batch": "Charge",
+    "ignored": "nichts",
+}  # fmt: skip
+"""What a column of a dropped file can mean."""
 GERMAN_STEPS: Final = {
     "unpacking": "Auspacken",
     "import": "Dateien lesen",
@@ -28,6 +34,7 @@ GERMAN_STEPS: Final = {
     "looking for a law that nobody has listed": "Nach einem Gesetz suchen, das keine Liste hat",
     "planning the next experiment": "Nächsten Versuch planen",
     "writing the report": "Bericht schreiben",
+    "calibrating": "Kalibrieren",
     "naming what the base model lacks": "Nennen, was dem Grundmodell fehlt",
 }
 """By the name of a step; one that is not here is shown as it is called."""
