@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -94,3 +95,21 @@ def test_a_map_without_the_optional_registers_still_gives_captures(fpga: Registe
     assert capture.batch_id is None
     assert capture.force is not None
     np.testing.assert_allclose(capture.force.values, [1.0, 2.0, 1.5])
+
+
+@pytest.mark.parametrize(
+    ("dwell_s", "is_fault"), [(0.0, False), (math.nan, False), (2.5, False), (-1.0, True)]
+)
+def test_a_tap_without_a_dwell_is_no_fault_and_a_negative_one_is(
+    fpga: RegisterMap, dwell_s: float, is_fault: bool
+) -> None:
+    first = fpga["window_sequence"].address
+    words = words_of(bytes(2 * header_words(fpga)))
+    header = {
+        register.name: register.decode(words[register.address - first : register.end - first])
+        for register in fpga.header()
+    }
+    empty = {name: words_of(b"") for name in ARRAYS}
+    capture, faults = decoding.capture_from_words(fpga, {**header, "dwell": dwell_s}, empty)
+    assert any("dwell" in fault for fault in faults) is is_fault
+    assert math.isnan(capture.dwell_s) if is_fault else capture.dwell_s == pytest.approx(dwell_s, nan_ok=True)
