@@ -135,4 +135,4 @@ def test_the_demo_sums_up(checkout: Path) -> None:
     assert summary["missed"] == 0
     assert summary["mu_s"] == pytest.approx(0.2, rel=0.15)
     assert summary["batch"]["id"] in {"B", "C"}
-    assert any(alarm["alarm"] == "DeviantCycle" for alarm in summary["alarms"])
+    assert any(alarm["alarm"] == "DeviantCycle" for alarm in summary["alarms"]), summary
