@@ -5,6 +5,8 @@ import itertools
 import socket
 import struct
 import threading
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from impactcell.errors import LinkError, ModbusExceptionError, ProtocolError
+from impactcell.fieldbus import register_client
 from impactcell.fieldbus.codec import FunctionCode, read_request
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
@@ -200,3 +203,15 @@ async def test_a_peer_that_holds_back_small_replies_is_not_waited_for() -> None:
         await client.close()
         thread.join()
     assert min(taken_s[20:]) < 0.02  # a fresh connection is quick by itself
+
+
+@pytest.mark.parametrize(("count", "sizes"), [(122, [122]), (123, [123]), (124, [123, 1]), (246, [123, 123])])
+def test_neighbours_are_written_together_as_many_as_a_request_can_hold(count: int, sizes: list[int]) -> None:
+    """At most 123 registers (Modbus Application Protocol V1.1b3, 6.12)."""
+    registers: Any = [
+        SimpleNamespace(bit=None, table="holding", address=40 + place, end=41 + place)
+        for place in range(count)
+    ]
+    runs = register_client._adjacent_runs(registers)
+    assert [len(run) for run in runs] == sizes
+    assert [register for run in runs for register in run] == registers
