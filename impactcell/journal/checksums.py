@@ -1,8 +1,9 @@
 """A checksum for every row, so that a bit that has changed on the disk is not believed.
 
 SQLite checks the structure of its pages, not what stands in them. Each row that is written carries the CRC-32
-of its values in the order of the table's columns; one without, from an older format, is taken as it is. A
-column that is added later is NULL in the rows before, and so does not change their checksums.
+of its values in the order of the table's columns, and of its number where rows stand in the order of these;
+one without, from an older format, is taken as it is. A column that is added later is NULL in the rows before,
+and so does not change their checksums.
 """
 
 import logging
@@ -21,18 +22,22 @@ log = logging.getLogger(__name__)
 CHECKED: Final = ("meta", "cycles", "alarms", "audit", "state", "state_backup")
 """Tables whose rows have a column `crc`; a capture carries its checksum inside."""
 KEYS: Final = ("seq", "id", "crc")
-"""Columns that no checksum covers: what SQLite numbers by itself, and the checksum."""
+"""Columns that are no values: the number of a row, and the checksum."""
+NUMBERED: Final = {"cycles": "seq", "alarms": "id", "audit": "id"}
+"""Tables whose rows stand in the order of their numbers, with the column of these. From format 6 on checksums
+cover the number too: a changed bit in it would put a row, as it was, in the place of another."""
 
 SqlValue = float | int | str | bytes | None
 _ENCODER = msgspec.msgpack.Encoder()
 
 
-def row_crc(values: Sequence[SqlValue]) -> int:
-    """CRC-32 of the values of a row, without `KEYS`, as read back; NULL at the end does not count."""
+def row_crc(values: Sequence[SqlValue], number: SqlValue = None) -> int:
+    """CRC-32 of a row, without `KEYS`, as read back, and of its number; NULL at the end does not count."""
     end = len(values)
     while end and values[end - 1] is None:
         end -= 1
-    return zlib.crc32(_ENCODER.encode(values[:end]))
+    crc = zlib.crc32(_ENCODER.encode(values[:end]))
+    return crc if number is None else zlib.crc32(_ENCODER.encode(number), crc)
 
 
 class CheckedTables:
@@ -58,8 +63,11 @@ class CheckedTables:
 
     def insert(self, table: str, values: Mapping[str, SqlValue]) -> int | None:
         """Write a row with its checksum, in the place of one with the same key; returns its number."""
+        if table in NUMBERED:
+            values = {**values, NUMBERED[table]: self._next_number(table)}
         columns = [name for name in self.columns[table] if name in values]
-        crc = row_crc([values.get(name) for name in self.columns[table] if name not in KEYS])
+        number = values[NUMBERED[table]] if table in NUMBERED else None
+        crc = row_crc([values.get(name) for name in self.columns[table] if name not in KEYS], number)
         row = [*(values[name] for name in columns), crc]
         names, places = ", ".join((*columns, "crc")), ", ".join("?" * len(row))
         statement = f"INSERT OR REPLACE INTO {table} ({names}) VALUES ({places})"  # noqa: S608 - from CHECKED
@@ -92,4 +100,11 @@ class CheckedTables:
         at = self._crc_at[table]
         if at is None or row[at] is None:
             return True
-        return row[at] == row_crc([row[i] for i in self._covered[table]])
+        values = [row[i] for i in self._covered[table]]
+        if table in NUMBERED and row[at] == row_crc(values, row[self.columns[table].index(NUMBERED[table])]):
+            return True
+        return row[at] == row_crc(values)
+
+    def _next_number(self, table: str) -> int:
+        last = f"SELECT coalesce(max({NUMBERED[table]}), 0) FROM {table}"  # noqa: S608 - from NUMBERED
+        return int(self._database.execute(last).fetchone()[0]) + 1

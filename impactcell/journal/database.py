@@ -7,6 +7,7 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -38,18 +39,27 @@ def errors(path: Path) -> Iterator[None]:
     except OSError as error:
         raise _temporary_error(path, error.strerror, full=error.errno in _NO_ROOM) from error
     except sqlite3.OperationalError as error:
-        code = error.sqlite_errorcode & 0xFF
+        code = _code(error)
         if code == sqlite3.SQLITE_ERROR:  # a table is missing
             raise JournalError(f"{path}: cannot be used ({error}); name another file") from error
         if code == sqlite3.SQLITE_IOERR:
             raise _io_error(path, error) from error
+        if code in _DAMAGED:
+            raise JournalDamagedError(f"{path}: is damaged and cannot be used ({error})") from error
         raise _temporary_error(path, error, full=code == sqlite3.SQLITE_FULL) from error
+    except UnicodeDecodeError as error:  # SQLite quotes a schema that is damaged
+        raise JournalDamagedError(f"{path}: is damaged and cannot be used (its text is no UTF-8)") from error
     except sqlite3.DatabaseError as error:
-        if getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED:
+        if _code(error) in _DAMAGED:
             raise JournalDamagedError(f"{path}: is damaged and cannot be used ({error})") from error
         raise JournalError(f"{path}: cannot be used ({error})") from error
     except OverflowError as error:
         raise JournalError(f"{path}: cannot be used ({error})") from error
+
+
+def _code(error: sqlite3.DatabaseError) -> int:
+    """Primary result code; text that is no UTF-8 has none, and is damage."""
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
 
 
 def _temporary_error(path: Path, reason: object, *, full: bool) -> JournalUnavailableError:
@@ -113,6 +123,7 @@ def open_database(
                 database.execute("PRAGMA synchronous = FULL")
                 _upgrade_file(database, path, upgrade)  # what is refused is left as it is
                 database.execute("PRAGMA journal_mode = WAL")
+        database.text_factory = partial(str, encoding="utf-8", errors="replace")  # a checksum finds it out
     except BaseException:
         database.close()
         raise
@@ -140,7 +151,7 @@ def _pages(database: sqlite3.Connection, path: Path, *, read_only: bool) -> int:
     try:
         return _pragma(database, "page_count")
     except sqlite3.DatabaseError as error:
-        code = error.sqlite_errorcode & 0xFF
+        code = _code(error)
         if code in _DAMAGED and not _is_ours(path):
             raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
         if code == sqlite3.SQLITE_CANTOPEN and read_only:

@@ -2,6 +2,8 @@
 
 import contextlib
 import fcntl
+import os
+import stat
 from pathlib import Path
 from typing import IO
 
@@ -11,18 +13,23 @@ from impactcell.errors import JournalError
 def lock_journal(path: Path) -> IO[str]:
     """Keep a second service from the same journal: a lock beside it, held as long as it is open.
 
-    It lies beside the file itself, not beside a symbolic link to it. A file with a second name (a hard link)
-    is refused: SQLite keeps a log for each name, and what one log holds is not in the file under the other
+    It lies beside the file itself, not beside a symbolic link to it; whatever is there under its name already
+    is neither waited for nor written to. What is no plain file is refused, and so is one with a second name
+    (a hard link): SQLite keeps a log for each name, and what one log holds is not in the file under the other
     (SQLite, How To Corrupt An SQLite Database File, section 2.5).
     """
-    file = path.resolve()
+    file = Path(os.path.realpath(path))
     with contextlib.suppress(FileNotFoundError):
-        if file.stat().st_nlink > 1:
+        status = file.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise JournalError(f"{path}: is a directory or a device, not a file; name another file")
+        if status.st_nlink > 1:
             raise JournalError(
                 f"{path}: the file has another name as well (a hard link), under which another service could "
                 "write it; remove that name, or make a copy of the file under this one"
             )
-    lock = file.with_name(f"{file.name}.lock").open("w")
+    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK
+    lock = os.fdopen(os.open(file.with_name(f"{file.name}.lock"), flags, 0o644), "w")
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:

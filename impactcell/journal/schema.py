@@ -20,8 +20,9 @@ from impactcell.records.quantity import DataType, Quantity
 
 APPLICATION_ID = 0x49435243
 """`PRAGMA application_id` by which a file says that it is a journal: the letters ICRC."""
-FORMAT = 5
-"""From 4 on, state, alarms and model say of which format they are; from 5 on, rows have checksums."""
+FORMAT = 6
+"""From 4 on, state, alarms and model say of which format they are; from 5 on, rows have checksums, and these
+cover from 6 on the numbers by which rows are in order."""
 OLDEST = 3
 """Oldest format that can be read."""
 
@@ -153,5 +154,6 @@ CREATE TABLE state (
 UPGRADES: Mapping[int, tuple[str, ...]] = {
     3: (EARLIER_STATES,),
     4: (STATE_BACKUP, *(f"ALTER TABLE {table} ADD COLUMN crc INTEGER" for table in CHECKED[:-1])),
+    5: (),
 }
 """Statements that lead from each earlier format to the next."""

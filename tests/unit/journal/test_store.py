@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.errors import ForeignJournalError, JournalError, JournalFullError
+from impactcell.errors import ForeignJournalError, JournalDamagedError, JournalError, JournalFullError
 from impactcell.journal.audit_entries import AuditEntry
+from impactcell.journal.checksums import row_crc
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import FREE_SHARE, Retention
 from impactcell.journal.store import Journal
@@ -162,6 +163,70 @@ def test_a_damaged_file_gives_what_is_whole_and_then_says_so(tmp_path: Path) -> 
         read.extend(capture.cycle for capture in journal.captures())
     assert read == list(range(1, len(read) + 1))
     assert 0 < len(read) < 39
+
+
+NUMBERS = {"cycles": "seq", "alarms": "id", "audit": "id"}
+
+
+@pytest.fixture
+def numbered(tmp_path: Path) -> Path:
+    """A journal with three rows in each table that is in the order of its numbers."""
+    with Journal(tmp_path / "j", "c") as journal:
+        for number in (1, 2, 3):
+            append(journal, number)
+            alarm = Alarm("WearLimit", cycle=number, time_ns=number)
+            journal.record(b"state", (alarm,), AuditEntry(number, "ann", f"action {number}", "", "done"))
+    return tmp_path / "j"
+
+
+def orders(path: Path) -> dict[str, list[int]]:
+    with Journal(path, "c", read_only=True) as journal:
+        last = journal.last_cycle_id()
+        return {
+            "cycles": [0 if last is None else last.cycle],
+            "alarms": [alarm.cycle for alarm in journal.alarms(HistoryQuery()).entries],
+            "audit": [entry.time_ns for entry in journal.audit()],
+        }
+
+
+@pytest.mark.parametrize("table", NUMBERS)
+def test_a_row_with_another_number_is_not_put_in_another_place(numbered: Path, table: str) -> None:
+    """As one changed bit in the number of the second row leaves it, which SQLite takes as it comes."""
+    whole = orders(numbered)
+    assert whole == {"cycles": [3], "alarms": [1, 2, 3], "audit": [1, 2, 3]}
+    with sqlite3.connect(numbered) as db:
+        db.execute(f"UPDATE {table} SET {NUMBERS[table]} = 66 WHERE {NUMBERS[table]} = 2")
+    db.close()
+    assert orders(numbered) == whole | ({} if table == "cycles" else {table: [1, 3]})
+
+
+def test_rows_of_format_5_have_checksums_without_their_numbers(numbered: Path) -> None:
+    whole = orders(numbered)
+    with sqlite3.connect(numbered) as db:
+        for table, key in NUMBERS.items():
+            for row in db.execute(f"SELECT * FROM {table}").fetchall():
+                db.execute(f"UPDATE {table} SET crc = ? WHERE {key} = ?", (row_crc(row[1:-1]), row[0]))
+        db.execute("PRAGMA user_version = 5")
+    db.close()
+    Journal(numbered, "c").close()
+    assert orders(numbered) == whole
+
+
+@pytest.mark.parametrize(
+    ("text", "read_only"), [(b"CREATE TABLE", True), (b"CREATE TABLE", False), (b"batch_offset_std", False)]
+)
+def test_text_of_the_schema_that_is_no_utf_8_is_damage(numbered: Path, text: bytes, read_only: bool) -> None:
+    data = numbered.read_bytes()
+    assert text in data
+    numbered.write_bytes(data.replace(text, text[:3] + bytes([text[3] | 0x80]) + text[4:]))
+    with pytest.raises(JournalDamagedError, match="is damaged"), Journal(numbered, "c", read_only=read_only):
+        pass
+
+
+def test_text_of_a_row_that_is_no_utf_8_costs_that_row_alone(numbered: Path) -> None:
+    data = numbered.read_bytes()
+    numbered.write_bytes(data.replace(b"action 2", b"acti\xefn 2"))
+    assert orders(numbered) == {"cycles": [3], "alarms": [1, 2, 3], "audit": [1, 3]}
 
 
 def test_the_model_is_kept_beside_the_captures(tmp_path: Path) -> None:
