@@ -159,10 +159,12 @@ def _scale_faults(
         channel = channels.get(name)
         if channel is None or not (math.isfinite(value) and value > 0.0):
             continue
-        largest = channel.values.max() if name == "force" else _displacement(channel.values)
-        if channel.values.min() == channel.values.max() or largest <= 0.0:
+        least, most = channel.values.min(), channel.values.max()
+        largest = most if name == "force" else most - least
+        if least == most or largest <= 0.0:
             continue
-        if not (largest - beside) / OUT_OF_SCALE < value < OUT_OF_SCALE * largest:
+        lasting = most if name == "force" else _displacement(channel.values)
+        if not (lasting - beside) / OUT_OF_SCALE < value < OUT_OF_SCALE * largest:
             where = f"register {figure} ({registers[figure].address})"
             yield (
                 f"{where}: {value:.3g} {unit}, but the samples of {name} show {largest:.3g} {unit}: "
