@@ -2,15 +2,23 @@
 
 Each of the busy processes counts for one in the load average; the processors are shared with the workers of
 the suite. A run is green if pytest says so; what failed is printed. What comes behind `--` goes to pytest.
+
+With `--together` the runs go side by side and are each other's load (five of four workers each are a load of
+20; add `--load 0`). Each has a clone of the last commit of its own, so that runs do not meet in files, and
+the same installed packages.
 """
 
 import argparse
+import contextlib
 import multiprocessing
 import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.benchmarks.table import Table
@@ -26,22 +34,36 @@ def _be_busy() -> None:
         sum(range(100_000))
 
 
-def run(busy: int, arguments: list[str]) -> tuple[int, float, float, list[str]]:
-    """Run the suite once; its exit code, how long it took in s, the load then, and what it said last."""
+@contextlib.contextmanager
+def _load(busy: int) -> Iterator[None]:
+    """So many busy processes, for as long as the suite runs."""
     others = [multiprocessing.Process(target=_be_busy, daemon=True) for _ in range(busy)]
     for process in others:
         process.start()
-    began_s = time.monotonic()
     try:
-        command = [sys.executable, "-m", "pytest", *SUITE, *arguments]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-        load = os.getloadavg()[1]
+        yield
     finally:
         for process in others:
             process.kill()
             process.join()
+
+
+def run(arguments: list[str], checkout: Path = ROOT) -> tuple[int, float, float, list[str]]:
+    """Run the suite once; its exit code, how long it took in s, the load then, and what it said last."""
+    began_s = time.monotonic()
+    command = [sys.executable, "-m", "pytest", *SUITE, *arguments]
+    environment = os.environ | {"PYTHONPATH": str(checkout)}
+    done = subprocess.run(command, cwd=checkout, env=environment, capture_output=True, text=True, check=False)
     said = [match[0] for match in LAST_LINES.finditer(done.stdout)]
-    return done.returncode, time.monotonic() - began_s, load, said
+    return done.returncode, time.monotonic() - began_s, os.getloadavg()[1], said
+
+
+def run_in_clone(arguments: list[str]) -> tuple[int, float, float, list[str]]:
+    """Run the suite once in a clone of the last commit, which goes away afterwards."""
+    with tempfile.TemporaryDirectory(prefix="suite-") as directory:
+        checkout = Path(directory) / "checkout"
+        subprocess.run(["git", "clone", "-q", str(ROOT), str(checkout)], check=True)
+        return run(arguments, checkout)
 
 
 def main() -> int:
@@ -49,15 +71,20 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.suite_under_load", description=__doc__)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--load", type=int, default=20, help="busy processes beside the suite")
+    parser.add_argument("--together", action="store_true", help="the runs side by side, each in a clone")
     parser.add_argument("arguments", nargs="*", help="for pytest, behind `--`")
     options = parser.parse_args()
     rows = []
-    for number in range(1, options.runs + 1):
-        code, took_s, load, said = run(options.load, options.arguments)
+    one_run, at_once = (run_in_clone, options.runs) if options.together else (run, 1)
+    with _load(options.load), ThreadPoolExecutor(at_once) as runs:
+        results = list(runs.map(one_run, [options.arguments] * options.runs))
+    for number, (code, took_s, load, said) in enumerate(results, 1):
         print(f"run {number}:", *said, sep="\n  ", file=sys.stderr, flush=True)
         green = "green" if code == 0 else f"**{code}**"
         rows.append((f"{number}", green, f"{took_s / 60.0:.1f}", f"{load:.0f}", said[-1] if said else ""))
-    note = f"{options.load} busy processes on {os.cpu_count()} processors; bar: green in each run."
+    order = "side by side, each in a clone" if options.together else "one after the other"
+    note = f"Runs {order}; {options.load} busy processes on {os.cpu_count()} processors; "
+    note += "bar: green in each run."
     print(
         Table(
             "The suite under load", ("run", "result", "min", "load, 5 min", "pytest"), rows, note
