@@ -60,18 +60,6 @@ def standard_nodes_once() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="session", autouse=True)
-def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compile each function in one worker, and not in each at the same time."""
-    if "PYTEST_XDIST_WORKER" not in os.environ or "numba" not in sys.modules:
-        yield
-        return
-    from tests.compiled_once import sharing
-
-    with sharing(tmp_path_factory.getbasetemp().parent / "compiling"):
-        yield
-
-
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Directory of the sample campaigns and real slides; the test skips where it is absent."""
