@@ -60,13 +60,19 @@ class CheckedTables:
             table: columns.index("crc") if "crc" in columns else None
             for table, columns in self.columns.items()
         }
+        self._number_at = {
+            table: self.columns[table].index(key)
+            for table, key in NUMBERED.items()
+            if key in self.columns[table]
+        }
 
     def insert(self, table: str, values: Mapping[str, SqlValue]) -> int | None:
         """Write a row with its checksum, in the place of one with the same key; returns its number."""
+        number = None
         if table in NUMBERED:
-            values = {**values, NUMBERED[table]: self._next_number(table)}
+            number = self._next_number(table)
+            values = {**values, NUMBERED[table]: number}
         columns = [name for name in self.columns[table] if name in values]
-        number = values[NUMBERED[table]] if table in NUMBERED else None
         crc = row_crc([values.get(name) for name in self.columns[table] if name not in KEYS], number)
         row = [*(values[name] for name in columns), crc]
         names, places = ", ".join((*columns, "crc")), ", ".join("?" * len(row))
@@ -101,7 +107,7 @@ class CheckedTables:
         if at is None or row[at] is None:
             return True
         values = [row[i] for i in self._covered[table]]
-        if table in NUMBERED and row[at] == row_crc(values, row[self.columns[table].index(NUMBERED[table])]):
+        if table in self._number_at and row[at] == row_crc(values, row[self._number_at[table]]):
             return True
         return row[at] == row_crc(values)
 

@@ -60,7 +60,7 @@ class FreeForms:
 
 def fit_free_forms(context: SearchContext, rough: Fit) -> FreeForms:
     """Fit a free form at every place, each alone; places that the shots do not go through are left out."""
-    fitted = [fit_term(context, rough, form) for form in REMAINDER_FORMS.values()]
+    fitted = [_fit_term(context, rough, form) for form in REMAINDER_FORMS.values()]
     terms = {term.form.place: term for term in fitted if term is not None}
     alone = [score_term(term, "", 1.0) for term in terms.values()]
     filtered = _fit_filter(context, rough)
@@ -69,7 +69,7 @@ def fit_free_forms(context: SearchContext, rough: Fit) -> FreeForms:
     return FreeForms(rough, tuple(sorted(alone, key=lambda model: -model.score)), terms)
 
 
-def fit_term(context: SearchContext, base: Fit, form: FreeForm) -> FreeTerm | None:
+def _fit_term(context: SearchContext, base: Fit, form: FreeForm) -> FreeTerm | None:
     """Fit a term beside a model; None where shots hardly go through its covariate, or it has no answer."""
     span = visited(context.coarse, base, form)
     if span is None:
