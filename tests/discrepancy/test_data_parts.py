@@ -1,0 +1,119 @@
+"""Parts of the data by themselves: drives, blocks, columns and what is held out."""
+
+import math
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from impactcell.discrepancy.data import driven_blocks, measured_drive, prepared_campaign
+from impactcell.discrepancy.data.excitation import ExcitationStrategy
+from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
+from impactcell.discrepancy.data.noise_floor import sensor_noise
+from impactcell.errors import CampaignError
+
+
+def test_a_part_that_turns_round_goes_on_by_the_ratio_of_its_accelerations() -> None:
+    """Under a constant force back, v0 falls by (F + f) / m until it turns, and grows by (F - f) / m then.
+
+    x(T) = t* v0 / 2 - a2 (T - t*)^2 / 2 with t* = v0 / a1, so that dx/dv0 = t* + (a2 / a1) (T - t*).
+    """
+    mass, force, friction, end = 3.0, 40.0, 5.0, 0.05
+    time = np.linspace(0.0, end, 42)
+    before, after = (force + friction) / mass, (force - friction) / mass
+    turns = 16.5 * time[1]
+    speed = np.where(time < turns, before * (turns - time), -after * (time - turns))
+    drive = SmoothedDrive(time, np.full(len(time), -force), 1e-4)
+    response, step = position_response(drive, speed, mass, friction), time[1]
+    for knot in (3, 7, 12):
+        by_speed = (turns - time[knot]) + after / before * (end - turns)
+        assert response[-1, knot] == pytest.approx(step / mass * by_speed, rel=0.03)
+
+
+def test_a_drive_that_is_a_line_stays_one() -> None:
+    time = np.arange(0.0, 0.3, 4e-4)
+    drive = smooth_drive(time, 5.0 - 30.0 * time, 0.3)
+    assert drive.force_n == pytest.approx(5.0 - 30.0 * drive.time_s, abs=1e-6)
+
+
+def test_friction_of_a_block_is_that_of_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coulomb friction, mu_k m g, is what the whitener of a driven block takes the part to lose."""
+
+    @dataclass
+    class Block:
+        times: Any
+        values: Any
+        drive: Any
+        covariates: dict[str, float]
+        whitener: Any = None
+
+    time = np.linspace(0.0, 0.5, 200)
+    position, empty, frictions = 0.02 * np.sin(12.0 * time), np.empty(0), []
+
+    def noted(drive: SmoothedDrive, speed: np.ndarray, mass: float, friction: float) -> np.ndarray:
+        frictions.append((mass, friction))
+        return position_response(drive, speed, mass, friction)
+
+    monkeypatch.setattr(measured_drive, "position_response", noted)
+    block: Any = Block(
+        (empty, time, empty),
+        (empty, position, empty),
+        np.vstack([time, 8.0 * np.cos(12.0 * time)]),
+        {"mass": 2.0},
+    )
+    whitened = measured_drive.whiten_block(block, 1e-6, 9.81, 0.25)
+    assert frictions == [(2.0, pytest.approx(0.25 * 2.0 * 9.81))]
+    assert whitened.whitener.shape == (len(whitened.times[1]),) * 2
+
+
+def test_a_slip_is_fast_and_of_one_direction() -> None:
+    speed = np.concatenate(
+        [np.full(20, 1e-4), np.full(30, 0.3), np.zeros(25), np.full(40, -0.2), np.full(20, 1e-4)]
+    )
+    parts = [(part.tolist(), sense) for part, sense in measured_drive._slip_intervals(speed)]
+    assert parts == [([*range(20, 50)], 1.0), ([*range(75, 115)], -1.0)]
+
+
+def test_blocks_are_cut_beside_a_stretch_without_samples() -> None:
+    time = np.concatenate([np.arange(0.0, 2.0, 1e-3), np.arange(4.0, 12.0, 1e-3)])
+    speed = np.sin(2.0 * np.pi * 5.0 * time)
+    cuts = driven_blocks._cut_samples(time, speed)
+    assert len(cuts) > 5
+    assert np.median(np.abs(speed[cuts])) == pytest.approx(1.0, abs=0.02)
+    assert np.abs(speed[cuts]).min() > 0.5
+    assert time[cuts[0]] < 2.0 < 4.0 < time[cuts[-1]]
+
+
+def test_a_column_of_nothing_but_zeros_does_not_vary() -> None:
+    shots: Any = [
+        SimpleNamespace(covariates={"zero": 0.0, "load": 2.0 + place, "same": 5.0, "gap": math.nan})
+        for place in range(4)
+    ]
+    strategy: Any = SimpleNamespace(record_of=lambda _: 0)
+    assert prepared_campaign._varying_covariates(strategy, shots) == ("load",)
+
+
+def test_a_channel_that_shows_no_noise_and_states_none_is_refused() -> None:
+    prepared: Any = SimpleNamespace(
+        shots=(SimpleNamespace(values=(np.full(50, 3.0), np.empty(0), np.empty(0))),),
+        stated_noise=(math.nan,) * 3,
+    )
+    with pytest.raises(CampaignError, match="neither is its noise stated"):
+        sensor_noise(prepared)
+
+
+def test_a_quarter_of_every_setting_is_held_out() -> None:
+    """Whether a setting has many shots or one: over 400 splits, as often as chance allows."""
+    velocities = np.array([1.0] * 8 + [2.0] * 5 + [3.0])
+    shots: Any = [SimpleNamespace(velocity_m_s=velocity, direction=1) for velocity in velocities.tolist()]
+    strategy: Any = None
+    share = np.zeros(len(shots))
+    for seed in range(400):
+        training, held_out = ExcitationStrategy.split(strategy, shots, seed)
+        assert sorted([*training, *held_out]) == list(range(len(shots)))
+        share[held_out] += 1.0 / 400
+    spread = 4.0 * math.sqrt(share.mean() * (1.0 - share.mean()) / 400)
+    for velocity in np.unique(velocities):
+        assert share[velocities == velocity].mean() == pytest.approx(share.mean(), abs=spread)

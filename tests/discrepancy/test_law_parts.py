@@ -1,0 +1,80 @@
+"""Parts of the search for a law by themselves: covariates, their range, how a spline bends."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from impactcell.discrepancy.data.phases import PHASES
+from impactcell.discrepancy.laws import covariates, finding, grammar
+from impactcell.physics.free_forms import FREE_FORMS
+
+
+def test_covariates_of_a_law_are_the_motions_own_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    n = 400
+    rng, sliding = np.random.default_rng(1), PHASES.index("loading")
+    trajectory = SimpleNamespace(
+        speed_m_s=rng.uniform(0.0, 0.2, n),
+        part_displacement_m=rng.uniform(0.0, 1e-3, n),
+        actuator_displacement_m=rng.uniform(1e-3, 3e-3, n),
+    )
+    items = [
+        SimpleNamespace(velocity_m_s=0.3, direction=1, start_m=0.0),
+        SimpleNamespace(velocity_m_s=0.5, direction=1, start_m=0.0),
+    ]
+    shots = SimpleNamespace(
+        items=items,
+        channel=np.arange(n) % 2,
+        values=rng.uniform(10.0, 90.0, n),
+        times=np.linspace(0.0, 1.0, n),
+    )
+    problem: Any = SimpleNamespace(shots=shots, sizes=np.array([150, 250]))
+    model: Any = None
+    monkeypatch.setattr(covariates, "trajectory_of", lambda *_: trajectory)
+    monkeypatch.setattr(covariates, "sample_phases", lambda *_: np.full(n, sliding))
+    forms = {form.covariate: form for form in FREE_FORMS.values() if not form.is_between_shots}
+    strikes = np.repeat([0.3, 0.5], [150, 250])
+    expected = {
+        "speed": trajectory.speed_m_s,
+        "indentation_rate": strikes - trajectory.speed_m_s,
+        "force": shots.values[shots.channel == 0],
+        "indentation": trajectory.actuator_displacement_m - trajectory.part_displacement_m,
+    }
+    assert len(expected.keys() & forms.keys()) > 2
+    for name in expected.keys() & forms.keys():
+        met = covariates.visited(problem, model, forms[name])
+        assert met is not None
+        assert met.values == pytest.approx(expected[name])
+        assert met.upper == pytest.approx(expected[name].max())
+
+
+@pytest.mark.parametrize(("lowest", "is_enough"), [(0.5, True), (0.78, True), (0.82, False)])
+def test_what_varies_by_less_than_a_fifth_was_not_gone_through(lowest: float, is_enough: bool) -> None:
+    form: Any = SimpleNamespace(covariate="position")
+    assert (covariates._range(np.linspace(lowest, 1.0, 80), form) is not None) is is_enough
+
+
+def test_a_range_that_begins_at_nought_has_the_atoms_of_positive_numbers() -> None:
+    def names(lower: float) -> set[str]:
+        return {
+            item.term[0].name
+            for item in grammar.shaped_terms(lower, 2.0, constant=True)
+            if len(item.term) == 1
+        }
+
+    assert names(0.0) == names(0.5)
+    assert names(-0.5) < names(0.0)
+
+
+@pytest.mark.parametrize("smoothness", finding.SMOOTHNESS)
+def test_only_the_smoothest_spline_tells_nothing_of_how_a_term_bends(
+    monkeypatch: pytest.MonkeyPatch, smoothness: float
+) -> None:
+    monkeypatch.setattr(finding, "gives_energy", lambda _: False)
+    form = SimpleNamespace(covariate="speed", effect=SimpleNamespace(equation="s(v)"))
+    term: Any = SimpleNamespace(smoothness=smoothness, form=form)
+    change: Any = SimpleNamespace(is_real=lambda: True, after=SimpleNamespace(of=lambda _: 1.0), parts=())
+    said = finding._refusal(term, None, change, 2.0)
+    assert bool(said) is (smoothness == max(finding.SMOOTHNESS))
+    assert finding._refusal(term, SimpleNamespace(), change, 2.0) == ""  # type: ignore[arg-type]

@@ -1,0 +1,86 @@
+"""Parts of a machine's study by themselves: what is left, its range, spikes and correlations."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from impactcell.discrepancy.machine import finding as machine_finding
+from impactcell.discrepancy.machine import proof, simulation, uniform_records
+from impactcell.discrepancy.machine.base_model import Response
+from impactcell.discrepancy.machine.study import Study
+
+
+def test_range_of_a_gap_where_nothing_is_left_is_students() -> None:
+    """Noise of one and five blocks' squares about it: t with four degrees of freedom, 2.776 of an error."""
+    squares = np.array([0.8, 1.3, 0.9, 1.1, 0.9])
+    model: Any = SimpleNamespace(fit=SimpleNamespace(columns=(), coefficients=np.empty(0)))
+
+    def blocks(values: np.ndarray) -> Any:
+        return SimpleNamespace(losses=lambda *_: 2.0 * values, noise=np.full(len(values), 2.0))
+
+    half = 2.776445 * squares.std(ddof=1) / squares.mean() / math.sqrt(5.0)
+    expected = math.sqrt(1.0 - half) / 1.05, math.sqrt(1.0 + half) * 1.05
+    assert proof.expected_gap(blocks(squares), model) == pytest.approx(expected, rel=1e-6)
+    lowest, highest = proof.expected_gap(blocks(squares[:1]), model)
+    assert lowest == 0.0 < 1.0 < highest
+    assert proof.expected_gap(blocks(np.array([1e-3, 4.0])), model)[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("after", "training", "expected"), [(1.0, 1.0, True), (2.0, 1.0, False), (1.0, 2.0, False)]
+)
+def test_a_model_is_at_the_floor_where_it_was_fitted_and_where_not(
+    after: float, training: float, expected: bool
+) -> None:
+    found: Any = SimpleNamespace(
+        fall=SimpleNamespace(after=after), expected=(0.9, 1.1), train_gaps=(3.0, training)
+    )
+    assert machine_finding.MachineFinding.is_at_floor.fget(found) is expected  # type: ignore[attr-defined]
+
+
+def test_spikes_are_taken_out_of_a_signal_far_from_nought() -> None:
+    values = 100.0 + np.sin(np.linspace(0.0, 6.0, 600))
+    spoilt = values.copy()
+    spoilt[[150, 400]] += [30.0, -25.0]
+    clean, spikes = uniform_records._without_spikes(spoilt)
+    assert spikes == 2
+    assert clean == pytest.approx(values, abs=0.02)
+
+
+def test_the_correlation_time_is_that_which_went_in() -> None:
+    """White noise averaged over m steps has the correlations 1 - l / m: their sum is (m + 1) / 2 steps."""
+    rng, m, step = np.random.default_rng(2), 12, 0.01
+    averaged = np.array([np.convolve(rng.normal(size=3000), np.ones(m), "valid") for _ in range(2)])
+    rows = SimpleNamespace(
+        target=averaged.ravel(), columns={}, record=np.repeat([0, 1], averaged.shape[1]),
+        time_s=np.tile(step * np.arange(averaged.shape[1]), 2),
+    )  # fmt: skip
+    study: Any = SimpleNamespace(rows=lambda: rows, records=(None, None))
+    model: Any = SimpleNamespace(fit=SimpleNamespace(columns=(), coefficients=()))
+    assert Study._correlation_time(study, model) == pytest.approx(0.5 * (m + 1) * step, rel=0.3)
+
+
+def test_held_out_stretches_are_simulated_from_begin_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = SimpleNamespace(time_s=0.1 * np.arange(100), position=np.sin(np.arange(100.0)))
+    stretches: list[slice] = []
+
+    def exact(_model: object, parts: Any, _period: float) -> list[np.ndarray]:
+        stretches.extend(stretch for _, stretch in parts)
+        return [part.position[stretch] for part, stretch in parts]
+
+    monkeypatch.setattr(simulation, "_positions", exact)
+    found: Any = SimpleNamespace(
+        held_spans=[(0, 2.0, 3.0), (0, 7.0, 9.9)], records=[record], scale=SimpleNamespace(period_s=1.0)
+    )
+    response = next(kind for kind in Response if kind is not Response.FORCE)
+    model: Any = SimpleNamespace(base=SimpleNamespace(response=response))
+    error = simulation.simulate_held_out(found, model)
+    times = [record.time_s[stretch] for stretch in stretches]
+    assert [(part[0], part[-1]) for part in times] == [
+        (pytest.approx(2.0), pytest.approx(3.0)),
+        (pytest.approx(7.0), pytest.approx(9.9)),
+    ]
+    assert (error.rmse, error.fit_percent) == (0.0, 100.0)

@@ -1,0 +1,34 @@
+"""What figures and sentences of a report say."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from impactcell.discrepancy.report import figures, sentences
+
+
+def test_a_figure_names_the_setting_of_its_shot() -> None:
+    shot = SimpleNamespace(number=7, velocity_m_s=0.02, mass_kg=1.5, direction=-1.0)
+    assert figures._setting(shot) == "shot 7, 1200 mm/min, 1.5 kg, −"
+    assert (
+        figures._setting(SimpleNamespace(number=7, velocity_m_s=math.nan, mass_kg=math.nan, direction=1.0))
+        == "shot 7, +"
+    )
+
+
+@pytest.mark.parametrize("ties", [(), ("quadratic_drag",)])
+def test_a_tie_and_a_name_are_told_as_what_they_are(ties: tuple[str, ...]) -> None:
+    result: Any = SimpleNamespace(
+        validation=SimpleNamespace(gap_before=3.0, gap_after=1.0),
+        conclusion=SimpleNamespace(
+            verdict="tied" if ties else "named",
+            established=("viscous_friction",),
+            ties={"viscous_friction": ties},
+            remaining=SimpleNamespace(explained=True),
+        ),
+    )
+    said = sentences._conclusion(result)
+    assert ("cannot tell apart" in said) is bool(ties)
+    assert ("with it the held-out gap falls from 3.00 to 1.00" in said) is not bool(ties)
