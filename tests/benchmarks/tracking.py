@@ -14,7 +14,17 @@ from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
-from tests.benchmarks import _declared, _inside, _signatures, _sizes, _slides, _steps, _track, _tracker
+from tests.benchmarks import (
+    _declared,
+    _inside,
+    _signatures,
+    _sizes,
+    _slides,
+    _steps,
+    _told_steps,
+    _track,
+    _tracker,
+)
 from tests.benchmarks.table import Table
 
 
@@ -29,6 +39,7 @@ def tables(*, quick: bool = False) -> Iterator[Table]:
         _tracker.known_table,
         _declared.table,
         _steps.table,
+        _told_steps.table,
         _signatures.speed_table,
         _signatures.error_table,
         _signatures.power_table,
