@@ -5,15 +5,14 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import yaml
-
 from impactcell.campaign import Excitation
-from impactcell.errors import MeasurementError
+from impactcell.errors import MeasurementError, SettingsError
 from impactcell.measurements.mapping import Given
 from impactcell.measurements.numbers import parse_number
 from impactcell.measurements.recognition import Quantity
 from impactcell.measurements.taps import NO_TRIGGER
 from impactcell.measurements.units import Dimension, parse_unit
+from impactcell.process import yaml_loader
 
 CONSTANTS: dict[str, tuple[tuple[Dimension, ...], str]] = {
     "mass": ((Dimension.MASS, Dimension.INERTIA), "18.9 kg"),
@@ -46,12 +45,7 @@ def read_given(
     MeasurementError
         Every name and value that is not known.
     """
-    sections, from_file = _read(file) if file is not None else ({}, {})
-    others = {
-        name: Quantity(key)
-        for key in OTHERS
-        for name in yaml.safe_load(sections.get("columns", {}).pop(key, "[]"))
-    }
+    sections, from_file, others = _read(file) if file is not None else ({}, {}, {})
     for section in SECTIONS:
         for text in said.get(section, ()):
             name, equals, value = text.partition("=") if section != "units" else _split_last(text)
@@ -87,30 +81,43 @@ def _split_last(text: str) -> tuple[str, str, str]:
     return text.rpartition("=")
 
 
-def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
+def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[str, Quantity]]:
+    """Blocks of a file, excitation and trigger, and the columns that are covariates or ignored."""
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MeasurementError(f"{file}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        line = "" if mark is None else f":{mark.line + 1}"
-        raise MeasurementError(f"{file}{line}: is not YAML") from error
+        content, positions = yaml_loader.load(file)
+    except SettingsError as error:
+        raise MeasurementError(str(error)) from error
+    known = (*SECTIONS, "excitation", "trigger")
     if not isinstance(content, dict):
         raise MeasurementError(f"{file}: has to hold blocks {', '.join(SECTIONS)}, excitation and trigger")
-    known = (*SECTIONS, "excitation", "trigger")
-    faults = [
-        f"{file}: unknown key {key!r}; known: {', '.join(known)}" for key in content if key not in known
-    ]
-    faults += [
-        f"{file}: {key} has to be a block of `name: value`"
-        for key in SECTIONS
-        if key in content and not isinstance(content[key], dict)
-    ]
+    faults: list[str] = []
+    sections: dict[str, dict[str, str]] = {}
+    single: dict[str, str] = {}
+    others: dict[str, Quantity] = {}
+
+    def fault(message: str, *location: str | int) -> None:
+        faults.append(yaml_loader.format_error(file, positions.key(location), message))
+
+    for key, value in content.items():
+        if key not in known:
+            fault(f"unknown key {key!r}; known: {', '.join(known)}", key)
+        elif key not in SECTIONS:
+            single[key] = str(value)
+        elif not isinstance(value, dict):
+            fault(f"{key} has to be a block of `name: value`", key)
+        else:
+            for name, item in value.items():
+                several = key == "columns" and name in OTHERS
+                listed = item if several and isinstance(item, list) else [item]
+                if not all(isinstance(part, str | int | float) for part in listed):
+                    fault(f"{key}.{name} has to be a text or a number", key, name)
+                elif several:
+                    others |= {str(column): Quantity(name) for column in listed}
+                else:
+                    sections.setdefault(key, {})[str(name)] = str(item)
     if faults:
         raise MeasurementError("\n".join(faults))
-    sections = {key: {str(k): str(v) for k, v in content[key].items()} for key in SECTIONS if key in content}
-    return sections, {key: str(content[key]) for key in ("excitation", "trigger") if key in content}
+    return sections, single, others
 
 
 def _quantity(key: str, faults: list[str]) -> Quantity | None:

@@ -5,24 +5,26 @@ PyYAML alone follows 1.1, where each of these surprises.
 """
 
 import difflib
-import re
+import itertools
 import types
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from impactcell.errors import SettingsError
+from impactcell.process.yaml_core_schema import CoreLoader, integer
 
 Location = tuple[str | int, ...]
 M = TypeVar("M", bound=BaseModel)
 
 MOST_NODES = 200_000
-"""A file of nested aliases can describe more than memory holds; no honest one comes near this."""
+"""A file of nested aliases or merges can describe more than memory holds; no honest one comes near this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,49 +63,6 @@ class Positions:
         return self.keys.get(path, self.values[path])
 
 
-class _CoreLoader(yaml.SafeLoader):
-    """SafeLoader with the scalars of YAML 1.2's core schema; a repeated key is an error."""
-
-    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:  # noqa: FBT001, FBT002
-        seen: set[object] = set()
-        for key_node, _ in node.value:
-            if key_node.tag == "tag:yaml.org,2002:merge":
-                continue
-            key = self.construct_object(key_node, deep=True)
-            if not isinstance(key, str | int | float | None):
-                raise yaml.MarkedYAMLError(
-                    None, None, "a key must be plain text or a number", key_node.start_mark
-                )
-            if key in seen:
-                raise yaml.MarkedYAMLError(None, None, f"key {key!r} is given twice", key_node.start_mark)
-            seen.add(key)
-        return super().construct_mapping(node, deep=deep)
-
-
-def _decimal(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
-    text = str(loader.construct_scalar(node))
-    return int(text, 0) if text[:2] in ("0x", "0o") else int(text)
-
-
-for _tag, _pattern, _first in (
-    ("bool", r"true|True|TRUE|false|False|FALSE", "tTfF"),
-    ("null", r"~|null|Null|NULL|", "~nN"),
-    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", "-+0123456789"),
-    (
-        "float",
-        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
-        "-+.0123456789",
-    ),
-    ("merge", r"<<", "<"),
-):
-    _CoreLoader.add_implicit_resolver(
-        f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), [*_first, *([""] * (_tag == "null"))]
-    )
-_CoreLoader.add_constructor("tag:yaml.org,2002:int", _decimal)
-
-
 def load(path: Path) -> tuple[object, Positions]:
     """Read one YAML document.
 
@@ -125,7 +84,7 @@ def load(path: Path) -> tuple[object, Positions]:
     except UnicodeDecodeError as fault:
         raise SettingsError(f"{path}: is not UTF-8 text (byte {fault.start})") from fault
     try:
-        loader = _CoreLoader(text)
+        loader = CoreLoader(text)
         try:
             node = loader.get_single_node()
             if node is None:
@@ -152,13 +111,14 @@ def load(path: Path) -> tuple[object, Positions]:
 def _positions(path: Path, root: yaml.Node) -> Positions:
     keys: dict[Location, FilePosition] = {}
     values: dict[Location, FilePosition] = {}
+    visits = itertools.count(1)
 
     def visit(node: yaml.Node, location: Location, above: tuple[yaml.Node, ...]) -> None:
         place = FilePosition(node.start_mark.line + 1, node.start_mark.column + 1)
         if node in above:
             raise SettingsError(f"{path}:{place}: this part of the file contains itself")
         values[location] = place
-        if len(values) > MOST_NODES:
+        if next(visits) > MOST_NODES:
             raise SettingsError(f"{path}:{place}: aliases describe more than {MOST_NODES} values")
         within = (*above, node)
         if isinstance(node, yaml.SequenceNode):
@@ -174,7 +134,8 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
                 if isinstance(key_node, yaml.ScalarNode) and (key_node, value_node) not in merged:
                     key: str | int = key_node.value
                     if key_node.tag == "tag:yaml.org,2002:int":
-                        key = int(key_node.value, 0) if "x" in key_node.value else int(key_node.value)
+                        with suppress(ValueError):  # what is no number is told when it is built
+                            key = integer(key_node.value)
                     here = (*location, key)
                     keys[here] = FilePosition(key_node.start_mark.line + 1, key_node.start_mark.column + 1)
                     visit(value_node, here, within)

@@ -20,8 +20,9 @@ import yaml
 from argon2 import PasswordHasher
 from argon2.exceptions import Argon2Error, InvalidHashError
 
-from impactcell.errors import AccessError
+from impactcell.errors import AccessError, SettingsError
 from impactcell.opcua.host_interface import RegisteredUser, Role
+from impactcell.process import yaml_loader
 from impactcell.process.whole_files import write_whole
 
 _log = logging.getLogger(__name__)
@@ -52,16 +53,12 @@ def read_users(path: Path) -> dict[str, User]:
     AccessError
         The file cannot be read or is not a users file; the message names the entry.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
+    if not path.exists():
         return {}
-    except (OSError, UnicodeDecodeError) as error:
-        raise AccessError(f"{path}: cannot be read: {error}") from error
     try:
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise AccessError(f"{path}: not YAML: {error}") from error
+        data, _ = yaml_loader.load(path)
+    except SettingsError as error:
+        raise AccessError(str(error)) from error
     entries = data.get("users") if isinstance(data, dict) else None
     if not isinstance(entries, list):
         raise AccessError(f"{path}: not a users file; make one with `impactcell users add {path}`")
@@ -81,14 +78,15 @@ def _user(entry: object, where: str) -> User:
     if unknown:
         raise AccessError(f"{where}: does not know {', '.join(sorted(map(str, unknown)))}")
     roles = {role.name.lower(): role for role in Role}
-    if entry.get("role") not in roles:
+    role = entry.get("role")
+    if not isinstance(role, str) or role not in roles:
         raise AccessError(f"{where}: the role is one of {', '.join(roles)}")
     password, certificate = entry.get("password"), entry.get("certificate")
     if not isinstance(password, str | None) or not isinstance(certificate, str | None):
         raise AccessError(f"{where}: password and certificate are text")
     if password is None and certificate is None:
         raise AccessError(f"{where}: has neither password nor certificate")
-    return User(entry["name"], roles[entry["role"]], password, certificate)
+    return User(entry["name"], roles[role], password, certificate)
 
 
 def write_users(path: Path, users: dict[str, User]) -> None:

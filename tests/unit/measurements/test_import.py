@@ -1,6 +1,7 @@
 """From files as people have them to a campaign: meaning of columns, trigger, cuts, what is told."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -222,6 +223,30 @@ def test_columns_are_left_out_or_kept_as_covariates(tmp_path: Path) -> None:
     }  # fmt: skip
     with pytest.raises(MeasurementError, match="there is no column 'gone'"):
         guess(tables, read_given({"columns": ["ignored=gone"]}))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("columns: {covariate: [[p]]}\n", "map.yaml:1:11: columns.covariate has to be a text or a number"),
+        ("columns:\n  force:\n", "map.yaml:2:3: columns.force has to be a text or a number"),
+        ("units: {x: [mm]}\n", "map.yaml:1:9: units.x has to be a text or a number"),
+        ("signs: 3\n", "map.yaml:1:1: signs has to be a block of `name: value`"),
+        ("units: {x: !!timestamp 2026-13-45}\n", "map.yaml:1:12: '2026-13-45' cannot be read as timestamp"),
+        ("", "map.yaml:1:1: the file is empty"),
+    ],
+)
+def test_what_a_mapping_file_cannot_say_is_told_with_its_place(text: str, told: str, tmp_path: Path) -> None:
+    said = tmp_path / "map.yaml"
+    said.write_text(text, encoding="utf-8")
+    with pytest.raises(MeasurementError, match=re.escape(told)):
+        read_given({}, said)
+
+
+def test_one_column_of_a_mapping_file_needs_no_list(tmp_path: Path) -> None:
+    said = tmp_path / "map.yaml"
+    said.write_text("columns: {covariate: Druck, ignored: 7}\n", encoding="utf-8")
+    assert read_given({}, said).others == {"Druck": Quantity.COVARIATE, "7": Quantity.IGNORED}
 
 
 def test_what_rotates_is_a_campaign_of_torque_angle_and_inertia(tmp_path: Path) -> None:

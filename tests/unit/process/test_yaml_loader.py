@@ -118,6 +118,14 @@ def test_an_unknown_key_without_a_near_one_lists_what_is_allowed(tmp_path: Path)
         ("a: \x07\n", "1:4: a character YAML does not allow"),
         ("- 1\n", "1:1: should be a valid dictionary"),
         ("a: *nobody\n", "1:4:"),
+        ("b: 1\na: !!bool maybe\n", "2:4: 'maybe' cannot be read as bool"),
+        ("a: !!timestamp soon\n", "1:4: 'soon' cannot be read as timestamp"),
+        ("a: !!timestamp 2026-13-45\n", "1:4: '2026-13-45' cannot be read as timestamp"),
+        ("a: !!float ''\n", "1:4: '' cannot be read as float"),
+        ("a: !!map one\n", "1:4: expected a mapping node"),
+        ("b: 1\n!!int one: 1\n", "2:1: 'one' cannot be read as int"),
+        (f"a: {'9' * 5000}\n", "1:4:"),
+        ('a: "\\ud800"\n', "1:4: half a surrogate pair is no character"),
     ],
 )
 def test_bad_files_are_refused_with_a_place(tmp_path: Path, text: str, message: str) -> None:
@@ -141,6 +149,17 @@ def test_a_file_of_nested_aliases_is_refused(tmp_path: Path) -> None:
         load(write(tmp_path, "\n".join(lines)))
 
 
+def test_a_file_of_nested_merges_is_refused(tmp_path: Path) -> None:
+    lines = ["a0: &a0 {x: 1}"]
+    lines += [f"a{n}: &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 10)}]}}" for n in range(1, 9)]
+    with pytest.raises(SettingsError, match="aliases describe more than"):
+        load(write(tmp_path, "\n".join(lines)))
+
+
+def test_keys_in_any_base_are_numbers(tmp_path: Path) -> None:
+    assert load(write(tmp_path, "0o17: {a: 1}\n0x10: 2\n010: 3\n"))[0] == {15: {"a": 1}, 16: 2, 10: 3}
+
+
 def test_merged_keys_keep_the_place_they_come_from(tmp_path: Path) -> None:
     text = "spares:\n  a: &a {mass_kg: 0}\n  b:\n    <<: *a\n    name: b\npart: {mass_kg: 1}\n"
     assert faults(tmp_path, text) == [
@@ -157,3 +176,18 @@ def test_no_text_gives_anything_but_data_or_a_settings_error(
     path.write_text(text, encoding="utf-8", errors="replace")
     with contextlib.suppress(SettingsError):
         read(path, Cell)
+
+
+SCALARS = st.sampled_from(["", "x", "1", "-", ".inf", "1e999", "2026-02-30", "@@", "~", "'", "[1]", "{a: 1}"])
+KINDS = ["bool", "int", "float", "null", "timestamp", "binary", "set", "omap", "pairs", "seq", "map", "str"]
+TAGS = st.sampled_from(["", *(f"!!{kind} " for kind in KINDS)])
+
+
+@given(st.lists(st.tuples(TAGS, SCALARS, TAGS, SCALARS), max_size=4))
+def test_values_and_keys_with_any_tag_are_data_or_a_settings_error(
+    tmp_path_factory: pytest.TempPathFactory, pairs: list[tuple[str, str, str, str]]
+) -> None:
+    path = tmp_path_factory.mktemp("tags") / "tags.yaml"
+    path.write_text("".join(f"? {tag}{key}\n: {kind}{value}\n" for tag, key, kind, value in pairs))
+    with contextlib.suppress(SettingsError):
+        load(path)
