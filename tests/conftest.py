@@ -13,7 +13,8 @@ import pytest_asyncio
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
+TESTS = Path(__file__).resolve().parent
+SHARED = TESTS.parents[1] / "shared" / "data"
 
 # The same examples in every run, and no example fails because the machine was busy. Hypothesis also draws
 # constants from the modules imported so far, and which those are depends on what a worker has run before:
@@ -33,11 +34,26 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) + 1
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
-    """Look for doctests in the product alone: what tests are made of has none, and takes long to import."""
-    collectors = yield
-    return [collector for collector in collectors if type(collector) is pytest.Module]
+class DoctestsOfTheProduct:
+    """Looks for doctests where there are any: in the product, and there only in files with a prompt.
+
+    What tests are made of has none, and takes long to import; to look through all that a module without one
+    defines takes long too.
+    """
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_collect_file(
+        self, file_path: Path
+    ) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+        collectors = yield
+        if file_path.suffix == ".py" and (TESTS in file_path.parents or b">>>" not in file_path.read_bytes()):
+            return [collector for collector in collectors if type(collector) is pytest.Module]
+        return collectors
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let the choice of doctests hold for the product too, which does not lie below this file."""
+    config.pluginmanager.register(DoctestsOfTheProduct())
 
 
 def pytest_collection_finish() -> None:

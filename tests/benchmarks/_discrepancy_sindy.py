@@ -20,7 +20,6 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from pysindy import STLSQ, SmoothedFiniteDifference
 
 from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, UNLOADING
 from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, PreparedShot
@@ -113,6 +112,8 @@ def smoothed(problem: Problem, shot: PreparedShot, on: np.ndarray, over_s: float
     travel = np.minimum(shot.velocity_m_s * t, problem.shots.stroke_m)
     if len(shot.times[ACTUATOR]):
         travel = np.interp(t, shot.times[ACTUATOR], shot.values[ACTUATOR] * shot.direction)
+    from pysindy import SmoothedFiniteDifference  # takes a second: not for who only collects tests
+
     slope = SmoothedFiniteDifference(smoother_kws={"window_length": window, "polyorder": 3})
     v, rate, travel_rate = np.asarray(slope(np.column_stack([x, force, travel]), t)).T
     a = np.asarray(slope(v[:, None], t))[:, 0]
@@ -226,6 +227,8 @@ def selected(shots: list[tuple[np.ndarray, Columns]]) -> list[str]:
 
 def _fitted(columns: np.ndarray, y: np.ndarray, on: np.ndarray, threshold: float) -> np.ndarray:
     """Coefficients of a sparse regression by PySINDy's optimizer; it warns where none is left."""
+    from pysindy import STLSQ
+
     optimizer = STLSQ(threshold=threshold, alpha=RIDGE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)

@@ -6,7 +6,7 @@ import io
 import json
 import shutil
 import zipfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -366,13 +366,20 @@ def many() -> bytes:
 
 
 @pytest.mark.parametrize(
-    "data",
-    [bomb(), lying(), many(), b"no zip at all", campaign_zip()[:200], b"PK\x03\x04" + b"\0" * 500],
+    "make_archive",
+    [
+        bomb,
+        lying,
+        many,
+        lambda: b"no zip at all",
+        lambda: campaign_zip()[:200],
+        lambda: b"PK\x03\x04" + b"\0" * 500,
+    ],
     ids=["bomb", "lying", "many", "text", "cut off", "zeros"],
 )
-async def test_archives_that_are_refused(page: Page, data: bytes) -> None:
+async def test_archives_that_are_refused(page: Page, make_archive: Callable[[], bytes]) -> None:
     async with page.logged_in(Role.OPERATOR) as client:
-        study, answer = await drop(client, "shots.zip", data)
+        study, answer = await drop(client, "shots.zip", make_archive())
         assert answer.status_code == 201
         found = await until(page, study, Stage.FAILED)
     assert found.faults
