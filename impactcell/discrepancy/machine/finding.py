@@ -9,6 +9,7 @@ from impactcell.discrepancy.machine.equations import Column
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord
+from impactcell.discrepancy.search import Proposal
 
 MIN_TRAINING, MIN_HELD_OUT = 9, 5
 """Blocks to fit and blocks held out that any test needs, as in the workflow of shots [1]."""
@@ -145,6 +146,8 @@ class MachineFinding:
         What is proposed where something remains.
     law_refused : str
         Why nothing is, where something was looked for.
+    experiments : tuple of Proposal
+        Records that would tell tied terms apart.
     """
 
     base: BaseModel
@@ -168,6 +171,7 @@ class MachineFinding:
     seed: int
     law: MachineLaw | None = None
     law_refused: str = ""
+    experiments: tuple[Proposal, ...] = ()
 
     @staticmethod
     def enough(training: Blocks, held_out: Blocks) -> bool:

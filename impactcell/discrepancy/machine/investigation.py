@@ -1,4 +1,4 @@
-"""The whole way from records and a base model to a finding: fit, name, prove on held-out blocks."""
+"""The whole way from records and a base model to a finding: fit, name, prove, and what to record next."""
 
 import math
 from collections.abc import Sequence
@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.study import Study
@@ -58,7 +59,8 @@ def investigate_machine(
     base, notes = hold_what_cannot_be_seen(base, records)
     candidates = _candidates(base, records)
     study = Study(records, base, candidates, _held_records(records, train, test))
-    return with_law(study, study.investigate([*notes_of(data_faults), *notes], seed))
+    finding = study.investigate([*notes_of(data_faults), *notes], seed)
+    return with_experiments(study, with_law(study, finding))
 
 
 def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:

@@ -196,7 +196,7 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     reason = _refusal(best, free_gains, max(gain_of_all, best.gain), excess)
     tied: tuple[str, ...] = ()
     if not reason:
-        tied = tuple(trial.term.choice.name for trial in trials[1:] if _is_tied(best, trial))
+        tied = tuple(trial.term.choice.name for trial in trials[1:] if is_tied(best, trial))
     return SelectionStep(
         tuple(trials), free_gains, gain_of_all, excess, None if reason else best, tied, reason
     )
@@ -218,7 +218,8 @@ def _refusal(best: Trial, free_gains: Mapping[str, float], gain_of_all: float, e
     return ""
 
 
-def _is_tied(best: Trial, rival: Trial) -> bool:
+def is_tied(best: Trial, rival: Trial) -> bool:
+    """Whether the blocks cannot tell a term that does worse from the best one."""
     if rival.gain < MIN_TIED_SHARE * best.gain or rival.at_end:
         return False
     return rival.gain >= EQUAL_SHARE * best.gain or mean_over_error(best.gains - rival.gains) < TIE_Z

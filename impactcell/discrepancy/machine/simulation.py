@@ -61,7 +61,7 @@ def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopEr
         stretches.append((record, slice(int(first), int(last) + 1)))
     if model.base.response is Response.FORCE:
         # At rest friction takes whatever balances the drive; no model says what.
-        simulated = [_forces(model, record, stretch, finding.scale) for record, stretch in stretches]
+        simulated = [needed_force(model, record, stretch, finding.scale) for record, stretch in stretches]
         measured = [record.force[stretch] for record, stretch in stretches]
     else:
         simulated = _positions(model, stretches, finding.scale.period_s)
@@ -74,7 +74,7 @@ def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopEr
     return OpenLoopError(rmse, 100.0 * (1.0 - rmse / float(value.std())), relative)
 
 
-def _forces(model: FittedModel, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
+def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
     """Force that the measured motion needs; nan where the part rests or turns."""
     half, narrow = half_supports(record, scale)
     velocity, noise = smoothed_speed(record.position, narrow, record.step_s)
@@ -101,17 +101,41 @@ def _positions(
 ) -> list[Samples]:
     """Positions that the measured forces lead to, all stretches at once."""
     records = [record for record, _ in stretches]
+    measured = [record.position[stretch] for record, stretch in stretches]
+    drives, start = [], np.empty((2, len(records)))
+    for lane, (record, stretch) in enumerate(stretches):
+        drives.append(np.interp(record.time_s[stretch] + model.delay_s, record.time_s, record.force))
+        start[:, lane] = _first_state(record.position[stretch], record.step_s)
+    run = _runner(model, records, drives, period_s)
+    begin = [
+        max(min(int(START_PERIODS * period_s / record.step_s), len(values) // 4), 2)
+        for record, values in zip(records, measured, strict=True)
+    ]
+    start = _settled_start(lambda state: run(state, max(begin)), start, measured, begin)
+    out = run(start, max(map(len, measured)))
+    return [out[: len(values), lane] for lane, values in enumerate(measured)]
+
+
+def positions_from(
+    model: FittedModel, records: Sequence[UniformRecord], start: Samples, period_s: float
+) -> list[Samples]:
+    """Positions that forces lead to from first states of shape (2, n), as long as each force."""
+    out = _runner(model, records, [record.force for record in records], period_s)(
+        start, max(len(record.force) for record in records)
+    )
+    return [out[: len(record.force), lane] for lane, record in enumerate(records)]
+
+
+def _runner(
+    model: FittedModel, records: Sequence[UniformRecord], drives: Sequence[Samples], period_s: float
+) -> Callable[[Samples, int], Samples]:
+    """Run all drives side by side: from first states (2, lanes) to positions (samples, lanes)."""
     parts = max(math.ceil(STEPS_PER_PERIOD * max(record.step_s for record in records) / period_s), 1)
     step = np.array([record.step_s for record in records]) / parts
-    measured = [record.position[stretch] for record, stretch in stretches]
-    longest = max(map(len, measured))
-    drive = np.zeros((longest + 1, len(records)))
-    start = np.empty((2, len(records)))
-    for lane, (record, stretch) in enumerate(stretches):
-        force = np.interp(record.time_s[stretch] + model.delay_s, record.time_s, record.force)
+    drive = np.zeros((max(map(len, drives)) + 1, len(records)))
+    for lane, force in enumerate(drives):
         drive[: len(force), lane] = force
         drive[len(force) :, lane] = force[-1]
-        start[:, lane] = _first_state(record.position[stretch], record.step_s)
     drive = drive * (1.0 + model.nuisance("force_gain")) + model.nuisance("force_offset")
     machine = _Lanes(
         np.array([record.inertia for record in records]) * (1.0 + model.nuisance("inertia")),
@@ -135,13 +159,7 @@ def _positions(
                 )
         return out
 
-    begin = [
-        max(min(int(START_PERIODS * period_s / record.step_s), len(values) // 4), 2)
-        for record, values in zip(records, measured, strict=True)
-    ]
-    start = _settled_start(lambda state: run(state, max(begin)), start, measured, begin)
-    out = run(start, longest)
-    return [out[: len(values), lane] for lane, values in enumerate(measured)]
+    return run
 
 
 def _settled_start(

@@ -16,7 +16,7 @@ from impactcell.discrepancy.machine import (
     simulate_held_out,
     term_of,
 )
-from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, round_digits
+from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
 
 SYMBOLS = {
     Coordinate.TRANSLATION: {"force": "N", "F": "n", "q": "m"},
@@ -115,7 +115,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
         },
         "simulation": _simulation(finding, errors),
         **_law(finding),
-        "next_experiment": [],
+        "next_experiment": experiments(finding.experiments),
         "nominal": _nuisances(finding.final)
         | {
             name: value

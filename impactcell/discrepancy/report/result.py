@@ -2,12 +2,13 @@
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS
 from impactcell.discrepancy.model import ParameterEstimate, estimate_parameters, linearise
 from impactcell.discrepancy.report.sentences import headline
-from impactcell.discrepancy.search import Gap, GapChange, ModelEvidence, Remaining, Simulation
+from impactcell.discrepancy.search import Gap, GapChange, ModelEvidence, Proposal, Remaining, Simulation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY, find_effect
@@ -67,15 +68,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
         },
         "simulation": _simulation(result.simulation),
         **_law(result),
-        "next_experiment": [
-            {
-                "separates": list(proposal.effects),
-                "setting": proposal.setting,
-                "shots": proposal.shots,
-                "power": round_digits(proposal.power),
-            }
-            for proposal in result.experiments
-        ],
+        "next_experiment": experiments(result.experiments),
         "nominal": _parameters([estimate for estimate in result.parameters if not estimate.effect]),
         "noise_floor": {
             "noise_std": [round_digits(value) for value in result.floor.noise_std],
@@ -122,6 +115,19 @@ def _simulation(simulation: Simulation) -> dict[str, Any]:
         "fit_percent": {when: round_digits(error.fit_percent) for when, error in errors.items()},
         "relative_force_error": {when: round_digits(error.relative_force) for when, error in errors.items()},
     }
+
+
+def experiments(proposals: Sequence[Proposal]) -> list[dict[str, Any]]:
+    """Write down what would tell tied effects apart."""
+    return [
+        {
+            "separates": list(proposal.effects),
+            "setting": proposal.setting,
+            "shots": proposal.shots,
+            "power": round_digits(proposal.power),
+        }
+        for proposal in proposals
+    ]
 
 
 def _law(result: DiscrepancyResult) -> dict[str, Any]:
