@@ -23,11 +23,14 @@ def write(campaign: Campaign, directory: Path) -> None:
     Raises
     ------
     CampaignError
-        The directory holds something already, cannot be written, or two shots share a number.
+        The directory holds something already, is a link, cannot be written, or two shots share a number.
     """
     numbers = [shot.cycle for shot in campaign.shots]
     if len(set(numbers)) < len(numbers):
         message = f"{directory}: two shots have the same number; number them anew"
+        raise CampaignError(message)
+    if directory.is_symlink():
+        message = f"{directory}: is a symbolic link; name the directory itself"
         raise CampaignError(message)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         message = f"{directory}: exists already; choose another name or remove it"

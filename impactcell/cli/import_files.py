@@ -1,6 +1,7 @@
 """`impactcell import`: measurement files become a campaign, and what was guessed of them is shown."""
 
 import json
+import os
 from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -69,6 +70,7 @@ def import_files(
         raise MeasurementError(
             f"{len(files)} files are more than the {limits.files} that are imported at once"
         )
+    _check_distinct(files)
     tables = [table for file in files for table in read_tables(file, limits, options.dialect)]
     mapping = guess(tables, given)
     if not as_json:
@@ -90,6 +92,15 @@ def import_files(
     shots = len(imported.campaign.shots)
     where = "nothing written (--dry-run)" if output is None else f"in {output}"
     print_result(f"{shots} shots of excitation {imported.campaign.excitation}, {where}")
+
+
+def _check_distinct(files: Sequence[Path]) -> None:
+    """Refuse a file that is named twice, by whatever path: its shots would count twice."""
+    names: dict[str, Path] = {}
+    for file in files:
+        before = names.setdefault(os.path.realpath(file), file)
+        if before is not file:
+            raise MeasurementError(f"{file}: is the file {before}, which is named already; name it once")
 
 
 def named_dialect(delimiter: str | None, decimal: str | None, encoding: str | None) -> Dialect:

@@ -1,9 +1,10 @@
 """Measurement files as people have them: read, understood, cut into shots, made a campaign."""
 
 from impactcell.measurements.assembly import Imported, make_campaign, write_campaign
+from impactcell.measurements.assignment import Assignment
 from impactcell.measurements.dialect import Dialect
 from impactcell.measurements.limits import Limits
-from impactcell.measurements.mapping import Assignment, Given, Mapping, guess
+from impactcell.measurements.mapping import Given, Mapping, guess
 from impactcell.measurements.reading import read_tables
 from impactcell.measurements.recognition import Quantity
 from impactcell.measurements.table import MeasuredColumn, Table

@@ -1,6 +1,7 @@
 """Unpacks archives with a limit on what comes out: a bomb is refused before it goes off."""
 
 import gzip
+import lzma
 import shutil
 import tempfile
 import zipfile
@@ -17,6 +18,8 @@ CHUNK_BYTES = 1 << 20
 """Bytes unpacked at a time."""
 ARCHIVES = (b"PK\x03\x04", b"PK\x05\x06", b"\x1f\x8b")
 """Begin of a zip, of an empty zip, and of a gzip file."""
+ENCRYPTED = 0x1
+"""Flag of a zip's member that is encrypted (APPNOTE.TXT, 4.4.4)."""
 
 
 @contextmanager
@@ -31,21 +34,29 @@ def unpacked(path: Path, limits: Limits) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="impactcell-") as name:
         directory = Path(name)
         try:
-            if zipfile.is_zipfile(path):
+            if _begins_as_zip(path):
                 _unpack_zip(path, directory, limits)
             else:
                 with gzip.open(path) as packed:
                     _copy(packed, directory / (path.stem or "data"), path, limits.unpacked_bytes)
+        except OSError as error:
+            raise MeasurementError(f"{path}: cannot be unpacked: {error.strerror or error}") from error
         except (
             zipfile.BadZipFile,
             zlib.error,
+            lzma.LZMAError,
             EOFError,
-            OSError,
+            ValueError,
+            LookupError,
             RuntimeError,
-            NotImplementedError,
         ) as error:
-            raise MeasurementError(f"{path}: cannot be unpacked: {error}") from error
+            raise MeasurementError(f"{path}: cannot be unpacked, it is damaged: {error}") from error
         yield directory
+
+
+def _begins_as_zip(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(2) == b"PK"
 
 
 def _unpack_zip(path: Path, directory: Path, limits: Limits) -> None:
@@ -65,13 +76,21 @@ def _unpack_zip(path: Path, directory: Path, limits: Limits) -> None:
                 f"that are read"
             )
         left = limits.unpacked_bytes
+        targets: set[Path] = set()
         for member in members:
             inner = PurePosixPath(member.filename.replace("\\", "/"))
+            if member.flag_bits & ENCRYPTED:
+                raise MeasurementError(f"{path}: {member.filename!r} is encrypted; unpack it yourself")
+            if not inner.parts:
+                raise MeasurementError(f"{path}: a file in it has no name; pack it again")
             if inner.is_absolute() or ".." in inner.parts or ":" in inner.parts[0]:
                 raise MeasurementError(f"{path}: the name {member.filename!r} leads out of the archive")
             if any(part.startswith((".", "__MACOSX")) for part in inner.parts):
                 continue
             target = directory.joinpath(*inner.parts)
+            if target in targets:
+                raise MeasurementError(f"{path}: holds {member.filename!r} twice; pack each file once")
+            targets.add(target)
             target.parent.mkdir(parents=True, exist_ok=True)
             with archive.open(member) as packed:
                 left -= _copy(packed, target, path, left)

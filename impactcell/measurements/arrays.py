@@ -17,7 +17,10 @@ def column_of(name: str, unit: str | None, values: Any) -> MeasuredColumn | None
 
     Moments become seconds from the first.
     """
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError:  # lists among the numbers
+        return None
     if array.ndim != 1 or not array.size:
         return None
     short = None if unit is None or not str(unit).strip() else str(unit).strip()
@@ -31,7 +34,7 @@ def column_of(name: str, unit: str | None, values: Any) -> MeasuredColumn | None
     if array.dtype.kind in "OSU":
         try:
             numbers = np.array([np.nan if cell is None else float(cell) for cell in array.tolist()])
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             cells = tuple(_word(cell) for cell in array.tolist())
             return MeasuredColumn(name, short, np.full(array.size, np.nan), cells)
         return MeasuredColumn(name, short, numbers)

@@ -64,6 +64,11 @@ def decode(content: bytes, source: str, encoding: str | None) -> tuple[str, str]
             f"{source}:{line}: byte {error.start} is not {encoding}; give the file's encoding, or leave "
             f"it to be told"
         ) from error
+    except UnicodeError as error:
+        raise MeasurementError(
+            f"{source}: is not {encoding}; give the file's encoding, or leave it to be told"
+        ) from error
+    text = text.removeprefix("\ufeff")
     if "\0" in text:
         raise MeasurementError(f"{source}: is not text (it has zero bytes), and no other kind that is read")
     return text, encoding

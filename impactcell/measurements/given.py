@@ -9,7 +9,7 @@ from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError, SettingsError
 from impactcell.measurements.mapping import Given
 from impactcell.measurements.numbers import parse_number
-from impactcell.measurements.recognition import Quantity
+from impactcell.measurements.recognition import CHANNELS, Quantity
 from impactcell.measurements.taps import NO_TRIGGER
 from impactcell.measurements.units import Dimension, parse_unit
 from impactcell.process import yaml_loader
@@ -128,6 +128,8 @@ def _quantity(key: str, faults: list[str]) -> Quantity | None:
 
 
 def _sign(key: str, text: str, faults: list[str]) -> int:
+    if key not in CHANNELS:
+        faults.append(f"{key} cannot be turned; a sign is of {', '.join(CHANNELS)}")
     if text in ("1", "+1", "-1"):
         return int(text)
     faults.append(f"the sign of {key} is {text!r}; it has to be 1 or -1")

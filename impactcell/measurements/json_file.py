@@ -34,8 +34,18 @@ def read_json(path: Path, limits: Limits) -> tuple[Table, ...]:
             content = max(records, key=len)
         else:
             columns = {key: value for key, value in lists.items() if not isinstance(value[0], dict | list)}
+            for key, values in columns.items():
+                place = next((n for n, v in enumerate(values, 1) if isinstance(v, dict | list)), None)
+                if place is not None:
+                    raise MeasurementError(f"{path}: item {place} of {key!r} is no number; mend or remove it")
     if isinstance(content, list):
         rows = [item for item in content if isinstance(item, dict)]
+        strange = next((n for n, item in enumerate(content, 1) if not isinstance(item, dict)), None)
+        if rows and strange is not None:
+            raise MeasurementError(
+                f'{path}: item {strange} of its {len(content)} is no record as `{{"time": 0.1}}` is; mend or '
+                f"remove it"
+            )
         names = list(dict.fromkeys(name for row in rows for name in row))
         limits.check_shape(str(path), len(rows), len(names))
         columns = {name: [_cell(row.get(name)) for row in rows] for name in names}

@@ -4,33 +4,21 @@ from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
-from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.assignment import SURE, Assignment, ascends, lacking
 from impactcell.measurements.recognition import (
-    CHANNELS,
-    RATE_WORDS,
-    STEP_WORDS,
     UNIT_ALONE,
     UNIT_MATCH,
     VOCABULARY,
     Quantity,
     name_score,
-    normalised,
 )
 from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
 
-SURE = 0.5
-"""Confidence from which on a guess is used without being confirmed."""
 GIVEN = 1.0
 """Confidence of what was given."""
-UNITLESS = (Quantity.SHOT, Quantity.DIRECTION, Quantity.BATCH, Quantity.COVARIATE, Quantity.IGNORED)
-"""Quantities that need no unit."""
-ASCENDING_SHARE = 0.8
-"""Share of steps forward from which on a column may be a time: it begins anew with each shot of a file."""
 PRIORITY = (
     Quantity.TIME, Quantity.FORCE, Quantity.ACTUATOR, Quantity.POSITION, Quantity.SHOT, Quantity.VELOCITY,
     Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
@@ -66,28 +54,6 @@ class Given:
     trigger: float | str | None = None
     constants: AbstractMapping[str, float] = field(default_factory=dict)
     others: AbstractMapping[str, Quantity] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class Assignment:
-    """What one column means.
-
-    Attributes
-    ----------
-    column : str
-    quantity : Quantity
-    unit : MeasuredUnit or None
-        None where the file says none and none was given: such a column cannot be used where one is needed.
-    confidence : float
-        0 to 1; 1 where it was given.
-    why : str
-    """
-
-    column: str
-    quantity: Quantity
-    unit: MeasuredUnit | None
-    confidence: float
-    why: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +114,7 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
         if taken is None and item.column not in chosen:
             chosen[item.column] = quantities[item.quantity] = item
     assignments = tuple(chosen.get(name) or _further(column, given) for name, column in columns.items())
-    mapping = Mapping(assignments, given, ())
-    return replace(mapping, faults=tuple(_faults(mapping, tables)))
+    return Mapping(assignments, given, tuple(lacking(assignments, given.constants, tables)))
 
 
 def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) -> None:
@@ -164,6 +129,12 @@ def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) ->
         for name, unit in given.units.items()
         if parse_unit(unit) is None
     ]
+    meanings = [(name, str(quantity)) for quantity, name in given.columns.items()]
+    meanings += [(name, str(quantity)) for name, quantity in given.others.items()]
+    for name in dict.fromkeys(name for name, _ in meanings):
+        several = [quantity for of, quantity in meanings if of == name]
+        if len(several) > 1:
+            faults.append(f"column {name!r} is given as {' and as '.join(several)}; it is one of them")
     if faults:
         raise MeasurementError("\n".join(faults))
 
@@ -205,7 +176,7 @@ def _score(
     fits = unit is not None and unit.dimension in VOCABULARY[quantity].dimensions
     if unit is not None and unit.dimension is not Dimension.NONE and not fits:
         return 0.0, ""
-    if quantity is Quantity.TIME and not np.mean(np.diff(column.values) > 0.0) > ASCENDING_SHARE:
+    if quantity is Quantity.TIME and not ascends(column.values):
         return 0.0, ""
     if score:
         why = f"named {word!r}"
@@ -232,56 +203,3 @@ def _further(column: MeasuredColumn, given: Given) -> Assignment:
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
     return Assignment(column.name, Quantity.COVARIATE, unit, SURE, "none of the known quantities")
-
-
-def sampling_step_s(table: Table, given: Given) -> float | None:
-    """Step of time of a table without a column of it, as given or as the file says beside its columns."""
-    if "rate_hz" in given.constants:
-        return 1.0 / given.constants["rate_hz"]
-    for key, text in table.attributes.items():
-        name = normalised(key)
-        number = _first_number(text)
-        if number is None or number <= 0.0:
-            continue
-        if any(word == name or name.startswith(word) for word in RATE_WORDS.split()):
-            return 1.0 / (number * (1e3 if "khz" in (key + text).lower() else 1.0))
-        if any(word == name or name.startswith(word) for word in STEP_WORDS.split()):
-            unit = parse_unit(text.split()[-1]) if len(text.split()) > 1 else None
-            return number * (unit.factor if unit and unit.dimension is Dimension.TIME else 1.0)
-    return None
-
-
-def _first_number(text: str) -> float | None:
-    first = text.split(maxsplit=1)[0] if text.split() else ""
-    value = parse_number(first)
-    return value if value is not None else parse_number(first, ",")
-
-
-def _faults(mapping: Mapping, tables: Sequence[Table]) -> list[str]:
-    """Say what has to be given first."""
-    faults = []
-    for item in mapping.assignments:
-        if item.quantity in UNITLESS:
-            continue
-        if item.unit is None:
-            faults.append(
-                f"column {item.column!r} ({item.quantity}) has no unit; say --unit '{item.column}="
-                f"{VOCABULARY[item.quantity].dimensions[0].value}', or which it is"
-            )
-        if item.confidence < SURE and item.quantity in (Quantity.TIME, *CHANNELS):
-            faults.append(
-                f"column {item.column!r} may be the {item.quantity} ({item.why}); confirm it with --column "
-                f"'{item.quantity}={item.column}', or name the right one"
-            )
-    if mapping.of(Quantity.TIME) is None and any(sampling_step_s(t, mapping.given) is None for t in tables):
-        faults.append(
-            "no column of time was found; name it with --column time=NAME, or give its rate, as --set "
-            "rate=10kHz"
-        )
-    if mapping.of(Quantity.POSITION) is None and mapping.of(Quantity.FORCE) is None:
-        names = ", ".join(repr(item.column) for item in mapping.assignments)
-        faults.append(
-            f"neither position nor force was found among {names}; name them with --column position=NAME and "
-            f"--column force=NAME"
-        )
-    return faults

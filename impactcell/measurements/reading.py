@@ -65,7 +65,7 @@ def read_tables(
                 return reader(path, limits)
         if path.suffix.lower() == ".mat":
             return read_matlab(path, limits)
-        if head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith((b"{", b"[{")) and path.suffix.lower() == ".json":
+        if path.suffix.lower() == ".json":
             return read_json(path, limits)
         return read_text(path, limits, dialect or Dialect())
     except OSError as error:

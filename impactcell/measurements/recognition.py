@@ -147,7 +147,7 @@ def normalised(name: str) -> str:
 def name_score(name: str, quantity: Quantity) -> tuple[float, str]:
     """How sure the name of a column makes that it is of this quantity, 0 to 1, and the word that says so."""
     words = VOCABULARY[quantity]
-    text = normalised(name)
+    text = normalised(re.sub(r" \(\d+\)$", "", name))  # a name that comes again is as good as the first
     known, symbols = words.words.split(), words.symbols.split()
     if text in known:
         return WORD_MATCH, text

@@ -8,24 +8,12 @@ import numpy as np
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements.faults import raise_faults
-from impactcell.measurements.mapping import Mapping, sampling_step_s
-from impactcell.measurements.numbers import parse_number
-from impactcell.measurements.recognition import (
-    CHANNELS,
-    TOKEN_MATCH,
-    VOCABULARY,
-    Quantity,
-    name_score,
-    normalised,
-)
+from impactcell.measurements.mapping import Mapping
+from impactcell.measurements.recognition import CHANNELS, Quantity
+from impactcell.measurements.sampling_step import sampling_step_s
+from impactcell.measurements.scalars import scalars_of
 from impactcell.measurements.table import Lines, Table
-from impactcell.measurements.units import Dimension, parse_unit, split_unit
 from impactcell.records import Samples
-
-SCALARS = (
-    Quantity.VELOCITY, Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
-)  # fmt: skip
-"""Quantities of which a shot has one value."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +116,12 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
         if item is None or column is None or item.unit is None:
             continue
         present = np.isfinite(column.values)
-        if column.text is not None:
+        infinite = np.flatnonzero(np.isinf(column.values))
+        if infinite.size:
+            faults.append(
+                f"{table.place(int(infinite[0]))}: column {column.name!r} is infinite in {infinite.size} rows"
+            )
+        elif column.text is not None:
             faults.append(f"{table.title}: column {column.name!r} holds text, where the {quantity} is needed")
         elif not present.any():
             faults.append(f"{table.title}: column {column.name!r} ({quantity}) has no value at all")
@@ -137,14 +130,14 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
             values[quantity] = (
                 item.unit.factor * mapping.given.signs.get(quantity, 1) * column.values[present]
             )
-    return Record(place, times, values, {**_said(table), **_scalars(table, mapping)})
+    return Record(place, times, values, scalars_of(table, place, mapping, faults))
 
 
 def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
     item = mapping.of(Quantity.TIME)
     column = None if item is None else table.column(item.column)
     if item is None or column is None:
-        step = sampling_step_s(table, mapping.given)
+        step = sampling_step_s(table, mapping.given.constants)
         if step is None:
             faults.append(
                 f"{table.title}: has no column of time; name it, or give the rate with --set rate=10kHz"
@@ -157,11 +150,11 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
         )
         return None
     time = item.unit.factor * column.values
-    empty = np.flatnonzero(np.isnan(time))
+    empty = np.flatnonzero(~np.isfinite(time))
     if empty.size:
         faults.append(
-            f"{table.place(int(empty[0]))}: column {column.name!r} is empty in {empty.size} rows; every "
-            f"row needs its time"
+            f"{table.place(int(empty[0]))}: column {column.name!r} is empty or infinite in {empty.size} "
+            f"rows; every row needs its time"
         )
         return None
     back = np.flatnonzero(np.diff(time) <= 0.0) + 1
@@ -174,68 +167,6 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
         )
         return None
     return time
-
-
-def _scalars(table: Table, mapping: Mapping) -> dict[str, float | str]:
-    """Give what is constant, from columns: the value where it does not change, else its mean."""
-    scalars: dict[str, float | str] = {}
-    for item in mapping.assignments:
-        column = table.column(item.column)
-        if column is None or item.quantity not in (*SCALARS, Quantity.COVARIATE):
-            continue
-        factor = 1.0 if item.unit is None else item.unit.factor
-        name = str(item.quantity)
-        if item.quantity is Quantity.COVARIATE:
-            name = covariate_name(item.column, item.unit.dimension if item.unit else None)
-        if column.text is not None:
-            distinct = list(dict.fromkeys(column.text))
-            if len(distinct) == 1 and distinct[0]:
-                scalars[name] = distinct[0]
-            continue
-        present = column.values[np.isfinite(column.values)]
-        if present.size:
-            scalars[name] = float(factor * (present[0] if np.ptp(present) == 0.0 else present.mean()))
-    return scalars
-
-
-def covariate_name(column: str, dimension: Dimension | None) -> str:
-    """Name of a covariate in `shots.csv`: of the column, with its SI unit.
-
-    Examples
-    --------
-    >>> covariate_name("Druck p1", Dimension.PRESSURE), covariate_name("Öl", None)
-    ('druck_p1_pa', 'oel')
-    """
-    name = normalised(column)
-    if dimension is None or dimension is Dimension.NONE:
-        return name
-    return f"{name}_{normalised(dimension.value.replace('²', '2').replace('/', ' per '))}"
-
-
-def _said(table: Table) -> dict[str, float | str]:
-    """Quantities that the file says beside its columns, as `Masse: 18,9 kg`."""
-    said: dict[str, float | str] = {}
-    for key, text in table.attributes.items():
-        name, unit_text = split_unit(key)
-        for quantity in SCALARS:
-            score, _ = name_score(name, quantity)
-            if score < TOKEN_MATCH:
-                continue
-            words = text.split()
-            number = parse_number(words[0]) if words else None
-            if number is None and words:
-                number = parse_number(words[0], ",")
-            unit = parse_unit(unit_text or " ".join(words[1:]))
-            if quantity is Quantity.BATCH:
-                said[str(quantity)] = text
-            elif quantity is Quantity.DIRECTION and number is not None:
-                said[str(quantity)] = number
-            elif (
-                number is not None and unit is not None and unit.dimension in VOCABULARY[quantity].dimensions
-            ):
-                said[str(quantity)] = number * unit.factor
-            break
-    return said
 
 
 def _together(first: Record, second: Record) -> Record:

@@ -129,12 +129,14 @@ def _with_velocity(
     taps = []
     for record, onset in parts:
         velocity = given.constants.get("velocity", record.scalars.get("velocity"))
-        if not isinstance(velocity, float) and Quantity.ACTUATOR in record.values:
+        varies = isinstance(velocity, float) and math.isnan(velocity)
+        if (varies or not isinstance(velocity, float)) and Quantity.ACTUATOR in record.values:
             velocity = _slope(record, onset)
         if not isinstance(velocity, float) or not abs(velocity) > 0.0:
+            why = ": its column changes within the record, so it was measured" if varies else ""
             faults.append(
-                f"{record.place}: the velocity of the actuator is not known; name its column with --column "
-                f"velocity=NAME, or give --set 'velocity=3000 mm/min'"
+                f"{record.place}: the velocity of the actuator is not known{why}; name the column of the "
+                f"commanded one with --column velocity=NAME, or give --set 'velocity=3000 mm/min'"
             )
             continue
         taps.append(_TapRecord(record, onset, abs(velocity)))

@@ -62,10 +62,16 @@ def _lines(text: str, source: str, limits: Limits) -> list[str]:
     return lines
 
 
+_OPENS = re.compile(r'(?:^|[,;|\t])\s*"')
+"""A cell that begins with a quote; one within a cell, as the inch of `Weg ["]`, is a sign like any other."""
+
+
 def _joined(lines: list[str]) -> list[str]:
     """Lines with what a quoted cell broke in two put together; the rest of it becomes blank lines."""
     joined = list(lines)
-    for index in range(min(len(lines), 200)):
+    for index in range(len(lines)):
+        if '"' not in joined[index] or not _OPENS.search(joined[index]):
+            continue
         count = 0
         while joined[index].count('"') % 2 and count < 3 and index + count + 1 < len(lines):
             count += 1

@@ -1,0 +1,185 @@
+"""What is constant in a record: mass, velocity, direction and the like, and covariates."""
+
+import math
+import re
+
+import numpy as np
+
+from impactcell.campaign import COLUMNS
+from impactcell.measurements.assignment import Assignment
+from impactcell.measurements.mapping import Mapping
+from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.recognition import TOKEN_MATCH, VOCABULARY, Quantity, name_score, normalised
+from impactcell.measurements.table import MeasuredColumn, Table
+from impactcell.measurements.units import Dimension, parse_unit, split_unit
+
+SCALARS = (
+    Quantity.VELOCITY, Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
+)  # fmt: skip
+"""Quantities of which a shot has one value."""
+STEADY = 0.01
+"""Range of a column as a share of its largest value up to which it is one value with noise; its mean is
+taken."""
+REQUIREMENTS = {
+    Quantity.VELOCITY: "finite", Quantity.MASS: "above 0", Quantity.DIRECTION: "1 or -1",
+    Quantity.DWELL: "0 or above", Quantity.START: "finite",
+}  # fmt: skip
+"""What a scalar of a campaign has to be."""
+TAKEN_NAMES = {
+    *Quantity, *(name for names in COLUMNS.values() for name in names.values()),
+    "shot", "time_s", "velocity_mm_per_min", "dwell_s",
+}  # fmt: skip
+"""Names of columns that a campaign has itself."""
+
+
+def scalars_of(table: Table, place: str, mapping: Mapping, faults: list[str]) -> dict[str, float | str]:
+    """Give what is constant in a table, from what stands beside its columns and from these; SI units.
+
+    What a shot has one of and that is given for all shots is not looked at. A velocity that changes is nan.
+    """
+    given = mapping.given.constants
+    scalars: dict[str, float | str] = {}
+    for quantity, value in _said(table).items():
+        if str(quantity) in given:
+            continue
+        if _is_possible(quantity, value, f"{place}: {quantity}", faults):
+            scalars[str(quantity)] = value
+    names = covariate_names(mapping)
+    for item in mapping.assignments:
+        column = table.column(item.column)
+        if column is None or str(item.quantity) in given:
+            continue
+        if item.quantity is Quantity.COVARIATE:
+            _take_covariate(column, item, names[item.column], scalars)
+        elif item.quantity in SCALARS:
+            scalar = _one_value(column, item, place, faults)
+            where = f"{place}: column {column.name!r} ({item.quantity})"
+            if scalar is not None and _is_possible(item.quantity, scalar, where, faults):
+                scalars[str(item.quantity)] = scalar
+    return scalars
+
+
+def _is_possible(quantity: Quantity, value: float | str, where: str, faults: list[str]) -> bool:
+    """Whether a scalar can be what it has to be; a fault where it cannot."""
+    if quantity is Quantity.BATCH or isinstance(value, str) or math.isnan(value):
+        return True
+    requirement = REQUIREMENTS[quantity]
+    possible = {"above 0": value > 0.0, "0 or above": value >= 0.0, "1 or -1": value in (1.0, -1.0)}
+    if math.isfinite(value) and possible.get(requirement, True):
+        return True
+    unit = VOCABULARY[quantity].dimensions[0]
+    shown = f"{value:g}" + ("" if unit is Dimension.NONE else f" {unit.value}")
+    faults.append(f"{where} is {shown}; it has to be {requirement}: correct it, or {_way_out(quantity)}")
+    return False
+
+
+def _way_out(quantity: Quantity) -> str:
+    examples = {
+        Quantity.VELOCITY: "'velocity=3000 mm/min'", Quantity.MASS: "mass=18.9kg",
+        Quantity.DIRECTION: "direction=1", Quantity.DWELL: "dwell=30s",
+    }  # fmt: skip
+    if quantity in examples:
+        return f"give it for all shots with --set {examples[quantity]}"
+    return "leave its column out with --column ignored=NAME"
+
+
+def _one_value(column: MeasuredColumn, item: Assignment, place: str, faults: list[str]) -> float | str | None:
+    """Give the value of a column that has one; None where it has none."""
+    factor = 1.0 if item.unit is None else item.unit.factor
+    if column.text is not None:
+        distinct = [text for text in dict.fromkeys(column.text) if text]
+        if len(distinct) > 1:
+            faults.append(_changes(column, item, place, repr(distinct[0]), repr(distinct[1])))
+        return distinct[0] if len(distinct) == 1 else None
+    present = column.values[np.isfinite(column.values)]
+    if not present.size:
+        return None
+    low, high = float(present.min()), float(present.max())
+    steady = 0.0 if item.quantity in (Quantity.BATCH, Quantity.DIRECTION) else STEADY
+    if high - low <= steady * max(abs(low), abs(high)):
+        return float(factor * (low if low == high else present.mean()))
+    if item.quantity is Quantity.VELOCITY:  # as it was measured, not commanded
+        return math.nan
+    unit = "" if item.unit is None or item.unit.dimension is Dimension.NONE else f" {item.unit.symbol}"
+    faults.append(_changes(column, item, place, f"{low:g}{unit}", f"{high:g}{unit}"))
+    return None
+
+
+def _changes(column: MeasuredColumn, item: Assignment, place: str, one: str, other: str) -> str:
+    return (
+        f"{place}: column {column.name!r} ({item.quantity}) is {one} and {other} within one record, where a "
+        f"shot has one; number the shots with --column shot=NAME, or {_way_out(item.quantity)}"
+    )
+
+
+def _take_covariate(
+    column: MeasuredColumn, item: Assignment, name: str, scalars: dict[str, float | str]
+) -> None:
+    """Take the value of a covariate where it does not change, else its mean; a text only where it is one."""
+    if column.text is not None:
+        distinct = list(dict.fromkeys(column.text))
+        if len(distinct) == 1 and distinct[0]:
+            scalars[name] = distinct[0]
+        return
+    factor = 1.0 if item.unit is None else item.unit.factor
+    present = column.values[np.isfinite(column.values)]
+    if present.size:
+        scalars[name] = float(factor * (present[0] if np.ptp(present) == 0.0 else present.mean()))
+
+
+def covariate_names(mapping: Mapping) -> dict[str, str]:
+    """Names of the covariates in `shots.csv` by their columns; each once, and none that a campaign has."""
+    names: dict[str, str] = {}
+    taken = set(TAKEN_NAMES)
+    for item in mapping.assignments:
+        if item.quantity is not Quantity.COVARIATE:
+            continue
+        base = covariate_name(item.column, item.unit.dimension if item.unit else None)
+        base = f"{base}_column" if base in TAKEN_NAMES else base
+        name, count = base, 1
+        while name in taken:
+            count += 1
+            name = f"{base}_{count}"
+        taken.add(name)
+        names[item.column] = name
+    return names
+
+
+def covariate_name(column: str, dimension: Dimension | None) -> str:
+    """Name of a covariate in `shots.csv`: of the column, with its SI unit.
+
+    Examples
+    --------
+    >>> covariate_name("Druck p1", Dimension.PRESSURE), covariate_name("Öl", None)
+    ('druck_p1_pa', 'oel')
+    """
+    name = normalised(column) or re.sub(r"\W+", "_", column.lower()).strip("_") or "covariate"
+    if dimension is None or dimension is Dimension.NONE:
+        return name
+    return f"{name}_{normalised(dimension.value.replace('²', '2').replace('/', ' per '))}"
+
+
+def _said(table: Table) -> dict[Quantity, float | str]:
+    """Quantities that the file says beside its columns, as `Masse: 18,9 kg`."""
+    said: dict[Quantity, float | str] = {}
+    for key, text in table.attributes.items():
+        name, unit_text = split_unit(key)
+        for quantity in SCALARS:
+            score, _ = name_score(name, quantity)
+            if score < TOKEN_MATCH:
+                continue
+            words = text.split()
+            number = parse_number(words[0]) if words else None
+            if number is None and words:
+                number = parse_number(words[0], ",")
+            unit = parse_unit(unit_text or " ".join(words[1:]))
+            if quantity is Quantity.BATCH:
+                said[quantity] = text
+            elif quantity is Quantity.DIRECTION and number is not None:
+                said[quantity] = number
+            elif (
+                number is not None and unit is not None and unit.dimension in VOCABULARY[quantity].dimensions
+            ):
+                said[quantity] = number * unit.factor
+            break
+    return said

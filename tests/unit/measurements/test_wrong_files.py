@@ -1,0 +1,219 @@
+"""Files that say something that cannot be: told with the place and the way out, and nothing written."""
+
+import contextlib
+import json
+import warnings
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from impactcell import campaign
+from impactcell.cli.app import run_verb
+from impactcell.errors import CampaignError, MeasurementError
+from impactcell.measurements import read_tables
+from tests.unit.measurements.records import sampled, taps
+
+TIME, FORCE, PLACE = (values[::4] for values in sampled(taps((3000,), (18.9,))[0], np.random.default_rng(3)))
+VELOCITY = ("--set", "velocity=3000 mm/min")
+
+
+def text(head: str = "time_s,force_n,position_m", further: object = None, before: str = "") -> str:
+    """One tap as CSV; `further` is the cell of one more column, or gives it by its row."""
+    rows = [f"{t:.6g},{f:.6g},{x:.7g}" for t, f, x in zip(TIME, FORCE, PLACE, strict=True)]
+    if further is not None:
+        rows = [f"{row},{further(n) if callable(further) else further}" for n, row in enumerate(rows)]
+    return "\n".join([*before.splitlines(), head, *rows]) + "\n"
+
+
+def run(tmp_path: Path, content: str | bytes, *options: str, name: str = "a.csv") -> Path:
+    file = tmp_path / name
+    file.write_bytes(content.encode() if isinstance(content, str) else content)
+    with contextlib.suppress(SystemExit):
+        run_verb(["import", str(file), "-o", str(tmp_path / "out"), *options])
+    return tmp_path / "out"
+
+
+def refused(tmp_path: Path, content: str | bytes, *options: str, name: str = "a.csv") -> str:
+    with pytest.raises(MeasurementError) as caught:
+        run(tmp_path, content, *options, name=name)
+    assert not (tmp_path / "out").exists()
+    return str(caught.value)
+
+
+HEAD = "time_s,force_n,position_m"
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "told"),
+    [
+        (text(f"{HEAD},mass_kg", -20), VELOCITY, "column 'mass' (mass) is -20 kg; it has to be above 0"),
+        (text(f"{HEAD},mass_kg", 0), VELOCITY, "give it for all shots with --set mass=18.9kg"),
+        (text(f"{HEAD},dwell_s", -1), VELOCITY, "column 'dwell' (dwell) is -1 s; it has to be 0 or above"),
+        (text(f"{HEAD},direction", 0), VELOCITY, "column 'direction' (direction) is 0; it has to be 1 or -1"),
+        (text(before="Masse: -3 kg"), VELOCITY, "a.csv: mass is -3 kg; it has to be above 0"),
+        (text(before="Vorschub: 1e400 mm/min"), (), "a.csv: velocity is inf m/s; it has to be finite"),
+        (
+            text(f"{HEAD},mass_kg", lambda row: 18 if row < 90 else 28), VELOCITY,
+            "column 'mass' (mass) is 18 kg and 28 kg within one record, where a shot has one; number",
+        ),
+        (
+            text(f"{HEAD},batch", lambda row: "a" if row < 90 else "b"), VELOCITY,
+            "column 'batch' (batch) is 'a' and 'b' within one record",
+        ),
+        (
+            text(f"{HEAD},velocity_m_per_s", lambda row: 1e-3 * row), (),
+            "the velocity of the actuator is not known: its column changes within the record",
+        ),
+        (text("time_s,force_kg,position_m"), VELOCITY, "column 'force' is called as the force, but is in kg"),
+        (text("time_s,force_m,position_n"), VELOCITY, "column 'position' is called as the position"),
+        (text("time_s,force_n,force_n"), VELOCITY, "column 'force' may be the force"),
+        (text(f"{HEAD},force_n", 1), VELOCITY, "confirm it with --column 'force=force'"),
+        (text(), (*VELOCITY, "--column", "force=force", "--column", "position=force"), "as force and as pos"),
+        (text(), (*VELOCITY, "--column", "force=force", "--column", "ignored=force"), "as force and as ign"),
+        (text(), (*VELOCITY, "--sign", "time=-1"), "time cannot be turned; a sign is of force, posi"),
+        (text(), ("--encoding", "undefined"), "a.csv: is not undefined; give the file's encoding"),
+        (text("force_n,position_m,x_v", before="sample rate: nan"), VELOCITY, "no column of time was found;"),
+        (text("force_n,position_m,x_v", before="dt: 1e400 s"), VELOCITY, "no column of time was found;"),
+        (
+            text().replace("\n0.", "\n0.", 1).replace(f"{TIME[5]:.6g},", "0,", 1), VELOCITY,
+            "a.csv:7: time does not increase",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_told_and_nothing_written(
+    content: str, options: tuple[str, ...], told: str, tmp_path: Path
+) -> None:
+    assert told in refused(tmp_path, content, *options)
+
+
+def test_a_time_that_stands_still_is_told_as_the_reason(tmp_path: Path) -> None:
+    rows = [f"0,{f:.6g},{x:.7g}" for f, x in zip(FORCE, PLACE, strict=True)]
+    told = refused(tmp_path, "\n".join([HEAD, *rows]), *VELOCITY)
+    assert f"no column of time was found: 'time' goes forward in 0 of {len(rows) - 1} steps only" in told
+
+
+def test_what_is_given_for_all_shots_goes_before_a_column_that_cannot_be(tmp_path: Path) -> None:
+    out = run(tmp_path, text(f"{HEAD},mass_kg", -20), *VELOCITY, "--set", "mass=18.9kg")
+    assert campaign.read(out).shots[0].mass_kg == 18.9
+
+
+def test_a_column_whose_noise_is_small_has_one_value(tmp_path: Path) -> None:
+    out = run(tmp_path, text(f"{HEAD},mass_kg", lambda row: 18.9 + 1e-3 * (row % 2)), *VELOCITY)
+    assert campaign.read(out).shots[0].mass_kg == pytest.approx(18.9005, abs=1e-4)
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(
+        st.one_of(
+            st.sampled_from(
+                ["mass_kg", "Mass [kg]", "mass (kg)", "batch", "shot", "velocity", "time_s", "温度"]
+            ),
+            st.text(st.characters(codec="utf-8", exclude_characters='",;|\t\n\r\0#%/'), max_size=8),
+        ),
+        min_size=1,
+        max_size=5,
+    )
+)
+def test_covariates_of_any_name_are_each_kept_and_read_back(
+    tmp_path_factory: pytest.TempPathFactory, names: list[str]
+) -> None:
+    directory = tmp_path_factory.mktemp("names")
+    file = directory / "a.json"
+    columns = {"time_s": TIME.tolist(), "force_n": FORCE.tolist(), "position_m": PLACE.tolist()}
+    further = {f"{name} {n}": n for n, name in enumerate(names, 1)}
+    columns |= {name: [value] * len(TIME) for name, value in further.items()}
+    file.write_text(json.dumps(columns), encoding="utf-8")
+    said = [f"covariate={column.name}" for column in read_tables(file)[0].columns[3:]]
+    options = [part for text in said for part in ("--column", text)]
+    with contextlib.suppress(SystemExit):
+        run_verb(["import", str(file), "-o", str(directory / "out"), *VELOCITY, *options])
+    (shot,) = campaign.read(directory / "out").shots
+    assert sorted(shot.covariates.values()) == sorted(further.values())
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ({"time_s": [10**400] * 5, "force_n": [1.0] * 5}, "'time' holds text, as '1000"),
+        ({"time_s": [0.0, 1.0, 2.0], "force_n": [1.0, [2.0], 3.0]}, "item 2 of 'force_n' is no number"),
+        ([{"time_s": 0.0, "force_n": 1.0}, 5], "item 2 of its 2 is no record"),
+        ([5, {"time_s": 0.0, "force_n": 1.0}], "item 1 of its 2 is no record"),
+        (
+            {"time_s": TIME.tolist(), "force_n": [np.inf, *FORCE.tolist()[1:]], "position_m": PLACE.tolist()},
+            "a.json: row 1: column 'force' is infinite in 1 rows",
+        ),
+    ],
+)
+def test_json_that_is_no_record_is_told(content: object, told: str, tmp_path: Path) -> None:
+    assert told in refused(tmp_path, json.dumps(content), *VELOCITY, name="a.json")
+
+
+@pytest.mark.parametrize(
+    ("members", "told"),
+    [
+        ([("a.csv", text()), ("a.csv", text())], "holds 'a.csv' twice; pack each file once"),
+        ([(".", text())], "a file in it has no name"),
+        ([("", text())], "cannot be unpacked, it is damaged"),
+    ],
+)
+def test_an_archive_with_strange_names_is_refused(
+    members: list[tuple[str, str]], told: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "a.zip"
+    with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(file, "w") as archive:
+        for name, content in members:
+            archive.writestr(zipfile.ZipInfo(name), content)
+    with pytest.raises(MeasurementError, match=told):
+        read_tables(file)
+
+
+def test_an_archive_whose_names_are_no_utf8_or_that_was_cut_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "a.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("äb.csv", text())
+    whole = file.read_bytes()
+    file.write_bytes(whole.replace("äb".encode(), b"\xff\xfeb"))
+    with pytest.raises(MeasurementError, match="cannot be unpacked, it is damaged: 'utf-8' codec"):
+        read_tables(file)
+    file.write_bytes(whole[:200])
+    with pytest.raises(MeasurementError, match="cannot be unpacked, it is damaged: File is not a zip file"):
+        read_tables(file)
+
+
+def test_a_file_is_taken_once_by_whatever_name(tmp_path: Path) -> None:
+    file, link = tmp_path / "a.csv", tmp_path / "b.csv"
+    file.write_text(text(), encoding="utf-8")
+    link.symlink_to(file)
+    with pytest.raises(MeasurementError, match=r"b\.csv: is the file .*a\.csv, which is named already"):
+        run_verb(["import", str(file), str(link), "-o", str(tmp_path / "out"), *VELOCITY])
+
+
+def test_a_campaign_is_not_written_through_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "real")
+    (tmp_path / "a.csv").write_text(text(), encoding="utf-8")
+    with pytest.raises(CampaignError, match="is a symbolic link; name the directory itself"):
+        run_verb(["import", str(tmp_path / "a.csv"), "-o", str(tmp_path / "out"), *VELOCITY])
+
+
+def test_a_mark_of_the_byte_order_is_no_letter_of_a_name(tmp_path: Path) -> None:
+    content = b"\xef\xbb\xbf" + text().encode()
+    run(tmp_path, content, *VELOCITY, "--encoding", "utf-8", "--column", "time=time")
+
+
+def test_the_sign_of_an_inch_opens_no_quote(tmp_path: Path) -> None:
+    (table,) = read_tables_of(tmp_path, text('time [s],force [N],position ["]'))
+    assert [column.unit for column in table.columns] == ["s", "N", '"']
+    broken = "\n".join(f'{t:g},1,2,"a\nb"' for t in range(300))
+    (table,) = read_tables_of(tmp_path, f"{HEAD},note\n{broken}")
+    assert len(table) == 300
+
+
+def read_tables_of(tmp_path: Path, content: str) -> tuple:
+    (tmp_path / "t.csv").write_text(content, encoding="utf-8")
+    return read_tables(tmp_path / "t.csv")
