@@ -1,9 +1,14 @@
 """Collects every fault of a campaign before any of them is reported."""
 
+import stat
 from pathlib import Path
 
 from impactcell.errors import CampaignError
 
+LARGEST = 1e30
+"""Beyond it, in SI units, is no measurement: squares of what is far larger have no double."""
+MOST_BYTES = 500_000_000
+"""Of one file: an hour of three channels at 10 kHz as text."""
 MAX_FAULTS_SHOWN = 20
 """Faults told of one campaign; a reader mends twenty at a time."""
 
@@ -43,7 +48,13 @@ class Faults:
 def read_text(file: Path, faults: Faults) -> str | None:
     """Text of `file`, or None after noting why it cannot be read."""
     try:
-        return file.read_text(encoding="utf-8-sig")
+        status = file.stat()
+        if not stat.S_ISREG(status.st_mode):
+            faults.add(file, None, "is not a file; put the data themselves there")
+        elif status.st_size > MOST_BYTES:
+            faults.add(file, None, f"has more than the {MOST_BYTES / 1e6:.0f} MB that are read; divide it")
+        else:
+            return file.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         faults.add(file, None, "is missing")
     except UnicodeDecodeError as error:

@@ -7,7 +7,7 @@ from pathlib import Path
 import yaml
 
 from impactcell.campaign.contents import CHANNELS, COLUMNS, Coordinate, Excitation, Sensor
-from impactcell.campaign.faults import Faults, read_text
+from impactcell.campaign.faults import LARGEST, Faults, read_text
 
 FORMAT = 1
 """Version of the campaign directory."""
@@ -153,7 +153,8 @@ class _Reader:
             )
         except ValueError:
             value = math.nan
-        if math.isnan(value) or (finite and math.isinf(value)) or (positive and value <= 0.0):
+        measured = 1.0 / LARGEST < abs(value) < LARGEST or (not finite and math.isinf(value))
+        if not measured or "_" in node.value or (positive and value <= 0.0):
             shown = node.value if isinstance(node, yaml.ScalarNode) else "a block"
             self.fault(node, f"{name} is {shown!r}; it has to be a positive number")
             return default

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from impactcell.campaign.contents import COLUMNS, Coordinate, Excitation
-from impactcell.campaign.faults import Faults, read_text
+from impactcell.campaign.faults import LARGEST, Faults, read_text
 
 MM_PER_MIN = 1e-3 / 60.0
 """One millimetre per minute in m/s."""
+LARGEST_SHOT = 2**53
+"""Number of a shot beyond which not every whole number has a double."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +112,9 @@ class _Row:
         mass = self._number(columns["mass"], _is_positive, "a positive number or empty")
         direction = self._number("direction", _is_sign, "+1 or -1", default=1.0)
         dwell = self._number("dwell_s", _is_not_negative, "a number from 0 or empty")
-        start = self._number(columns["start"], math.isfinite, "a finite number or empty", default=0.0)
+        start = self._number(columns["start"], _is_measured, "a finite number or empty", default=0.0)
         covariates = {
-            name: self._covariate(text)
+            name: self._covariate(name, text)
             for name, text in self._cells.items()
             if name not in (*KNOWN_COLUMNS, columns["mass"], columns["start"])
         }
@@ -142,11 +144,14 @@ class _Row:
             return default
         return value
 
-    @staticmethod
-    def _covariate(text: str) -> float | str:
+    def _covariate(self, name: str, text: str) -> float | str:
         value = _to_float(text)
         if value is None:
             return text or math.nan
+        if abs(value) >= LARGEST:
+            self._faults.add(
+                self._file, self._line, f"{name} is {text!r}; it has to be a text, a finite number or empty"
+            )
         return value
 
 
@@ -159,15 +164,19 @@ def _to_float(text: str) -> float | None:
 
 
 def _is_count(value: float) -> bool:
-    return value >= 1 and value == math.floor(value) and math.isfinite(value)
+    return 1.0 <= value < LARGEST_SHOT and value == math.floor(value)
 
 
 def _is_positive(value: float) -> bool:
-    return 0.0 < value < math.inf
+    return 1.0 / LARGEST < value < LARGEST
 
 
 def _is_not_negative(value: float) -> bool:
-    return 0.0 <= value < math.inf
+    return 0.0 <= value < LARGEST
+
+
+def _is_measured(value: float) -> bool:
+    return abs(value) < LARGEST
 
 
 def _is_sign(value: float) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from impactcell.campaign.contents import CHANNELS, COLUMNS, Coordinate
-from impactcell.campaign.faults import Faults, read_text
+from impactcell.campaign.faults import LARGEST, Faults, read_text
 from impactcell.records import Samples
 
 MAX_FAULTS_PER_TRACE = 3
@@ -85,7 +85,7 @@ def _numbers(file: Path, lines: list[str], width: int, faults: Faults) -> Sample
     except ValueError:
         table = None
     # An underscore would be read as a thousands sign of Python source, which a trace does not have.
-    if table is not None and np.isfinite(table).all() and "_" not in joined:
+    if table is not None and (np.abs(table) < LARGEST).all() and "_" not in joined:
         return table.reshape(-1, width)
     return _parse_cells(file, cells, width, faults)
 
@@ -102,7 +102,7 @@ def _parse_cells(file: Path, cells: list[str], width: int, faults: Faults) -> Sa
         except ValueError:
             bad.append(place)
             continue
-        if not np.isfinite(table[place]) or "_" in text:
+        if not abs(table[place]) < LARGEST or "_" in text:
             bad.append(place)
     for place in bad[:MAX_FAULTS_PER_TRACE]:
         faults.add(

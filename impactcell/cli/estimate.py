@@ -20,6 +20,7 @@ from impactcell.prediction.free_slide import free_slide_friction
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
+from impactcell.process.whole_files import write_whole
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
 
@@ -87,9 +88,13 @@ def estimate(
         _write(rows, sys.stdout)
     if output is None:
         return
+    text = io.StringIO()
+    _write(rows, text)
     try:
-        with output.open("w", encoding="utf-8", newline="") as file:
-            _write(rows, file)
+        if output.exists() and not output.is_file():  # a pipe or a terminal has nothing to be replaced
+            output.write_text(text.getvalue(), encoding="utf-8")
+        else:
+            write_whole(output.resolve(), text.getvalue())
     except OSError as fault:
         raise CampaignError(f"{output}: cannot be written: {fault.strerror}") from fault
     if not as_json:

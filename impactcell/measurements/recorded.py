@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from impactcell.campaign import LARGEST
 from impactcell.errors import MeasurementError
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Mapping
@@ -116,10 +117,11 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
         if item is None or column is None or item.unit is None:
             continue
         present = np.isfinite(column.values)
-        infinite = np.flatnonzero(np.isinf(column.values))
+        infinite = np.flatnonzero(np.abs(item.unit.factor * column.values) >= LARGEST)
         if infinite.size:
             faults.append(
-                f"{table.place(int(infinite[0]))}: column {column.name!r} is infinite in {infinite.size} rows"
+                f"{table.place(int(infinite[0]))}: column {column.name!r} is infinite, or beyond any "
+                f"measurement, in {infinite.size} rows"
             )
         elif column.text is not None:
             faults.append(f"{table.title}: column {column.name!r} holds text, where the {quantity} is needed")
@@ -150,7 +152,7 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
         )
         return None
     time = item.unit.factor * column.values
-    empty = np.flatnonzero(~np.isfinite(time))
+    empty = np.flatnonzero(~(np.abs(time) < LARGEST))
     if empty.size:
         faults.append(
             f"{table.place(int(empty[0]))}: column {column.name!r} is empty or infinite in {empty.size} "

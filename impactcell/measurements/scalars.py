@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from impactcell.campaign import COLUMNS
+from impactcell.campaign import COLUMNS, LARGEST
 from impactcell.measurements.assignment import Assignment
 from impactcell.measurements.mapping import Mapping
 from impactcell.measurements.numbers import parse_number
@@ -65,7 +65,7 @@ def _is_possible(quantity: Quantity, value: float | str, where: str, faults: lis
         return True
     requirement = REQUIREMENTS[quantity]
     possible = {"above 0": value > 0.0, "0 or above": value >= 0.0, "1 or -1": value in (1.0, -1.0)}
-    if math.isfinite(value) and possible.get(requirement, True):
+    if abs(value) < LARGEST and possible.get(requirement, True):
         return True
     unit = VOCABULARY[quantity].dimensions[0]
     shown = f"{value:g}" + ("" if unit is Dimension.NONE else f" {unit.value}")

@@ -218,7 +218,11 @@ class _CampaignProblem:
         """Give the parameters of every tap, the covariance of the shared ones, and the sum of squares."""
         minimum, step, converged = gauss_newton.fit(self, initial_guess, STOP)
         if not converged:
-            raise NotConvergedError("the plant could not be fitted to the campaign")
+            raise NotConvergedError(
+                "the plant could not be fitted to the campaign: no k, b and mu_k/mu_s explain its taps; see "
+                "that t = 0 is the first contact in each trace and that stroke and masses are right, or give "
+                "a cell's model with --cell"
+            )
         return minimum.theta, step.covariance, 2.0 * minimum.cost
 
     def linearise(self, theta: Samples) -> _CampaignPoint:

@@ -23,6 +23,8 @@ from impactcell.process.yaml_core_schema import CoreLoader, integer
 Location = tuple[str | int, ...]
 M = TypeVar("M", bound=BaseModel)
 
+MOST_BYTES = 10_000_000
+"""Of one file; a map of every register there can be has 6 MB."""
 MOST_NODES = 200_000
 """A file of nested aliases or merges can describe more than memory holds; no honest one comes near this."""
 
@@ -78,7 +80,11 @@ def load(path: Path) -> tuple[object, Positions]:
         The file cannot be read, is empty, is not UTF-8 or not YAML, repeats a key or contains itself.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise SettingsError(f"{path}: has more than {MOST_BYTES} bytes, so it is no file of settings")
+        text = content.decode("utf-8-sig")
     except OSError as fault:
         raise SettingsError(f"{path}: cannot be read: {fault.strerror}") from fault
     except UnicodeDecodeError as fault:

@@ -16,6 +16,8 @@ ELASTIC_CORRELATION = 0.98
 """Correlation of force and position from which on a driven part is on a spring, as in stick."""
 MAX_LATE_S = 5e-3
 """Largest lateness looked for: a third of a contact."""
+FINEST_LATENESS_S = 1e-5
+"""Least step in which a lateness is looked for: a thousand of them, however fast a channel was sampled."""
 LATE_STEPS = 1.0
 """Sampling steps by which a channel has to be late to be told: less is what a trigger leaves open."""
 MIN_FALL = 40.0
@@ -86,7 +88,7 @@ def lateness_s(shot: Capture) -> float:
     if len(touching) < MIN_CONTACT_SAMPLES:
         return math.nan
     begin, end = float(force.time_s[touching[0]]), float(force.time_s[touching[-1]])
-    step = float(np.median(np.diff(force.time_s)))
+    step = max(float(np.median(np.diff(force.time_s))), FINEST_LATENESS_S)
     moving = (position.time_s > begin + 0.25 * (end - begin)) & (position.time_s < end + 0.5 * (end - begin))
     if moving.sum() < MIN_CONTACT_SAMPLES:
         return math.nan

@@ -1,5 +1,6 @@
 """Campaign directories: every faulty file is reported with its line, every good one is read as written."""
 
+import os
 import re
 import time
 from pathlib import Path
@@ -184,6 +185,54 @@ def test_faults_of_a_trace(tmp_path: Path, trace: str, line: int | None, message
         read(directory)
     assert message in str(caught.value)
     assert ("2.csv: " if line is None else f"2.csv:{line}: ") in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("\n1,3000", "\ninf,3000", "shots.csv:2: shot is 'inf'; it has to be a whole number from 1"),
+        ("\n1,3000", "\n1e300,3000", "shots.csv:2: shot is '1e300'; it has to be a whole number from 1"),
+        ("\n1,3000", "\n1,1e300", "shots.csv:2: velocity_mm_per_min is '1e300'; it has to be a positive"),
+        (",18.9,", ",1e-300,", "shots.csv:2: mass_kg is '1e-300'; it has to be a positive number or empty"),
+        ("A,5\n", "A,1e300\n", "shots.csv:2: dwell_s is '1e300'; it has to be a number from 0 or empty"),
+        ("dwell_s\n", "temperature\n", ""),
+        ("A,5\n", "A,inf\n", "shots.csv:2: temperature is 'inf'; it has to be a text, a finite number or"),
+        ("noise_std_n: 0.4", "noise_std_n: 1e-300", "campaign.yaml:7: sensors.force.noise_std_n is '1e-300'"),
+        ("gravity_m_s2: 9.81", "gravity_m_s2: 1_0", "campaign.yaml:3: gravity_m_s2 is '1_0'; it has to be a"),
+        ("0.1,2,\n", "0.1,2e300,\n", "1.csv:3: '2e300' is not a finite number"),
+        ("0.1,2,\n", "0.1e300,2,1\n", "1.csv:3: '0.1e300' is not a finite number"),
+    ],
+)
+def test_numbers_that_no_measurement_has(tmp_path: Path, old: str, new: str, told: str) -> None:
+    header, trace = HEADER.replace(old, new), TRACE.replace(old, new)
+    shots = SHOTS.replace("dwell_s", "temperature") if "temperature" in told else SHOTS
+    directory = campaign(tmp_path / "c", header, shots.replace(old, new), _1=trace)
+    if not told:
+        assert read(directory).shots[0].covariates == {"temperature": 5.0}
+        return
+    with pytest.raises(CampaignError, match=re.escape(told)):
+        read(directory)
+
+
+@pytest.mark.parametrize("name", ["campaign.yaml", "shots.csv", "traces/1.csv"])
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    directory = campaign(tmp_path / "c")
+    (directory / name).unlink()
+    os.mkfifo(directory / name)
+    with pytest.raises(CampaignError, match=f"{name}: is not a file; put the data themselves there"):
+        read(directory)
+    (directory / name).unlink()
+    (directory / name).symlink_to("/dev/zero")
+    with pytest.raises(CampaignError, match=f"{name}: is not a file"):
+        read(directory)
+
+
+def test_a_file_of_many_gigabytes_is_not_read(tmp_path: Path) -> None:
+    directory = campaign(tmp_path / "c")
+    with (directory / "traces" / "1.csv").open("r+b") as file:
+        file.truncate(5_000_000_000)  # a hole, which takes no room
+    with pytest.raises(CampaignError, match=r"1\.csv: has more than the 500 MB that are read"):
+        read(directory)
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:

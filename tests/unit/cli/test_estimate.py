@@ -5,6 +5,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 import pytest
@@ -202,3 +203,32 @@ def test_a_unit_that_is_wrong_is_told(tmp_path: Path, channel: str, told: str) -
     )
     with pytest.raises(CampaignError, match=told):
         estimate(tmp_path / "c")
+
+
+def test_traces_sampled_without_pause_or_stated_without_noise_are_no_traceback(tmp_path: Path) -> None:
+    shots = captures(taps()[:2])
+    quick = [
+        replace(shot, force=replace(shot.force, time_s=1e-25 * shot.force.time_s))
+        for shot in shots if shot.force is not None
+    ]  # fmt: skip
+    write(Campaign(Excitation.TAP, tuple(quick), 9.81, 1.5e-3, SENSORS, COVARIATES), tmp_path / "quick")
+    with pytest.raises((CampaignError, PredictionError)):
+        estimate(tmp_path / "quick")
+
+
+def test_rows_replace_a_file_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(
+        Campaign(Excitation.TAP, tuple(captures(taps())), 9.81, 1.5e-3, SENSORS, COVARIATES), tmp_path / "c"
+    )
+    out = tmp_path / "out.csv"
+    out.write_text("before", encoding="utf-8")
+
+    def interrupted(_: object, file: TextIO) -> None:
+        file.write("shot,mu_s")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("impactcell.cli.estimate._write", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        estimate(tmp_path / "c", PROTOTYPE, out)
+    assert out.read_text(encoding="utf-8") == "before"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "out.csv"]

@@ -145,7 +145,7 @@ def test_covariates_of_any_name_are_each_kept_and_read_back(
         ([5, {"time_s": 0.0, "force_n": 1.0}], "item 1 of its 2 is no record"),
         (
             {"time_s": TIME.tolist(), "force_n": [np.inf, *FORCE.tolist()[1:]], "position_m": PLACE.tolist()},
-            "a.json: row 1: column 'force' is infinite in 1 rows",
+            "a.json: row 1: column 'force' is infinite, or beyond any measurement, in 1",
         ),
     ],
 )

@@ -142,6 +142,16 @@ def test_a_missing_file_a_directory_and_bytes_are_named(tmp_path: Path) -> None:
         load(tmp_path / "b.yaml")
 
 
+def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, "a: 1\n")
+    with path.open("r+b") as file:
+        file.truncate(20_000_000)
+    with pytest.raises(SettingsError, match="has more than 10000000 bytes, so it is no file of settings"):
+        load(path)
+    with pytest.raises(SettingsError, match="has more than 10000000 bytes"):
+        load(Path("/dev/zero"))
+
+
 def test_a_file_of_nested_aliases_is_refused(tmp_path: Path) -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 9)]
