@@ -128,3 +128,21 @@ def test_an_accepted_model_lacks_nothing_until_taps_show_it_and_plans_as_before(
         moved = SLIDE_M * math.exp(features @ weights) * (1.0 + 0.03 * rng.standard_normal())
         again = update_posterior(again, slide(features), moved)
     assert not tap_predictions(again).lacking
+
+
+def test_what_comes_to_be_missing_after_a_model_was_accepted_is_told() -> None:
+    weights = np.zeros(FEATURES)
+    weights[1] = 0.12
+    posterior = with_model_accepted(taught(weights, 25, 3)[0])
+    weights[2] = 0.12  # a second effect, from here on
+    rng, told = np.random.default_rng(5), math.inf
+    for tap in range(1, 26):
+        features = np.zeros(FEATURES)
+        features[:3] = rng.standard_normal(3)
+        moved = SLIDE_M * math.exp(features @ weights) * (1.0 + 0.03 * rng.standard_normal())
+        posterior = update_posterior(posterior, slide(features), moved)
+        told = min(told, tap if tap_predictions(posterior).lacking else math.inf)
+    predictions = tap_predictions(posterior)
+    assert told <= 10
+    assert predictions.depends_on == "mass"
+    assert predictions.evidence.size == pytest.approx(0.12, abs=4.0 * predictions.evidence.size_std)
