@@ -13,6 +13,8 @@ import pytest_asyncio
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
+import impactcell  # noqa: F401  # says how many threads numpy takes, and so comes before numpy
+
 TESTS = Path(__file__).resolve().parent
 SHARED = TESTS.parents[1] / "shared" / "data"
 
