@@ -11,12 +11,13 @@ import time
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import replace
 from types import TracebackType
-from typing import Final, Self
+from typing import Self
 
 from impactcell.errors import FieldbusError, LinkError
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
-from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_consistent, next_capture
+from impactcell.fieldbus.capture_ring import cycles_after
+from impactcell.fieldbus.cycle_choice import CycleChoice
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.identity import IdentityCheck
 from impactcell.fieldbus.modbus_client import ModbusClient
@@ -31,9 +32,6 @@ from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Capture, CycleId, ModuleStatus
 
 __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
-
-_DISAGREEMENTS: Final = 5
-"""So often status block and window may disagree about the oldest cycle; then the next one is tried."""
 
 
 class ModuleAcquisition:
@@ -145,7 +143,7 @@ class ModuleAcquisition:
         backoff, schedule = Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
         newest = CycleId(0, 0)
-        overwritten = disagreements = 0
+        choice = CycleChoice(self.registers, self._log)
         while True:
             sent_s = loop.time()
             try:
@@ -154,7 +152,7 @@ class ModuleAcquisition:
                 newest_now = CycleId(status.session, status.cycle_counter)
                 schedule.record_poll(sent_s, loop.time(), new=newest_now != newest)
                 newest = newest_now
-                target = self._target(taken.last, status, overwritten // 2 + disagreements // _DISAGREEMENTS)
+                target = choice.target(taken.last, status, loop.time())
                 if target is None:
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
@@ -166,15 +164,12 @@ class ModuleAcquisition:
                 # An attempt that ran into its timeout has waited long enough.
                 await asyncio.sleep(max(0.0, sent_s + backoff.next_delay_s() - loop.time()))
                 continue
-            if fetched is NotFetched.OVERWRITTEN:  # look at the ring again, and then further from its end
-                overwritten = min(max(1, 2 * overwritten), self.registers.slots)
-                continue
             if isinstance(fetched, NotFetched):
-                self._log.debug("%s", fetched.value, cycle=target.cycle_id.cycle)
-                disagreements += not target.restarted and fetched is NotFetched.NOT_SHOWN
-                await asyncio.sleep(schedule.delay_s(loop.time()))
+                choice.record_failure(target, fetched, loop.time())
+                if fetched is not NotFetched.OVERWRITTEN:  # else the ring is looked at again at once
+                    await asyncio.sleep(schedule.delay_s(loop.time()))
                 continue
-            overwritten, disagreements = overwritten // 2, 0
+            choice.record_success()
             capture = self._dated(replace(fetched.capture, session=target.cycle_id.session))
             last = taken.last
             schedule.update(
@@ -196,12 +191,6 @@ class ModuleAcquisition:
     def _dated(self, capture: Capture) -> Capture:
         """Date a capture of a module without a clock: it was made when it was read, for all one knows."""
         return capture if "cycle_time" in self.registers else replace(capture, time_ns=time.time_ns())
-
-    def _target(self, last: CycleId | None, status: StatusBlock, skip: int) -> NextCapture | None:
-        """Choose the cycle to read; None where there is none, or the status block contradicts itself."""
-        if not is_consistent(status.cycle_counter, status.ring):
-            return None
-        return next_capture(last, status.session, status.cycle_counter, status.ring, skip)
 
     async def connect_once(self) -> StatusBlock:
         """Connect, check who answers, and read the status block; raises FieldbusError where that fails."""

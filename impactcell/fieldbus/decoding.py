@@ -16,6 +16,11 @@ from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 
 LIGHTEST_KG, HEAVIEST_KG = 0.01, 1e5
 """What a part can weigh; anything else is a wrong register, and would cost the estimators much time."""
+FARTHEST = 1e9
+"""No time, length, velocity, rate or figure of a tap is as large, in SI; none above 0 as small as one over it
+[SI]."""
+FINEST = 1e12
+"""Sampling steps from first contact from which on two of them need not differ any more as doubles."""
 LATEST_NS = 2**63 - 1
 """The year 2262."""
 OUT_OF_SCALE = 5.0
@@ -29,7 +34,10 @@ def sample_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[s
 
     Where nothing says it, all of an array is used.
     """
-    return {name: min(_count(registers, header, name)[1], registers[name].count) for name in registers.arrays}
+    return {
+        name: min(max(_count(registers, header, name)[1], 0), registers[name].count)
+        for name in registers.arrays
+    }
 
 
 def _count(registers: RegisterMap, header: Mapping[str, Value], name: str) -> tuple[str, int]:
@@ -41,11 +49,11 @@ def _count(registers: RegisterMap, header: Mapping[str, Value], name: str) -> tu
 
 
 def excessive_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[str, str]:
-    """Return a fault for each array of which more is said to be used than the map has room for."""
+    """Return a fault for each array of which more is said to be used than the map has room for, or < 0."""
     faults = {}
     for name in registers.arrays:
         register, count = _count(registers, header, name)
-        if count > registers[name].count:
+        if not 0 <= count <= registers[name].count:
             where = f"register {register} ({registers[register].address})"
             faults[name] = f"{where}: {count} samples, but the map has room for {registers[name].count}"
     return faults
@@ -78,8 +86,8 @@ def capture_from_words(
         faults.append(f"{_where(registers, 'mass')}: {mass:g} kg cannot be")
         mass = math.nan
     time_ns = _time_ns(header.get("cycle_time", 0))
-    if time_ns > LATEST_NS:
-        faults.append(f"register cycle_time ({registers['cycle_time'].address}): {time_ns} ns is no date")
+    if not 0 <= time_ns <= LATEST_NS:
+        faults.append(f"register cycle_time ({registers['cycle_time'].address}): {time_ns:g} ns is no date")
         time_ns = 0
     stroke = checked.positive("stroke", math.inf, also=lambda value: value == math.inf)
     dwell = checked.positive("dwell", math.nan, also=lambda value: value == 0.0 or math.isnan(value))
@@ -95,6 +103,9 @@ def capture_from_words(
     if summary is not None:
         faults += _scale_faults(registers, summary, channels, stroke)
     start = number(header.get("start_position", 0.0))
+    if not abs(start) < FARTHEST:
+        faults.append(f"{_where(registers, 'start_position')}: {start:g} m cannot be")
+        start = 0.0
     return Capture(
         cycle=integer(header["window_cycle" if "window_cycle" in header else "cycle_counter"]),
         velocity_m_s=velocity,
@@ -104,7 +115,7 @@ def capture_from_words(
         actuator=channels.get("actuator"),
         direction=direction,
         stroke_m=stroke,
-        time_ns=time_ns,
+        time_ns=round(time_ns),
         batch_id=str(header.get("batch_id", "")) or None,
         dwell_s=dwell,
         start_m=start,
@@ -117,12 +128,13 @@ def _summary(registers: RegisterMap, header: Mapping[str, Value], faults: list[s
     names = [name for name in ("peak_force", "sliding_distance") if name in header]
     if not names:
         return None
-    faults += [
-        f"register {name} ({registers[name].address}): not a number"
-        for name in names
-        if not math.isfinite(number(header[name]))
-    ]
-    values = [number(header.get(name, math.nan)) for name in ("peak_force", "sliding_distance")]
+    values = []
+    for name in ("peak_force", "sliding_distance"):
+        value = number(header.get(name, math.nan))
+        if name in header and not abs(value) < FARTHEST:
+            faults.append(f"register {name} ({registers[name].address}): not a number")
+            value = math.nan
+        values.append(value)
     stds = [
         registers[name].si_std if name in registers else math.nan
         for name in ("peak_force", "sliding_distance")
@@ -136,10 +148,10 @@ def _where(registers: RegisterMap, name: str) -> str:
     return f"register {name} ({place})"
 
 
-def _time_ns(value: Value) -> int:
-    """Nanoseconds since 1970 of a time: a plain code is one, a time with a unit is in seconds."""
-    if isinstance(value, float) and math.isfinite(value) and value > 0.0:
-        return round(1e9 * value)
+def _time_ns(value: Value) -> float:
+    """Nanoseconds since 1970 of a time: a plain code is one, a time with a unit is in seconds; 0 for nan."""
+    if isinstance(value, float):
+        return 0 if math.isnan(value) else 1e9 * value
     return integer(value)
 
 
@@ -191,11 +203,11 @@ class _CheckedHeader:
     faults: list[str]
 
     def positive(self, name: str, absent: float, also: Callable[[float], bool] = _never) -> float:
-        """Return a value; `absent` where there is none, nan where it is neither above 0 nor `also`."""
+        """Return a value; `absent` where there is none, nan where it cannot be, nor is `also`."""
         if name not in self.header:
             return absent
         value = number(self.header[name])
-        if also(value) or (math.isfinite(value) and value > 0.0):
+        if also(value) or 1.0 / FARTHEST < value < FARTHEST:
             return value
         shown = f"{value:g}"
         if name in self.registers:
@@ -216,8 +228,8 @@ def _channel(
         if name != "actuator":  # most modules have none
             faults.append(f"{where}: no samples, {name}_count is 0")
         return None
-    if not rate_hz > 0.0 or not math.isfinite(start_s):
-        faults.append(f"{where}: no time axis, {name}_rate is {rate_hz:g} Hz")
+    if not (1.0 / FARTHEST < rate_hz < FARTHEST and abs(start_s) * rate_hz < FINEST):
+        faults.append(f"{where}: no time axis, {name}_rate is {rate_hz:g} Hz, from {start_s:g} s on")
         return None
     values = np.asarray(register.decode(words), dtype=np.float64)
     time_s = uniform_times(start_s, rate_hz, values.size)

@@ -60,7 +60,10 @@ def window_faults(registers: Mapping[str, Register]) -> Iterator[str]:
         if name in registers and not registers[name].is_code:
             yield f"register {name} must be a whole number, without scale, offset or unit"
     for name in _COUNTERS:
-        if name in registers and not (registers[name].is_code and registers[name].kind in _LARGEST):
+        if name not in registers:
+            continue
+        counter = registers[name]
+        if not (counter.is_code and counter.kind in _LARGEST and counter.bit is None):
             yield f"register {name} must be u16, u32, bcd16 or bcd32, without scale: it counts"
     for written, read in _ECHOED.items():
         most = [_LARGEST.get(registers[name].kind, 0) for name in (written, read) if name in registers]

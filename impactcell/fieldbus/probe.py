@@ -67,6 +67,13 @@ async def probe(module: ModuleAcquisition) -> ProbeResult:
         faults: tuple[str, ...] = ()
         if status.cycle_counter in status.ring and status.cycle_counter:
             capture, faults = await _newest(module, status)
+        elif status.cycle_counter:
+            held = ", ".join(str(cycle) for cycle in status.ring[:4])
+            what = f"cycle_counter shows {status.cycle_counter}, but ring_cycle {held} ..."
+            way_out = (
+                f"one of them has another address, type or word order than in map {module.registers.name}"
+            )
+            faults = (f"{module.cell}: {what}: {way_out}",)
         round_trip_s = module.status.round_trip_s
         window = str(module.register_client.modbus.window)
         identification = await _identification(module)

@@ -1,0 +1,74 @@
+"""Which cycle to read next, from what came of those before; tells of a module that never shows it."""
+
+from typing import Final
+
+from impactcell.fieldbus.capture_reader import NotFetched
+from impactcell.fieldbus.capture_ring import NextCapture, is_consistent, next_capture
+from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.status_block import StatusBlock
+from impactcell.process.cell_logger import CellLogger
+from impactcell.records import CycleId
+
+_DISAGREEMENTS: Final = 5
+"""So often status block and window may disagree about the oldest cycle; then the next one is tried."""
+PATIENCE_S: Final = 10.0
+"""So long a status block and what the module shows may contradict each other before it is told: a gateway
+that answers out of a store, or a module that starts, is through by then."""
+
+
+class CycleChoice:
+    """Chooses the cycle to read, farther from the ring's end the more of them were overwritten meanwhile."""
+
+    def __init__(self, registers: RegisterMap, log: CellLogger) -> None:
+        self._registers = registers
+        self._log = log
+        self._overwritten = self._disagreements = 0
+        self._contradicted_since_s: float | None = None
+        self._told = False
+
+    def target(self, last: CycleId | None, status: StatusBlock, now_s: float) -> NextCapture | None:
+        """Choose the cycle to read; None where there is none, or the status block contradicts itself."""
+        if not is_consistent(status.cycle_counter, status.ring):
+            held = [cycle for cycle in status.ring if cycle]
+            shown = f"{min(held)} to {max(held)}" if held else "no cycle at all"
+            self._contradict(f"cycle_counter shows {status.cycle_counter}, but ring_cycle {shown}", now_s)
+            return None
+        skip = self._overwritten // 2 + self._disagreements // _DISAGREEMENTS
+        target = next_capture(last, status.session, status.cycle_counter, status.ring, skip)
+        if target is None:
+            self._agree()
+        return target
+
+    def record_failure(self, target: NextCapture, reason: NotFetched, now_s: float) -> None:
+        """Take note of a cycle that was not read."""
+        if reason is NotFetched.OVERWRITTEN:
+            self._overwritten = min(max(1, 2 * self._overwritten), self._registers.slots)
+            return
+        cycle = target.cycle_id.cycle
+        self._log.debug("%s", reason.value, cycle=cycle)
+        self._disagreements += not target.restarted and reason is NotFetched.NOT_SHOWN
+        if reason is NotFetched.NOT_SHOWN:
+            self._contradict(f"cycle_counter shows {target.counter}, but {reason.value}", now_s)
+
+    def record_success(self) -> None:
+        """Take note of a cycle that was read."""
+        self._overwritten, self._disagreements = self._overwritten // 2, 0
+        self._agree()
+
+    def _agree(self) -> None:
+        self._contradicted_since_s, self._told = None, False
+
+    def _contradict(self, what: str, now_s: float) -> None:
+        """Tell, once, of a contradiction that does not pass: no cycle can be read, and nobody would know."""
+        if self._contradicted_since_s is None:
+            self._contradicted_since_s = now_s
+        elif now_s - self._contradicted_since_s >= PATIENCE_S and not self._told:
+            self._told = True
+            names = ("cycle_counter", "ring_cycle", "window_cycle", "window_slot")
+            where = ", ".join(
+                f"{name} ({self._registers[name].address})" for name in names if name in self._registers
+            )
+            self._log.warning(
+                "no cycle can be read for %.0f s: %s; see whether %s are right in map %s",
+                now_s - self._contradicted_since_s, what, where, self._registers.name,
+            )  # fmt: skip
