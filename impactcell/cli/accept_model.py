@@ -11,8 +11,9 @@ from typing import Any
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.errors import SettingsError
 from impactcell.prediction import Model
-from impactcell.process.console import print_result
+from impactcell.process.console import print_note, print_result
 from impactcell.settings import read_cell
+from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import read_model, write_model
 
 PLANT_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
@@ -38,6 +39,9 @@ def accept_model(cell: Path, extended: Path, *, as_json: bool = False) -> None:
     previous = previous_model(target)
     previous.write_bytes(target.read_bytes())
     write_model(model, target)
+    for finding in judge_cell(read_cell(cell)):
+        if finding.is_fault:
+            print_note(str(finding))
     _tell(
         {"cell": cell_config.name, "model": model.name, "previous": str(previous)},
         f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}",

@@ -25,7 +25,9 @@ from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.model_file import write_model
 
 TAPS: Final = 30
-"""Taps of a running cell that its first model is fitted to: k, b and mu_k/mu_s to a per cent or so."""
+"""Taps that a running cell's first model is fitted to at first: k, b and mu_k/mu_s to a per cent or so."""
+MOST_TAPS: Final = 240
+"""Taps that are taken at most where fewer are not good enough: more of the same would not be either."""
 FEWEST_TAPS: Final = 10
 """Below this the spread from tap to tap is hardly seen."""
 LARGEST_STIFFNESS_ERROR: Final = 0.02
@@ -87,7 +89,9 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     fit = fit_plant(_with_one_contact(taps), struck.gravity_m_s2, name)
     provenance = {"made by": "impactcell", "fitted to": f"{len(fit.used)} taps of {source}"}
     fit = replace(fit, model=replace(fit.model, provenance=provenance))
-    return FirstModel(fit, len(taps), tuple(_shortcomings(fit)))
+    return FirstModel(
+        fit, len(taps), tuple(_shortcomings(fit, float(np.median([t.capture.mass_kg for t in taps]))))
+    )
 
 
 def _with_one_contact(taps: Sequence[Features]) -> Sequence[Features]:
@@ -118,7 +122,7 @@ def _meets_again(tap: Features) -> bool:
     return bool(np.diff(pushed).max(initial=0.0) > APART * tap.slide.separation_s)
 
 
-def _shortcomings(fit: PlantFit) -> list[str]:
+def _shortcomings(fit: PlantFit, mass_kg: float) -> list[str]:
     plant, prior = fit.model.plant, fit.model.prior
     found = []
     if len(fit.used) < FEWEST_TAPS:
@@ -128,8 +132,11 @@ def _shortcomings(fit: PlantFit) -> list[str]:
     if not prior.damping_std_n_s_per_m <= LARGEST_DAMPING_ERROR * max(plant.damping_n_s_per_m, 1.0):
         found.append("b is not known well enough; vary the velocity")
     if not prior.ratio_std <= LARGEST_RATIO_ERROR:
+        weight_n = mass_kg * plant.gravity_m_s2
+        slow = 6e4 * plant.mu_s * weight_n / max(plant.damping_n_s_per_m, 1.0)
         found.append(
-            "mu_k/mu_s is not known well enough; strike more taps, slower ones too: they stick first"
+            "mu_k/mu_s is not known well enough; strike more taps, slower ones too, which stick "
+            f"first: with this part those well below {round(slow, -2):.0f} mm/min"
         )
     if not fit.gap <= LARGEST_GAP:
         found.append(
@@ -140,9 +147,12 @@ def _shortcomings(fit: PlantFit) -> list[str]:
 
 
 def fit_model(
-    cell: Path, campaign: Path | None, taps: int, *, anyway: bool = False, as_json: bool = False
+    cell: Path, campaign: Path | None, taps: int | None, *, anyway: bool = False, as_json: bool = False
 ) -> None:
     """Fit a cell's model to a campaign, or to the first taps of its own journal, and put it into service.
+
+    Where no number of taps is said, 30 are taken, and twice as many while they are not good enough and there
+    are more: whoever strikes further taps, as he is told, need say nothing else.
 
     The model that it replaces is kept beside it, as `model accept` does. One that is not good enough is put
     into service only where that is asked for with `anyway`.
@@ -155,8 +165,7 @@ def fit_model(
         No plant could be fitted, or it is not good enough.
     """
     config = read_cell(cell)
-    source, data = _taps(config, campaign, taps)
-    first = fit_first_model(data, config.name, source)
+    first = _fit(config, campaign, taps)
     if first.shortcomings and not anyway:
         say_first_model(first, None, as_json=as_json)
         raise PredictionError("not put into service (--anyway would)")
@@ -165,6 +174,17 @@ def fit_model(
     previous_model(target).write_bytes(target.read_bytes())
     write_model(model, target)
     say_first_model(first, target, as_json=as_json)
+
+
+def _fit(config: CellConfig, campaign: Path | None, taps: int | None) -> FirstModel:
+    count = taps or TAPS
+    while True:
+        source, data = _taps(config, campaign, count)
+        first = fit_first_model(data, config.name, source)
+        has_more = campaign is None and taps is None and first.taps == count < MOST_TAPS
+        if not first.shortcomings or not has_more:
+            return first
+        count *= 2
 
 
 def say_first_model(first: FirstModel, target: Path | None, *, as_json: bool = False) -> None:

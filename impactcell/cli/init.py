@@ -106,6 +106,8 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
     source = _map_file(answers.register_map)
     cell, model = directory / f"{answers.name}.yaml", directory / f"{answers.name}.model.yaml"
     target_map = directory / source.name
+    if target_map in (cell, model):  # each keeps its own name
+        target_map = directory / f"{source.stem}.map.yaml"
     for path in (cell, model):
         if path.exists():
             raise SettingsError(f"{path}: is there already; name another directory or another cell")
@@ -192,7 +194,7 @@ def _cell(answers: Answers, target_map: Path) -> dict[str, Any]:
 def _next_steps(cell: Path, directory: Path, *, is_provisional: bool) -> str:
     steps = [
         f"impactcell probe {cell}        # what the module says, read as the map has it",
-        f"impactcell users add {directory / 'users.yaml'}",
+        f"impactcell users add {directory / 'users.yaml'} NAME --role engineer    # asks for a password",
         f"impactcell run {cell}          # then open http://127.0.0.1:8480",
     ]
     if is_provisional:

@@ -36,7 +36,10 @@ def model_fit(
     campaign: Annotated[
         Path | None, typer.Option(metavar="CAMPAIGN", help="Instead of the cell's own journal.")
     ] = None,
-    taps: Annotated[int, typer.Option(min=3, help="Of the journal, the first so many.")] = 30,
+    taps: Annotated[
+        int | None,
+        typer.Option(min=3, help="Of the journal, the first so many; else 30, or as many as it takes."),
+    ] = None,
     anyway: Annotated[bool, typer.Option("--anyway", help="Also if it is not good enough.")] = False,
     as_json: AsJson = False,
 ) -> None:

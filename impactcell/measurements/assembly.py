@@ -15,6 +15,7 @@ from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given, Mapping
 from impactcell.measurements.recognition import CHANNELS, Quantity
 from impactcell.measurements.recorded import Record, records_of
+from impactcell.measurements.scalars import said_beside
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
 from impactcell.measurements.units import Dimension
@@ -61,7 +62,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         raise MeasurementError("\n".join(mapping.faults))
     given = mapping.given
     records = records_of(tables, mapping)
-    notes: list[str] = []
+    notes = _said_of(tables, given)
     excitation = given.excitation or _excitation(records, notes)
     _check_channels(records, excitation)
     coordinate = _coordinate(mapping, excitation)
@@ -102,6 +103,20 @@ def write_campaign(tables: Sequence[Table], mapping: Mapping, directory: Path) -
     imported = make_campaign(tables, mapping)
     write_directory(imported.campaign, directory)
     return imported
+
+
+def _said_of(tables: Sequence[Table], given: Given) -> list[str]:
+    """Tell what was read of mass and velocity beside the columns, where nothing else was given."""
+    said = [said_beside(table) for table in tables]
+    told = []
+    for quantity, factor, unit in ((Quantity.MASS, 1.0, "kg"), (Quantity.VELOCITY, 6e4, "mm/min")):
+        if str(quantity) in given.constants:
+            continue
+        values = [value for of in said if isinstance(value := of.get(quantity), float)]
+        if values:
+            low, high = factor * min(values), factor * max(values)
+            told.append(f"{quantity} {low:.6g}{'' if low == high else f' to {high:.6g}'} {unit}")
+    return [f"the lines beside the columns say: {', '.join(told)}"] if told else []
 
 
 def _excitation(records: Sequence[Record], notes: list[str]) -> Excitation:

@@ -4,6 +4,8 @@ from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
 from impactcell.measurements.assignment import SURE, Assignment, ascends, lacking
@@ -202,4 +204,6 @@ def _further(column: MeasuredColumn, given: Given) -> Assignment:
     unit = _unit_of(column, given)
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
+    if column.text is None and len(column.values) > 2 and (np.diff(column.values) == 1.0).all():
+        return Assignment(column.name, Quantity.IGNORED, unit, UNIT_MATCH + SURE, "counts the rows")
     return Assignment(column.name, Quantity.COVARIATE, unit, SURE, "none of the known quantities")

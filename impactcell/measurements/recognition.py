@@ -144,6 +144,18 @@ def normalised(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", text).strip("_")
 
 
+def is_kind_of(name: str, quantity: Quantity) -> bool:
+    """Whether a German compound ends in a word of the quantity, which says what it is a kind of.
+
+    Examples
+    --------
+    >>> is_kind_of("Teilemasse", Quantity.MASS), is_kind_of("Massenträger", Quantity.MASS)
+    (True, False)
+    """
+    words = (word for word in VOCABULARY[quantity].words.split() if len(word) >= 4)
+    return normalised(name).endswith(tuple(words))
+
+
 def name_score(name: str, quantity: Quantity) -> tuple[float, str]:
     """How sure the name of a column makes that it is of this quantity, 0 to 1, and the word that says so."""
     words = VOCABULARY[quantity]

@@ -9,7 +9,14 @@ from impactcell.campaign import COLUMNS, LARGEST
 from impactcell.measurements.assignment import Assignment
 from impactcell.measurements.mapping import Mapping
 from impactcell.measurements.numbers import parse_number
-from impactcell.measurements.recognition import TOKEN_MATCH, VOCABULARY, Quantity, name_score, normalised
+from impactcell.measurements.recognition import (
+    TOKEN_MATCH,
+    VOCABULARY,
+    Quantity,
+    is_kind_of,
+    name_score,
+    normalised,
+)
 from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.units import Dimension, parse_unit, split_unit
 
@@ -39,7 +46,7 @@ def scalars_of(table: Table, place: str, mapping: Mapping, faults: list[str]) ->
     """
     given = mapping.given.constants
     scalars: dict[str, float | str] = {}
-    for quantity, value in _said(table).items():
+    for quantity, value in said_beside(table).items():
         if str(quantity) in given:
             continue
         if _is_possible(quantity, value, f"{place}: {quantity}", faults):
@@ -159,14 +166,13 @@ def covariate_name(column: str, dimension: Dimension | None) -> str:
     return f"{name}_{normalised(dimension.value.replace('²', '2').replace('/', ' per '))}"
 
 
-def _said(table: Table) -> dict[Quantity, float | str]:
+def said_beside(table: Table) -> dict[Quantity, float | str]:
     """Quantities that the file says beside its columns, as `Masse: 18,9 kg`."""
     said: dict[Quantity, float | str] = {}
     for key, text in table.attributes.items():
         name, unit_text = split_unit(key)
         for quantity in SCALARS:
-            score, _ = name_score(name, quantity)
-            if score < TOKEN_MATCH:
+            if name_score(name, quantity)[0] < TOKEN_MATCH and not is_kind_of(name, quantity):
                 continue
             words = text.split()
             number = parse_number(words[0]) if words else None

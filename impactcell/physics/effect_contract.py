@@ -268,14 +268,17 @@ def _energy(effect: Effect) -> list[str]:
         for _ in range(ENERGY_DRAWS):
             p = np.array([rng.uniform(max(q.lower, 1e-6), min(q.upper, 1e6)) for q in effect.parameters])
             rate = float(rng.uniform(-2.0, 2.0))
+            where = ""
             if kind is LawKind.BODY:
-                gives = law(float(rng.uniform(-1.0, 1.0)), rate, 18.9, 9.81, p) * rate > 0.0
+                place = float(rng.uniform(-1.0, 1.0))
+                where = f" at x = {place:.3g} m"
+                gives = law(place, rate, 18.9, 9.81, p) * rate > 0.0
             elif kind is LawKind.KINETIC:
                 gives = law(abs(rate), 0.0, 0.0, 0.0, p) < 0.0
             else:
                 gives = law(float(rng.uniform(0.0, 1e-2)), rate, 6.5e5, 465.0, p) * rate < 0.0
             if gives:
                 shown = ", ".join(f"{value:.4g}" for value in p)
-                told = f"it claims to dissipate, and gives energy at {rate:.3g} m/s with {shown}"
+                told = f"it claims to dissipate, and gives energy{where} at {rate:.3g} m/s with {shown}"
                 return [f"{told}; say dissipates=False"]
     return []

@@ -229,11 +229,19 @@ def calibrate(
     if progress is not None:
         progress(len(masses_kg), len(masses_kg))
     if not predictors:
-        raise PredictionError(
+        told = (
             f"no part of {masses_kg[0]:.4g}-{masses_kg[-1]:.4g} kg slides free of the actuator between "
-            f"{6e4 * velocities_m_s[0]:.4g} and {6e4 * velocities_m_s[-1]:.4g} mm/min; "
-            "tap faster, or with another stroke"
+            f"{6e4 * velocities_m_s[0]:.4g} and {6e4 * velocities_m_s[-1]:.4g} mm/min"
         )
+        deceleration = plant.mu_k * plant.gravity_m_s2
+        longest_m = float(velocities_m_s[-1]) ** 2 / deceleration
+        if tap.stroke_m > longest_m and math.isfinite(tap.stroke_m):
+            fast = 6e4 * math.sqrt(tap.stroke_m * deceleration)
+            raise PredictionError(
+                f"{told}: it catches up with the part; tap from about {round(fast, -3):.0f} mm/min on, or "
+                f"with a stroke of less than about {1e3 * longest_m:.2g} mm"
+            )
+        raise PredictionError(f"{told}; tap faster, or with another stroke")
     return tuple(predictors)
 
 

@@ -52,6 +52,11 @@ MAX_STEP = 0.3
 """Longest step of a shared parameter's logarithm: farther away the linear model says nothing."""
 MIN_RATIO_STD = 1e-3
 """Least standard deviation of mu_k/mu_s from tap to tap that a prior is given. Our choice."""
+NO_REST = (
+    "the plant could not be fitted to the campaign: no k, b and mu_k/mu_s explain its taps; see that t = 0 "
+    "is the first contact in each trace and that stroke and masses are right, or give --cell"
+)
+"""What is said where the steps of a joint fit come to no end."""
 REWEIGHTING_ROUNDS = 4
 """Rounds of weighing the phases by what the model misses of them. Our choice."""
 
@@ -113,15 +118,18 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
             faults.append(f"shot {tap.capture.cycle}: {fault}")
     if not responses:
         raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
-    thetas_fitted, covariance, chi2 = _CampaignProblem(responses, thetas[0][SHARED], WEAK_STD).fit(
-        np.array(thetas)
-    )
+    fitted = _CampaignProblem(responses, thetas[0][SHARED], WEAK_STD).fit(np.array(thetas))
+    thetas_fitted, covariance = fitted.theta, fitted.covariance
     count = sum(response.size for response in responses)
-    misfit = math.sqrt(chi2 / max(count - len(thetas_fitted) - 3, 1))
+    misfit = math.sqrt(fitted.chi2 / max(count - len(thetas_fitted) - 3, 1))
     if misfit > MISFIT_THRESHOLD:
         anchored = thetas_fitted.copy()
         anchored[:, STIFFNESS], anchored[:, DAMPING] = math.log(stiffness), math.log(max(damping, 1.0))
+        if not fitted.is_at_rest:  # to and fro over the kink at mu_k = mu_s, from where nothing leads back
+            anchored[:, RATIO] = math.log(INITIAL_RATIO)
         thetas_fitted, covariance = _fit_reweighted(responses, anchored, intervals)
+    elif not fitted.is_at_rest:
+        raise NotConvergedError(NO_REST)
     mu_k = float(np.exp(thetas_fitted[:, MU_K]).mean())
     ratio, stiffness, damping = np.exp(thetas_fitted[0, SHARED]).tolist()
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
@@ -207,6 +215,16 @@ class _CampaignPoint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _CampaignFit:
+    """Parameters of every tap, covariance of the shared ones, sum of squares, and whether the steps ended."""
+
+    theta: Samples
+    covariance: Samples
+    chi2: float
+    is_at_rest: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _CampaignProblem:
     """The shared parameters, held to `anchor` within `spread`, and every tap's mu_k, which is eliminated."""
 
@@ -214,16 +232,10 @@ class _CampaignProblem:
     anchor: Samples
     spread: Samples
 
-    def fit(self, initial_guess: Samples) -> tuple[Samples, Samples, float]:
-        """Give the parameters of every tap, the covariance of the shared ones, and the sum of squares."""
-        minimum, step, converged = gauss_newton.fit(self, initial_guess, STOP)
-        if not converged:
-            raise NotConvergedError(
-                "the plant could not be fitted to the campaign: no k, b and mu_k/mu_s explain its taps; see "
-                "that t = 0 is the first contact in each trace and that stroke and masses are right, or give "
-                "a cell's model with --cell"
-            )
-        return minimum.theta, step.covariance, 2.0 * minimum.cost
+    def fit(self, initial_guess: Samples) -> _CampaignFit:
+        """Go from a guess to the minimum."""
+        minimum, step, is_at_rest = gauss_newton.fit(self, initial_guess, STOP)
+        return _CampaignFit(minimum.theta, step.covariance, 2.0 * minimum.cost, is_at_rest)
 
     def linearise(self, theta: Samples) -> _CampaignPoint:
         """Linearise the model of every tap."""
@@ -271,5 +283,8 @@ def _fit_reweighted(
             )
             for response, row, interval in zip(responses, thetas, intervals, strict=True)
         ]
-        thetas, covariance, _ = _CampaignProblem(reweighted, anchor, CONTACT_STD).fit(thetas)
+        fitted = _CampaignProblem(reweighted, anchor, CONTACT_STD).fit(thetas)
+        if not fitted.is_at_rest:
+            raise NotConvergedError(NO_REST)
+        thetas, covariance = fitted.theta, fitted.covariance
     return thetas, covariance

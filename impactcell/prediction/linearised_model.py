@@ -41,6 +41,10 @@ KINK_SPAN_S = 1.5e-4
 """How far to either side of an event of the start, s, blocks are short: the fit has its event there. With
 half of it, twice and four times the errors of mu_s are the same to 1e-3 of themselves."""
 
+AT_THE_HALT_S = 1e-9
+"""A sample this near to the actuator's halt, s, is of before or after it by rounding alone: modules give
+times in whole ns."""
+
 
 def tap_input(capture: Capture) -> TapInput:
     """Turn a capture's command into a tap for the model; without a stroke the actuator halts by itself."""
@@ -208,8 +212,10 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     edges = [halt] if math.isfinite(halt) else []
     force = average_blocks(required(features.force), FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
     jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
-    if jumps:
-        force = replace(force, std=force.std * _std_factors_at_jumps(force.time_s, jumps))
+    if jumps or edges:
+        factors = _std_factors_at_jumps(force.time_s, jumps, 2.0 * FINE_FORCE_BLOCK_S)
+        factors *= _std_factors_at_jumps(force.time_s, edges, AT_THE_HALT_S)
+        force = replace(force, std=force.std * factors)
     position = average_blocks(required(features.position), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return LinearisedModel(plant, tap, force, position)
 
@@ -283,9 +289,9 @@ def _sample_squares(
     return total, counted
 
 
-def _std_factors_at_jumps(times: Samples, jumps: list[float]) -> Samples:
+def _std_factors_at_jumps(times: Samples, jumps: list[float], within_s: float) -> Samples:
     """Factor that takes blocks about a jump out of the fit: their means depend on where in them it lies."""
     factor = np.ones_like(times)
     for jump in jumps:
-        factor[np.abs(times - jump) < 2.0 * FINE_FORCE_BLOCK_S] = 1e3
+        factor[np.abs(times - jump) < within_s] = 1e3
     return factor

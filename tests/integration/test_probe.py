@@ -71,4 +71,4 @@ async def test_a_module_that_is_not_there_is_named(tmp_path: Path) -> None:
         cell = write_cell(tmp_path, module["port"])
     code, out, err = await probed(cell)
     assert (code, out) == (1, "")
-    assert "nothing listens there; is the module on, are host and port right?" in err
+    assert "nothing listens at this host and port" in err

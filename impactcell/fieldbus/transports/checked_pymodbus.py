@@ -224,7 +224,7 @@ class CheckedPymodbus:
             case None:
                 return f"no connection within {self._link.timeout_s:g} s"
             case ConnectionRefusedError():
-                return "no connection: nothing listens there; is the module on, are host and port right?"
+                return "no connection: nothing listens at this host and port"
             case error:
                 return f"no connection: {error.strerror or error}"
 

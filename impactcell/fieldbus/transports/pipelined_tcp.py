@@ -63,9 +63,7 @@ class PipelinedTcp:
         except TimeoutError:
             raise LinkError(f"{link}: no connection within {link.timeout_s:g} s") from None
         except ConnectionRefusedError as error:
-            raise LinkError(
-                f"{link}: no connection: nothing listens there; is the module on, are host and port right?"
-            ) from error
+            raise LinkError(f"{link}: no connection: nothing listens at this host and port") from error
         except OSError as error:
             raise LinkError(f"{link}: no connection: {error.strerror or error}") from error
 

@@ -7,12 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
+from impactcell.campaign import Campaign, read
 from impactcell.cli.app import run_verb
 from impactcell.errors import CampaignError, ImpactCellError, PredictionError, SettingsError
 from impactcell.journal.store import Journal
+from impactcell.physics import Plant, TapInput
+from impactcell.prediction import calibration
+from impactcell.prediction.joint_plant_fit import PlantFit
 from impactcell.process.shipped import shipped_config
 from impactcell.settings import read_cell
 from simulator.campaign_files import write
@@ -68,6 +73,66 @@ def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
         run_verb(["init", str(begun), *ANSWERS])
 
 
+def test_a_map_may_be_called_like_the_cell(
+    begun: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = read_cell(begun / "own.yaml").model
+    monkeypatch.setattr("impactcell.cli.init.calibrated_model", lambda _: model)
+    own = tmp_path / "own.yaml"
+    shutil.copyfile(begun / "fpga-v1.yaml", own)
+    run("init", tmp_path / "cell", *ANSWERS, "--map", own)
+    assert (tmp_path / "cell" / "own.map.yaml").read_bytes() == own.read_bytes()
+    assert read_cell(tmp_path / "cell" / "own.yaml").register_map.name == "fpga-v1"
+    assert "users.yaml NAME --role engineer" in capsys.readouterr().out, "the next steps run as they stand"
+
+
+def test_a_model_that_does_not_fit_the_cell_is_told_when_it_is_accepted(
+    begun: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(begun, tmp_path / "own")
+    theirs = shipped_config() / "models" / "prototype.yaml"  # of 18.9 kg
+    monkeypatch.setattr("impactcell.cli.accept_model.calibrated_model", lambda config: config.model)
+    run("model", "accept", tmp_path / "own" / "own.yaml", theirs)
+    assert "the part has 4.2 kg, model 'prototype' is calibrated for" in capsys.readouterr().err
+
+
+def test_a_stroke_that_catches_up_with_the_part_is_told_with_the_way_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(calibration, "regimes", lambda *_: None)
+    monkeypatch.setattr(calibration, "velocity_spans", lambda *_: ())
+    tap = TapInput(velocity_m_s=0.1, mass_kg=12.0, stroke_m=0.25)
+    speeds, frictions = np.linspace(0.03, 0.1, 3), np.linspace(0.2, 0.3, 3)
+    told = "from about 44000 mm/min on, or with a stroke of less than about 4.7 mm"  # v² = mu_k g s
+    with pytest.raises(PredictionError, match=told):
+        calibration.calibrate(Plant(4e5, 300.0, 0.28, 0.2166), tap, [12.0], speeds, frictions)
+
+
+def test_further_taps_are_taken_where_the_first_are_not_good_enough(
+    begun: Path, shots: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from impactcell.cli import first_model
+
+    shutil.copytree(begun, tmp_path / "own")
+    captures = read(shots).shots[:9]
+    with Journal(tmp_path / "own" / "own.sqlite", "own") as journal:
+        for capture in captures:
+            journal.append(capture, make_snapshot(capture), b"", ())
+    model, counts = read_cell(begun / "own.yaml").model, []
+
+    def fit(campaign: Campaign, *_: str) -> first_model.FirstModel:
+        counts.append(len(campaign.shots))
+        return first_model.FirstModel(PlantFit(model, (), 1.0), len(campaign.shots), ("strike more taps",))
+
+    monkeypatch.setattr(first_model, "fit_first_model", fit)
+    monkeypatch.setattr(first_model, "TAPS", 3)
+    cell = str(tmp_path / "own" / "own.yaml")
+    for taps in ([], ["--taps", "4"]):
+        with pytest.raises(PredictionError, match="not put into service"):
+            run_verb(["model", "fit", cell, *taps])
+    assert counts == [3, 6, 9, 4], "twice as many while there are more; as many as said"
+
+
 def test_what_has_to_be_said_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
     with pytest.raises(SettingsError, match="--mass-kg, --stroke-mm, --wear-limit"):
@@ -116,8 +181,6 @@ def test_the_first_model_is_that_of_the_plant(
 def test_the_first_taps_of_the_journal_make_the_model(
     begun: Path, shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from impactcell.campaign import read
-
     shutil.copytree(begun, tmp_path / "own")
     cell = tmp_path / "own" / "own.yaml"
     captures = [replace(shot, stroke_m=math.inf) for shot in read(shots).shots]  # the cell file knows it

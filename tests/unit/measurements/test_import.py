@@ -89,6 +89,26 @@ def test_a_long_record_is_cut_into_its_taps(tmp_path: Path) -> None:
         assert np.ptp(shot.position.values[-50:]) < 2e-5
 
 
+def test_lines_beside_the_columns_are_told_and_a_count_of_rows_is_no_covariate(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    paths = []
+    for mass, tap in zip((12.5, 15.0), taps((3000,), (18.9,)), strict=False):
+        time, force, position = sampled(tap, rng)
+        rows = zip(time, 1e-3 * force, 1e3 * position, strict=True)
+        lines = [f"Teilemasse;{mass};kg", "Geschwindigkeit;3000;mm/min", "Massenträger;7;kg", ""]
+        lines += ["lfd. Nr.;Zeit / s;Kraft / kN;Weg / mm"]
+        lines += [f"{n};{t:.5f};{f:.6f};{x:.5f}".replace(".", ",") for n, (t, f, x) in enumerate(rows, 1)]
+        paths.append(tmp_path / f"{mass}.csv")
+        paths[-1].write_text("\n".join(lines), encoding="utf-8")
+    tables = read(paths)
+    mapping = guess(tables)
+    assert [str(item.quantity) for item in mapping.assignments] == ["ignored", "time", "force", "position"]
+    imported = make_campaign(tables, mapping)
+    assert [shot.mass_kg for shot in imported.campaign.shots] == [12.5, 15.0]
+    assert not any(shot.covariates for shot in imported.campaign.shots)
+    assert imported.notes[0] == "the lines beside the columns say: mass 12.5 to 15 kg, velocity 3000 mm/min"
+
+
 def test_a_column_numbers_the_shots_and_a_word_is_the_batch() -> None:
     rng = np.random.default_rng(7)
     parts = [sampled(tap, rng) for tap in taps((3000,), (18.9, 25.2))]

@@ -58,6 +58,40 @@ def test_a_law_that_the_model_lacks_bends_it_little_and_is_seen() -> None:
     assert abs(found.model.ratio - 0.8) < 2.5 * found.model.prior.ratio_std
 
 
+def light_part(stroke_m: float, effects: dict[str, dict[str, float]], force_hz: float) -> list[Capture]:
+    """Taps of 12 kg on another plant, their samples on whole milliseconds among others."""
+    rng = np.random.default_rng(3)
+    taps = [
+        Tap(
+            velocity / 6e4, 0.27 * (1 + 0.01 * rng.normal()), 0.8, 12.0, stroke_m,
+            stiffness=4e5, damping=300.0, effects=effects,
+        )
+        for velocity in (2000, 3500, 6000)
+        for _ in range(4)
+    ]  # fmt: skip
+    return [tap.capture(rng, cycle=number, force_hz=force_hz) for number, tap in enumerate(taps, 1)]
+
+
+def test_a_law_that_bends_everything_leaves_stiffness_and_damping_right() -> None:
+    """A film this thick in a light part's way takes the fit of all to mu_k = mu_s, where it finds no rest."""
+    film = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 60.0}}
+    found = fit_plant([extract(tap) for tap in light_part(1e-3, film, 2e4)], 9.81)
+    assert found.gap > 5.0
+    assert found.model.plant.stiffness_n_per_m == pytest.approx(4e5, rel=3e-3)
+    assert found.model.plant.damping_n_s_per_m == pytest.approx(300.0, rel=0.02)
+    assert abs(found.model.ratio - 0.8) < 2.5 * found.model.prior.ratio_std
+
+
+def test_a_sample_at_the_very_halt_of_the_actuator_says_nothing_of_the_plant() -> None:
+    """The force jumps there by b v: on which side of it the model has the sample is rounding."""
+    found = fit_plant([extract(tap) for tap in light_part(2.5e-4, {}, 1e5)], 9.81)
+    plant, prior = found.model.plant, found.model.prior
+    assert prior.stiffness_std_n_per_m > 1.0, "what rounding decides tells nothing so exactly"
+    assert abs(plant.stiffness_n_per_m - 4e5) < 4.0 * prior.stiffness_std_n_per_m
+    assert abs(plant.damping_n_s_per_m - 300.0) < 4.0 * prior.damping_std_n_s_per_m
+    assert abs(found.model.ratio - 0.8) < 4.0 * prior.ratio_std
+
+
 def test_contact_constants_and_mass_need_no_law_of_friction() -> None:
     for effects in ({}, DRAG):
         for capture in campaign(3, effects)[4:]:
