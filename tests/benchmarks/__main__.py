@@ -11,6 +11,7 @@ import pkgutil
 import sys
 import time
 
+import impactcell  # noqa: F401  # says how many threads numpy takes, and so comes before numpy
 import tests.benchmarks
 
 NOT_TOPICS = {"__main__", "table"}
