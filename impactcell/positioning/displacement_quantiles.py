@@ -130,43 +130,47 @@ def displacement_quantiles(
     own = psi @ scenarios.root
     course, other = np.empty(count), np.empty(count)
     square = np.zeros(count)
-    features, further = np.empty((count, weights.shape[1])), np.zeros((count, weights.shape[1]))
+    size = weights.shape[1]
+    features, further = np.empty((size, count)), np.zeros((size, count))
     tap = np.empty(3)
     shift = depth * product(psi, weights[middle])
     tap[1], tap[2] = depth, rows[middle, 3]
     displacements(velocity, strokes + shift, rows[middle], part, course)
     for j in range(count):
         tap[0] = strokes[j] + shift
-        discrepancy_features(tap, course[j], part, scenarios.place, features[j])
-        breakaway_features(velocity, strokes[j], depth, further[j])
-        further[j] *= depth
-        out[j, middle] = displaced(course[j], features[j], further[j], weights[middle])
+        discrepancy_features(tap, course[j], part, scenarios.place, features[:, j])
+        breakaway_features(velocity, strokes[j], depth, further[:, j])
+    further *= depth
     farther = max(depth * math.sqrt(product(own, own)), SHORTEST_SHIFT_M)
     displacements(velocity, strokes + shift + farther, rows[middle], part, other)
     slope = (other - course) * (depth / farther)  # of the displacement over psi · w
+    displaced(course, features, further, weights[middle])
+    out[:, middle] = course
     for q in range(nodes):
         if q != middle:
             displacements(velocity, strokes + depth * product(psi, weights[q]), rows[q], part, course)
-            for j in range(count):
-                out[j, q] = displaced(course[j], features[j], further[j], weights[q])
+            displaced(course, features, further, weights[q])
+            out[:, q] = course
     for a in range(across):
         p, n = nodes + a, nodes + across + a
         displacements(velocity, strokes + depth * product(psi, weights[p]), rows[p], part, course)
         displacements(velocity, strokes + depth * product(psi, weights[n]), rows[n], part, other)
+        displaced(course, features, further, weights[p])
+        displaced(other, features, further, weights[n])
         for j in range(count):
-            above = displaced(course[j], features[j], further[j], weights[p])
-            below = displaced(other[j], features[j], further[j], weights[n])
-            step = max(abs(above - out[j, middle]), abs(below - out[j, middle])) / ACROSS_Z
+            step = max(abs(course[j] - out[j, middle]), abs(other[j] - out[j, middle])) / ACROSS_Z
             square[j] += step * step
+    root, step_of, further_of = scenarios.root, np.empty(count), np.empty(count)
+    for a in range(root.shape[1]):
+        along_weights(features, root[:, a], step_of)
+        along_weights(further, root[:, a], further_of)
+        for j in range(count):
+            square[j] += (out[j, middle] * step_of[j] + further_of[j] + slope[j] * own[a]) ** 2
     line = np.empty(nodes)
-    root = scenarios.root
     for j in range(count):
         line[:] = out[j]
-        for a in range(root.shape[1]):
-            step = line[middle] * product(features[j], root[:, a]) + product(further[j], root[:, a])
-            square[j] += (step + slope[j] * own[a]) ** 2
-        indented = max(abs(slope[j]), (1.0 - features[j, 0]) * min(depth, line[middle]))
-        indented = max(indented, BREAKAWAY_SHARE * further[j, BREAKAWAY])
+        indented = max(abs(slope[j]), (1.0 - features[0, j]) * min(depth, line[middle]))
+        indented = max(indented, BREAKAWAY_SHARE * further[BREAKAWAY, j])
         for q in range(nodes):
             if q != middle:
                 by_itself = scenarios.scatter[q, 0] * line[middle]
@@ -176,9 +180,25 @@ def displacement_quantiles(
 
 
 @compiled
-def displaced(course: float, features: Samples, further: Samples, weights: Samples) -> float:
-    """Displacement (m) with the discrepancy phi and delta beta, that of psi being in `course` already."""
-    return max(course * math.exp(product(features, weights)) + product(further, weights), 0.0)
+def displaced(course: Samples, features: Samples, further: Samples, weights: Samples) -> None:
+    """Add the discrepancy phi and delta beta to displacements (m), that of psi being in them already.
+
+    `features` and `further`, shape (FEATURES, strokes), have phi and delta beta.
+    """
+    sliding, breaking = np.empty(course.size), np.empty(course.size)
+    along_weights(features, weights, sliding)
+    along_weights(further, weights, breaking)
+    for j in range(course.size):
+        course[j] = max(course[j] * math.exp(sliding[j]) + breaking[j], 0.0)
+
+
+@compiled
+def along_weights(features: Samples, weights: Samples, out: Samples) -> None:
+    """Write the scalar product of each column of `features` with the weights to `out`."""
+    out[:] = 0.0
+    for n in range(weights.size):
+        for j in range(out.size):
+            out[j] += features[n, j] * weights[n]
 
 
 @compiled

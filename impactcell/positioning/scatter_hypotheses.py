@@ -43,6 +43,10 @@ GRID = np.stack(np.meshgrid(FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD, indexin
 """All combinations, shape (g, 3)."""
 
 
+TAILS = tuple(ndtr(-REACH / std[:, None]) for std in (FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD))
+"""Of each standard deviation, the probability to reach further than each of these."""
+
+
 def prior_weights() -> Samples:
     """Probability of each combination before the first tap, shape (g,)."""
     prior = np.einsum("i,j,k->ijk", FRICTION_PRIOR, DISPLACEMENT_PRIOR, CONTACT_PRIOR).ravel()
@@ -97,9 +101,9 @@ def quantile_scales(weights: Samples, z: Samples) -> Samples:
     scales = np.empty((z.size, 3))
     shape = (FRICTION_STD.size, DISPLACEMENT_STD.size, CONTACT_STD.size)
     cube = weights.reshape(shape)
-    for n, std in enumerate((FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD)):
+    for n, tails in enumerate(TAILS):
         share = cube.sum(axis=tuple(axis for axis in range(3) if axis != n))
-        tail = share @ ndtr(-REACH / std[:, None])
+        tail = share @ tails
         score = -ndtri(np.maximum(tail, 1e-300))
         scales[:, n] = np.interp(nodes, score, REACH) / nodes
     return scales
