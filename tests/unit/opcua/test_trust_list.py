@@ -239,7 +239,7 @@ def test_users_file_round_trip_and_permissions(tmp_path: Path) -> None:
             "users: [{name: a, role: observer, password: x}, {name: a, role: observer, password: x}]",
             "twice",
         ),
-        ("users: [", "not YAML"),
+        ("users: [", r"users\.yaml:1:9: expected the node content"),
     ],
 )
 def test_bad_users_files(tmp_path: Path, text: str, message: str) -> None:
