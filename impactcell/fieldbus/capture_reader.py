@@ -204,9 +204,9 @@ class CaptureReader:
         cycle = self._numbers.number(integer(header[name]), near=target.cycle_id.cycle)
         return CycleId(integer(header.get("window_session", target.cycle_id.session)), cycle)
 
-    def _blocks(self, header: Mapping[str, Value]) -> dict[str, PartialBlock]:
+    def _blocks(self, header: Mapping[str, Value], *, again: bool = False) -> dict[str, PartialBlock]:
         counts = decoding.sample_counts(self._registers, header)
-        return {name: self._client.partial_block(name, count) for name, count in counts.items()}
+        return {n: self._client.partial_block(n, count, again=again) for n, count in counts.items()}
 
     def _identifying(self, image: RegisterImage) -> bytes:
         """Words of a header that stay the same while its capture does."""
@@ -259,8 +259,12 @@ class CaptureReader:
         return f"register window_sequence changed from {before} to {after} meanwhile"
 
     async def _read_twice(self, partial: _PartialCapture) -> str | None:
-        """Read the samples, then samples and header once more, for nothing else proves them."""
-        again = self._blocks(partial.header)
+        """Read the samples, then samples and header once more, for nothing else proves them.
+
+        In other requests: on a line without transactions a reply may be that to the request before, both
+        times.
+        """
+        again = self._blocks(partial.header, again=True)
         await self._client.modbus.complete(*partial.blocks.values())
         await self._client.modbus.complete(*again.values())
         image = await self._client.read_header()

@@ -103,9 +103,13 @@ class ModbusClient:
         await self.complete(block)
         return block.words()
 
-    def block(self, address: int, count: int, table: str = "holding") -> PartialBlock:
-        """Give a block of registers that is still to be read, by `complete`."""
-        step = self.link.max_registers * (_BITS_A_REGISTER if table in BIT_TABLES else 1)
+    def block(self, address: int, count: int, table: str = "holding", fewer: int = 0) -> PartialBlock:
+        """Give a block of registers that is still to be read, by `complete`.
+
+        A request reads as many of them as the link allows, or `fewer`.
+        """
+        registers = max(self.link.max_registers - fewer, 1)
+        step = registers * (_BITS_A_REGISTER if table in BIT_TABLES else 1)
         return PartialBlock(address, count, table, step)
 
     async def complete(

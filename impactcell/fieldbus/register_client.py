@@ -51,10 +51,15 @@ class RegisterClient:
             image = self._images[names] = decoded_image(blocks, raw)
         return image
 
-    def partial_block(self, name: str, values: int) -> PartialBlock:
-        """Give the first `values` values of a register as a block that is still to be read."""
+    def partial_block(self, name: str, values: int, *, again: bool = False) -> PartialBlock:
+        """Give the first `values` values of a register as a block that is still to be read.
+
+        `again`: cut into other requests than else, so that a reply that is for the request before does not
+        agree with itself.
+        """
         register = self.registers[name]
-        return self.modbus.block(register.address, values * register.words_per_value, register.table)
+        words = values * register.words_per_value
+        return self.modbus.block(register.address, words, register.table, fewer=int(again))
 
     async def read_words(self, name: str, values: int) -> Words:
         """Read the words of the first `values` values of a register."""

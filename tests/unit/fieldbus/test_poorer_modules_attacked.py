@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MapError
 from impactcell.fieldbus.map_promises import not_promised
-from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.registers import RegisterMap, Words
 from simulator.faults import Fault, FaultInjector, FaultKind
 from simulator.scripted import ScriptedDevice
 from tests.unit.fieldbus.test_acquisition import running, take
@@ -73,6 +73,33 @@ async def test_one_bit_of_a_buffer_wrong_once(name: str) -> None:
                 recorded = getattr(received.capture, channel)
                 np.testing.assert_allclose(recorded.values, samples_of(cycle)[channel], atol=0.0126)
                 assert recorded.time_s[-1] == pytest.approx(2e-5 + 699 / 5e4)
+        assert module.status.unreadable == 0
+
+
+@pytest.mark.parametrize("at", [130, 300, 620])
+async def test_the_reply_before_in_both_readings_of_a_buffer(at: int) -> None:
+    """A line without transactions: the reply to the request before is as long, and whole."""
+    device = ScriptedDevice(ONE_BUFFER)
+    sound, wanted = device.read, ONE_BUFFER["force"].address + at
+    before, times = np.zeros(0, ">u2"), 0
+
+    def stale(table: str, address: int, count: int) -> Words:
+        nonlocal before, times
+        words = sound(table, address, count).copy()
+        shown = words
+        if times < 2 and address <= wanted < address + count and before.size == count:
+            times, shown = times + 1, before
+        before = words
+        return shown
+
+    async with running(ONE_BUFFER, device, window=1) as (_, module, receptions):
+        make_buffer(device)
+        device.read = stale  # type: ignore[method-assign]
+        (received,) = await take(receptions, 1)
+        assert times == 2
+        assert received.faults == ()
+        assert received.capture.force is not None
+        np.testing.assert_allclose(received.capture.force.values, samples_of(1)["force"], atol=0.0126)
         assert module.status.unreadable == 0
 
 
