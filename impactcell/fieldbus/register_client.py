@@ -111,8 +111,10 @@ class RegisterClient:
 
     async def _read_until_stable(self, block: RegisterBlock, raw: bytes) -> bytes:
         """Read a block that takes several requests until two readings agree; `raw` is the first."""
-        for _ in range(_STABLE_READ_ATTEMPTS):
-            before, raw = raw, (await self._read([block]))[0].tobytes()
+        for attempt in range(_STABLE_READ_ATTEMPTS):  # each cut into other requests than the one before
+            part = self.modbus.block(block.address, block.count, block.table, fewer=1 - attempt % 2)
+            await self.modbus.complete(part)
+            before, raw = raw, part.words().tobytes()
             if before == raw:
                 return raw
         raise ProtocolError(
