@@ -8,19 +8,49 @@ from generators.markdown import code, table
 ROOT = Path(__file__).resolve().parents[2]
 NODESET = ROOT / "impactcell" / "scada" / "model" / "ImpactCell.NodeSet2.xml"
 UA = "{http://opcfoundation.org/UA/2011/03/UANodeSet.xsd}"
+TYPES = "{http://opcfoundation.org/UA/2008/02/Types.xsd}"
 KINDS = ("UAVariable", "UAMethod")
+PROPERTIES = ("EURange", "EngineeringUnits", "InputArguments")
+"""Nodes below a variable or method that its own row tells of."""
+DATA_TYPES = {
+    "i=1": "Boolean",
+    "i=11": "Double",
+    "i=12": "String",
+    "i=15": "ByteString",
+    "i=21": "LocalizedText",
+}
+"""Types of arguments, Part 6, A.2."""
 
 
 def variables() -> str:
     """Write a row a node that has a description, in the order of the file."""
+    root = ET.parse(NODESET).getroot()  # our own file
+    objects = {node.attrib["NodeId"]: _name(node) for node in root.iter(f"{UA}UAObject")}
+    below = {(node.attrib.get("ParentNodeId"), _name(node)): node for node in root.iter(f"{UA}UAVariable")}
     rows = []
-    for node in ET.parse(NODESET).getroot():  # our own file
+    for node in root:
         kind = node.tag.removeprefix(UA)
-        description = node.findtext(f"{UA}Description", "")
-        if kind not in KINDS or not description:
+        description, name = node.findtext(f"{UA}Description", ""), _name(node)
+        if kind not in KINDS or not description or name in PROPERTIES:
             continue
-        name = node.attrib["BrowseName"].split(":", 1)[-1]
-        rows.append(
-            (code(name), kind.removeprefix("UA").lower(), node.attrib.get("DataType", ""), description)
-        )
-    return table(("browse name", "kind", "type", "description"), rows)
+        folder = objects.get(node.attrib.get("ParentNodeId", ""))
+        arguments = below.get((node.attrib["NodeId"], "InputArguments"))
+        typed = _arguments(arguments) if kind == "UAMethod" else node.attrib.get("DataType", "")
+        path = f"{folder}/{name}" if folder else name
+        rows.append((code(path), kind.removeprefix("UA").lower(), typed, description))
+    return table(("path below the cell", "kind", "type, or arguments", "description"), rows)
+
+
+def _name(node: ET.Element) -> str:
+    return node.attrib.get("BrowseName", "").split(":", 1)[-1]
+
+
+def _arguments(node: ET.Element | None) -> str:
+    if node is None:
+        return "none"
+    told = []
+    for argument in node.iter(f"{TYPES}Argument"):
+        kind = argument.findtext(f"{TYPES}DataType/{TYPES}Identifier", "")
+        said = argument.findtext(f"{TYPES}Description/{TYPES}Text", "")
+        told.append(f"{code(argument.findtext(f'{TYPES}Name', ''))} ({DATA_TYPES[kind]}): {said}")
+    return " ".join(told)

@@ -38,7 +38,7 @@ from impactcell.scada.methods import (
     bind_refresh,
 )
 from impactcell.scada.publishing import CellValues
-from impactcell.scada.rights import CONDITION_AREAS, allowed
+from impactcell.scada.rights import CONDITION_AREAS, Area, allowed
 from impactcell.scada.users import Users
 
 _log = logging.getLogger(__name__)
@@ -207,6 +207,23 @@ class Server:
         """
         what = describe_action(cell, alarm, action.event, action.comment, action.shelve_s)
         await audited(actor, what, self._act(cell, alarm, action, actor))
+
+    async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
+        """Do from elsewhere what the method ResetWear does: same right, bound and audit trail.
+
+        Raises
+        ------
+        RefusedError
+            The role may not, the comment is too long, or the state forbids it.
+        """
+        await audited(actor, f"{cell}: ResetWear({comment!r})", self._reset_wear(cell, comment, actor))
+
+    async def _reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
+        if not allowed(actor.role, Area.RESET_WEAR, Permission.CALL):
+            raise RefusedError("BadUserAccessDenied")
+        if len(comment) > MAX_COMMENT:
+            raise RefusedError("BadOutOfRange", f"a comment has at most {MAX_COMMENT} characters")
+        await self._actions.reset_wear(cell, comment, actor)
 
     async def _act(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
         event, comment, shelve_s = action.event, action.comment, action.shelve_s

@@ -58,6 +58,10 @@ class PageGateway:
         """Act on a condition, as its OPC UA methods do it."""
         await self._in_service(self._servers[cell].act_on_condition(cell, alarm, action, actor))
 
+    async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
+        """Learn the wear level anew, as the OPC UA method does it."""
+        await self._in_service(self._servers[cell].reset_wear(cell, comment, actor))
+
     async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
         """Let a client connect whose certificate has been refused."""
         await self._in_service(audited(actor, f"trust certificate {thumbprint!r}", self._trust(thumbprint)))

@@ -78,6 +78,7 @@ VIEWS: Final = (
 ACTIONS: Final = (
     Action("/logout", login_pages.log_out, Role.OBSERVER),
     Action("/alarms/act", alarm_pages.act, Role.OPERATOR),
+    Action("/cells/{cell}/reset-wear", cell_pages.reset_wear, Role.ENGINEER),
     Action("/system/trust", system_page.trust, Role.ENGINEER),
     Action("/studies", study_pages.begin, Role.OPERATOR),
     Action("/studies/{study}/read", study_pages.read, Role.OPERATOR),

@@ -3,11 +3,12 @@
 from typing import Any
 
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp
 
 from impactcell.errors import JournalError
 from impactcell.journal.trend import TrendColumn
+from impactcell.scada import RefusedError
 from impactcell.web.cell_view import number
 from impactcell.web.event_stream import MAX_VIEWERS, EventStream
 from impactcell.web.figures import figures
@@ -32,7 +33,22 @@ async def cell(context: PageContext, request: Request, session: BrowserSession) 
         cell=_cell(context, request),
         spans=tuple(SPANS_S),
         folders=figures(context.language(request)),
+        refusal=request.query_params.get("refused", ""),
     )
+
+
+async def reset_wear(
+    context: PageContext, request: Request, session: BrowserSession, form: dict[str, str]
+) -> Response:
+    """Learn the wear level anew: worn parts were replaced."""
+    name = _cell(context, request).name
+    try:
+        await context.backend.reset_wear(name, form.get("comment", "").strip(), session.actor)
+    except RefusedError as error:
+        if error.code == "BadUserAccessDenied":
+            raise RequestRefusedError(403, "error_role") from error
+        return RedirectResponse(f"/cells/{name}?refused={error.code}", 303)
+    return RedirectResponse(f"/cells/{name}", 303)
 
 
 async def live(context: PageContext, request: Request, session: BrowserSession) -> Response | ASGIApp:

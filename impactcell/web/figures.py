@@ -13,7 +13,7 @@ STD_SUFFIX = "StdDev"
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A published value on the page; `form` is `coefficient`, `count`, or empty for any other."""
+    """A published value on the page; `form` is `coefficient`, `count`, `cycle` (0: none), or empty."""
 
     path: str
     title: str
@@ -43,7 +43,7 @@ def figures(language: str) -> dict[str, list[Figure]]:
 
 def _form(quantity: Quantity[Any]) -> str:
     if quantity.data_type is DataType.UINT32:
-        return "count"
+        return "cycle" if quantity.path.endswith("Cycle") else "count"
     bounds = quantity.node_range(Ranges())
     is_coefficient = quantity.unit is ONE and bounds is not None and bounds[1] <= Ranges().friction
     return "coefficient" if is_coefficient else ""

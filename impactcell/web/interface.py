@@ -111,6 +111,9 @@ class PageBackend(Protocol):
     async def act_on_condition(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
         """Acknowledge, confirm, comment, shelve or unshelve an alarm, as over OPC UA."""
 
+    async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
+        """Learn the wear level anew after worn parts were replaced, as over OPC UA."""
+
     async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
         """Let a client connect whose certificate has been refused."""
 

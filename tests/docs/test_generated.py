@@ -70,8 +70,9 @@ def test_every_key_of_a_cell_file_is_listed(pages: dict[str, str]) -> None:
 
 
 def test_nodes_and_conditions_are_listed(pages: dict[str, str]) -> None:
-    for name in ("StaticFriction", "CyclesToLimitHigh", "TSquared", "StartBatch"):
-        assert f"| `{name}` |" in pages["nodes.md"]
+    for path in ("Friction/StaticFriction", "Wear/CyclesToLimitHigh", "Signature/TSquared", "StartBatch"):
+        assert f"| `{path}` |" in pages["nodes.md"]
+    assert "`Expected` (Boolean)" in pages["nodes.md"], "arguments of methods, with their types"
     for name, rule in RULES.items():
         assert f"| `{name}` | {rule.settings.severity} |" in pages["alarms.md"]
     assert "| `cycle_counter` | 36 | u32 |" in pages["register_map.md"]

@@ -89,6 +89,12 @@ PAGE_TEXTS: Texts = {
         "Line: last cycle with ±2 standard deviations; band: cycles before; dashed: the last deviant cycle.",
         "Linie: letzter Zyklus mit ±2 Standardabweichungen; Band: davor; gestrichelt: letzter abweichender.",
     ),
+    "reset_wear": ("Worn parts were replaced", "Verschlissene Teile wurden ersetzt"),
+    "reset_wear_help": (
+        "The wear level is learned anew. Who did it, and the comment, are kept in the audit trail.",
+        "Das Verschleißniveau wird neu gelernt. Wer es war und der Kommentar werden festgehalten.",
+    ),
+    "reset_wear_now": ("Reset wear", "Verschleiß zurücksetzen"),
     "positioning": ("Positioning", "Positionieren"),
     "remaining": ("Remaining", "Rest"),
     "figures": ("Figures of the last cycle", "Werte des letzten Zyklus"),

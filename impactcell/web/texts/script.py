@@ -43,7 +43,7 @@ SCRIPT_TEXTS: Texts = {
     "live_no_trend": ("no cycles in this time", "keine Zyklen in dieser Zeit"),
     "live_no_past": ("this cell keeps no journal", "diese Zelle führt kein Journal"),
     "live_not_recorded": ("not recorded in this cycle", "in diesem Zyklus nicht aufgezeichnet"),
-    "live_compared_with": ("compared with earlier taps:", "verglichen mit früheren Stößen:"),
+    "live_compared_with": ("Earlier taps in the band:", "Frühere Stöße im Band:"),
     "live_waveform": ("the whole waveform", "dem ganzen Verlauf"),
     "live_combined": ("force and distance together", "Kraft und Gleitweg zusammen"),
     "live_distance_axis": ("distance slid", "Gleitweg"),

@@ -36,6 +36,7 @@ class Backend:
     trusted: list[str] = field(default_factory=list)
     logins: list[tuple[str, str]] = field(default_factory=list)
     changed: list[tuple[str, str, str]] = field(default_factory=list)
+    replaced: list[tuple[str, str, str]] = field(default_factory=list)
     refuses: str = ""
 
     async def log_in(self, name: str, password: str, address: str) -> Actor:
@@ -59,6 +60,11 @@ class Backend:
     async def restore_model(self, cell: str, actor: Actor) -> str:
         self.changed.append((cell, "", actor.user))
         return "before"
+
+    async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
+        if self.refuses:
+            raise RefusedError(self.refuses)
+        self.replaced.append((cell, comment, actor.user))
 
     async def trust_certificate(self, thumbprint: str, actor: Actor) -> None:
         if self.refuses:

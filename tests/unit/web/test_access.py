@@ -105,6 +105,7 @@ async def test_each_role_does_what_it_may(page: Page, action: Action, role: Role
         await asyncio.sleep(0)
     assert len(page.backend.acted) == (action.path == "/alarms/act" and role >= Role.OPERATOR)
     assert len(page.backend.trusted) == (action.path == "/system/trust" and role >= Role.ENGINEER)
+    assert len(page.backend.replaced) == (action.path.endswith("/reset-wear") and role >= Role.ENGINEER)
     changes_model = action.path.endswith(("/accept", "/restore"))
     assert len(page.backend.changed) == (changes_model and role >= Role.ENGINEER)
 
@@ -290,6 +291,23 @@ async def test_an_observer_is_offered_nothing_to_do(page: Page) -> None:
             text = (await client.get("/alarms")).text
         assert "friction is off" in text
         assert ('action="/alarms/act"' in text) == (role >= Role.OPERATOR)
+
+
+async def test_wear_is_reset_by_an_engineer_and_a_refusal_is_said(page: Page) -> None:
+    for role in Role:
+        async with page.logged_in(role) as client:
+            text = (await client.get(f"/cells/{CELL}")).text
+            assert (f'action="/cells/{CELL}/reset-wear"' in text) == (role >= Role.ENGINEER)
+            form = {"csrf": await csrf_of(client), "comment": " new plate "}
+            answer = await client.post(f"/cells/{CELL}/reset-wear", data=form)
+            assert answer.status_code == (303 if role >= Role.ENGINEER else 403)
+            if role >= Role.ENGINEER:
+                assert page.backend.replaced == [(CELL, "new plate", "eva")]
+                assert (await client.post("/cells/none/reset-wear", data=form)).status_code == 404
+                page.backend.refuses = "BadOutOfRange"
+                answer = await client.post(f"/cells/{CELL}/reset-wear", data=form)
+                assert "the comment is too long" in (await client.get(answer.headers["location"])).text
+    assert len(page.backend.replaced) == 1
 
 
 SCRIPT = '"><script>alert(1)</script><img src=x onerror=alert(2)>'

@@ -24,6 +24,12 @@ def test_every_value_has_its_line_in_both_languages(language: str) -> None:
     assert len({figure.title for figure in listed}) == len(listed), "two lines of one name"
 
 
+def test_a_cycle_that_has_not_been_is_no_number() -> None:
+    forms = {figure.path: figure.form for folder in figures("en").values() for figure in folder}
+    assert forms["Batch/LastShiftCycle"] == "cycle", "0 before the first: a dash"
+    assert forms["Module/CyclesMissed"] == "count", "0 is a number"
+
+
 def test_a_card_has_every_value_in_the_unit_of_its_node() -> None:
     snapshot, status = make_snapshot(make_capture(3)), ModuleStatus(connected=True, received=3)
     view = CellView("press-1")

@@ -1,0 +1,40 @@
+"""Resetting wear from elsewhere than OPC UA: the same right, bound and audit trail as the method has."""
+
+import logging
+
+import pytest
+
+from impactcell.scada import Actor, RefusedError, Role
+from impactcell.scada.methods import MAX_COMMENT
+from impactcell.scada.server import Server
+
+
+class Actions:
+    def __init__(self) -> None:
+        self.done: list[tuple[str, str, str]] = []
+
+    async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
+        self.done.append((cell, comment, actor.user))
+
+
+async def test_wear_is_reset_by_whom_the_method_lets_and_is_written_down(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    server, actions = Server.__new__(Server), Actions()
+    server._actions = actions  # type: ignore[assignment]  # nothing else of it is asked
+    with caplog.at_level(logging.INFO, "impactcell.audit"):
+        for role in Role:
+            actor = Actor(role.name, role, "10.0.0.7")
+            if role >= Role.ENGINEER:
+                await server.reset_wear("press-1", "new plate", actor)
+            else:
+                with pytest.raises(RefusedError, match="BadUserAccessDenied"):
+                    await server.reset_wear("press-1", "new plate", actor)
+        with pytest.raises(RefusedError, match="characters"):
+            await server.reset_wear("press-1", "x" * (MAX_COMMENT + 1), actor)
+    assert actions.done == [("press-1", "new plate", "ENGINEER")]
+    outcomes = [record.getMessage() for record in caplog.records]
+    assert (
+        sum("press-1: ResetWear('new plate'): refused, BadUserAccessDenied" in said for said in outcomes) == 2
+    )
+    assert "ENGINEER (engineer) from 10.0.0.7: press-1: ResetWear('new plate'): done" in outcomes
