@@ -1,5 +1,6 @@
 """Reads MDF files (ASAM) with asammdf; a channel group is a table with its own time."""
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ def read_mdf4(path: Path, limits: Limits) -> tuple[Table, ...]:
         It is too large, damaged, without channels, or asammdf is not installed.
     """
     asammdf = reader_library("asammdf", "MDF", path)
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it says there is raised here
     tables: list[Table] = []
     cells = 0
     try:

@@ -28,6 +28,7 @@ def read_tdms(path: Path, limits: Limits) -> tuple[Table, ...]:
     cells = 0
     try:
         with path.open("rb") as opened, nptdms.TdmsFile.open(opened) as file:
+            cut = ", cut off: what follows its last whole chunk is lost" if _is_cut_off(file) else ""
             for group in file.groups():
                 channels = group.channels()
                 limits.check_shape(f"{path}: {group.name}", 0, len(channels))
@@ -36,7 +37,7 @@ def read_tdms(path: Path, limits: Limits) -> tuple[Table, ...]:
                 columns = [(channel.name, _unit(channel), channel[:]) for channel in channels if len(channel)]
                 columns = [*_times(channels), *columns]
                 said = {**file.properties, **group.properties}
-                tables += tables_of(str(path), columns, group.name, said, f"TDMS group {group.name}")
+                tables += tables_of(str(path), columns, group.name, said, f"TDMS group {group.name}{cut}")
     except MeasurementError:
         raise
     except Exception as error:
@@ -44,6 +45,11 @@ def read_tdms(path: Path, limits: Limits) -> tuple[Table, ...]:
     if not tables:
         raise MeasurementError(f"{path}: holds no channel")
     return tuple(tables)
+
+
+def _is_cut_off(file: Any) -> bool:
+    """Whether the file ends within a segment, as after a crash of what wrote it."""
+    return bool(file.file_status.incomplete_final_segment)
 
 
 def _unit(channel: Any) -> str | None:

@@ -4,6 +4,7 @@ import gc
 import gzip
 import io
 import json
+import logging
 import tracemalloc
 import zipfile
 import zlib
@@ -289,3 +290,19 @@ def test_json_logs_are_read(tmp_path: Path) -> None:
         log.write_text(text, encoding="utf-8")
         with pytest.raises(MeasurementError, match=told):
             read_tables(log)
+
+
+def test_a_tdms_file_that_ends_within_a_segment_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "a.tdms"
+    write_tdms(file, arrays(200))
+    (table,) = read_tables(file)
+    assert table.notes == ("TDMS group run 1",)
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) - 100])
+    assert all("cut off: what follows" in table.notes[0] for table in read_tables(file))
+
+
+def test_what_a_library_logs_of_a_file_does_not_stand_beside_our_message(tmp_path: Path) -> None:
+    write_mdf(tmp_path / "a.mf4", arrays(50))
+    read_tables(tmp_path / "a.mf4")
+    assert not logging.getLogger("asammdf").isEnabledFor(logging.ERROR)
