@@ -14,7 +14,7 @@ random walk in x (Wecker & Ansley 1983, JASA 78:81) without its first-order erro
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -29,6 +29,8 @@ from impactcell.tracking.signature import spline_integrals
 Acceleration = Callable[[Samples], Samples]
 """Speeds along the tap, m/s, to the acceleration along it, m/s², that a model knows beside friction."""
 
+MIN_BLOCKS = 8
+"""Blocks that are left of a slide that is cut off, at least: twice the unknowns of a cubic in time."""
 SMOOTHING_STRENGTHS = np.logspace(-9.0, 9.0, 37)
 """Strengths of the smoothing searched, over that which weighs like the data: none to a straight line."""
 
@@ -77,10 +79,12 @@ def information(
     Parameters
     ----------
     grid_m : ndarray, shape (g,)
-        Uniform; friction beyond its ends is that at the ends. There are g + 2 coefficients.
+        Uniform, from 0. There are g + 2 coefficients. What the part slid beyond its end does not count: to
+        take friction there for the last on the grid would make any that differs pass for friction before.
     acceleration : callable, optional
         What the model's effects do to the part at a speed: one cycle cannot tell it from mu(x).
     """
+    slide = _on_grid(slide, float(grid_m[-1]))
     moved_m = (
         np.zeros(len(slide.time_s)) if acceleration is None else _known_displacement(slide, acceleration)
     )
@@ -88,6 +92,15 @@ def information(
         slide.time_s, slide.distance_m, moved_m, slide.variance, grid_m, gravity_m_s2
     )
     return SplineInformation(*fields)
+
+
+def _on_grid(slide: SlideSegment, end_m: float) -> SlideSegment:
+    """Cut a slide off after its first block beyond the grid."""
+    beyond = np.flatnonzero(slide.distance_m > end_m)
+    if not len(beyond):
+        return slide
+    count = max(int(beyond[0]) + 1, MIN_BLOCKS)
+    return replace(slide, time_s=slide.time_s[:count], distance_m=slide.distance_m[:count])
 
 
 def _known_displacement(slide: SlideSegment, acceleration: Acceleration) -> Samples:

@@ -19,8 +19,12 @@ STRIBECK: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_an_effect_that_the_model_has_taken_over_makes_no_cycle_deviant(known: bool) -> None:
-    """Friction rises towards standstill from cycle 26 on, at velocities that vary, in both directions."""
+def test_an_effect_of_every_cycle_makes_none_deviant(known: bool) -> None:
+    """Friction rises towards standstill from cycle 26 on, at velocities that vary, in both directions.
+
+    Whether the model has taken it over or not: what cycles have in common is no deviance. Taps of the faster
+    velocities slide beyond the grid, where nothing is learned of friction.
+    """
     design = cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml"))
     if known:
         plant = replace(design.model.plant, effects=VISCOUS | STRIBECK)
@@ -37,4 +41,4 @@ def test_an_effect_that_the_model_has_taken_over_makes_no_cycle_deviant(known: b
         stepped = core.step(design, state, tap.capture(draw, cycle=cycle), PositioningState(), None, ())
         state = stepped.state
         deviant += bool(np.isfinite(stepped.snapshot.signature.deviates_at_m))
-    assert (deviant == 0) if known else (deviant > 3)
+    assert deviant == 0

@@ -100,6 +100,23 @@ def test_friction_against_an_independent_slide(rate, bound):
     assert np.isnan(found.friction[distance + 1e-4 < GRID]).all()
 
 
+@pytest.mark.parametrize("beyond", [0.1, 0.3])
+def test_friction_beyond_the_grid_is_none_on_it(beyond):
+    """A slide of twice the grid whose second half is on another surface says of the first what it is."""
+    end = GRID[-1]
+
+    def friction(x):
+        return 0.2 + (beyond - 0.2) / (1.0 + np.exp(-(x - 1.3 * end) / 0.05e-3))
+
+    capture, distance = slide(friction, 0.17, 1e4, NOISE, 3)
+    assert distance > 1.3 * end
+    found = tracker.update(SETTINGS, tracker.initial_state(SETTINGS), extract(capture)).signature
+    error = found.friction - 0.2
+    assert np.isfinite(error).all()
+    assert ((error / found.friction_std) ** 2).mean() < 3.0
+    assert found.friction_std.max() < 0.02
+
+
 def test_viscous_friction_of_the_model_is_taken_out():
     from scipy.integrate import solve_ivp
 
