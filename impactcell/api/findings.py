@@ -9,6 +9,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from impactcell.api.finding_files import write_files
 from impactcell.api.friction import calibrated
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
@@ -123,7 +125,7 @@ def discrepancy(
     if train is not None or test is not None:
         raise CampaignError("train and test go with base; without it the seed divides the shots")
     nominal = None if model is None else read_model(Path(model))
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with _blas_as_in_the_service(), ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         result = investigate(
             data,
             seed=seed,
@@ -137,10 +139,19 @@ def discrepancy(
     )
 
 
+def _blas_as_in_the_service() -> threadpool_limits:
+    """Give BLAS the threads that this package asks for, also where numpy was imported before it.
+
+    A second one costs several times what it gives, and may change last digits.
+    """
+    return threadpool_limits(int(os.environ["OPENBLAS_NUM_THREADS"]), "blas")
+
+
 def _of_machine(
     data: Campaign, base: Path, patterns: tuple[str | None, str | None], seed: int
 ) -> DiscrepancyFindings:
-    finding = investigate_with_base(data, base, patterns, seed)
+    with _blas_as_in_the_service():
+        finding = investigate_with_base(data, base, patterns, seed)
     return _findings(
         machine_document(finding),
         lambda output, source: write_machine_findings(finding, data, output, source),
