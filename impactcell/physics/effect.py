@@ -18,7 +18,7 @@ class LawKind(enum.IntEnum):
 
     A law is a plain Python function `law(a, b, c, d, p) -> float` of the restricted Python that numba
     compiles. Unused numbers are 0. It is evaluated beyond the events that bound its phase, so it should be
-    continued smoothly there.
+    continued smoothly there. Behind the parameters p holds the shot's values of the effect's `columns`.
     """
 
     BODY = at.BODY
@@ -26,7 +26,7 @@ class LawKind(enum.IntEnum):
     SCALE = at.SCALE
     """(x): factor of mu_s and mu_k."""
     KINETIC = at.KINETIC
-    """(abs(x')): what is added to mu_k in slip."""
+    """(abs(x'), x): what is added to mu_k in slip."""
     CONTACT = at.CONTACT
     """(d, d', k, b): added to k d + b max(d', 0) while in contact [N]; their sum is never negative."""
     PULL = at.PULL
@@ -156,8 +156,8 @@ class Effect:
         The part that acts between shots: parameters (each of shape (shots,), those of a `per_batch`
         parameter (shots, batches - 1)) and covariates in, factors out.
     columns : mapping of str to (float, float)
-        Further columns of `shots.csv` that `between` reads, and the range of each in which the law is known;
-        its factors are 1 where one of them is nan.
+        Further columns of `shots.csv` that `between` or the laws read, and the range of each in which the
+        effect is known; where one of them is nan the effect is at its null.
     dissipates : bool
         Claims to take energy from the part, never to give any.
     order : int

@@ -87,7 +87,6 @@ def _statement(effect: Effect) -> list[str]:
             "it names no phase in which it shows",
         ),
         (bool(effect.laws) != between, "it needs either laws or between=, not both"),
-        (not effect.columns or between, "columns of shots.csv are read by between= only"),
         (
             all(low < high and np.isfinite([low, high]).all() for low, high in effect.columns.values()),
             "a column's range has to be two ascending numbers",
@@ -180,12 +179,17 @@ def _with(effect: Effect) -> Ensemble:
     return _ensemble(effect.identifier, columns=effect.columns)
 
 
+def _middle(effect: Effect) -> list[float]:
+    """Middle of the range of each column that an effect reads."""
+    return [0.5 * (low + high) for low, high in effect.columns.values()]
+
+
 def _unknown_columns(effect: Effect) -> list[str]:
     if not effect.columns:
         return []
     unknown = _traces(_ensemble(effect.identifier), _values(effect, lambda p: p.typical))
     if not np.abs(unknown - _traces(_ensemble(), [])).max() <= VANISHING:
-        return [f"its factors are not 1 where {' and '.join(effect.columns)} is not known (nan)"]
+        return [f"it still moves a tap where {' and '.join(effect.columns)} is not known (nan)"]
     return []
 
 
@@ -221,7 +225,7 @@ def _range(effect: Effect) -> list[str]:
         for kind, law in effect.laws.items():
             try:
                 with np.errstate(all="ignore"):
-                    is_finite = math.isfinite(law(*ARGUMENTS, np.array(values)))
+                    is_finite = math.isfinite(law(*ARGUMENTS, np.array([*values, *_middle(effect)])))
             except ArithmeticError:
                 is_finite = False
             is_finite = is_finite or not np.isfinite(values).all()  # an end at infinity means it
@@ -266,7 +270,10 @@ def _energy(effect: Effect) -> list[str]:
         if kind not in (LawKind.BODY, LawKind.KINETIC, LawKind.CONTACT):
             return [f"it claims to dissipate, which a law of kind {kind.name} cannot; say dissipates=False"]
         for _ in range(ENERGY_DRAWS):
-            p = np.array([rng.uniform(max(q.lower, 1e-6), min(q.upper, 1e6)) for q in effect.parameters])
+            p = np.array(
+                [rng.uniform(max(q.lower, 1e-6), min(q.upper, 1e6)) for q in effect.parameters]
+                + [rng.uniform(*ends) for ends in effect.columns.values()]
+            )
             rate = float(rng.uniform(-2.0, 2.0))
             where = ""
             if kind is LawKind.BODY:

@@ -83,7 +83,8 @@ def kinetic_friction(advance: float, speed: float, phase: SmoothPhase) -> float:
     """Magnitude of Coulomb friction in slip at `speed` >= 0 [N]."""
     mu = phase.parameters[at.MU_K]
     for i in range(phase.laws[at.KINETIC], phase.laws[at.KINETIC + 1], 2):
-        mu += evaluate_law(i, speed, 0.0, 0.0, 0.0, phase)
+        x = phase.parameters[at.START] + phase.parameters[at.DIRECTION] * advance
+        mu += evaluate_law(i, speed, x, 0.0, 0.0, phase)
     return mu * friction_scale(advance, phase) * phase.parameters[at.MASS] * phase.parameters[at.GRAVITY]
 
 

@@ -30,7 +30,7 @@ Between = Callable[[Sequence[Samples], Covariates], Factors]
 @cache
 def column_form(column: str) -> FreeForm:
     """Free-form factor of the friction over a column; the same one whenever it is asked for."""
-    letters = re.sub(r"[^a-z0-9]+", "_", column.lower()).strip("_")[:MOST_LETTERS]
+    letters = column_letters(column)
     check = hashlib.sha256(column.encode()).hexdigest()[:6]
     knots = tuple(
         Parameter(end, "1", null=math.nan, lower=-math.inf, upper=math.inf, typical=1.0)
@@ -52,6 +52,11 @@ def column_form(column: str) -> FreeForm:
     )
     add_effect(effect)
     return FreeForm(effect, column, "1", None, "1.0 + s", "", constant_is="mu_k")
+
+
+def column_letters(column: str) -> str:
+    """Letters and digits of a column's name, as an identifier may have them."""
+    return re.sub(r"[^a-z0-9]+", "_", column.lower()).strip("_")[:MOST_LETTERS]
 
 
 def printed(column: str) -> str:

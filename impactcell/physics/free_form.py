@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from impactcell.physics.effect import Effect, LawKind
 
+ACROSS = 4
+"""B-splines along a second covariate: one cubic piece."""
 FINE = "_fine"
 """End of the identifier of a finer term."""
 
@@ -32,6 +34,9 @@ class FreeForm:
     dissipates : str
         Parameter of the plant to which the function is added where the sum must not be negative, lest it give
         energy; `0` where it is the function alone, empty where either sign is possible.
+    second, second_unit, second_argument : str
+        The same of the second covariate w, another number of the motion or a column of `shots.csv`; empty
+        where the function has one alone.
     """
 
     effect: Effect
@@ -42,6 +47,9 @@ class FreeForm:
     argument: str
     constant_is: str = ""
     dissipates: str = ""
+    second: str = ""
+    second_unit: str = ""
+    second_argument: str = ""
 
     @property
     def place(self) -> str:
@@ -51,12 +59,17 @@ class FreeForm:
     @property
     def coefficients(self) -> tuple[str, ...]:
         """Names of the parameters that a fit moves."""
-        return tuple(parameter.name for parameter in self.effect.parameters[2:])
+        return tuple(parameter.name for parameter in self.effect.parameters[2 * len(self.covariates) :])
 
     @property
     def spans(self) -> int:
-        """Polynomial pieces of its spline."""
-        return len(self.coefficients) - 3
+        """Polynomial pieces of its spline along its first covariate."""
+        return len(self.coefficients) // (ACROSS if self.second else 1) - 3
+
+    @property
+    def covariates(self) -> tuple[str, ...]:
+        """What the function is of."""
+        return (self.covariate, self.second) if self.second else (self.covariate,)
 
     @property
     def is_factor(self) -> bool:
@@ -71,4 +84,4 @@ class FreeForm:
     @property
     def unit(self) -> str:
         """Unit of the function."""
-        return self.effect.parameters[2].unit
+        return self.effect.parameters[-1].unit

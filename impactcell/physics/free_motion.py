@@ -18,8 +18,12 @@ CHORD_SPEED_M_S = 2.0**-4
 
 
 def acts_on_speed(identifier: str) -> bool:
-    """Whether an effect accelerates a free part, friction that changes from place to place apart."""
-    return not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(find_effect(identifier).laws)
+    """Whether an effect accelerates a free part, friction that changes from place to place apart.
+
+    One that reads columns of `shots.csv` is at its null: a cycle does not say what they are.
+    """
+    effect = find_effect(identifier)
+    return not effect.columns and not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(effect.laws)
 
 
 def model_acceleration(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | None:
@@ -40,9 +44,9 @@ def model_acceleration(plant: Plant, capture: Capture) -> Callable[[Samples], Sa
 def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
     """Evaluate the laws of a plant's effects for a free part, mu_k itself left out.
 
-    Along the tap, a = s sum_i F_i(x_0, s v, m, g) / m - g sum_j dmu_j(v), with s its direction, F the laws
-    of `LawKind.BODY` and dmu those of `LawKind.KINETIC`. A force that depends on the place is taken where
-    the part lay.
+    Along the tap, a = s sum_i F_i(x_0, s v, m, g) / m - g sum_j dmu_j(v, x_0), with s its direction, F the
+    laws of `LawKind.BODY` and dmu those of `LawKind.KINETIC`. What depends on the place is taken where the
+    part lay.
 
     Parameters
     ----------
@@ -69,7 +73,7 @@ def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
             arguments[:, 2], arguments[:, 3] = mass, g
             total += sign * _evaluate(address(body), arguments, p) / mass
         if kinetic is not None:
-            arguments[:, 0], arguments[:, 1:] = speed_m_s, 0.0
+            arguments[:, 0], arguments[:, 1], arguments[:, 2:] = speed_m_s, tap.start_m, 0.0
             total -= g * _evaluate(address(kinetic), arguments, p)
     return total
 
@@ -94,8 +98,9 @@ def linear_resistance(plant: Plant) -> float:
     values = parameter_vector(plant, table)
     total = 0.0
     for identifier, spans in zip(table.effects, table.parameter_spans, strict=True):
-        body = find_effect(identifier).laws.get(LawKind.BODY)
-        if body is not None:
+        effect = find_effect(identifier)
+        body = effect.laws.get(LawKind.BODY)
+        if body is not None and not effect.columns:
             p = [values[first] for first, _ in spans]
             force = [body(0.0, v, 1.0, plant.gravity_m_s2, p) for v in (0.0, CHORD_SPEED_M_S)]
             total += (force[0] - force[1]) / CHORD_SPEED_M_S

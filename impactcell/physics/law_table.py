@@ -10,7 +10,7 @@ import numpy as np
 from impactcell.errors import PhysicsError
 from impactcell.numerics.jit import IntArray, address
 from impactcell.physics import memory_layout as at
-from impactcell.physics.effect import Covariates, LawKind
+from impactcell.physics.effect import Covariates, Effect, LawKind
 from impactcell.physics.effects import find_effect
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
@@ -32,6 +32,10 @@ class LawTable:
         See `impactcell.physics.memory_layout`.
     width : int
         Numbers of a tap.
+    places : ndarray
+        Where in them the parameters of the effects lie, in the order of `names[4:]`.
+    column_places : tuple of int
+        Of each effect, where the shot's values of the columns that its laws read begin; 0 where none do.
     """
 
     effects: tuple[str, ...]
@@ -40,6 +44,8 @@ class LawTable:
     parameter_spans: tuple[tuple[tuple[int, int], ...], ...]
     laws: IntArray
     width: int
+    places: IntArray
+    column_places: tuple[int, ...]
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel to another process by name: addresses of laws mean nothing there."""
@@ -58,7 +64,8 @@ class LawTable:
         parameters[:, at.START] = taps["start_m"]
         parameters[:, at.HALTS_AT_SEPARATION] = taps["halts_at_separation"]
         parameters[:, at.INITIAL_SPEED] = taps["initial_speed_m_s"]
-        parameters[:, at.FIRST_EFFECT_PARAMETER :] = values[:, 4:]
+        parameters[:, self.places] = values[:, 4:]
+        self._set_columns(parameters, taps)
         shots: Covariates | None = None
         for identifier, spans in zip(self.effects, self.parameter_spans, strict=True):
             effect = find_effect(identifier)
@@ -69,7 +76,7 @@ class LawTable:
                     taps["dwell_s"], taps["shot"], taps["shots"], taps["batch"], taps["direction"]
                 )
             unknown = np.full(n, np.nan)
-            further = {name: taps.get(column_key(name), unknown) for name in effect.columns}
+            further = _columns_of(effect, taps, unknown)
             columns = [
                 values[:, begin:end] if parameter.per_batch else values[:, begin]
                 for (begin, end), parameter in zip(spans, effect.parameters, strict=True)
@@ -79,6 +86,24 @@ class LawTable:
             parameters[:, at.MU_K] *= factors.mu_k
             parameters[:, at.MASS] *= factors.mass
         return parameters
+
+    def _set_columns(self, parameters: Samples, taps: Mapping[str, Samples]) -> None:
+        """Hand laws the shots' values of their columns; where one is not known the effect is at its null."""
+        entries = zip(self.effects, self.parameter_spans, self.column_places, strict=True)
+        for identifier, spans, begin in entries:
+            if not begin:
+                continue
+            effect = find_effect(identifier)
+            given = _columns_of(effect, taps, np.full(len(parameters), np.nan))
+            known = np.isfinite(np.column_stack(list(given.values()))).all(axis=1)
+            for place, (name, column) in enumerate(given.items(), begin):
+                lower = effect.columns[name][0]
+                parameters[:, place] = np.where(known, column, lower if math.isfinite(lower) else 0.0)
+            for (first, last), parameter in zip(spans, effect.parameters, strict=True):
+                if not math.isnan(parameter.null):
+                    parameters[~known, begin - spans[-1][1] + first : begin - spans[-1][1] + last] = (
+                        parameter.null
+                    )
 
 
 @lru_cache(maxsize=256)
@@ -92,12 +117,16 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
     """
     names = list(NOMINAL_PARAMETERS)
     spans: list[tuple[tuple[int, int], ...]] = []
+    column_places: list[int] = []
+    places: list[int] = []
+    width = at.FIRST_EFFECT_PARAMETER
     lists: dict[int, list[tuple[int, int, int]]] = {kind: [] for kind in range(at.LAW_KINDS)}
     if len(set(effects)) != len(effects):
         raise PhysicsError(f"an effect is named twice among {', '.join(effects)}")
     for identifier in effects:
         effect = find_effect(identifier)
         spans_of_effect: list[tuple[int, int]] = []
+        named = len(names)
         for parameter in effect.parameters:
             begin = len(names)
             if parameter.per_batch:
@@ -106,8 +135,12 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
                 names.append(f"{identifier}.{parameter.name}")
             spans_of_effect.append((begin, len(names)))
         spans.append(tuple(spans_of_effect))
+        first, numbers = width, len(names) - named
+        places += range(first, first + numbers)
+        has_columns = bool(effect.laws and effect.columns)
+        column_places.append(first + numbers if has_columns else 0)
+        width += numbers + (len(effect.columns) if has_columns else 0)
         for place, law in effect.laws.items():
-            first = spans_of_effect[0][0] - len(NOMINAL_PARAMETERS) + at.FIRST_EFFECT_PARAMETER
             lists[int(place)].append((effect.order, address(law), first))
     for single in (LawKind.REACH, LawKind.LAG, LawKind.DELAY, LawKind.STICK):
         if len(lists[single]) > 1:
@@ -127,8 +160,15 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
         names=tuple(names),
         parameter_spans=tuple(spans),
         laws=np.array(starts + entries, dtype=np.int64),
-        width=at.FIRST_EFFECT_PARAMETER + len(names) - len(NOMINAL_PARAMETERS),
+        width=width,
+        places=np.array(places, dtype=np.int64),
+        column_places=tuple(column_places),
     )
+
+
+def _columns_of(effect: Effect, taps: Mapping[str, Samples], unknown: Samples) -> dict[str, Samples]:
+    """Give the columns of `shots.csv` that an effect reads, each of shape (n,); nan where not known."""
+    return {name: taps.get(column_key(name), unknown) for name in effect.columns}
 
 
 def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Samples:
