@@ -67,7 +67,7 @@ def initial_state(settings: AlarmSettings) -> AlarmSetState:
 
 
 def evaluate(settings: AlarmSettings, state: AlarmSetState, inputs: CycleInputs) -> list[RuleResult]:
-    """Ask every rule that looks at cycles; each result says how rarely the rule was designed to be wrong."""
+    """Ask every rule that looks at cycles; one that holds says how rarely it was designed to be wrong."""
     results = [
         rule.evaluate(inputs, RuleContext(settings.rule(name), state.alarm(name).active))
         for name, rule in RULES.items()
@@ -75,7 +75,10 @@ def evaluate(settings: AlarmSettings, state: AlarmSetState, inputs: CycleInputs)
     ]
     if math.isnan(inputs.false_alarm_cycles):
         return results
-    return [replace(result, evidence=_rated(result.evidence, inputs)) for result in results]
+    return [
+        replace(result, evidence=_rated(result.evidence, inputs)) if result.holds else result
+        for result in results
+    ]
 
 
 def _rated(evidence: Evidence, inputs: CycleInputs) -> Evidence:

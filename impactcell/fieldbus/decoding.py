@@ -12,6 +12,7 @@ import numpy as np
 
 from impactcell.fieldbus.registers import RegisterMap, Value, Words
 from impactcell.fieldbus.status_block import integer, number
+from impactcell.numerics.local_polynomial import median
 from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 
 LIGHTEST_KG, HEAVIEST_KG = 0.01, 1e5
@@ -187,7 +188,7 @@ def _scale_faults(
 def _displacement(position: Samples) -> float:
     """How far a part lies from where it lay, in metres."""
     few = max(len(position) // AT_REST, 1)
-    return abs(float(np.median(position[-few:]) - np.median(position[:few])))
+    return abs(median(position[-few:]) - median(position[:few]))
 
 
 def _never(_: float) -> bool:

@@ -48,7 +48,7 @@ class RegisterClient:
                 raw[i] = await self._read_until_stable(block, raw[i])
         image = self._images.get(names)
         if image is None or image.raw != tuple(raw):  # nearly always a poll finds all unchanged
-            image = self._images[names] = decoded_image(blocks, raw)
+            image = self._images[names] = decoded_image(blocks, raw, image)
         return image
 
     def partial_block(self, name: str, values: int, *, again: bool = False) -> PartialBlock:
@@ -78,7 +78,10 @@ class RegisterClient:
         if slot is not None and self.registers.has_ring:
             select = self.registers["slot_select"]
             write = (select.address, select.encode(slot))
-        return decoded_image(blocks, [words.tobytes() for words in await self._read(blocks, write)])
+        raw = [words.tobytes() for words in await self._read(blocks, write)]
+        image = decoded_image(blocks, raw, self._images.get(self._header))
+        self._images[self._header] = image
+        return image
 
     async def write_values(self, values: Mapping[str, ArrayLike | str]) -> None:
         """Write registers; neighbours go out in one request, so that the device takes them together."""

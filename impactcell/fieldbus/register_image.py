@@ -30,9 +30,15 @@ class RegisterBlock:
         fields = tuple((each, slice(each.address - first, each.end - first)) for each in registers)
         return cls(registers[0].table, first, registers[-1].end - first, fields)
 
-    def decode(self, words: Words) -> dict[str, Value]:
-        """Values in its words, by name."""
-        return {register.name: register.decode(words[where]) for register, where in self.fields}
+    def decode(self, raw: bytes, before: bytes, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Values in its words `raw`, by name; of words as they were in `before` those are in `values`."""
+        words = np.frombuffer(raw, WIRE)
+        decoded: dict[str, Value] = {}
+        for register, where in self.fields:
+            part = slice(2 * where.start, 2 * where.stop)
+            unchanged = raw[part] == before[part]
+            decoded[register.name] = values[register.name] if unchanged else register.decode(words[where])
+        return decoded
 
 
 def group_registers(
@@ -79,9 +85,19 @@ class RegisterImage:
         return words
 
 
-def decoded_image(blocks: tuple[RegisterBlock, ...], raw: Sequence[bytes]) -> RegisterImage:
-    """Decode what was read of blocks, block by block."""
+def decoded_image(
+    blocks: tuple[RegisterBlock, ...], raw: Sequence[bytes], before: RegisterImage | None = None
+) -> RegisterImage:
+    """Decode what was read of blocks, block by block.
+
+    Parameters
+    ----------
+    before : RegisterImage, optional
+        What the same blocks showed before: most registers have not changed since, and keep their values.
+    """
     values: dict[str, Value] = {}
-    for block, data in zip(blocks, raw, strict=True):
-        values |= block.decode(np.frombuffer(data, WIRE))
+    earlier = (b"",) * len(blocks) if before is None else before.raw
+    earlier_values = {} if before is None else before.values
+    for block, data, data_before in zip(blocks, raw, earlier, strict=True):
+        values |= block.decode(data, data_before, earlier_values)
     return RegisterImage(blocks, tuple(raw), values)

@@ -10,6 +10,7 @@ import logging
 import sqlite3
 import zlib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -38,6 +39,13 @@ def row_crc(values: Sequence[SqlValue], number: SqlValue = None) -> int:
         end -= 1
     crc = zlib.crc32(_ENCODER.encode(values[:end]))
     return crc if number is None else zlib.crc32(_ENCODER.encode(number), crc)
+
+
+@cache
+def _insert(table: str, columns: tuple[str, ...]) -> str:
+    """Give the statement that writes a row of these columns and its checksum."""
+    names, places = ", ".join((*columns, "crc")), ", ".join("?" * (len(columns) + 1))
+    return f"INSERT OR REPLACE INTO {table} ({names}) VALUES ({places})"  # noqa: S608 - from CHECKED
 
 
 class CheckedTables:
@@ -72,12 +80,9 @@ class CheckedTables:
         if table in NUMBERED:
             number = self._next_number(table)
             values = {**values, NUMBERED[table]: number}
-        columns = [name for name in self.columns[table] if name in values]
-        crc = row_crc([values.get(name) for name in self.columns[table] if name not in KEYS], number)
-        row = [*(values[name] for name in columns), crc]
-        names, places = ", ".join((*columns, "crc")), ", ".join("?" * len(row))
-        statement = f"INSERT OR REPLACE INTO {table} ({names}) VALUES ({places})"  # noqa: S608 - from CHECKED
-        return self._database.execute(statement, row).lastrowid
+        columns = self.columns[table]
+        crc = row_crc([values.get(columns[i]) for i in self._covered[table]], number)
+        return self._database.execute(_insert(table, tuple(values)), [*values.values(), crc]).lastrowid
 
     def rows(self, table: str, query: str, *arguments: str) -> list[dict[str, Any]]:
         """Read whole rows that have to be right.

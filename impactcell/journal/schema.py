@@ -85,7 +85,8 @@ _SQL_TYPES = {DataType.DOUBLE: "REAL", DataType.UINT32: "INTEGER", DataType.STRI
 
 
 def _value(quantity: Quantity[Snapshot]) -> Callable[[Capture, Snapshot], Value]:
-    return lambda _, snapshot: cast("Value", quantity.value(snapshot))
+    read = cast("Callable[[Snapshot], Value]", quantity.value)
+    return lambda _, snapshot: read(snapshot)
 
 
 def _quality(quality: Callable[[Snapshot], Quality]) -> Callable[[Capture, Snapshot], Value]:
@@ -106,16 +107,19 @@ COLUMNS = _columns()
 
 def cycle_row(capture: Capture, snapshot: Snapshot) -> dict[str, SqlValue]:
     """Give the row of a cycle, as SQLite will give it back."""
-    return {column.name: _sql(column, column.of(capture, snapshot)) for column in COLUMNS}
+    return {name: form(of(capture, snapshot)) for name, form, of in _CELLS}
 
 
-def _sql(column: Column, value: Value) -> SqlValue:
+def _real(value: Value) -> SqlValue:
     """NaN is no SQL number and stored as NULL; no number that SQLite gives back is a negative zero."""
-    if isinstance(value, str):
-        return value
-    if column.sql_type == "INTEGER":
-        return int(value)
-    return None if math.isnan(value) else float(value) + 0.0
+    number = float(value)
+    return None if math.isnan(number) else number + 0.0
+
+
+_STORED_FORMS: Mapping[str, Callable[[Value], SqlValue]] = {"INTEGER": int, "REAL": _real, "TEXT": str}
+"""What of a value is stored, by the SQL type of its column."""
+_CELLS = tuple((column.name, _STORED_FORMS[column.sql_type], column.of) for column in COLUMNS)
+"""The columns taken apart, for a row of every cycle."""
 
 
 EARLIER_STATES = """

@@ -78,7 +78,7 @@ class Ensemble:
         self.names = self._table.names
         self.gravity_m_s2 = gravity_m_s2
         self._count = len(taps)
-        self._sample_index = np.zeros((len(taps), at.SAMPLE_INDEX_COUNT), dtype=np.int64)
+        index = [[0] * at.SAMPLE_INDEX_COUNT for _ in taps]
         times_by_channel = (force_time_s, position_time_s, actuator_time_s, velocity_time_s)
         pairs = [(channel, i) for channel in range(at.CHANNEL_COUNT) for i in range(len(taps))]
         pieces: list[Samples] = []
@@ -86,20 +86,21 @@ class Ensemble:
         for channel, i in sorted(pairs, key=lambda pair: pair[1]) if by_tap else pairs:
             of_taps = times_by_channel[channel]
             times = NO_SAMPLES if of_taps is None else np.asarray(of_taps[i], dtype=np.float64)
-            if times is not checked:  # taps may share theirs
+            if times.size and times is not checked:  # taps may share theirs
                 if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
                     raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
                 checked = times
             pieces.append(times)
-            self._sample_index[i, channel] = total
+            index[i][channel] = total
             total += times.size
-            self._sample_index[i, at.CHANNEL_COUNT + channel] = total
+            index[i][at.CHANNEL_COUNT + channel] = total
         self._times = np.concatenate(pieces) if pieces else NO_SAMPLES
-        spans = [self._sample_index[:, [k, at.CHANNEL_COUNT + k]] for k in range(at.CHANNEL_COUNT)]
+        self._sample_index = np.array(index, dtype=np.int64).reshape(-1, at.SAMPLE_INDEX_COUNT)
+        spans = [[(row[k], row[at.CHANNEL_COUNT + k]) for row in index] for k in range(at.CHANNEL_COUNT)]
         self._channels: list[slice | np.ndarray] = [
             np.concatenate([np.arange(begin, end) for begin, end in span])
             if by_tap
-            else slice(int(span.min(initial=total)), int(span.max(initial=0)))
+            else slice(span[0][0] if span else 0, span[-1][1] if span else 0)
             for span in spans
         ]
         self._drives, self._drive_ends = NO_SAMPLES, np.zeros(len(taps) + 1, dtype=np.int64)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import attrgetter
 
 import numpy as np
 
@@ -17,6 +18,12 @@ from impactcell.records import Samples
 
 NOMINAL_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
 MAX_EFFECT_STATES = at.STATE_WIDTH - at.FIRST_EXTRA_STATE
+_TAP_COLUMNS = (
+    *("velocity_m_s", "mass_kg", "stroke_m", "direction", "halts_at_separation", "start_m", "dwell_s"),
+    *("shot", "shots", "batch"),
+)
+"""Fields of a tap that laws and parameters may ask for."""
+_TAP_FIELDS = attrgetter(*_TAP_COLUMNS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -208,21 +215,8 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
 
 def tap_columns(taps: Sequence[TapInput]) -> dict[str, Samples]:
     """Columns of `LawTable.tap_parameters`, each of shape (n,), of taps that strike: no initial speed."""
-    columns = {
-        name: np.array([getattr(tap, name) for tap in taps], dtype=np.float64)
-        for name in (
-            "velocity_m_s",
-            "mass_kg",
-            "stroke_m",
-            "direction",
-            "halts_at_separation",
-            "start_m",
-            "dwell_s",
-            "shot",
-            "shots",
-            "batch",
-        )
-    }
+    rows = np.array([_TAP_FIELDS(tap) for tap in taps], dtype=np.float64).reshape(-1, len(_TAP_COLUMNS))
+    columns = dict(zip(_TAP_COLUMNS, np.ascontiguousarray(rows.T), strict=True))
     columns["initial_speed_m_s"] = np.full(len(taps), np.nan)
     further = [dict(tap.columns) for tap in taps]
     for name in dict.fromkeys(name for known in further for name in known):
