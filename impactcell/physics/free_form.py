@@ -1,5 +1,6 @@
 """A place in the equations of motion at which a smooth function may act, and how it enters there."""
 
+import re
 from dataclasses import dataclass
 
 from impactcell.physics.effect import Effect, LawKind
@@ -55,6 +56,11 @@ class FreeForm:
     def place(self) -> str:
         """Identifier of the place, whatever the number of pieces."""
         return self.effect.identifier.removesuffix(FINE)
+
+    @property
+    def state(self) -> frozenset[str]:
+        """Which of the first two numbers of its law it reads: `a`, `b` or both."""
+        return frozenset(re.findall(r"\b[ab]\b", f"{self.argument} {self.around}"))
 
     @property
     def coefficients(self) -> tuple[str, ...]:

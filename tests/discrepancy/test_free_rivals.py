@@ -1,5 +1,6 @@
 """Named effects held against free forms: what a smooth force of no name leaves is not named after it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
@@ -13,8 +14,11 @@ from impactcell.discrepancy.laws.standing import (
     fit_free_forms,
     is_in_its_place,
     outdoes,
-    stands,
+    outdone_by,
+    stands_beside,
 )
+from impactcell.discrepancy.report.result import result_document
+from impactcell.discrepancy.search import Outdone
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY as EFFECTS
 from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
@@ -75,9 +79,79 @@ def test_a_name_that_leaves_something_falls_to_free_forms(
     assert outdoes(_scored("", place, left, ahead), named, _leaving(20.0)) is falls
 
 
-def test_a_name_that_leaves_nothing_falls_to_no_form_that_leaves_as_little() -> None:
+@pytest.mark.parametrize(
+    ("place", "ahead", "falls"),
+    [
+        ("free_friction_over_position", 50.0, False),
+        ("free_force_over_position", 1.0, False),
+        ("free_force_over_position", 50.0, True),
+    ],
+)
+def test_a_name_that_leaves_nothing_falls_only_to_what_shots_tell_from_it_elsewhere(
+    place: str, ahead: float, *, falls: bool
+) -> None:
     named = _scored("friction_patch", "", 1.1)
-    assert not outdoes(_scored("", "free_force_over_position", 1.0, 50.0), named, _leaving(20.0))
+    assert outdoes(_scored("", place, 1.0, ahead), named, _leaving(20.0)) is falls
+
+
+def _seconds(*models: ScoredModel) -> Any:
+    """Make second forms, beside a name or beside a form, come out as given."""
+    of = {"": [model for model in models if not model.effect], "named": [m for m in models if m.effect]}
+    return patch(
+        "impactcell.discrepancy.laws.standing._with_second",
+        lambda _context, _problem, _base, effect: of["named" if effect else ""],
+    )
+
+
+@pytest.mark.parametrize(
+    ("second", "ahead", "stays"),
+    [
+        ("free_friction_over_speed", 50.0, False),
+        ("free_friction_over_speed", 40.0, False),
+        ("free_friction_over_speed", 39.0, True),
+        ("free_reading_over_force", 50.0, True),
+    ],
+)
+def test_a_name_that_shows_beside_a_form_falls_to_a_second_form_elsewhere(
+    second: str, ahead: float, *, stays: bool
+) -> None:
+    """A gain of the force sensor was named beside friction over position, for friction that came late."""
+    named = _scored("force_sensor_gain", "free_friction_over_position", 1.01, 40.0)
+    with _seconds(_scored("", second, 1.0, ahead)):
+        assert stands_beside(SimpleNamespace(), named, SimpleNamespace(problem=None, fit=None)) is stays  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("alone", "beside_name", "beside_form", "outdone"),
+    [
+        (50.0, 60.0, 100.0, True),
+        (50.0, 100.0, 60.0, False),
+        (50.0, 99.9, 100.0, False),
+        (1.0, 60.0, 100.0, False),
+    ],
+)
+def test_in_its_place_a_form_outdoes_a_name_only_where_it_keeps_ahead_with_a_second_beside_each(
+    alone: float, beside_name: float, beside_form: float, *, outdone: bool
+) -> None:
+    """A patch was named for friction that came late: a curve over position follows it better."""
+    named = _scored("friction_patch", "", 2.5)
+    own, elsewhere = "free_friction_over_position", "free_friction_over_speed"
+    form = _scored("", own, 1.6, alone)
+    fit: Any = SimpleNamespace(effects=("friction_patch",), residual=np.ones(10))
+    context: Any = SimpleNamespace(coarse=SimpleNamespace(with_effects=lambda _effects: None))
+    term: Any = SimpleNamespace(problem=None, fit=None)
+    given: Any = SimpleNamespace(accepted=fit, nominal=None)
+    seconds = (
+        _scored("friction_patch", elsewhere, 1.4, beside_name), _scored("", elsewhere, 1.2, beside_form)
+    )  # fmt: skip
+    named = replace(named, fit=SimpleNamespace(residual=named.fit.residual, effects=fit.effects))  # type: ignore[arg-type]
+    with (
+        _seconds(*seconds),
+        patch("impactcell.discrepancy.laws.standing.refine", lambda *_: [fit]),
+        patch("impactcell.discrepancy.laws.standing.score_fit", lambda *_: named),
+    ):
+        found = outdone_by(context, given, FreeForms(_leaving(20.0), (form,), {own: term}))
+    assert found == (Outdone("friction_patch", own, place_is_right=True) if outdone else None)
 
 
 @pytest.mark.parametrize(
@@ -110,7 +184,8 @@ def test_a_name_between_shots_falls_to_a_form_that_narrows_the_factors_as_much_f
         patch("impactcell.discrepancy.laws.standing.refine", lambda *_: [named]),
         patch("impactcell.discrepancy.laws.standing.chance_of_order", lambda *_: chance),
     ):
-        assert stands(context, selection, FreeForms(named, (form,), {})) is not falls
+        outdone = outdone_by(context, selection, FreeForms(named, (form,), {}))
+    assert (outdone is not None) is falls
 
 
 @pytest.mark.parametrize(
@@ -122,6 +197,9 @@ def test_a_name_between_shots_falls_to_a_form_that_narrows_the_factors_as_much_f
         ("viscous_friction", "free_drag_over_speed"),
         ("hertz_contact", "free_stiffness_over_indentation"),
         ("adhesion", "free_pull_over_gap"),
+        ("restoring_force", "free_force_over_position"),
+        ("hunt_crossley_damping", "free_damping_over_indentation"),
+        ("surface_tilt", "free_force_over_position"),
     ],
 )
 def test_an_effect_has_its_place_among_the_free_forms(effect: str, place: str) -> None:
@@ -129,6 +207,20 @@ def test_an_effect_has_its_place_among_the_free_forms(effect: str, place: str) -
     assert effect in EFFECTS
     assert is_in_its_place(effect, place)
     assert not is_in_its_place(effect, "free_speed_over_time")
+
+
+@pytest.mark.parametrize(
+    ("effect", "place"),
+    [
+        ("restoring_force", "free_drag_over_speed"),
+        ("quadratic_drag", "free_force_over_position"),
+        ("hunt_crossley_damping", "free_stiffness_over_indentation"),
+        ("mass_error", "free_reading_over_force"),
+    ],
+)
+def test_a_form_that_does_not_read_what_an_effect_reads_is_not_in_its_place(effect: str, place: str) -> None:
+    """They may enter the equations of motion at the same point all the same: a spring is no drag."""
+    assert not is_in_its_place(effect, place)
 
 
 def test_no_filter_is_fitted_where_no_force_was_recorded() -> None:
@@ -146,3 +238,8 @@ def test_a_delay_is_not_established_in_the_place_of_a_lag() -> None:
     assert found.selection.nominal.p_value < 0.01
     assert found.verdict == "unknown"
     assert found.added == ()
+    outcome = result_document(found)
+    assert outcome["outdone"] == {
+        "effect": "channel_skew", "form": FORCE_FILTER.equation, "place_is_right": True
+    }  # fmt: skip
+    assert "Channel skew comes nearest, but a free function" in outcome["headline"]

@@ -179,10 +179,14 @@ def _spline_is_better(term: FreeTerm, law: FittedLaw) -> bool:
 
 
 def effective_numbers(term: FreeTerm) -> float:
-    """Effective number of coefficients of a penalised spline, tr((H + P)⁻¹ H) over them (Wood 2017)."""
+    """Effective number of coefficients of penalised splines, tr((H + P)⁻¹ H) over them (Wood 2017).
+
+    Those of the term, and of any other that the model has.
+    """
     H, _ = equations(term.problem, term.fit.state)
-    share = np.linalg.pinv(H + term.problem.penalty_matrix, rcond=1e-13, hermitian=True) @ H
-    return float(np.diag(share)[term.columns].sum())
+    penalty = term.problem.penalty_matrix
+    share = np.linalg.pinv(H + penalty, rcond=1e-13, hermitian=True) @ H
+    return float(np.diag(share)[np.diag(penalty) > 0.0].sum())
 
 
 def _equivalents(laws: list[FittedLaw]) -> tuple[FittedLaw, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from impactcell.discrepancy.data import decimate
 from impactcell.discrepancy.laws.free_term import FreeTerm, candidate_terms
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_term
-from impactcell.discrepancy.laws.standing import FreeForms, fit_free_forms, stands
+from impactcell.discrepancy.laws.standing import FreeForms, fit_free_forms, outdone_by, stands_beside
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.discrepancy.search import (
     CandidateFit,
@@ -67,11 +67,17 @@ def hold_against_free_forms(context: SearchContext, selection: SelectionResult) 
         free = forms.alone[0]
         beside = [model for model in _beside_terms(fewer, forms) if not is_at_bound(model.fit)]
         best = max(beside, key=lambda model: model.score, default=free)
-        if best.leaves_nothing and best.is_told_from(free) and best.p_value <= MAX_P_VALUE:
+        if (
+            best.leaves_nothing
+            and best.is_told_from(free)
+            and best.p_value <= MAX_P_VALUE
+            and stands_beside(fewer, best, forms.terms[best.place])
+        ):
             return _accept(context, selection, best, _tied(best, beside))
-    if selection.accepted is not None and not stands(fewer, selection, forms):
-        return reject(selection.nominal, selection.final, selection.alternatives)
-    return selection
+    outdone = outdone_by(fewer, selection, forms)
+    if outdone is None:
+        return selection
+    return replace(reject(selection.nominal, selection.final, selection.alternatives), outdone=outdone)
 
 
 def _asks(context: SearchContext, selection: SelectionResult) -> bool:

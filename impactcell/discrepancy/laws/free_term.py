@@ -219,7 +219,7 @@ class TermStart:
     form : FreeForm
     visited : Visited
     problem : Problem
-        Nothing is said of the roughness.
+        Nothing is said of the term's roughness.
     state : FitState
     information, gradient : ndarray, shapes (p, p) and (p,)
         Of the shared coordinates, each shot's own eliminated.
@@ -234,14 +234,15 @@ class TermStart:
 
     @classmethod
     def at(cls, problem: Problem, base: Fit, form: FreeForm, span: Visited) -> "TermStart":
-        """Add a term to a model."""
+        """Add a term to a model; a term that is there already keeps its roughness."""
         identifier, count = form.effect.identifier, len(form.coefficients)
         held = {
             **problem.constraints.held,
             f"{identifier}.{LOWER}": span.lower,
             f"{identifier}.{UPPER}": span.upper,
         }
-        bare = problem.constrained((*base.effects, identifier), Constraints(held))
+        constraints = Constraints(held, problem.constraints.roughness)
+        bare = problem.constrained((*base.effects, identifier), constraints)
         theta = np.concatenate([base.theta, np.zeros(count)])
         state = bare.evaluate(theta, base.shot_parameters, base.spread)
         return cls(form, span, bare, state, *equations(bare, state))
@@ -259,8 +260,9 @@ class TermStart:
         scale = float(np.trace(self.information[-count:, -count:])) / count
         differences = np.diff(np.eye(count), n=2, axis=0)
         rows = np.vstack([np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(count)])
-        roughness = Roughness(identifier, self.form.coefficients, rows)
-        constraints = Constraints(self.problem.constraints.held, (roughness,))
+        given = self.problem.constraints
+        roughness = (*given.roughness, Roughness(identifier, self.form.coefficients, rows))
+        constraints = Constraints(given.held, roughness)
         return self.problem.constrained(self.problem.effects, constraints)
 
     def fit(self, smoothness: float) -> tuple[Problem, Fit]:

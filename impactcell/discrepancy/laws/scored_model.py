@@ -78,7 +78,8 @@ class ScoredModel:
 
 def score_term(term: FreeTerm, effect: str, p_value: float) -> ScoredModel:
     """Score a model that has a term, with an effect beside it or alone."""
-    numbers = len(term.fit.coordinates) - len(term.columns) + effective_numbers(term)
+    penalised = int((np.diag(term.problem.penalty_matrix) > 0.0).sum())
+    numbers = len(term.fit.coordinates) - penalised + effective_numbers(term)
     return _scored(term.problem, term.fit, (effect, term.form.place), numbers, p_value)
 
 

@@ -1,26 +1,36 @@
-"""Whether a name that leaves something stands against a free form in every place there is.
+"""Whether a name that leaves something stands against free forms in every place there is.
 
 An effect that stands out takes most of a gap, but so may another law's best likeness in the library: a patch
 of friction is drawn to a pull that ends somewhere. So each place at which the equations of motion allow a
 force, a friction, a motion or a reading of no form gets a free form, fitted alone, and the force channel a
 filter. A name falls to a form elsewhere that explains as much. In its own place a form that explains more is
 to be expected beside other errors, as it takes a part of them; where it leaves nothing the place is right,
-and the law is not. What acts between shots falls to a form that leaves the friction factors as narrow, and in
-no order that they would go with it.
+and the law is not. So it is where the form keeps ahead when name and form each have a second form beside them
+that may take the other errors. What acts between shots falls to a form that leaves the friction factors as
+narrow, and in no order that they would go with it.
+
+A name that only shows beside a form falls to a second form beside that one likewise.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from impactcell.discrepancy.data import FORCE
 from impactcell.discrepancy.laws.covariates import visited
-from impactcell.discrepancy.laws.free_term import FIRST_TRY, MOST_STEPS, FreeTerm, fit_free_term
+from impactcell.discrepancy.laws.free_term import (
+    FIRST_TRY,
+    MOST_STEPS,
+    FreeTerm,
+    candidate_terms,
+    fit_free_term,
+)
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_fit, score_term
-from impactcell.discrepancy.model import Fit, fit
+from impactcell.discrepancy.model import Fit, Problem, fit
 from impactcell.discrepancy.search import (
     POLICY,
     ModelEvidence,
+    Outdone,
     SearchContext,
     SelectionResult,
     chance_of_order,
@@ -28,6 +38,7 @@ from impactcell.discrepancy.search import (
 )
 from impactcell.errors import DiscrepancyError
 from impactcell.physics import Kind
+from impactcell.physics.effect import Effect, LawKind
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_form import FreeForm
 from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
@@ -35,6 +46,11 @@ from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
 MIN_SHARE_OF_FREE = 0.9
 """Share of the squared gap that a term alone closes which a name has to close [1]: one wave or patch has been
 seen to close 0.83 of what a smooth curve of no name makes."""
+SECOND_FORMS = 3
+"""Free forms that are fitted beside a name or a form, of those that promise most there [1]. Own choice."""
+STATES = tuple(10.0**power for power in range(-6, 3))
+"""Values of what a law reads, from micrometres to hundreds of newtons, over which it is asked whether
+it does [SI]."""
 FILTER_STARTS = ((0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
 """Delay and time constant at which fits of the filter start, in units of their typical sizes [1]."""
 
@@ -98,21 +114,66 @@ def _fit_filter(context: SearchContext, rough: Fit) -> Fit | None:
     return max(fits, key=lambda one: float(one.log_likelihood(problem.shots).sum()), default=None)
 
 
-def stands(context: SearchContext, selection: SelectionResult, forms: FreeForms) -> bool:
-    """Whether no free form takes the name away from the effect that was accepted.
+def outdone_by(context: SearchContext, selection: SelectionResult, forms: FreeForms) -> Outdone | None:
+    """Which free form takes the name away from the effect that was accepted; None where it stands.
 
     What acts between shots is compared by the friction factors, in which it shows; all others by the traces.
     """
     if selection.accepted is None:
-        return False
+        return None
+    effect = selection.accepted.effects[-1]
     refitted = refine(context, [selection.accepted])
     if not refitted:
-        return False
-    named = score_fit(context.coarse, refitted[0], selection.accepted.effects[-1])
-    if find_effect(named.effect).kind is Kind.BETWEEN_SHOTS:
-        narrower = [form for form in forms.alone if form.variance_of_factors <= named.variance_of_factors]
-        return all(_is_followed(context, selection.nominal, named.effect, form) for form in narrower)
-    return not any(outdoes(form, named, forms.rough) for form in forms.alone)
+        return Outdone(effect, "", place_is_right=False)
+    named = score_fit(context.coarse, refitted[0], effect)
+    if find_effect(effect).kind is Kind.BETWEEN_SHOTS:
+        rivals = (
+            form
+            for form in forms.alone
+            if form.variance_of_factors <= named.variance_of_factors
+            and not _is_followed(context, selection.nominal, effect, form)
+        )
+        rival = next(rivals, None)
+    else:
+        rivals = (form for form in forms.alone if outdoes(form, named, forms.rough))
+        rival = next(rivals, None) or _another_law(context, named, forms)
+    return None if rival is None else Outdone(effect, rival.place, is_in_its_place(effect, rival.place))
+
+
+def stands_beside(context: SearchContext, named: ScoredModel, term: FreeTerm) -> bool:
+    """Whether an effect that shows beside a term is likelier than a free form elsewhere beside the same."""
+    seconds = _with_second(context, term.problem, term.fit, "")
+    return not any(
+        form.score >= named.score for form in seconds if not is_in_its_place(named.effect, form.place)
+    )
+
+
+def _another_law(context: SearchContext, named: ScoredModel, forms: FreeForms) -> ScoredModel | None:
+    """Find the form in an effect's place that keeps ahead of it when either has a second form beside it."""
+    ahead = (
+        form
+        for form in forms.alone
+        if form.place in forms.terms
+        and is_in_its_place(named.effect, form.place)
+        and form.is_told_from(named)
+    )
+    form = next(ahead, None)
+    if form is None:
+        return None
+    problem, term = context.coarse.with_effects(named.fit.effects), forms.terms[form.place]
+    with_name = _with_second(context, problem, named.fit, named.effect)
+    with_form = _with_second(context, term.problem, term.fit, "")
+    best = max(with_name, key=lambda model: model.score, default=named)
+    rival = max(with_form, key=lambda model: model.score, default=form)
+    return form if rival.is_told_from(best) else None
+
+
+def _with_second(context: SearchContext, problem: Problem, base: Fit, effect: str) -> list[ScoredModel]:
+    """Fit free forms beside a model, each by itself, of those that promise most there."""
+    there = replace(context, coarse=problem)
+    forms = [form for form in REMAINDER_FORMS.values() if form.effect.identifier not in base.effects]
+    fitted = [_fit_term(there, base, form) for form in candidate_terms(problem, base, forms)[:SECOND_FORMS]]
+    return [score_term(term, effect, 1.0) for term in fitted if term is not None]
 
 
 def _is_followed(context: SearchContext, nominal: ModelEvidence, effect: str, form: ScoredModel) -> bool:
@@ -134,13 +195,30 @@ def outdoes(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:
     before = float(np.mean(rough.residual**2))
     if before - named.mean_square < MIN_SHARE_OF_FREE * (before - form.mean_square):
         return True
-    if named.leaves_nothing:
-        return False
     if is_in_its_place(named.effect, form.place):
-        return form.leaves_nothing and form.is_told_from(named)
-    return form.score >= named.score
+        return not named.leaves_nothing and form.leaves_nothing and form.is_told_from(named)
+    return form.is_told_from(named) if named.leaves_nothing else form.score >= named.score
 
 
 def is_in_its_place(effect: str, place: str) -> bool:
-    """Whether an effect enters the equations of motion where a free form does."""
-    return bool(set(find_effect(effect).laws) & set(find_effect(place).laws))
+    """Whether a free form may be the law of an effect: it enters where that does, and reads all it reads."""
+    named = find_effect(effect)
+    if place == FORCE_FILTER.identifier:
+        return bool(set(named.laws) & set(FORCE_FILTER.laws))
+    form = REMAINDER_FORMS[place]
+    shared = set(named.laws) & set(form.effect.laws)
+    return any(state_read(named, kind) <= form.state for kind in shared)
+
+
+def state_read(effect: Effect, kind: LawKind) -> frozenset[str]:
+    """Which of the first two numbers of a law, its state, it reads: `a`, `b`, both or neither.
+
+    The other two are numbers of the shot or of the plant. It reads what changes its value, with its
+    parameters at their typical sizes.
+    """
+    law, typical = effect.laws[kind], [parameter.typical for parameter in effect.parameters]
+    varied = {
+        "a": [{law(state, other, 1.0, 1.0, typical) for state in STATES} for other in STATES],
+        "b": [{law(other, state, 1.0, 1.0, typical) for state in STATES} for other in STATES],
+    }
+    return frozenset(name for name, values in varied.items() if any(len(items) > 1 for items in values))

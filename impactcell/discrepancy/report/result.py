@@ -8,7 +8,15 @@ from typing import Any
 from impactcell.discrepancy.data import BETWEEN_SHOTS
 from impactcell.discrepancy.model import ParameterEstimate, estimate_parameters, linearise
 from impactcell.discrepancy.report.sentences import headline
-from impactcell.discrepancy.search import Gap, GapChange, ModelEvidence, Proposal, Remaining, Simulation
+from impactcell.discrepancy.search import (
+    Gap,
+    GapChange,
+    ModelEvidence,
+    Outdone,
+    Proposal,
+    Remaining,
+    Simulation,
+)
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY, find_effect
@@ -45,6 +53,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
         "headline": headline(result),
         "effects": [_effect(result, effect) for effect in result.added],
         "unconfirmed": list(result.conclusion.unconfirmed),
+        "outdone": _outdone(result.selection.outdone),
         "remaining": _remaining(result.conclusion.remaining),
         "unexplained": None
         if gap is None
@@ -81,6 +90,14 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
         "model": "model.extended.yaml",
         "report": "report.html",
     }
+
+
+def _outdone(outdone: Outdone | None) -> dict[str, Any] | None:
+    """Write which name fell to which free form."""
+    if outdone is None:
+        return None
+    form = find_effect(outdone.form).equation if outdone.form else ""
+    return {"effect": outdone.effect, "form": form, "place_is_right": outdone.place_is_right}
 
 
 def _parts(gap: Gap) -> dict[str, float | None]:

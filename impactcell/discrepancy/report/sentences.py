@@ -102,6 +102,18 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     }
 
 
+def _outdone(result: DiscrepancyResult) -> str:
+    """Say which name comes nearest, and why it is not the answer; empty where none does."""
+    outdone = result.selection.outdone
+    if outdone is None or not outdone.form:
+        return ""
+    name = phrase(outdone.effect).capitalize()
+    form = f"a free function s, {find_effect(outdone.form).equation},"
+    if outdone.place_is_right:
+        return f" {name} comes nearest, but {form} follows better: the place is right, the law is not."
+    return f" {name} comes nearest, but {form} explains as much: it is not the cause."
+
+
 def _conclusion(result: DiscrepancyResult) -> str:
     proof, conclusion = result.validation, result.conclusion
     if conclusion.verdict == UNTESTED:
@@ -127,7 +139,7 @@ def _conclusion(result: DiscrepancyResult) -> str:
                 f"{names.capitalize()} would explain the training shots, but held-out shots do not confirm "
                 f"it: their gap is {_gap(proof)} noise floors"
             )
-        return f"{said}{_where(result)}."
+        return f"{said}{_where(result)}.{_outdone(result)}"
     groups = [
         " or ".join(map(phrase, (effect, *conclusion.ties.get(effect, ()))))
         for effect in conclusion.established

@@ -1,6 +1,6 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
-from impactcell.discrepancy.search.acceptance import SelectionResult, exchanged, reject
+from impactcell.discrepancy.search.acceptance import Outdone, SelectionResult, exchanged, reject
 from impactcell.discrepancy.search.between_shots import (
     chance_by_exchange,
     chance_of_narrowing,
@@ -66,6 +66,7 @@ __all__ = [
     "ModelError",
     "ModelEvidence",
     "OpenedShots",
+    "Outdone",
     "Part",
     "Place",
     "Proposal",

@@ -16,6 +16,24 @@ from impactcell.discrepancy.search.indistinguishability import (
 from impactcell.discrepancy.search.policy import POLICY
 
 
+@dataclass(frozen=True, slots=True)
+class Outdone:
+    """A name that explained most of a gap, and that a free form took away.
+
+    Attributes
+    ----------
+    effect : str
+    form : str
+        Identifier of the free form's place.
+    place_is_right : bool
+        The form may be the law of the effect: it enters the equations of motion where that does.
+    """
+
+    effect: str
+    form: str
+    place_is_right: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SelectionResult:
     """Outcome of the search.
@@ -37,6 +55,8 @@ class SelectionResult:
         Sets of effects whose fits came to rest short of an optimum: they neither win nor lose.
     remains : bool
         The model that was accepted leaves something: its effects stand out, but do not suffice.
+    outdone : Outdone or None
+        What was accepted and fell to a free form.
     """
 
     nominal: ModelEvidence
@@ -48,6 +68,7 @@ class SelectionResult:
     alternatives: tuple[Alternative, ...] = field(default=())
     unconverged: tuple[tuple[str, ...], ...] = field(default=())
     remains: bool = False
+    outdone: Outdone | None = None
 
     def is_accepted(self, model: Fit) -> bool:
         """Whether the search ended with this model."""

@@ -72,6 +72,7 @@ def german_headline(result: Mapping[str, Any]) -> str:
             if result.get("unconfirmed"):
                 names = " und ".join(map(german_effect, result["unconfirmed"]))
                 said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht."
+            said += _outdone(result)
         case _:
             said = f"Es fehlt: {_missing(result)}; damit fällt die Abweichung von {before} auf {after}."
             if not result.get("remaining", {}).get("explained", True):
@@ -84,6 +85,17 @@ def german_headline(result: Mapping[str, Any]) -> str:
     if law:
         said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {law['equation']}."
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
+
+
+def _outdone(result: Mapping[str, Any]) -> str:
+    outdone = result.get("outdone")
+    if not outdone or not outdone["form"]:
+        return ""
+    name, form = german_effect(outdone["effect"]), f"eine freie Funktion s, {outdone['form']},"
+    says = "folgt besser: Die Stelle stimmt, das Gesetz nicht"
+    if not outdone["place_is_right"]:
+        says = "erklärt ebenso viel: Das ist nicht die Ursache"
+    return f" {name} kommt ihr am nächsten, aber {form} {says}."
 
 
 def _missing(result: Mapping[str, Any]) -> str:
