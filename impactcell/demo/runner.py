@@ -52,7 +52,7 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     """
     if sys.stderr.isatty() and not is_quiet():
         sys.stderr.write("setting up; the first time on a machine takes a minute or two, to compile\n")
-    # Until the event loop takes the signal over, an end has to pass through `set_up`, which cleans up.
+    # Until the event loop takes the signal over, an end has to pass through `set_up_scenario`: it cleans up.
     signal.signal(signal.SIGTERM, _end)
     with set_up_scenario(scenario, cycles) as setup:
         show = _DemoRun(setup, cycles)
@@ -70,7 +70,7 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
 
 @dataclass(slots=True)
 class _DemoRun:
-    """Runs the service over the stage and keeps what it said."""
+    """Runs the service on the cell that was set up, and keeps what it said."""
 
     setup: DemoSetup
     cycles: int | None

@@ -1,8 +1,8 @@
 """Cycles of one module, each once and in order, whatever the link does.
 
-`Module.captures` connects, checks who answers, polls, reads each new cycle consistently, catches up from the
-module's ring after an outage, and counts what the ring no longer had. It never raises for what the module or
-the link does: that is said in `Module.status` and in the `faults` of a `ReceivedCycle`.
+`ModuleAcquisition.captures` connects, checks who answers, polls, reads each new cycle consistently, catches
+up from the module's ring after an outage, and counts what the ring no longer had. It never raises for what
+the module or the link does: that is said in its `status` and in the `faults` of a `ReceivedCycle`.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
 class ModuleAcquisition:
     """The FPGA module of one cell.
 
-    Use as ``async with Module(...) as module: async for reception in module.captures(after): ...``.
+    Use as ``async with ModuleAcquisition(...) as module: async for received in module.captures(after): ...``.
     Nothing is connected before `captures` runs.
 
     Parameters

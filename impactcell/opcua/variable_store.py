@@ -124,7 +124,7 @@ class VariableStore:
         self.write(node, ua.DataValue(ua.Variant(value, kind), status, time, datetime.now(UTC)))
 
     def add_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:
-        """Call `watcher` with every value written from now on."""
+        """Call `observer` with every value written from now on."""
         self.variable(node).observers[observer] = None
 
     def remove_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:

@@ -132,7 +132,7 @@ class Service:
         return [waiting_cell(name) if running is None else running.health for name, running in cells]
 
     async def reload(self) -> None:
-        """Read every cell's files again; see `RunningCell.reload`."""
+        """Read every cell's files again; see `CellTask.reload`."""
         systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
         for running in tuple(self.running.values()):
             await running.reload()

@@ -27,7 +27,7 @@ VELOCITY_NOISE_SHARE = 0.02
 
 
 def cut_blocks(captures: tuple[Capture, ...]) -> tuple[tuple[Capture, int], ...]:
-    """Blocks of all records, each with the place of its record, from 1; at most `MOST`, evenly chosen.
+    """Blocks of all records, each with the place of its record, from 1; at most `MAX_BLOCKS`, evenly chosen.
 
     A block's times count from its start, its positions from where the record began; `start_m` says where on
     the table it begins.

@@ -29,7 +29,7 @@ from impactcell.physics.law_table import build_law_table
 from impactcell.records import Samples
 
 FORWARD_STEP = 0.1
-"""Step forward, in units of `SMALL`."""
+"""Step forward, in units of `SMALL_STRENGTH`."""
 MAX_STRENGTH = 5.0
 """Strongest start of a fit, in units of an effect's typical strength."""
 WEAK_STRENGTH = 0.3

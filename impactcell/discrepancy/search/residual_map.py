@@ -2,7 +2,7 @@
 
 A cell of the map asks whether the residuals of one phase, on any channel and in any smooth shape along the
 phase, have a mean that is not zero (column `all`) or that changes with a covariate. The row `between_shots`
-asks the same of the friction factors. Every cell is a group of directions for `resample`.
+asks the same of the friction factors. Every cell is a group of directions for `wild_bootstrap`.
 """
 
 from dataclasses import dataclass
