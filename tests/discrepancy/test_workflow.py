@@ -14,7 +14,7 @@ from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.noise_floor import replicate_spread
 from impactcell.discrepancy.model.least_squares import fit
 from impactcell.discrepancy.model.problem import remove_jumps
-from impactcell.discrepancy.model.shot_parameters import fit_shot_parameters
+from impactcell.discrepancy.model.shot_fits import fit_shot_parameters
 from impactcell.discrepancy.report.result import json_text, result_document
 from impactcell.discrepancy.search.indistinguishability import (
     are_indistinguishable,

@@ -1,45 +1,13 @@
 """Predictions of the plant for a whole set of shots, in the layout of `ShotSet`."""
 
 import math
-from dataclasses import dataclass, fields
 
 import numpy as np
 
 from impactcell.discrepancy.data import IndexArray, ShotSet, Trajectory
+from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.physics import Ensemble, TapInput
 from impactcell.records import Samples
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ShotParameters:
-    """What every shot has of its own, each of shape (n,).
-
-    Attributes
-    ----------
-    log_factor : ndarray
-        Logarithm of the shot's friction factor.
-    mass_kg : ndarray
-    speed_m_s : ndarray
-        Initial speed; nan where an actuator strikes.
-    shift_m : ndarray
-        Added to the positions: error of the first sample, which a free slide counts from.
-    """
-
-    log_factor: Samples
-    mass_kg: Samples
-    speed_m_s: Samples
-    shift_m: Samples
-
-    def select(self, places: IndexArray) -> "ShotParameters":
-        """Return the numbers of some of the shots."""
-        return ShotParameters(*(getattr(self, item.name)[places] for item in fields(self)))
-
-    def put(self, places: IndexArray, replacement: "ShotParameters") -> "ShotParameters":
-        """Return the same numbers but for those of some shots, which are taken from `replacement`."""
-        values_by_name = {item.name: getattr(self, item.name).copy() for item in fields(self)}
-        for name, values in values_by_name.items():
-            values[places] = getattr(replacement, name)
-        return ShotParameters(**values_by_name)
 
 
 class ForwardModel:

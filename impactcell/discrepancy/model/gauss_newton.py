@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
-from impactcell.discrepancy.model.shot_parameters import correct_shot_parameters, normal_equations
+from impactcell.discrepancy.model.shot_fits import correct_shot_parameters, normal_equations
 from impactcell.records import Samples
 
 

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.discrepancy.data import IndexArray, ShotSet
-from impactcell.discrepancy.model.forward import ShotParameters
 from impactcell.discrepancy.model.gauss_newton import gauss_newton
 from impactcell.discrepancy.model.parameters import Coordinate
 from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
-from impactcell.discrepancy.model.shot_parameters import (
+from impactcell.discrepancy.model.shot_fits import (
     PINNED_SPREAD,
     THOROUGH_STEPS,
     better_per_shot,
@@ -25,6 +24,7 @@ from impactcell.discrepancy.model.shot_parameters import (
     normal_equations,
     shot_equations,
 )
+from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.errors import DiscrepancyError
 from impactcell.records import Samples
 
@@ -200,7 +200,7 @@ def _refit_without_stuck(problem: Problem, state: FitState, stuck: IndexArray) -
     part = problem.select(good)
     start = part.evaluate(state.theta, state.shot_parameters.select(good), state.spread)
     refitted = gauss_newton(part, start, POLICY.fewest_steps_to_restart, POLICY.rough_tolerance)
-    shot_parameters = state.shot_parameters.put(good, refitted.shot_parameters)
+    shot_parameters = state.shot_parameters.with_shots(good, refitted.shot_parameters)
     moved = problem.evaluate(refitted.theta, shot_parameters, state.spread)
     left_out = np.setdiff1d(np.arange(problem.count), good)
     restarted = _reinitialise(problem, moved, left_out)
@@ -211,7 +211,7 @@ def _reinitialise(problem: Problem, state: FitState, indices: IndexArray) -> Fit
     """Start some shots again; each keeps what suits it better."""
     factors = (0.0, -state.spread, state.spread)
     again = initialise(problem.select(indices), state.theta, state.spread, factors)
-    shot_parameters = state.shot_parameters.put(indices, again.shot_parameters)
+    shot_parameters = state.shot_parameters.with_shots(indices, again.shot_parameters)
     return better_per_shot(problem, state, problem.evaluate(state.theta, shot_parameters, state.spread))
 
 

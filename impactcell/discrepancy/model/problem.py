@@ -8,7 +8,7 @@ import numpy as np
 
 from impactcell.discrepancy.data import IndexArray, ShotSet
 from impactcell.discrepancy.model.constraints import UNCONSTRAINED, Constraints
-from impactcell.discrepancy.model.forward import ForwardModel, ShotParameters
+from impactcell.discrepancy.model.forward import ForwardModel
 from impactcell.discrepancy.model.parameters import (
     Coordinate,
     default_parameters,
@@ -18,6 +18,7 @@ from impactcell.discrepancy.model.parameters import (
     parameter_columns,
     plant_parameters,
 )
+from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.physics import LawKind
 from impactcell.physics.effects import find_effect
 from impactcell.records import Samples
