@@ -133,7 +133,7 @@ def _print_guess(tables: Sequence[Table], mapping: Mapping) -> None:
     for item in mapping.assignments:
         unit = "-" if item.unit is None else item.unit.symbol
         grid.add_row(
-            _plain(item.column), item.quantity, _plain(unit), _plain(item.why), f"{item.confidence:.0%}"
+            _plain(item.column), item.meaning, _plain(unit), _plain(item.why), f"{item.confidence:.0%}"
         )
     console = Console(stderr=True)
     console.print(f"{len(tables)} tables; the first: {_plain('; '.join(tables[0].notes))}", markup=False)
@@ -151,7 +151,7 @@ def _understood(tables: Sequence[Table], mapping: Mapping) -> dict[str, Any]:
         "columns": [
             {
                 "column": item.column,
-                "quantity": str(item.quantity),
+                "quantity": str(item.meaning),
                 "unit": None if item.unit is None else item.unit.symbol,
                 "why": item.why,
                 "confidence": round(item.confidence, 2),

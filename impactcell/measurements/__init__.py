@@ -6,18 +6,18 @@ from impactcell.measurements.dialect import Dialect
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.mapping import Given, Mapping, guess
 from impactcell.measurements.reading import read_tables
-from impactcell.measurements.recognition import Quantity
+from impactcell.measurements.recognition import ColumnMeaning
 from impactcell.measurements.table import MeasuredColumn, Table
 
 __all__ = [
     "Assignment",
+    "ColumnMeaning",
     "Dialect",
     "Given",
     "Imported",
     "Limits",
     "Mapping",
     "MeasuredColumn",
-    "Quantity",
     "Table",
     "guess",
     "make_campaign",

@@ -13,7 +13,7 @@ from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.captures import channel_of, described
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given, Mapping
-from impactcell.measurements.recognition import CHANNELS, Quantity
+from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.recorded import Record, records_of
 from impactcell.measurements.scalars import said_beside
 from impactcell.measurements.table import Table
@@ -109,19 +109,21 @@ def _said_of(tables: Sequence[Table], given: Given) -> list[str]:
     """Tell what was read of mass and velocity beside the columns, where nothing else was given."""
     said = [said_beside(table) for table in tables]
     told = []
-    for quantity, factor, unit in ((Quantity.MASS, 1.0, "kg"), (Quantity.VELOCITY, 6e4, "mm/min")):
-        if str(quantity) in given.constants:
+    for meaning, factor, unit in ((ColumnMeaning.MASS, 1.0, "kg"), (ColumnMeaning.VELOCITY, 6e4, "mm/min")):
+        if str(meaning) in given.constants:
             continue
-        values = [value for of in said if isinstance(value := of.get(quantity), float)]
+        values = [value for of in said if isinstance(value := of.get(meaning), float)]
         if values:
             low, high = factor * min(values), factor * max(values)
-            told.append(f"{quantity} {low:.6g}{'' if low == high else f' to {high:.6g}'} {unit}")
+            told.append(f"{meaning} {low:.6g}{'' if low == high else f' to {high:.6g}'} {unit}")
     return [f"the lines beside the columns say: {', '.join(told)}"] if told else []
 
 
 def _excitation(records: Sequence[Record], notes: list[str]) -> Excitation:
     """Tell contacts, which push for a short while, from a drive; without force the part slides freely."""
-    forces = [record.values[Quantity.FORCE] for record in records if Quantity.FORCE in record.values]
+    forces = [
+        record.values[ColumnMeaning.FORCE] for record in records if ColumnMeaning.FORCE in record.values
+    ]
     if not forces:
         notes.append("excitation free_slide: no force was recorded (--excitation says otherwise)")
         return Excitation.FREE_SLIDE
@@ -143,9 +145,9 @@ def _excitation(records: Sequence[Record], notes: list[str]) -> Excitation:
 
 def _check_channels(records: Sequence[Record], excitation: Excitation) -> None:
     needed = {
-        Excitation.TAP: {Quantity.FORCE},
-        Excitation.FREE_SLIDE: {Quantity.POSITION},
-        Excitation.DRIVEN: {Quantity.FORCE, Quantity.POSITION},
+        Excitation.TAP: {ColumnMeaning.FORCE},
+        Excitation.FREE_SLIDE: {ColumnMeaning.POSITION},
+        Excitation.DRIVEN: {ColumnMeaning.FORCE, ColumnMeaning.POSITION},
     }[excitation]
     lacking = [
         f"{record.place}: has no {' and no '.join(sorted(needed - set(record.values)))}, which a campaign of "
@@ -165,9 +167,9 @@ def _whole(number: int, record: Record, given: Given) -> Capture:
 def _coordinate(mapping: Mapping, excitation: Excitation) -> Coordinate:
     """Rotation where the units of the channels are of one: N m, rad, kg m²."""
     dimensions = {
-        str(item.quantity): item.unit.dimension
+        str(item.meaning): item.unit.dimension
         for item in mapping.assignments
-        if item.unit is not None and item.quantity in (*CHANNELS, Quantity.MASS)
+        if item.unit is not None and item.meaning in (*CHANNELS, ColumnMeaning.MASS)
     }
     rotating = {name for name, dimension in dimensions.items() if dimension in ROTATING}
     if not rotating:

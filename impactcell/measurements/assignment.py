@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.measurements.recognition import CHANNELS, VOCABULARY, WORD_MATCH, Quantity, name_score
+from impactcell.measurements.recognition import CHANNELS, VOCABULARY, WORD_MATCH, ColumnMeaning, name_score
 from impactcell.measurements.sampling_step import sampling_step_s
 from impactcell.measurements.table import Table
 from impactcell.measurements.units import Dimension, MeasuredUnit
@@ -13,7 +13,13 @@ from impactcell.records import Samples
 
 SURE = 0.5
 """Confidence from which on a guess is used without being confirmed."""
-UNITLESS = (Quantity.SHOT, Quantity.DIRECTION, Quantity.BATCH, Quantity.COVARIATE, Quantity.IGNORED)
+UNITLESS = (
+    ColumnMeaning.SHOT,
+    ColumnMeaning.DIRECTION,
+    ColumnMeaning.BATCH,
+    ColumnMeaning.COVARIATE,
+    ColumnMeaning.IGNORED,
+)
 """Quantities that need no unit."""
 ASCENDING_SHARE = 0.8
 """Share of steps forward from which on a column may be a time: it begins anew with each shot of a file."""
@@ -26,7 +32,7 @@ class Assignment:
     Attributes
     ----------
     column : str
-    quantity : Quantity
+    meaning : ColumnMeaning
     unit : MeasuredUnit or None
         None where the file says none and none was given: such a column cannot be used where one is needed.
     confidence : float
@@ -35,7 +41,7 @@ class Assignment:
     """
 
     column: str
-    quantity: Quantity
+    meaning: ColumnMeaning
     unit: MeasuredUnit | None
     confidence: float
     why: str
@@ -53,13 +59,15 @@ def lacking(
     """Say what has to be given first."""
     faults = [fault for item in assignments for fault in _of_column(item)]
     faults += _contradictions(assignments)
-    present = {item.quantity for item in assignments}
-    if Quantity.TIME not in present and any(sampling_step_s(table, constants) is None for table in tables):
+    present = {item.meaning for item in assignments}
+    if ColumnMeaning.TIME not in present and any(
+        sampling_step_s(table, constants) is None for table in tables
+    ):
         faults.append(
             f"no column of time was found{_no_time(tables)}; name it with --column time=NAME, or give its "
             f"rate, as --set rate=10kHz"
         )
-    if not {Quantity.POSITION, Quantity.FORCE} & present:
+    if not {ColumnMeaning.POSITION, ColumnMeaning.FORCE} & present:
         names = ", ".join(repr(item.column) for item in assignments)
         faults.append(
             f"neither position nor force was found among {names}; name them with --column position=NAME and "
@@ -69,37 +77,37 @@ def lacking(
 
 
 def _of_column(item: Assignment) -> list[str]:
-    if item.quantity in UNITLESS:
+    if item.meaning in UNITLESS:
         return []
     faults = []
     if item.unit is None:
         faults.append(
-            f"column {item.column!r} ({item.quantity}) has no unit; say --unit '{item.column}="
-            f"{VOCABULARY[item.quantity].dimensions[0].value}', or which it is"
+            f"column {item.column!r} ({item.meaning}) has no unit; say --unit '{item.column}="
+            f"{VOCABULARY[item.meaning].dimensions[0].value}', or which it is"
         )
-    if item.confidence < SURE and item.quantity in (Quantity.TIME, *CHANNELS):
+    if item.confidence < SURE and item.meaning in (ColumnMeaning.TIME, *CHANNELS):
         faults.append(
-            f"column {item.column!r} may be the {item.quantity} ({item.why}); confirm it with --column "
-            f"'{item.quantity}={item.column}', or name the right one"
+            f"column {item.column!r} may be the {item.meaning} ({item.why}); confirm it with --column "
+            f"'{item.meaning}={item.column}', or name the right one"
         )
     return faults
 
 
 def _contradictions(assignments: Sequence[Assignment]) -> list[str]:
     """Tell columns that are called as a channel that is not there, in a unit that no such channel has."""
-    present = {item.quantity for item in assignments}
+    present = {item.meaning for item in assignments}
     faults = []
     for item in assignments:
         if item.unit is None or item.unit.dimension is Dimension.NONE or item.confidence == 1.0:
             continue
-        for quantity in (Quantity.TIME, *CHANNELS):
-            dimensions = VOCABULARY[quantity].dimensions
-            if name_score(item.column, quantity)[0] < WORD_MATCH or item.unit.dimension in dimensions:
+        for meaning in (ColumnMeaning.TIME, *CHANNELS):
+            dimensions = VOCABULARY[meaning].dimensions
+            if name_score(item.column, meaning)[0] < WORD_MATCH or item.unit.dimension in dimensions:
                 continue
-            if quantity in present and item.quantity is Quantity.COVARIATE:
+            if meaning in present and item.meaning is ColumnMeaning.COVARIATE:
                 continue  # another column is that channel, so this is one more, of whatever
             faults.append(
-                f"column {item.column!r} is called as the {quantity}, but is in {item.unit.symbol}; give "
+                f"column {item.column!r} is called as the {meaning}, but is in {item.unit.symbol}; give "
                 f"its unit with --unit '{item.column}={dimensions[0].value}', or what it is with --column "
                 f"'covariate={item.column}'"
             )
@@ -110,7 +118,7 @@ def _no_time(tables: Sequence[Table]) -> str:
     """Say why a column that is called as the time is none."""
     for table in tables:
         for column in table.columns:
-            if name_score(column.name, Quantity.TIME)[0] < WORD_MATCH:
+            if name_score(column.name, ColumnMeaning.TIME)[0] < WORD_MATCH:
                 continue
             if column.text is not None:
                 return f": {column.name!r} holds text, as {column.text[0][:40]!r}"

@@ -9,7 +9,7 @@ from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError, SettingsError
 from impactcell.measurements.mapping import Given
 from impactcell.measurements.numbers import parse_number
-from impactcell.measurements.recognition import CHANNELS, Quantity
+from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.taps import NO_TRIGGER
 from impactcell.measurements.units import Dimension, parse_unit
 from impactcell.process import yaml_loader
@@ -26,7 +26,7 @@ CONSTANTS: dict[str, tuple[tuple[Dimension, ...], str]] = {
 """What can be said to hold for all shots: its units, and an example."""
 NAMES = {"rate": "rate_hz"}
 """Names of constants that carry their unit."""
-OTHERS = (Quantity.COVARIATE, Quantity.IGNORED)
+OTHERS = (ColumnMeaning.COVARIATE, ColumnMeaning.IGNORED)
 """What several columns can be: said once for each, or as a list in a file."""
 SECTIONS = ("columns", "units", "signs", "constants")
 """Blocks of a mapping file; beside them `excitation` and `trigger`."""
@@ -52,7 +52,7 @@ def read_given(
             if not equals or not name.strip() or not value.strip():
                 raise MeasurementError(f"{text!r} is not NAME=VALUE")
             if section == "columns" and name.strip() in OTHERS:
-                others[value.strip()] = Quantity(name.strip())
+                others[value.strip()] = ColumnMeaning(name.strip())
             else:
                 sections.setdefault(section, {})[name.strip()] = value.strip()
     faults: list[str] = []
@@ -81,7 +81,7 @@ def _split_last(text: str) -> tuple[str, str, str]:
     return text.rpartition("=")
 
 
-def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[str, Quantity]]:
+def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[str, ColumnMeaning]]:
     """Blocks of a file, excitation and trigger, and the columns that are covariates or ignored."""
     try:
         content, positions = yaml_loader.load(file)
@@ -93,7 +93,7 @@ def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[s
     faults: list[str] = []
     sections: dict[str, dict[str, str]] = {}
     single: dict[str, str] = {}
-    others: dict[str, Quantity] = {}
+    others: dict[str, ColumnMeaning] = {}
 
     def fault(message: str, *location: str | int) -> None:
         faults.append(yaml_loader.format_error(file, positions.key(location), message))
@@ -112,7 +112,7 @@ def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[s
                 if not all(isinstance(part, str | int | float) for part in listed):
                     fault(f"{key}.{name} has to be a text or a number", key, name)
                 elif several:
-                    others |= {str(column): Quantity(name) for column in listed}
+                    others |= {str(column): ColumnMeaning(name) for column in listed}
                 else:
                     sections.setdefault(key, {})[str(name)] = str(item)
     if faults:
@@ -120,10 +120,10 @@ def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[s
     return sections, single, others
 
 
-def _quantity(key: str, faults: list[str]) -> Quantity | None:
-    if key in set(Quantity):
-        return Quantity(key)
-    faults.append(f"{key!r} is no quantity; known: {', '.join(Quantity)}")
+def _quantity(key: str, faults: list[str]) -> ColumnMeaning | None:
+    if key in set(ColumnMeaning):
+        return ColumnMeaning(key)
+    faults.append(f"{key!r} is no quantity; known: {', '.join(ColumnMeaning)}")
     return None
 
 

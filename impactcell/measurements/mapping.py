@@ -13,7 +13,7 @@ from impactcell.measurements.recognition import (
     UNIT_ALONE,
     UNIT_MATCH,
     VOCABULARY,
-    Quantity,
+    ColumnMeaning,
     name_score,
 )
 from impactcell.measurements.table import MeasuredColumn, Table
@@ -22,8 +22,9 @@ from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
 GIVEN = 1.0
 """Confidence of what was given."""
 PRIORITY = (
-    Quantity.TIME, Quantity.FORCE, Quantity.ACTUATOR, Quantity.POSITION, Quantity.SHOT, Quantity.VELOCITY,
-    Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
+    ColumnMeaning.TIME, ColumnMeaning.FORCE, ColumnMeaning.ACTUATOR, ColumnMeaning.POSITION,
+    ColumnMeaning.SHOT, ColumnMeaning.VELOCITY, ColumnMeaning.MASS, ColumnMeaning.DIRECTION,
+    ColumnMeaning.BATCH, ColumnMeaning.DWELL, ColumnMeaning.START,
 )  # fmt: skip
 """Order in which equally sure guesses are taken."""
 
@@ -49,13 +50,13 @@ class Given:
         Columns that are covariates or ignored, by their names.
     """
 
-    columns: AbstractMapping[Quantity, str] = field(default_factory=dict)
+    columns: AbstractMapping[ColumnMeaning, str] = field(default_factory=dict)
     units: AbstractMapping[str, str] = field(default_factory=dict)
-    signs: AbstractMapping[Quantity, int] = field(default_factory=dict)
+    signs: AbstractMapping[ColumnMeaning, int] = field(default_factory=dict)
     excitation: Excitation | None = None
     trigger: float | str | None = None
     constants: AbstractMapping[str, float] = field(default_factory=dict)
-    others: AbstractMapping[str, Quantity] = field(default_factory=dict)
+    others: AbstractMapping[str, ColumnMeaning] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +76,9 @@ class Mapping:
     given: Given
     faults: tuple[str, ...]
 
-    def of(self, quantity: Quantity) -> Assignment | None:
+    def of(self, meaning: ColumnMeaning) -> Assignment | None:
         """Give the column of a quantity that only one can have."""
-        return next((item for item in self.assignments if item.quantity is quantity), None)
+        return next((item for item in self.assignments if item.meaning is meaning), None)
 
 
 def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
@@ -101,20 +102,20 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
         for column in columns.values()
         for candidate in _candidates(column, given, list(columns.values()))
     ]
-    candidates.sort(key=lambda item: (-item.confidence, PRIORITY.index(item.quantity)))
+    candidates.sort(key=lambda item: (-item.confidence, PRIORITY.index(item.meaning)))
     chosen: dict[str, Assignment] = {}
-    quantities: dict[Quantity, Assignment] = {}
+    quantities: dict[ColumnMeaning, Assignment] = {}
     for item in candidates:
-        taken = quantities.get(item.quantity)
+        taken = quantities.get(item.meaning)
         if taken is not None and taken.confidence < GIVEN and abs(taken.confidence - item.confidence) < 0.05:
             unsure = replace(
                 taken,
                 confidence=min(taken.confidence, 0.4),
                 why=f"{taken.why}; {item.column!r} could be it too",
             )
-            quantities[item.quantity] = chosen[taken.column] = unsure
+            quantities[item.meaning] = chosen[taken.column] = unsure
         if taken is None and item.column not in chosen:
-            chosen[item.column] = quantities[item.quantity] = item
+            chosen[item.column] = quantities[item.meaning] = item
     assignments = tuple(chosen.get(name) or _further(column, given) for name, column in columns.items())
     return Mapping(assignments, given, tuple(lacking(assignments, given.constants, tables)))
 
@@ -131,10 +132,10 @@ def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) ->
         for name, unit in given.units.items()
         if parse_unit(unit) is None
     ]
-    meanings = [(name, str(quantity)) for quantity, name in given.columns.items()]
-    meanings += [(name, str(quantity)) for name, quantity in given.others.items()]
+    meanings = [(name, str(meaning)) for meaning, name in given.columns.items()]
+    meanings += [(name, str(meaning)) for name, meaning in given.others.items()]
     for name in dict.fromkeys(name for name, _ in meanings):
-        several = [quantity for of, quantity in meanings if of == name]
+        several = [meaning for of, meaning in meanings if of == name]
         if len(several) > 1:
             faults.append(f"column {name!r} is given as {' and as '.join(several)}; it is one of them")
     if faults:
@@ -151,39 +152,39 @@ def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[Measured
     unit = _unit_of(column, given)
     if column.name in given.others:
         return []
-    named = [quantity for quantity, name in given.columns.items() if name == column.name]
+    named = [meaning for meaning, name in given.columns.items() if name == column.name]
     if named:
         return [Assignment(column.name, named[0], unit, GIVEN, "given")]
     found = []
-    for quantity in PRIORITY:
-        if quantity in given.columns:
+    for meaning in PRIORITY:
+        if meaning in given.columns:
             continue
-        score, why = _score(column, quantity, unit, columns, given)
+        score, why = _score(column, meaning, unit, columns, given)
         if score > 0.0:
-            found.append(Assignment(column.name, quantity, unit, score, why))
+            found.append(Assignment(column.name, meaning, unit, score, why))
     return found
 
 
 def _score(
     column: MeasuredColumn,
-    quantity: Quantity,
+    meaning: ColumnMeaning,
     unit: MeasuredUnit | None,
     columns: Sequence[MeasuredColumn],
     given: Given,
 ) -> tuple[float, str]:
     is_text = column.text is not None
-    if is_text != (quantity is Quantity.BATCH) and not (quantity is Quantity.BATCH and not is_text):
+    if is_text != (meaning is ColumnMeaning.BATCH) and not (meaning is ColumnMeaning.BATCH and not is_text):
         return 0.0, ""
-    score, word = name_score(column.name, quantity)
-    fits = unit is not None and unit.dimension in VOCABULARY[quantity].dimensions
+    score, word = name_score(column.name, meaning)
+    fits = unit is not None and unit.dimension in VOCABULARY[meaning].dimensions
     if unit is not None and unit.dimension is not Dimension.NONE and not fits:
         return 0.0, ""
-    if quantity is Quantity.TIME and not ascends(column.values):
+    if meaning is ColumnMeaning.TIME and not ascends(column.values):
         return 0.0, ""
     if score:
         why = f"named {word!r}"
         return (min(score + UNIT_MATCH, 0.99), f"{why}, unit fits") if fits and unit else (score, why)
-    alone = quantity in (Quantity.TIME, Quantity.FORCE, Quantity.POSITION)
+    alone = meaning in (ColumnMeaning.TIME, ColumnMeaning.FORCE, ColumnMeaning.POSITION)
     return _score_by_unit(unit, columns, given) if fits and alone and unit is not None else (0.0, "")
 
 
@@ -205,5 +206,5 @@ def _further(column: MeasuredColumn, given: Given) -> Assignment:
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
     if column.text is None and len(column.values) > 2 and (np.diff(column.values) == 1.0).all():
-        return Assignment(column.name, Quantity.IGNORED, unit, UNIT_MATCH + SURE, "counts the rows")
-    return Assignment(column.name, Quantity.COVARIATE, unit, SURE, "none of the known quantities")
+        return Assignment(column.name, ColumnMeaning.IGNORED, unit, UNIT_MATCH + SURE, "counts the rows")
+    return Assignment(column.name, ColumnMeaning.COVARIATE, unit, SURE, "none of the known quantities")

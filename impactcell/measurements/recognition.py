@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from impactcell.measurements.units import Dimension
 
 
-class Quantity(enum.StrEnum):
+class ColumnMeaning(enum.StrEnum):
     """What a column can be for a campaign."""
 
     TIME = "time"
@@ -25,7 +25,7 @@ class Quantity(enum.StrEnum):
     IGNORED = "ignored"
 
 
-CHANNELS = (Quantity.FORCE, Quantity.POSITION, Quantity.ACTUATOR)
+CHANNELS = (ColumnMeaning.FORCE, ColumnMeaning.POSITION, ColumnMeaning.ACTUATOR)
 """Quantities that vary within a shot."""
 
 
@@ -49,50 +49,50 @@ class Words:
 
 
 VOCABULARY = {
-    Quantity.TIME: Words(
+    ColumnMeaning.TIME: Words(
         "time zeit timestamp elapsed zeitstempel messzeit datetime datum uhrzeit timestamps relzeit x_value",
         "t",
         (Dimension.TIME,),
     ),
-    Quantity.FORCE: Words(
+    ColumnMeaning.FORCE: Words(
         "force kraft contact_force kontaktkraft load_cell kraftsensor kraftaufnehmer dms torque moment "
         "drehmoment drive_force antriebskraft loadcell",
         "f fx fz f1 m tau",
         (Dimension.FORCE, Dimension.TORQUE),
     ),
-    Quantity.POSITION: Words(
+    ColumnMeaning.POSITION: Words(
         "position weg pos displacement lage verschiebung auslenkung part_position teil bauteil werkstueck "
         "part "
         "slider travel encoder angle winkel laser wegsensor distance displ",
         "x s q theta phi x1",
         (Dimension.LENGTH, Dimension.ANGLE),
     ),
-    Quantity.ACTUATOR: Words(
+    ColumnMeaning.ACTUATOR: Words(
         "actuator aktor aktuator ram stoessel pusher plunger tool schieber stempel actuator_position axis "
         "achse "
         "antriebsweg",
         "y z",
         (Dimension.LENGTH, Dimension.ANGLE),
     ),
-    Quantity.SHOT: Words(
+    ColumnMeaning.SHOT: Words(
         "shot cycle schuss versuch zyklus hub trial run stroke_number shot_number versuchsnummer tap messung",
         "nr n",
         (Dimension.NONE,),
     ),
-    Quantity.VELOCITY: Words(
+    ColumnMeaning.VELOCITY: Words(
         "velocity geschwindigkeit vorschub speed feed commanded_velocity tempo feedrate",
         "v",
         (Dimension.VELOCITY, Dimension.ANGULAR_VELOCITY),
     ),
-    Quantity.MASS: Words(
+    ColumnMeaning.MASS: Words(
         "mass masse gewicht weight part_mass inertia traegheit traegheitsmoment",
         "m j",
         (Dimension.MASS, Dimension.INERTIA),
     ),
-    Quantity.DIRECTION: Words("direction richtung dir", "", (Dimension.NONE,)),
-    Quantity.BATCH: Words("batch charge los lot material batch_id chargennummer", "", (Dimension.NONE,)),
-    Quantity.DWELL: Words("dwell liegezeit wartezeit ruhezeit dwell_time", "", (Dimension.TIME,)),
-    Quantity.START: Words("start start_position startposition startlage", "", (Dimension.LENGTH,)),
+    ColumnMeaning.DIRECTION: Words("direction richtung dir", "", (Dimension.NONE,)),
+    ColumnMeaning.BATCH: Words("batch charge los lot material batch_id chargennummer", "", (Dimension.NONE,)),
+    ColumnMeaning.DWELL: Words("dwell liegezeit wartezeit ruhezeit dwell_time", "", (Dimension.TIME,)),
+    ColumnMeaning.START: Words("start start_position startposition startlage", "", (Dimension.LENGTH,)),
 }
 """How columns are called."""
 
@@ -144,28 +144,31 @@ def normalised(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", text).strip("_")
 
 
-def is_kind_of(name: str, quantity: Quantity) -> bool:
+def is_kind_of(name: str, meaning: ColumnMeaning) -> bool:
     """Whether a German compound ends in a word of the quantity, which says what it is a kind of.
 
     Examples
     --------
-    >>> is_kind_of("Teilemasse", Quantity.MASS), is_kind_of("Massenträger", Quantity.MASS)
+    >>> is_kind_of("Teilemasse", ColumnMeaning.MASS), is_kind_of("Massenträger", ColumnMeaning.MASS)
     (True, False)
     """
-    words = (word for word in VOCABULARY[quantity].words.split() if len(word) >= 4)
+    words = (word for word in VOCABULARY[meaning].words.split() if len(word) >= 4)
     return normalised(name).endswith(tuple(words))
 
 
-def name_score(name: str, quantity: Quantity) -> tuple[float, str]:
+def name_score(name: str, meaning: ColumnMeaning) -> tuple[float, str]:
     """How sure the name of a column makes that it is of this quantity, 0 to 1, and the word that says so."""
-    words = VOCABULARY[quantity]
+    words = VOCABULARY[meaning]
     text = normalised(re.sub(r" \(\d+\)$", "", name))  # a name that comes again is as good as the first
     known, symbols = words.words.split(), words.symbols.split()
     if text in known:
         return WORD_MATCH, text
     if text in symbols:
         return SYMBOL_MATCH, text
-    if COMMAND_WORDS & set(text.split("_")) and quantity not in (Quantity.VELOCITY, Quantity.DIRECTION):
+    if COMMAND_WORDS & set(text.split("_")) and meaning not in (
+        ColumnMeaning.VELOCITY,
+        ColumnMeaning.DIRECTION,
+    ):
         return 0.0, ""
     tokens = [re.sub(r"\d+$", "", token) for token in text.split("_")]
     for word in known:

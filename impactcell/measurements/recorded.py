@@ -10,7 +10,7 @@ from impactcell.campaign import LARGEST
 from impactcell.errors import MeasurementError
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Mapping
-from impactcell.measurements.recognition import CHANNELS, Quantity
+from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.sampling_step import sampling_step_s
 from impactcell.measurements.scalars import scalars_of
 from impactcell.measurements.table import Lines, Table
@@ -32,8 +32,8 @@ class Record:
     """
 
     place: str
-    times: AbstractMapping[Quantity, Samples]
-    values: AbstractMapping[Quantity, Samples]
+    times: AbstractMapping[ColumnMeaning, Samples]
+    values: AbstractMapping[ColumnMeaning, Samples]
     scalars: AbstractMapping[str, float | str] = field(default_factory=dict)
 
 
@@ -67,7 +67,7 @@ def records_of(tables: Sequence[Table], mapping: Mapping) -> list[Record]:
 
 def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Table, str]]:
     """Rows of each shot, in order of appearance."""
-    shot = mapping.of(Quantity.SHOT)
+    shot = mapping.of(ColumnMeaning.SHOT)
     column = None if shot is None else table.column(shot.column)
     if column is None:
         return [(table, table.title)]
@@ -109,10 +109,10 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
     time = _time(table, mapping, faults)
     if time is None:
         return None
-    times: dict[Quantity, Samples] = {}
-    values: dict[Quantity, Samples] = {}
-    for quantity in CHANNELS:
-        item = mapping.of(quantity)
+    times: dict[ColumnMeaning, Samples] = {}
+    values: dict[ColumnMeaning, Samples] = {}
+    for meaning in CHANNELS:
+        item = mapping.of(meaning)
         column = None if item is None else table.column(item.column)
         if item is None or column is None or item.unit is None:
             continue
@@ -124,19 +124,17 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
                 f"measurement, in {infinite.size} rows"
             )
         elif column.text is not None:
-            faults.append(f"{table.title}: column {column.name!r} holds text, where the {quantity} is needed")
+            faults.append(f"{table.title}: column {column.name!r} holds text, where the {meaning} is needed")
         elif not present.any():
-            faults.append(f"{table.title}: column {column.name!r} ({quantity}) has no value at all")
+            faults.append(f"{table.title}: column {column.name!r} ({meaning}) has no value at all")
         else:
-            times[quantity] = time[present]
-            values[quantity] = (
-                item.unit.factor * mapping.given.signs.get(quantity, 1) * column.values[present]
-            )
+            times[meaning] = time[present]
+            values[meaning] = item.unit.factor * mapping.given.signs.get(meaning, 1) * column.values[present]
     return Record(place, times, values, scalars_of(table, place, mapping, faults))
 
 
 def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
-    item = mapping.of(Quantity.TIME)
+    item = mapping.of(ColumnMeaning.TIME)
     column = None if item is None else table.column(item.column)
     if item is None or column is None:
         step = sampling_step_s(table, mapping.given.constants)

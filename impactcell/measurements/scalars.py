@@ -12,7 +12,7 @@ from impactcell.measurements.numbers import parse_number
 from impactcell.measurements.recognition import (
     TOKEN_MATCH,
     VOCABULARY,
-    Quantity,
+    ColumnMeaning,
     is_kind_of,
     name_score,
     normalised,
@@ -21,19 +21,20 @@ from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.units import Dimension, parse_unit, split_unit
 
 SCALARS = (
-    Quantity.VELOCITY, Quantity.MASS, Quantity.DIRECTION, Quantity.BATCH, Quantity.DWELL, Quantity.START,
+    ColumnMeaning.VELOCITY, ColumnMeaning.MASS, ColumnMeaning.DIRECTION, ColumnMeaning.BATCH,
+    ColumnMeaning.DWELL, ColumnMeaning.START,
 )  # fmt: skip
 """Quantities of which a shot has one value."""
 STEADY = 0.01
 """Range of a column as a share of its largest value up to which it is one value with noise; its mean is
 taken."""
 REQUIREMENTS = {
-    Quantity.VELOCITY: "finite", Quantity.MASS: "above 0", Quantity.DIRECTION: "1 or -1",
-    Quantity.DWELL: "0 or above", Quantity.START: "finite",
+    ColumnMeaning.VELOCITY: "finite", ColumnMeaning.MASS: "above 0", ColumnMeaning.DIRECTION: "1 or -1",
+    ColumnMeaning.DWELL: "0 or above", ColumnMeaning.START: "finite",
 }  # fmt: skip
 """What a scalar of a campaign has to be."""
 TAKEN_NAMES = {
-    *Quantity, *(name for names in COLUMNS.values() for name in names.values()),
+    *ColumnMeaning, *(name for names in COLUMNS.values() for name in names.values()),
     "shot", "time_s", "velocity_mm_per_min", "dwell_s",
 }  # fmt: skip
 """Names of columns that a campaign has itself."""
@@ -46,47 +47,47 @@ def scalars_of(table: Table, place: str, mapping: Mapping, faults: list[str]) ->
     """
     given = mapping.given.constants
     scalars: dict[str, float | str] = {}
-    for quantity, value in said_beside(table).items():
-        if str(quantity) in given:
+    for meaning, value in said_beside(table).items():
+        if str(meaning) in given:
             continue
-        if _is_possible(quantity, value, f"{place}: {quantity}", faults):
-            scalars[str(quantity)] = value
+        if _is_possible(meaning, value, f"{place}: {meaning}", faults):
+            scalars[str(meaning)] = value
     names = covariate_names(mapping)
     for item in mapping.assignments:
         column = table.column(item.column)
-        if column is None or str(item.quantity) in given:
+        if column is None or str(item.meaning) in given:
             continue
-        if item.quantity is Quantity.COVARIATE:
+        if item.meaning is ColumnMeaning.COVARIATE:
             _take_covariate(column, item, names[item.column], scalars)
-        elif item.quantity in SCALARS:
+        elif item.meaning in SCALARS:
             scalar = _one_value(column, item, place, faults)
-            where = f"{place}: column {column.name!r} ({item.quantity})"
-            if scalar is not None and _is_possible(item.quantity, scalar, where, faults):
-                scalars[str(item.quantity)] = scalar
+            where = f"{place}: column {column.name!r} ({item.meaning})"
+            if scalar is not None and _is_possible(item.meaning, scalar, where, faults):
+                scalars[str(item.meaning)] = scalar
     return scalars
 
 
-def _is_possible(quantity: Quantity, value: float | str, where: str, faults: list[str]) -> bool:
+def _is_possible(meaning: ColumnMeaning, value: float | str, where: str, faults: list[str]) -> bool:
     """Whether a scalar can be what it has to be; a fault where it cannot."""
-    if quantity is Quantity.BATCH or isinstance(value, str) or math.isnan(value):
+    if meaning is ColumnMeaning.BATCH or isinstance(value, str) or math.isnan(value):
         return True
-    requirement = REQUIREMENTS[quantity]
+    requirement = REQUIREMENTS[meaning]
     possible = {"above 0": value > 0.0, "0 or above": value >= 0.0, "1 or -1": value in (1.0, -1.0)}
     if abs(value) < LARGEST and possible.get(requirement, True):
         return True
-    unit = VOCABULARY[quantity].dimensions[0]
+    unit = VOCABULARY[meaning].dimensions[0]
     shown = f"{value:g}" + ("" if unit is Dimension.NONE else f" {unit.value}")
-    faults.append(f"{where} is {shown}; it has to be {requirement}: correct it, or {_way_out(quantity)}")
+    faults.append(f"{where} is {shown}; it has to be {requirement}: correct it, or {_way_out(meaning)}")
     return False
 
 
-def _way_out(quantity: Quantity) -> str:
+def _way_out(meaning: ColumnMeaning) -> str:
     examples = {
-        Quantity.VELOCITY: "'velocity=3000 mm/min'", Quantity.MASS: "mass=18.9kg",
-        Quantity.DIRECTION: "direction=1", Quantity.DWELL: "dwell=30s",
+        ColumnMeaning.VELOCITY: "'velocity=3000 mm/min'", ColumnMeaning.MASS: "mass=18.9kg",
+        ColumnMeaning.DIRECTION: "direction=1", ColumnMeaning.DWELL: "dwell=30s",
     }  # fmt: skip
-    if quantity in examples:
-        return f"give it for all shots with --set {examples[quantity]}"
+    if meaning in examples:
+        return f"give it for all shots with --set {examples[meaning]}"
     return "leave its column out with --column ignored=NAME"
 
 
@@ -102,10 +103,10 @@ def _one_value(column: MeasuredColumn, item: Assignment, place: str, faults: lis
     if not present.size:
         return None
     low, high = float(present.min()), float(present.max())
-    steady = 0.0 if item.quantity in (Quantity.BATCH, Quantity.DIRECTION) else STEADY
+    steady = 0.0 if item.meaning in (ColumnMeaning.BATCH, ColumnMeaning.DIRECTION) else STEADY
     if high - low <= steady * max(abs(low), abs(high)):
         return float(factor * (low if low == high else present.mean()))
-    if item.quantity is Quantity.VELOCITY:  # as it was measured, not commanded
+    if item.meaning is ColumnMeaning.VELOCITY:  # as it was measured, not commanded
         return math.nan
     unit = "" if item.unit is None or item.unit.dimension is Dimension.NONE else f" {item.unit.symbol}"
     faults.append(_changes(column, item, place, f"{low:g}{unit}", f"{high:g}{unit}"))
@@ -114,8 +115,8 @@ def _one_value(column: MeasuredColumn, item: Assignment, place: str, faults: lis
 
 def _changes(column: MeasuredColumn, item: Assignment, place: str, one: str, other: str) -> str:
     return (
-        f"{place}: column {column.name!r} ({item.quantity}) is {one} and {other} within one record, where a "
-        f"shot has one; number the shots with --column shot=NAME, or {_way_out(item.quantity)}"
+        f"{place}: column {column.name!r} ({item.meaning}) is {one} and {other} within one record, where a "
+        f"shot has one; number the shots with --column shot=NAME, or {_way_out(item.meaning)}"
     )
 
 
@@ -139,7 +140,7 @@ def covariate_names(mapping: Mapping) -> dict[str, str]:
     names: dict[str, str] = {}
     taken = set(TAKEN_NAMES)
     for item in mapping.assignments:
-        if item.quantity is not Quantity.COVARIATE:
+        if item.meaning is not ColumnMeaning.COVARIATE:
             continue
         base = covariate_name(item.column, item.unit.dimension if item.unit else None)
         base = f"{base}_column" if base in TAKEN_NAMES else base
@@ -166,26 +167,24 @@ def covariate_name(column: str, dimension: Dimension | None) -> str:
     return f"{name}_{normalised(dimension.value.replace('²', '2').replace('/', ' per '))}"
 
 
-def said_beside(table: Table) -> dict[Quantity, float | str]:
+def said_beside(table: Table) -> dict[ColumnMeaning, float | str]:
     """Quantities that the file says beside its columns, as `Masse: 18,9 kg`."""
-    said: dict[Quantity, float | str] = {}
+    said: dict[ColumnMeaning, float | str] = {}
     for key, text in table.attributes.items():
         name, unit_text = split_unit(key)
-        for quantity in SCALARS:
-            if name_score(name, quantity)[0] < TOKEN_MATCH and not is_kind_of(name, quantity):
+        for meaning in SCALARS:
+            if name_score(name, meaning)[0] < TOKEN_MATCH and not is_kind_of(name, meaning):
                 continue
             words = text.split()
             number = parse_number(words[0]) if words else None
             if number is None and words:
                 number = parse_number(words[0], ",")
             unit = parse_unit(unit_text or " ".join(words[1:]))
-            if quantity is Quantity.BATCH:
-                said[quantity] = text
-            elif quantity is Quantity.DIRECTION and number is not None:
-                said[quantity] = number
-            elif (
-                number is not None and unit is not None and unit.dimension in VOCABULARY[quantity].dimensions
-            ):
-                said[quantity] = number * unit.factor
+            if meaning is ColumnMeaning.BATCH:
+                said[meaning] = text
+            elif meaning is ColumnMeaning.DIRECTION and number is not None:
+                said[meaning] = number
+            elif number is not None and unit is not None and unit.dimension in VOCABULARY[meaning].dimensions:
+                said[meaning] = number * unit.factor
             break
     return said

@@ -10,7 +10,7 @@ from impactcell.campaign import contacts
 from impactcell.measurements.captures import channel_of, described, scalar
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given
-from impactcell.measurements.recognition import CHANNELS, Quantity
+from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.recorded import Record
 from impactcell.records import Capture, Channel, Samples
 
@@ -58,21 +58,21 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
 
 def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[Record]:
     """Turn the force so that compression is positive."""
-    signs = [contacts.pulse_sign(record.values[Quantity.FORCE]) for record in records]
-    sign = 1 if sum(signs) >= 0 or Quantity.FORCE in given.signs else -1
+    signs = [contacts.pulse_sign(record.values[ColumnMeaning.FORCE]) for record in records]
+    sign = 1 if sum(signs) >= 0 or ColumnMeaning.FORCE in given.signs else -1
     if sign < 0:
         notes.append("force turned: it was negative in compression (--sign force=1 leaves it)")
     turned = []
     for record in records:
-        force = sign * record.values[Quantity.FORCE]
+        force = sign * record.values[ColumnMeaning.FORCE]
         turned.append(
-            Record(record.place, record.times, {**record.values, Quantity.FORCE: force}, record.scalars)
+            Record(record.place, record.times, {**record.values, ColumnMeaning.FORCE: force}, record.scalars)
         )
     return turned
 
 
 def _taps(record: Record, given: Given, faults: list[str]) -> list[_TapRecord]:
-    time, force = record.times[Quantity.FORCE], record.values[Quantity.FORCE]
+    time, force = record.times[ColumnMeaning.FORCE], record.values[ColumnMeaning.FORCE]
     if given.trigger == NO_TRIGGER:
         return _with_velocity([(record, None)], given, faults)
     threshold = given.trigger if isinstance(given.trigger, float) else None
@@ -100,9 +100,9 @@ def _taps(record: Record, given: Given, faults: list[str]) -> list[_TapRecord]:
 
 def _end(record: Record, onset_s: float, next_s: float) -> float:
     """When the part has come to rest, and the record says no more of this tap."""
-    if Quantity.POSITION not in record.values:
+    if ColumnMeaning.POSITION not in record.values:
         return next_s
-    time, position = record.times[Quantity.POSITION], record.values[Quantity.POSITION]
+    time, position = record.times[ColumnMeaning.POSITION], record.values[ColumnMeaning.POSITION]
     stretch = (time >= onset_s) & (time < next_s)
     if stretch.sum() < 10:
         return next_s
@@ -111,7 +111,7 @@ def _end(record: Record, onset_s: float, next_s: float) -> float:
 
 def _part(record: Record, onset: int, end_s: float) -> tuple[Record, int]:
     """Cut one tap out of a record that has several."""
-    time = record.times[Quantity.FORCE]
+    time = record.times[ColumnMeaning.FORCE]
     begin_s = time[onset] - contacts.REST_S
     kept = {q: (t >= begin_s) & (t <= end_s) for q, t in record.times.items()}
     part = Record(
@@ -130,7 +130,7 @@ def _with_velocity(
     for record, onset in parts:
         velocity = given.constants.get("velocity", record.scalars.get("velocity"))
         varies = isinstance(velocity, float) and math.isnan(velocity)
-        if (varies or not isinstance(velocity, float)) and Quantity.ACTUATOR in record.values:
+        if (varies or not isinstance(velocity, float)) and ColumnMeaning.ACTUATOR in record.values:
             velocity = _slope(record, onset)
         if not isinstance(velocity, float) or not abs(velocity) > 0.0:
             why = ": its column changes within the record, so it was measured" if varies else ""
@@ -145,8 +145,8 @@ def _with_velocity(
 
 def _slope(record: Record, onset: int | None) -> float:
     """Velocity of the actuator about first contact, from its own channel."""
-    time, position = record.times[Quantity.ACTUATOR], record.values[Quantity.ACTUATOR]
-    t0 = record.times[Quantity.FORCE][onset or 0]
+    time, position = record.times[ColumnMeaning.ACTUATOR], record.values[ColumnMeaning.ACTUATOR]
+    t0 = record.times[ColumnMeaning.FORCE][onset or 0]
     near = (time >= t0 - 0.01) & (time <= t0 + 0.003)
     if near.sum() < 4:
         return math.nan
@@ -159,8 +159,8 @@ def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:
     if triggered:
         times, forces, onsets, velocities = [], [], [], []
         for tap in triggered:
-            force = tap.record.values[Quantity.FORCE]
-            times.append(tap.record.times[Quantity.FORCE])
+            force = tap.record.values[ColumnMeaning.FORCE]
+            times.append(tap.record.times[ColumnMeaning.FORCE])
             forces.append(force - _rest_force(force, tap.onset))
             onsets.append(tap.onset or 0)
             velocities.append(tap.velocity_m_s)
@@ -195,7 +195,7 @@ def _capture(number: int, tap: _TapRecord, t0: float, given: Given) -> Capture:
         channels["force"] = Channel(force.time_s, force.values - offset)
     position = channels["position"]
     start = 0.0
-    direction = scalar(record, given, Quantity.DIRECTION)
+    direction = scalar(record, given, ColumnMeaning.DIRECTION)
     if position is not None:
         start = _start(position)
         channels["position"] = Channel(position.time_s, position.values - start)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements import Limits, Quantity, Table, guess, read_tables
+from impactcell.measurements import ColumnMeaning, Limits, Table, guess, read_tables
 
 Arrays = dict[str, np.ndarray]
 UNITS = {"time": "s", "Force": "N", "Position": "mm"}
@@ -116,8 +116,8 @@ def test_round_trip(name: str, count: int, seed: int, dtype: str, tmp_path: Path
         np.testing.assert_array_equal(column.values, written[column.name].astype(np.float64))
     mapping = guess([table])
     assert not mapping.faults
-    assert {item.quantity for item in mapping.assignments} == {
-        Quantity.TIME, Quantity.FORCE, Quantity.POSITION,
+    assert {item.meaning for item in mapping.assignments} == {
+        ColumnMeaning.TIME, ColumnMeaning.FORCE, ColumnMeaning.POSITION,
     }  # fmt: skip
 
 

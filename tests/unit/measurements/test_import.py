@@ -15,9 +15,9 @@ from impactcell.cli.app import run_verb
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.features import extract
 from impactcell.measurements import (
+    ColumnMeaning,
     Given,
     MeasuredColumn,
-    Quantity,
     Table,
     guess,
     make_campaign,
@@ -102,7 +102,7 @@ def test_lines_beside_the_columns_are_told_and_a_count_of_rows_is_no_covariate(t
         paths[-1].write_text("\n".join(lines), encoding="utf-8")
     tables = read(paths)
     mapping = guess(tables)
-    assert [str(item.quantity) for item in mapping.assignments] == ["ignored", "time", "force", "position"]
+    assert [str(item.meaning) for item in mapping.assignments] == ["ignored", "time", "force", "position"]
     imported = make_campaign(tables, mapping)
     assert [shot.mass_kg for shot in imported.campaign.shots] == [12.5, 15.0]
     assert not any(shot.covariates for shot in imported.campaign.shots)
@@ -160,9 +160,9 @@ def test_what_cannot_be_understood_is_told_and_nothing_written(
 def test_what_is_given_goes_before_what_is_guessed() -> None:
     tables = [table(t=("s", TIME), F=("N", WAVE), Fx=("N", WAVE), x=("mm", -WAVE))]
     with pytest.raises(MeasurementError, match="there is no column 'G'"):
-        guess(tables, Given(columns={Quantity.FORCE: "G"}))
-    mapping = guess(tables, Given(columns={Quantity.FORCE: "Fx"}, units={"x": "um"}))
-    force, position = mapping.of(Quantity.FORCE), mapping.of(Quantity.POSITION)
+        guess(tables, Given(columns={ColumnMeaning.FORCE: "G"}))
+    mapping = guess(tables, Given(columns={ColumnMeaning.FORCE: "Fx"}, units={"x": "um"}))
+    force, position = mapping.of(ColumnMeaning.FORCE), mapping.of(ColumnMeaning.POSITION)
     assert force is not None
     assert position is not None
     assert (force.column, force.confidence) == ("Fx", 1.0)
@@ -239,7 +239,7 @@ def test_columns_are_left_out_or_kept_as_covariates(tmp_path: Path) -> None:
     said = tmp_path / "map.yaml"
     said.write_text("columns: {ignored: [Speed, torque_enable], covariate: [p]}\n", encoding="utf-8")
     assert read_given({}, said).others == {
-        "Speed": Quantity.IGNORED, "torque_enable": Quantity.IGNORED, "p": Quantity.COVARIATE,
+        "Speed": ColumnMeaning.IGNORED, "torque_enable": ColumnMeaning.IGNORED, "p": ColumnMeaning.COVARIATE,
     }  # fmt: skip
     with pytest.raises(MeasurementError, match="there is no column 'gone'"):
         guess(tables, read_given({"columns": ["ignored=gone"]}))
@@ -266,7 +266,7 @@ def test_what_a_mapping_file_cannot_say_is_told_with_its_place(text: str, told: 
 def test_one_column_of_a_mapping_file_needs_no_list(tmp_path: Path) -> None:
     said = tmp_path / "map.yaml"
     said.write_text("columns: {covariate: Druck, ignored: 7}\n", encoding="utf-8")
-    assert read_given({}, said).others == {"Druck": Quantity.COVARIATE, "7": Quantity.IGNORED}
+    assert read_given({}, said).others == {"Druck": ColumnMeaning.COVARIATE, "7": ColumnMeaning.IGNORED}
 
 
 def test_what_rotates_is_a_campaign_of_torque_angle_and_inertia(tmp_path: Path) -> None:
