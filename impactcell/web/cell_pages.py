@@ -11,8 +11,8 @@ from impactcell.journal.trend import TrendColumn
 from impactcell.scada import RefusedError
 from impactcell.web.cell_view import number
 from impactcell.web.event_stream import MAX_VIEWERS, EventStream
-from impactcell.web.figures import figures
 from impactcell.web.interface import CellFacts
+from impactcell.web.listed_values import listed_values
 from impactcell.web.page_context import PageContext
 from impactcell.web.past import SPANS_S
 from impactcell.web.requests import RequestRefusedError
@@ -32,7 +32,7 @@ async def cell(context: PageContext, request: Request, session: BrowserSession) 
         session,
         cell=_cell(context, request),
         spans=tuple(SPANS_S),
-        folders=figures(context.language(request)),
+        folders=listed_values(context.language(request)),
         refusal=request.query_params.get("refused", ""),
     )
 

@@ -124,7 +124,7 @@ def test_a_published_value_is_one_row(copy: Path) -> None:
         "tests/integration/test_opcua_values.py::test_node_ids_stay_over_restarts_and_new_cells",
         "-k",
         "not killed",
-        "tests/unit/web/test_figures.py",
+        "tests/unit/web/test_listed_values.py",
     )
-    shown = "from impactcell.web.figures import figures; print(figures('de')['Model'][-1].title)"
+    shown = "from impactcell.web.listed_values import listed_values as of; print(of('de')['Model'][-1].title)"
     assert run(copy, "-c", shown) == "µs nach (6)\n"

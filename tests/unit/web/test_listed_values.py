@@ -7,8 +7,8 @@ import pytest
 from impactcell.quantities import CYCLE, MODULE
 from impactcell.records import ModuleStatus
 from impactcell.web.cell_view import CellView
-from impactcell.web.figures import figures
 from impactcell.web.interface import CellNews
+from impactcell.web.listed_values import listed_values
 from tests.snapshots import make_capture, make_snapshot
 
 ALL = (*CYCLE, *MODULE)
@@ -16,16 +16,16 @@ ALL = (*CYCLE, *MODULE)
 
 @pytest.mark.parametrize("language", ["en", "de"])
 def test_every_value_has_its_line_in_both_languages(language: str) -> None:
-    listed = [figure for folder in figures(language).values() for figure in folder]
-    shown = {figure.path for figure in listed} | {f"{figure.path}StdDev" for figure in listed}
+    listed = [value for folder in listed_values(language).values() for value in folder]
+    shown = {value.path for value in listed} | {f"{value.path}StdDev" for value in listed}
     assert {quantity.path for quantity in ALL if not quantity.is_array} <= shown
     titles = {quantity.path: quantity.title[language == "de"] for quantity in ALL}
-    assert all(figure.title == titles[figure.path] for figure in listed)
-    assert len({figure.title for figure in listed}) == len(listed), "two lines of one name"
+    assert all(value.title == titles[value.path] for value in listed)
+    assert len({value.title for value in listed}) == len(listed), "two lines of one name"
 
 
 def test_a_cycle_that_has_not_been_is_no_number() -> None:
-    forms = {figure.path: figure.form for folder in figures("en").values() for figure in folder}
+    forms = {value.path: value.form for folder in listed_values("en").values() for value in folder}
     assert forms["Batch/LastShiftCycle"] == "cycle", "0 before the first: a dash"
     assert forms["Module/CyclesMissed"] == "count", "0 is a number"
 

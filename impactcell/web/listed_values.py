@@ -12,7 +12,7 @@ STD_SUFFIX = "StdDev"
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class ListedValue:
     """A published value on the page; `form` is `coefficient`, `count`, `cycle` (0: none), or empty."""
 
     path: str
@@ -21,14 +21,14 @@ class Figure:
     form: str
 
 
-def figures(language: str) -> dict[str, list[Figure]]:
+def listed_values(language: str) -> dict[str, list[ListedValue]]:
     """List what can be shown in one line, by folder, in the order of the table.
 
-    >>> [figure.title for figure in figures("de")["Model"]]
+    >>> [value.title for value in listed_values("de")["Model"]]
     ['Modell', 'Abweichung']
     """
     index = list(LANGUAGES).index(language)
-    listed: dict[str, list[Figure]] = {}
+    listed: dict[str, list[ListedValue]] = {}
     quantities: tuple[Quantity[Any], ...] = (*CYCLE, *MODULE)
     paths = {quantity.path for quantity in quantities}
     for quantity in quantities:
@@ -36,8 +36,8 @@ def figures(language: str) -> dict[str, list[Figure]]:
         if quantity.is_array or is_std:
             continue
         unit = quantity.unit.symbol if quantity.unit is not None else ""
-        figure = Figure(quantity.path, quantity.title[index], unit, _form(quantity))
-        listed.setdefault(quantity.path.partition("/")[0], []).append(figure)
+        value = ListedValue(quantity.path, quantity.title[index], unit, _form(quantity))
+        listed.setdefault(quantity.path.partition("/")[0], []).append(value)
     return listed
 
 
