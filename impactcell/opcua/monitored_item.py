@@ -157,7 +157,8 @@ class DataMonitoredItem:
     def close(self) -> None:
         """Watch no longer; what is still on its way does not arrive."""
         self.mode = ua.MonitoringMode.Disabled
-        self._values.remove_observer(self._node, self.offer)
+        if self._attribute == ua.AttributeIds.Value:
+            self._values.remove_observer(self._node, self.offer)
         self._queue.clear()
 
 

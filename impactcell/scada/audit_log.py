@@ -14,7 +14,9 @@ T = TypeVar("T")
 _log: Final = logging.getLogger("impactcell.audit")
 
 MAX_ARGUMENT: Final = 200
-"""Longest part of an argument that is logged, characters."""
+"""Longest part of an argument, or of a name that a client makes up, that is logged, characters."""
+MAX_ARGUMENTS: Final = 8
+"""Arguments of a call that are logged, and entries of one that is a list: no method takes more."""
 
 
 def _log_outcome(actor: Actor, what: str, refusal: str = "") -> None:
@@ -59,16 +61,35 @@ class MethodAudit:
     def method_called(self, actor: Actor, request: ua.CallMethodRequest, status: int, reason: str) -> None:
         """Log a call."""
         ids = request.ObjectId, request.MethodId
-        name = self._names.get(ids, " ".join(node.to_string() for node in ids))
+        name = self._names.get(ids, " ".join(_one_line(node.to_string()) for node in ids))
         if not name:
             return
-        arguments = ", ".join(_written(argument.Value) for argument in request.InputArguments or [])
+        given = request.InputArguments or []
+        arguments = ", ".join(_written(argument.Value) for argument in given[:MAX_ARGUMENTS])
+        if len(given) > MAX_ARGUMENTS:
+            arguments += f", {len(given) - MAX_ARGUMENTS} more"
         code = ua.StatusCode(status)
         _log_outcome(actor, f"{name}({arguments})", "" if code.is_good() else f"{code.name} {reason}")
 
 
 def _written(value: Any) -> str:
+    """Write an argument, without going through the whole of a long one."""
     if isinstance(value, ua.LocalizedText):
         value = value.Text
-    text = value.hex() if isinstance(value, bytes) else repr(value)
+    if isinstance(value, list):
+        more = f", {len(value) - MAX_ARGUMENTS} more" if len(value) > MAX_ARGUMENTS else ""
+        return f"[{', '.join(map(_written, value[:MAX_ARGUMENTS]))}{more}]"
+    if isinstance(value, bytes):
+        return value[:MAX_ARGUMENT].hex()
+    if isinstance(value, str):
+        value = value[: MAX_ARGUMENT + 1]
+    return _shortened(repr(value))
+
+
+def _one_line(text: str) -> str:
+    """Write what a client makes up as one line of a log, whatever is in it."""
+    return _shortened(ascii(text[: MAX_ARGUMENT + 1])[1:-1])
+
+
+def _shortened(text: str) -> str:
     return text if len(text) <= MAX_ARGUMENT else f"{text[:MAX_ARGUMENT]}..."

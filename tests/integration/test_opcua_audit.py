@@ -67,3 +67,33 @@ async def test_a_refresh_is_no_act(caplog: pytest.LogCaptureFixture) -> None:
         )
         await client.uaclient.call([request])
     assert [r for r in caplog.records if r.name == "impactcell.audit"] == []
+
+
+@pytest.mark.parametrize(
+    ("made_up", "arguments"),
+    [
+        ("no\nengineer (engineer) from 10.0.0.9: press-1: ResetWear('new tool'): done", []),
+        ("\x1b[2Jno", ["a\r\nb"]),
+        ("x" * 4000, [list(range(20_000))]),
+        ("no", [["y" * 4000] * 40]),
+        ("no", [b"z" * 20_000]),
+        ("no", [1] * 500),
+    ],
+    ids=["lines", "escapes", "long names", "long lists", "long texts in lists", "many arguments"],
+)
+async def test_whatever_a_client_makes_up_is_one_short_line(
+    made_up: str, arguments: list[object], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "impactcell.audit")
+    async with site() as here, await here.client("observer") as client:
+        request = ua.CallMethodRequest(
+            ObjectId=ua.NodeId(made_up, 2),
+            MethodId=ua.NodeId(f"{made_up} too", 2),
+            InputArguments=[ua.Variant(argument) for argument in arguments],
+        )
+        (result,) = await client.uaclient.call([request])
+    assert not result.StatusCode.is_good()
+    (line,) = (r.getMessage() for r in caplog.records if r.name == "impactcell.audit")
+    assert line.isprintable()
+    assert line.startswith("observer (observer) from 127.0.0.1: ")
+    assert len(line) < 3000

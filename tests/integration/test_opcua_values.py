@@ -211,6 +211,45 @@ async def test_only_changes_are_told() -> None:
         assert changes.queue.empty()
 
 
+@pytest.mark.parametrize("whole_subscription", [False, True])
+async def test_an_item_on_an_object_ends_like_any_other(
+    caplog: pytest.LogCaptureFixture, *, whole_subscription: bool
+) -> None:
+    """An object has no value to watch: whoever watched its name left all items after it running."""
+    async with site() as here, await here.client() as client:
+        subscription = await client.create_subscription(1000, None)
+        number = subscription.subscription_id
+        watched = [
+            (CELL, ua.AttributeIds.DisplayName),
+            (f"{CELL}/Friction/StaticFriction", ua.AttributeIds.Value),
+        ]
+        made = await client.uaclient.create_monitored_items(
+            ua.CreateMonitoredItemsParameters(
+                number,
+                ua.TimestampsToReturn.Both,
+                [
+                    ua.MonitoredItemCreateRequest(
+                        ua.ReadValueId(
+                            ua.NodeId(path, (await here.node(client, "")).nodeid.NamespaceIndex), attribute
+                        ),
+                        ua.MonitoringMode.Reporting,
+                        ua.MonitoringParameters(ClientHandle=1, SamplingInterval=0.0, QueueSize=1),
+                    )
+                    for path, attribute in watched
+                ],
+            )
+        )
+        assert [result.StatusCode.value for result in made] == [0, 0]
+        if whole_subscription:
+            await client.uaclient.delete_subscriptions([number])
+        else:
+            gone = ua.DeleteMonitoredItemsParameters(number, [item.MonitoredItemId for item in made])
+            ended = await client.uaclient.delete_monitored_items(gone)
+            assert [result.value for result in ended] == [0, 0]
+        await client.nodes.server_state.read_value()
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
 async def test_deadband_is_measured_from_what_was_reported() -> None:
     """A drift in steps smaller than the deadband is reported each time it has added up to it."""
     async with site() as here, await here.client() as client:
