@@ -137,7 +137,7 @@ def slide(
         (SAME["direction"], "direction"): same * shot.direction,
         ("position_dependent_friction", "x"): mu * place,
         ("restoring_force", "x"): place * shot.direction / weight,
-        ("friction_drift", "order"): same * mu * (shot.place / shot.shots - 0.5),
+        ("friction_drift", "order"): same * mu * (shot.record / shot.records - 0.5),
     }
     terms |= {("stribeck_friction", f"{vs}"): np.exp(-((v / vs) ** 2)) for vs in STRIBECK_M_S}
     terms |= {

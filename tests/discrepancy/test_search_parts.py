@@ -137,9 +137,9 @@ def test_each_batch_has_a_factor_of_its_own() -> None:
     batches, changes = np.array([0, 0, 1, 2, 1, 2]), (0.07, -0.12)
     items = [
         SimpleNamespace(
-            dwell_s=1.0, place=place, shots=6, batch=batch, direction=1, covariates={"batch": batch}
+            dwell_s=1.0, record=record, records=6, batch=batch, direction=1, covariates={"batch": batch}
         )
-        for place, batch in enumerate(batches.tolist(), start=1)
+        for record, batch in enumerate(batches.tolist(), start=1)
     ]
     problem: Any = SimpleNamespace(shots=SimpleNamespace(items=items), batches=3)
     coordinates = candidate_scores.effect_coordinates("batch_shift", 3)

@@ -58,7 +58,7 @@ class Driven(ExcitationStrategy):
 
     def record_of(self, shot: PreparedShot) -> int:
         """Blocks of one record: its friction is one draw for all of them."""
-        return shot.place
+        return shot.record
 
     def unit_ratios(self, shot: PreparedShot, gravity_m_s2: float) -> Mapping[PlausibleRatio, float]:
         """None: the mass of a record is checked where it is cut."""
@@ -70,7 +70,7 @@ class Driven(ExcitationStrategy):
         del seed
         n = len(shots)
         indices = np.arange(n)
-        record = np.array([shot.place for shot in shots])
+        record = np.array([shot.record for shot in shots])
         last = [
             members[len(members) - len(members) // 3 :]
             for members in (indices[record == number] for number in np.unique(record))

@@ -131,7 +131,7 @@ def replicate_spread(shots: tuple[PreparedShot, ...], log_factor: Samples, batch
     inside = size[member] > 1
     if int(inside.sum() - np.unique(member[inside]).size) < MIN_DEGREES_OF_FREEDOM:
         return ReplicateSpread(math.nan, 0)
-    columns = [np.array([shot.place / shot.shots for shot in shots])]
+    columns = [np.array([shot.record / shot.records for shot in shots])]
     columns += [np.array([float(shot.batch == batch) for shot in shots]) for batch in range(1, batches)]
     dwell = np.array([shot.covariates["dwell"] for shot in shots])
     if np.isfinite(dwell).all():

@@ -147,12 +147,12 @@ def _settings(capture: Capture) -> tuple[float, ...]:
 
 
 def _prepared_shot(
-    strategy: ExcitationStrategy, capture: Capture, place_of: tuple[int, int], batch: int, group: int
+    strategy: ExcitationStrategy, capture: Capture, record_of: tuple[int, int], batch: int, group: int
 ) -> PreparedShot:
-    place, shots = place_of
+    record, records = record_of
     dwell = math.log10(max(capture.dwell_s, MIN_DWELL_S)) if math.isfinite(capture.dwell_s) else math.nan
     covariates = {
-        "shot": float(place),
+        "shot": float(record),
         "velocity": capture.velocity_m_s,
         "mass": capture.mass_kg,
         "direction": float(capture.direction),
@@ -164,8 +164,8 @@ def _prepared_shot(
     channels = strategy.predicted_channels(capture)
     return PreparedShot(
         number=capture.cycle,
-        place=place,
-        shots=shots,
+        record=record,
+        records=records,
         velocity_m_s=capture.velocity_m_s,
         mass_kg=capture.mass_kg,
         direction=capture.direction,

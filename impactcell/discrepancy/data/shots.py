@@ -29,9 +29,9 @@ class PreparedShot:
     Attributes
     ----------
     number : int
-        As `shots.csv` numbers it.
-    place, shots : int
-        Place in file order, from 1, and how many there are.
+        As `shots.csv` numbers the shot; blocks are counted from 1 over all records.
+    record, records : int
+        Its record in file order, from 1, and how many there are: a shot is one, blocks share theirs.
     batch : int
         Number of the batch in order of appearance.
     group : int
@@ -49,8 +49,8 @@ class PreparedShot:
     """
 
     number: int
-    place: int
-    shots: int
+    record: int
+    records: int
     velocity_m_s: float
     mass_kg: float
     direction: int

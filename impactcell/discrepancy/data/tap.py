@@ -131,7 +131,7 @@ class Tap(ExcitationStrategy):
 
     def settings_within_reach(self, shots: Sequence[PreparedShot]) -> list[tuple[str, PreparedShot]]:
         """Velocities, masses, directions, dwells and batches: what was done, and one step beyond it."""
-        typical = sorted(shots, key=lambda shot: (shot.velocity_m_s, shot.place))[len(shots) // 2]
+        typical = sorted(shots, key=lambda shot: (shot.velocity_m_s, shot.record))[len(shots) // 2]
         velocities = sorted({shot.velocity_m_s for shot in shots})
         masses = sorted({shot.mass_kg for shot in shots if math.isfinite(shot.mass_kg)}) or [1.0]
         settings = []
@@ -153,7 +153,7 @@ class Tap(ExcitationStrategy):
             settings += [
                 (
                     f"batch {batch + 1} again, after the others",
-                    replace(typical, batch=batch, place=typical.shots),
+                    replace(typical, batch=batch, record=typical.records),
                 )
                 for batch in range(last + 1)
             ]

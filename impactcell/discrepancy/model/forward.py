@@ -45,8 +45,8 @@ class ForwardModel:
                 direction=shot.direction,
                 start_m=shot.start_m,
                 dwell_s=shot.dwell_s,
-                shot=shot.place,
-                shots=shot.shots,
+                shot=shot.record,
+                shots=shot.records,
                 batch=shot.batch,
                 columns=shot.columns,
             )

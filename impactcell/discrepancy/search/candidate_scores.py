@@ -161,8 +161,8 @@ def between_shot_factors(problem: Problem, identifier: str, point: GridPoint) ->
         columns,
         Covariates(
             dwell_s=np.array([shot.dwell_s for shot in items]),
-            shot=np.array([float(shot.place) for shot in items]),
-            shots=np.array([float(shot.shots) for shot in items]),
+            shot=np.array([float(shot.record) for shot in items]),
+            shots=np.array([float(shot.records) for shot in items]),
             batch=np.array([float(shot.batch) for shot in items]),
             direction=np.array([float(shot.direction) for shot in items]),
             columns={
