@@ -12,7 +12,7 @@ from impactcell.discrepancy.data.measured_drive import (
     position_response,
     smooth_drive,
 )
-from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set
+from impactcell.discrepancy.data.prepared_campaign import check_campaign_units, prepare, shot_set
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
@@ -117,8 +117,10 @@ def test_the_motion_weighs_the_part() -> None:
     assert capture.force is not None
     assert mass_from_momentum(capture.position, capture.force) == pytest.approx(capture.mass_kg, rel=0.05)
     heavy = replace(capture, mass_kg=1000.0 * capture.mass_kg)
-    with pytest.raises(CampaignError, match="check the units of mass_kg"):
-        prepare(replace(given, shots=(heavy,)))
+    for check in (prepare, check_campaign_units):
+        with pytest.raises(CampaignError, match="check the units of mass_kg"):
+            check(replace(given, shots=(heavy,)))
+    check_campaign_units(given)
     unknown = prepare(replace(given, shots=(replace(capture, mass_kg=float("nan")),)))
     assert any("mass of shot 1 is not stated" in note for note in unknown.notes)
 

@@ -24,7 +24,7 @@ from impactcell.records import Capture, Channel, Samples
 STRATEGIES: dict[Excitation, ExcitationStrategy] = {
     strategy.excitation: strategy for strategy in (Tap(), FreeSlide(), Driven())
 }
-"""What the workflow asks, by the word in `campaign.yaml`."""
+"""Whom the workflow asks what an excitation is like, by its word in `campaign.yaml`."""
 MIN_SHOTS = 4
 """Fewer cannot be divided into shots to fit and one to hold out."""
 TIME_GAP_FACTOR = 5.0
@@ -45,7 +45,7 @@ class PreparedCampaign:
     batches : tuple of str
         In order of appearance.
     covariates : tuple of str
-        Names of the covariates that vary, in the order of `shots.csv`.
+        Names of the covariates that vary: `OWN_COVARIATES` first, then further columns of `shots.csv`.
     stated_noise : tuple of float
         Of force, position and actuator as stated; nan where nothing is.
     notes : tuple of str
@@ -85,8 +85,8 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     batches = tuple(dict.fromkeys(capture.batch_id or "" for capture, _ in captures))
     groups: dict[tuple[float, ...], int] = {}
     shots = []
-    for place, (capture, record) in enumerate(captures, 1):
-        key = _settings(capture) if strategy.has_replicates else (float(place),)
+    for number, (capture, record) in enumerate(captures, 1):
+        key = _settings(capture) if strategy.has_replicates else (float(number),)
         group = groups.setdefault(key, len(groups))
         batch = batches.index(capture.batch_id or "")
         shots.append(_prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group))
@@ -118,7 +118,8 @@ def check_campaign_units(campaign: Campaign) -> None:
         With the columns whose unit to check.
     """
     strategy = STRATEGIES[campaign.excitation]
-    shots = [_prepared_shot(strategy, shot, (1, 1), 0, 0) for shot in campaign.shots]
+    captures = strategy.cut(campaign, [])
+    shots = [_prepared_shot(strategy, capture, (1, 1), 0, 0) for capture, _ in captures]
     check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
 
 

@@ -43,7 +43,8 @@ class PreparedShot:
     drive : ndarray, shape (2, n)
         Times and values of the driving force; shape (2, 0) unless the part is driven.
     covariates : dict of str to float
-        Everything of `shots.csv` that is a number or was made one.
+        Everything of `shots.csv` that is a number or was made one: `shot` is the record, `batch` its number,
+        `dwell` the base-10 logarithm of the dwell in seconds, at least that of `MIN_DWELL_S`.
     whitener : ndarray, shape (n, n)
         Makes residuals of a driven block independent and of unit variance; shape (0, 0) elsewhere.
     """
