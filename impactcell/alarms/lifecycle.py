@@ -1,6 +1,7 @@
 """The life cycle of one alarm: a transition table after ISA-18.2 and OPC UA Part 9, and nothing else.
 
-Four machines run beside each other in every alarm (OPC 10000-9, 5.5, 5.7, 5.8 and annex B):
+Five machines run beside each other in every alarm (OPC 10000-9, 5.5, 5.7, 5.8 and annex B): the first
+two of these, and one for each of the three switches.
 
 =============  ====================================================================
 annunciation   active x acknowledged x confirmed, six states; see `ANNUNCIATION`
