@@ -1,4 +1,4 @@
-"""Everything impactcell raises on purpose.
+"""What impactcell raises on purpose for who calls or runs it: one tree.
 
 ::
 
@@ -24,16 +24,20 @@
     │   ├── WrongDeviceError      identity or map version is not what the cell file says
     │   ├── LinkError             not connected, lost, or no answer in time          (retry)
     │   ├── ProtocolError         the peer broke the protocol; nothing of it is used  (retry)
-    │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry, if busy)
+    │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry)
     ├── JournalError
     │   ├── ForeignJournalError   not our file, or of another version; never overwritten
-    │   ├── JournalDamagedError   what is stored is not what was written (retry: in a journal begun anew)
+    │   ├── JournalDamagedError   what is stored is not what was written (retry: it is put aside)
     │   ├── JournalGoneError      the file was removed or replaced while it was in use (retry)
     │   └── JournalUnavailableError  the file cannot be opened or written now         (retry)
     │       └── JournalFullError     ... for the disk, or a quota, is full            (retry)
     └── AccessError               users, certificates and rights of the OPC UA server
 
 `retry` says whether doing the same again can help. A message names the cell, the thing and the way out.
+
+Outside the tree stands what an edge answers to its peer, and what ends in the room it belongs to: in
+`impactcell.opcua` StatusCodeError, DecodingError, RefusedError, InvalidArgumentError, SecureChannelError and
+UntrustedError; in `impactcell.web` RequestRefusedError and StudyFailedError.
 """
 
 import math
@@ -158,6 +162,9 @@ class ProtocolError(FieldbusError):
 class ModbusExceptionError(FieldbusError):
     """The peer refused a request.
 
+    Asking again can help whatever the code: a device that was busy has been asked again already until the
+    link's timeout, and one that starts, or is being configured, refuses addresses that it has later.
+
     Attributes
     ----------
     code : int
@@ -180,7 +187,10 @@ class ForeignJournalError(JournalError):
 
 
 class JournalDamagedError(JournalError):
-    """What is stored is not what was written; the message names the file, and the cycle where it is one's."""
+    """What is stored is not what was written; the message names the file, and the cycle where it is one's.
+
+    The file as it is never can be used again; the service puts it aside and begins another with its state.
+    """
 
     retry: ClassVar[bool] = True
 

@@ -51,8 +51,10 @@ class Journal:
         If the file is not a journal, of another format, or of another cell; it is left as it is.
     JournalUnavailableError
         If the file cannot be opened now.
+    JournalDamagedError
+        If it is damaged: once it is put aside, another can be begun at its path.
     JournalError
-        If it never can: another service writes it, it has two names, or it is damaged.
+        If somebody has to act first: another service writes it, or it has two names.
     """
 
     def __init__(
