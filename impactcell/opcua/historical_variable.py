@@ -62,7 +62,7 @@ class ReadRange:
         return replace(self, remaining=remaining, resume=resume)
 
 
-def read_range(
+def parse_read_range(
     start: datetime | None, end: datetime | None, max_values: int, *, bounds: bool = False
 ) -> ReadRange:
     """Read the bounds of a question: two of start, end and number are needed (Part 11, 6.5.3.2).

@@ -12,7 +12,7 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.event_filter import EventFilter
-from impactcell.opcua.historical_variable import HistoricalVariable, ReadRange, read_range
+from impactcell.opcua.historical_variable import HistoricalVariable, ReadRange, parse_read_range
 from impactcell.opcua.history_encoding import DataValueEncoder, history_data
 from impactcell.opcua.history_processed import ProcessedReading
 from impactcell.opcua.host_interface import AccessPolicy, HistoryProvider, Permission, RefusedError
@@ -135,14 +135,14 @@ class HistoryService:
     def _begin(self, node: ua.NodeId, details: Any, index: int) -> ReadRange | ProcessedReading:
         """Check what is asked of one node; nothing is read yet."""
         if isinstance(details, ua.ReadRawModifiedDetails) and not details.IsReadModified:
-            return read_range(
+            return parse_read_range(
                 details.StartTime, details.EndTime, details.NumValuesPerNode, bounds=details.ReturnBounds
             )
         if isinstance(details, ua.ReadProcessedDetails):
             series = HistoricalVariable(self._history, node)
             return ProcessedReading(series, details, details.AggregateType[index])
         if isinstance(details, ua.ReadEventDetails):
-            return read_range(details.StartTime, details.EndTime, details.NumValuesPerNode)
+            return parse_read_range(details.StartTime, details.EndTime, details.NumValuesPerNode)
         raise StatusCodeError(ua.StatusCodes.BadHistoryOperationUnsupported)
 
     async def _go_on(
