@@ -13,7 +13,8 @@ from impactcell.opcua.read_budget import ReadBudget
 from impactcell.opcua.variable_store import nanoseconds
 
 VALUES_PER_PAGE: Final = 1_000
-"""Values, events or aggregates in one answer; more come by continuation point."""
+"""Values, events or aggregates of one node in one answer; more come by continuation point. `read_budget`
+bounds the answer over all nodes."""
 BEGINNING: Final = ua.get_win_epoch()
 """Times up to here mean that none was given (Part 6, 5.2.2.5)."""
 NO_BOUND: Final = int(ua.StatusCodes.BadBoundNotFound)
@@ -27,6 +28,8 @@ class ReadRange:
     ----------
     remaining : int or None
         Number of values still wanted; None for all of the span.
+    resume : bytes or None
+        Where the source goes on after the last page, in its own words; None at the beginning.
     per_answer : int or None
         Most values in one answer, as the client asks; None leaves that to the server.
     first_bound_ns, last_bound_ns : int or None
@@ -65,10 +68,11 @@ class ReadRange:
 def parse_read_range(
     start: datetime | None, end: datetime | None, max_values: int, *, bounds: bool = False
 ) -> ReadRange:
-    """Read the bounds of a question: two of start, end and number are needed (Part 11, 6.5.3.2).
+    """Check what a client asks, and make it a span: start, end and number, two of them (Part 11, 6.5.3.2).
 
-    The start belongs to the span and the end does not, in whichever direction time runs. With both ends the
-    number is that of one answer, and more come by continuation point; with one it is that of all.
+    The start belongs to the span and the end does not, in whichever direction time runs; a `ReadRange`
+    has both its ends, so the excluded one is moved by the nanosecond that times are counted in. With both
+    ends the number is that of one answer, and more come by continuation point; with one it is that of all.
 
     Raises
     ------
@@ -108,7 +112,7 @@ class HistoricalVariable:
         if first_ns is not None:
             current = replace(current, first_bound_ns=None)
             bound = await self._bound(first_ns, later=current.newest_first)
-            if bound.value is None or bound.time_ns != first_ns:  # else it is the first value itself
+            if bound.value is None or bound.time_ns != first_ns:  # a value at this very time is on the page
                 values.append(bound)
             if len(values) == limit:
                 return values, current
@@ -130,9 +134,9 @@ class HistoricalVariable:
         return values, None
 
     async def page(self, current: ReadRange) -> tuple[Sequence[HistoricalValue], ReadRange | None]:
-        """Read a page, and say what is left."""
-        page = await self._history.read_values(self._node, current.request(current.limit))
-        return page.values, current.after(len(page.values), page.resume)
+        """Read one page, without bounds or budget, and say what is left."""
+        values = await self._history.read_values(self._node, current.request(current.limit))
+        return values.values, current.after(len(values.values), values.resume)
 
     async def ends(self) -> tuple[int, int] | None:
         """Find the times of the first and the last stored value."""

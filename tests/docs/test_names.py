@@ -82,6 +82,12 @@ def test_docstrings_use_no_retired_type() -> None:
     assert gone == []
 
 
+def test_the_table_of_opcua_has_a_row_for_each_module() -> None:
+    room = ROOT / "impactcell" / "opcua"
+    rows = re.findall(r"^`(\w+)` {2,}", docstrings(room / "__init__.py"), re.MULTILINE)
+    assert sorted(rows) == sorted(path.stem for path in room.glob("*.py") if path.stem != "__init__")
+
+
 def test_a_name_that_is_gone_is_seen() -> None:
     assert not is_there("no_such_room/pipeline.py")
     assert not exists("impactcell.tracking.honesty")
