@@ -35,15 +35,16 @@ class ReadyItems:
         """Let no item report anything."""
         self._items.clear()
 
-    @property
-    def fit_one_message(self) -> bool:
-        """Whether one message may tell all of it."""
-        items = self._items
-        few = len(items) <= MAX_NOTIFICATIONS
-        return few and sum(item.waiting for item in items.values()) <= MAX_NOTIFICATIONS
+    def fit_one_message(self, max_notifications: int) -> bool:
+        """Whether one message of so many notifications tells all of it, unless its length ends it before."""
+        few = len(self._items) <= max_notifications  # most have one or more: a short way to no
+        return few and sum(item.waiting for item in self._items.values()) <= max_notifications
 
     def take(self, max_notifications: int) -> list[bytes]:
-        """Take what one message holds, encoded: data changes, and events."""
+        """Take what one message holds, encoded: data changes, and events.
+
+        It ends, as an item that is asked for its notifications gives one at least.
+        """
         room, room_bytes = max_notifications, MAX_MESSAGE_BYTES
         data = list[tuple[int, bytes]]()
         events = list[bytes]()

@@ -123,7 +123,7 @@ class Subscription:
         """
         if self._is_in_line:
             return
-        if self._ready_items.fit_one_message:
+        if self._ready_items.fit_one_message(self.max_notifications):
             self._answer()
         self._stand_in_line()
 
