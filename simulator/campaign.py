@@ -4,7 +4,7 @@ Everything random comes from one seed; the same scenario gives the same shots.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,6 +34,7 @@ class PlannedShot:
     dwell_s: float
     factor: float
     ratio_factor: float
+    strength: float
     columns: Mapping[str, float]
 
 
@@ -99,6 +100,7 @@ def _plan(scenario: CampaignScenario, random: np.random.Generator) -> Iterator[P
             dwell_s=round(float(np.exp(random.uniform(np.log(low), np.log(high)))), 1),
             factor=float(1.0 + scenario.friction_scatter * random.standard_normal()),
             ratio_factor=float(1.0 + scenario.ratio_scatter * random.standard_normal()),
+            strength=1.0,
             columns={},
         )
 
@@ -108,18 +110,38 @@ def _with_columns(scenario: CampaignScenario, plan: PlannedShot, random: np.rand
     values = {
         name: float(random.uniform(column.low, column.high)) for name, column in scenario.columns.items()
     }
-    factor = plan.factor
+    factor, strength = plan.factor, 1.0
     for name, column in scenario.columns.items():
-        if column.friction:
-            at, factors = zip(*column.friction, strict=True)
-            factor *= float(np.interp(values[name], at, factors))
-    return replace(plan, factor=factor, columns=values)
+        factor *= _factor(column.friction, values[name])
+        strength *= _factor(column.strength, values[name])
+    return replace(plan, factor=factor, strength=strength, columns=values)
+
+
+def _factor(table: Sequence[tuple[float, float]], value: float) -> float:
+    """Give the factor at a column's value; 1 where there is no table."""
+    if not table:
+        return 1.0
+    at, factors = zip(*table, strict=True)
+    return float(np.interp(value, at, factors))
+
+
+def _at_strength(plant: Plant, strength: float) -> Plant:
+    """Multiply the first parameter of each hidden effect, its strength."""
+    effects: dict[str, Mapping[str, Any]] = {}
+    for identifier, parameters in plant.effects.items():
+        first, *_ = parameters
+        value = parameters[first]
+        scaled = [strength * one for one in value] if isinstance(value, Sequence) else strength * value
+        effects[identifier] = {**parameters, first: scaled}
+    return replace(plant, effects=effects)
 
 
 def _shot(
     scenario: CampaignScenario, base: Plant, plan: PlannedShot, shots: int, random: np.random.Generator
 ) -> MadeShot:
     plant = replace(base, mu_s=base.mu_s * plan.factor, mu_k=base.mu_k * plan.factor * plan.ratio_factor)
+    if any(column.strength for column in scenario.columns.values()):
+        plant = _at_strength(plant, plan.strength)
     covariates = Shot(plan.direction, plan.start_m, plan.dwell_s, plan.number, shots, plan.batch)
     drive: _Drive | None = None
     match scenario.excitation:

@@ -63,17 +63,18 @@ class DriveScenario(ScenarioModel):
 
 
 class ColumnScenario(ScenarioModel):
-    """A further column of `shots.csv`, drawn for each shot, and what friction does with it.
+    """A further column of `shots.csv`, drawn for each shot, and what goes with it.
 
-    `friction` lists [value, factor of both coefficients] in ascending order, linear between; empty where it
-    does nothing.
+    `friction` lists [value, factor of both coefficients] in ascending order, linear between; `strength` the
+    same for the strength of everything that is hidden. Empty where it does nothing.
     """
 
     low: float
     high: float
     friction: list[tuple[float, Positive]] = Field([])
+    strength: list[tuple[float, NotNegative]] = Field([])
 
-    @field_validator("friction", mode="before")
+    @field_validator("friction", "strength", mode="before")
     @classmethod
     def _as_pairs(cls, value: object) -> object:
         return (
@@ -84,9 +85,12 @@ class ColumnScenario(ScenarioModel):
 
     @model_validator(mode="after")
     def _ascending(self) -> Self:
-        values = [value for value, _ in self.friction]
-        if not self.low < self.high or values != sorted(set(values)):
-            message = "low has to be below high, and the values of friction have to ascend"
+        ascend = all(
+            [value for value, _ in pairs] == sorted({value for value, _ in pairs})
+            for pairs in (self.friction, self.strength)
+        )
+        if not self.low < self.high or not ascend:
+            message = "low has to be below high, and the values of friction and strength have to ascend"
             raise ValueError(message)
         return self
 

@@ -25,6 +25,7 @@ ACTS = {
     "magnetic_pull": frozenset({"free_slide"}),
     "relaxing_contact": CONTACT,
     "wandering_force": MOVING | CONTACT,
+    "wedge_drag": MOVING,
 }
 """Phases in which the simulator's unlisted laws act: a law of contact in contact, one of the gap after it."""
 

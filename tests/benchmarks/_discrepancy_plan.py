@@ -102,7 +102,7 @@ def _removed(per: int) -> Iterator[Job]:
 
 
 def _outside(per: int) -> Iterator[Job]:
-    for effect, seed in _turns(sorted(set(UNLISTED) - {"wandering_force"}), per, 40_000):
+    for effect, seed in _turns(sorted(set(UNLISTED) - {"wandering_force", "wedge_drag"}), per, 40_000):
         yield _like("outside", (effect,), seed, VISIBLE)
 
 

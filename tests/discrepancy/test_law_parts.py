@@ -72,7 +72,7 @@ def test_only_the_smoothest_spline_tells_nothing_of_how_a_term_bends(
     monkeypatch: pytest.MonkeyPatch, smoothness: float
 ) -> None:
     monkeypatch.setattr(finding, "gives_energy", lambda _: False)
-    form = SimpleNamespace(covariate="speed", effect=SimpleNamespace(equation="s(v)"))
+    form = SimpleNamespace(covariates=("speed",), second="", effect=SimpleNamespace(equation="s(v)"))
     term: Any = SimpleNamespace(smoothness=smoothness, form=form)
     change: Any = SimpleNamespace(is_real=lambda: True, after=SimpleNamespace(of=lambda _: 1.0), parts=())
     said = finding._refusal(term, None, change, 2.0)

@@ -106,7 +106,7 @@ def test_the_first_screen_says_what_it_means_and_what_to_do(tied: DiscrepancyRes
 def test_noise_alone_is_drawn_thin(tied: DiscrepancyResult, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four standard deviations of noise take a fifth of a panel, a per cent of friction a tenth, at most."""
     drawn: list[Any] = []
-    monkeypatch.setattr(figures, "_svg", lambda figure: drawn.append(figure) or "")
+    monkeypatch.setattr(figures, "svg", lambda figure: drawn.append(figure) or "")
     figures.trace_figure(tied)
     figures.factor_figure(tied)
     residuals = drawn[0].axes[1::2]

@@ -12,17 +12,31 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import fmin
 
-from impactcell.discrepancy.laws.free_term import FreeTerm, equations
-from impactcell.discrepancy.laws.grammar import WAVE_ATOMS, WAVES, Form, Shaped, name, shaped_terms
-from impactcell.physics.bspline import spline_basis
+from impactcell.discrepancy.laws.grammar import (
+    WAVE_ATOMS,
+    WAVES,
+    Atom,
+    Form,
+    Shaped,
+    name,
+    shaped_pairs,
+    shaped_terms,
+)
+from impactcell.discrepancy.laws.tangent import Tangent
+from impactcell.physics.bspline import spline_basis, tensor_basis
+from impactcell.physics.free_form import ACROSS
 from impactcell.records import Samples
 
 GRID = 240
 """Points of the range on which a form is projected on the spline: three for each of the most pieces."""
+PAIR_GRID = (48, 16)
+"""The same along a first and a second covariate: four for each piece, and more than the four splines."""
 WAVE_CYCLES, WAVE_STEP = 25.0, 0.1
 """Most cycles of a wave in the range, a third of the most pieces, and how finely they are gone through."""
 PAIRS = 400
 """Single-atom terms that are paired into sums, the best first."""
+PRODUCTS = 30
+"""Products of a function of each of two covariates that are refined whatever their rank, the best first."""
 REFINED = 60
 """Forms whose shapes are refined."""
 SINGULAR = 1e-9
@@ -31,49 +45,6 @@ WIDEST_STEP, FARTHEST = 0.25, 2.0
 """First step of a shape's search, and how far it may go, in its logarithm or as a share of the range."""
 EVALUATIONS, SETTLED_SHAPE, SETTLED_GAIN = 80, 1e-3, 0.05
 """Evaluations for each shape, and where its search ends, in the same units and in log-likelihood."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tangent:
-    """Quadratic log-likelihood of the coefficients.
-
-    Attributes
-    ----------
-    information : ndarray, shape (K, K)
-    pull : ndarray, shape (K,)
-    lower, upper : float
-        Range of the covariate.
-    samples : int
-        How many were fitted.
-    constant : bool
-        A constant function is a law of its own.
-    fitted : ndarray, shape (K,)
-        Coefficients of the fitted spline itself.
-    others, response : ndarray, shape (p,) and (p, K)
-        All other coordinates at zero coefficients, and how they move with the coefficients.
-    """
-
-    information: Samples
-    pull: Samples
-    lower: float
-    upper: float
-    samples: int
-    constant: bool
-    fitted: Samples
-    others: Samples
-    response: Samples
-
-    @property
-    def reference(self) -> float:
-        """Largest magnitude of the covariate."""
-        return max(abs(self.lower), abs(self.upper))
-
-    @property
-    def most(self) -> float:
-        """Gain of the spline itself: no form has more."""
-        return 0.5 * float(
-            self.pull @ np.linalg.pinv(self.information, rcond=1e-10, hermitian=True) @ self.pull
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,29 +73,13 @@ class RankedForm:
         return tuple(item.term for item in self.terms)
 
 
-def tangent(term: FreeTerm) -> Tangent:
-    """Quadratic log-likelihood of a fitted term's coefficients, in the unit of its place."""
-    H, g = equations(term.problem, term.fit.state)
-    inside = term.columns
-    rest = np.setdiff1d(np.arange(len(g)), inside)
-    inverse = np.linalg.pinv(H[np.ix_(rest, rest)], rcond=1e-13, hermitian=True)
-    scale = np.array([term.fit.coordinates[i].scale for i in inside.tolist()])
-    cross = H[np.ix_(rest, inside)] / scale
-    S = H[np.ix_(inside, inside)] / np.outer(scale, scale) - cross.T @ inverse @ cross
-    pull = g[inside] / scale - cross.T @ inverse @ g[rest] + S @ term.coefficients
-    response = -inverse @ cross
-    others = term.fit.theta[rest] + inverse @ g[rest] - response @ term.coefficients
-    span, form = term.visited, term.form
-    samples = term.fit.residual.size
-    return Tangent(
-        S, pull, span.lower, span.upper, samples, not form.constant_is, term.coefficients, others, response
-    )
-
-
 def rank_forms(quadratic: Tangent) -> list[RankedForm]:
     """Functional forms, the best first; one entry a form."""
     projector = _Projector(quadratic)
-    singles = list(shaped_terms(quadratic.lower, quadratic.upper, constant=quadratic.constant))
+    if quadratic.second is None:
+        singles = list(shaped_terms(quadratic.lower, quadratic.upper, constant=quadratic.constant))
+    else:
+        singles = list(shaped_pairs(quadratic.ranges[0], quadratic.second, constant=quadratic.constant))
     columns = np.array([projector.coefficients(item) for item in singles])
     h, gram = projector.against(columns)
     best: dict[str, tuple[float, tuple[Shaped, ...]]] = {}
@@ -140,7 +95,7 @@ def rank_forms(quadratic: Tangent) -> list[RankedForm]:
     numbers = np.array([1 + item.shape_count for item in singles])
     for i in np.argsort(-(gains - cost * numbers)).tolist():
         offer(float(gains[i] - cost * numbers[i]), (singles[i],))
-    plain = [i for i, item in enumerate(singles) if len(item.term) == 1]
+    plain = [i for i, item in enumerate(singles) if len(item.term) == 1 or quadratic.second is not None]
     chosen = sorted(plain, key=lambda i: -(gains[i] - cost * numbers[i]))[:PAIRS]
     chosen += [i for i in plain if i not in set(chosen) and singles[i].shape_count == 0]
     a, b = np.triu_indices(len(chosen), 1)
@@ -156,11 +111,14 @@ def rank_forms(quadratic: Tangent) -> list[RankedForm]:
             continue
         offer(float(pair[place]), (one, other))
     order = sorted(best.values(), key=lambda entry: -entry[0])
-    order = order[:REFINED] + [
-        entry for entry in order[REFINED:] if is_simple(tuple(t.term for t in entry[1]))
-    ]
+    rest = order[REFINED:]
+    simple = [entry for entry in rest if is_simple(tuple(t.term for t in entry[1]))]
+    # At few starts a sum may stand in for one product between them: products alone are refined as well.
+    products = [entry for entry in rest if len(entry[1]) == 1 and len(entry[1][0].term) == 2]
+    order = order[:REFINED] + (products[:PRODUCTS] if quadratic.second else []) + simple
     refined = [projector.refine(terms, cost) for _, terms in order]
-    return sorted([*refined, projector.wave(cost)], key=lambda item: -item.score)
+    waves = [projector.wave(cost)] if quadratic.second is None else []
+    return sorted([*refined, *waves], key=lambda item: -item.score)
 
 
 def is_simple(form: Form) -> bool:
@@ -177,14 +135,19 @@ class _Projector:
 
     def __init__(self, quadratic: Tangent) -> None:
         self.quadratic = quadratic
-        self.points = np.linspace(quadratic.lower, quadratic.upper, GRID)
-        self.inverse = np.linalg.pinv(
-            spline_basis(self.points, quadratic.lower, quadratic.upper, len(quadratic.pull) - 3)
-        )
+        count = len(quadratic.pull)
+        if quadratic.second is None:
+            self.points = np.linspace(quadratic.lower, quadratic.upper, GRID)
+            basis = spline_basis(self.points, quadratic.lower, quadratic.upper, count - 3)
+        else:
+            axes = [np.linspace(*ends, n) for ends, n in zip(quadratic.ranges, PAIR_GRID, strict=True)]
+            self.points = np.column_stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])
+            basis = tensor_basis(self.points, quadratic.ranges, count // ACROSS - 3)
+        self.inverse = np.linalg.pinv(basis)
 
     def coefficients(self, item: Shaped) -> Samples:
         """Coefficients of the spline that is nearest to a term of amplitude one."""
-        out: Samples = self.inverse @ item.values(self.points, self.quadratic.reference)
+        out: Samples = self.inverse @ item.values(self.points, *self.quadratic.references)
         return out
 
     def against(self, columns: Samples) -> tuple[Samples, Samples]:
@@ -197,11 +160,14 @@ class _Projector:
         values = np.asarray(np.linalg.lstsq(gram, h, rcond=1e-12)[0], dtype=np.float64)
         return values, 0.5 * float(values @ h)
 
+    def _ends(self, atom: Atom) -> tuple[float, float]:
+        """Range of the covariate that an atom is of."""
+        return self.quadratic.ranges[int(atom.second)]
+
     def _inside(self, item: Shaped) -> bool:
         """Whether every centre lies in the range gone through."""
-        lower, upper = self.quadratic.lower, self.quadratic.upper
         return all(
-            lower < value < upper
+            self._ends(atom)[0] < value < self._ends(atom)[1]
             for atom, values in zip(item.term, item.shapes, strict=True)
             for shape, value in zip(atom.shapes, values, strict=True)
             if shape.name == "centre"
@@ -217,7 +183,7 @@ class _Projector:
 
         def projected(cycles: float) -> tuple[float, tuple[Shaped, ...], Samples]:
             terms = tuple(Shaped((atom,), (((upper - lower) / cycles,),)) for atom in WAVE_ATOMS)
-            columns = [item.values(self.points, self.quadratic.reference) for item in terms]
+            columns = [item.values(self.points, *self.quadratic.references) for item in terms]
             design = np.column_stack([*columns, np.ones(len(self.points))])
             amplitudes = np.asarray(np.linalg.lstsq(design, values)[0], dtype=np.float64)
             return float(np.sum((values - design @ amplitudes) ** 2)), terms, amplitudes[:2]
@@ -235,13 +201,17 @@ class _Projector:
         wave = len(terms) == 2 and _is_wave(*terms)
         free = terms[:1] if wave else terms
         start = np.array([value for item in free for atom in item.shapes for value in atom])
-        kinds = [shape for item in free for atom in item.term for shape in atom.shapes]
-        width = self.quadratic.upper - self.quadratic.lower
+        kinds = [
+            (shape, self._ends(atom)[1] - self._ends(atom)[0])
+            for item in free
+            for atom in item.term
+            for shape in atom.shapes
+        ]
 
         def placed(x: Samples) -> tuple[Shaped, ...]:
             moved = [
                 float(origin + width * step) if kind.name == "centre" else float(origin * math.exp(step))
-                for origin, step, kind in zip(start, x, kinds, strict=True)
+                for origin, step, (kind, width) in zip(start, x, kinds, strict=True)
             ]
             numbers = iter(moved)
             out = tuple(

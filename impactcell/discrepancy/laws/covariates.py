@@ -1,10 +1,11 @@
 """What a free-form term may depend on: each covariate at every sample, and the range gone through."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from impactcell.discrepancy.data import PHASES
+from impactcell.discrepancy.data import PHASES, Trajectory
 from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
 from impactcell.physics.free_form import FreeForm
 from impactcell.records import Samples
@@ -22,6 +23,11 @@ FEWEST_VALUES = 8
 LEAST_VARIETY = 0.2
 """Share of its largest magnitude over which a covariate has to vary: a function of what hardly changes is a
 number, and what it does elsewhere is unknown. Own choice."""
+MOST_SHARED = 0.95
+"""Share of the variance of a second covariate that a cubic of the first may explain: beyond it a function of
+both is one of the first alone, as far as anybody can tell. Own choice."""
+WHERE = {"gap": AFTER, "speed": SLIDING, "position": SLIDING}
+"""Phases in which a term over a covariate acts; any other number of the motion in contact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,44 +40,92 @@ class Visited:
         Range in which it was met.
     values : ndarray, shape (n,)
         At the samples at which the term acts; of a column of `shots.csv` a value a shot.
+    second : Visited or None
+        The second covariate at the same samples; None where there is one alone.
     """
 
     lower: float
     upper: float
     values: Samples
+    second: "Visited | None" = None
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Range of each covariate."""
+        return ((self.lower, self.upper), *(self.second.ranges if self.second else ()))
+
+    @property
+    def points(self) -> Samples:
+        """Values, shape (n,); of two covariates shape (n, 2)."""
+        if self.second is None:
+            return self.values
+        return np.column_stack([self.values, self.second.values])
 
 
 def visited(problem: Problem, model: Fit, form: FreeForm) -> Visited | None:
-    """Range of a form's covariate under a fitted model; None where it was not, or hardly, gone through."""
+    """Range of a form's covariates under a fitted model; None where one was not, or hardly, gone through."""
     if form.is_between_shots:
         return _of_shots(problem, form)
     trajectory = trajectory_of(problem, model)
     phases = np.array(PHASES)[sample_phases(problem, trajectory)]
-    items, sizes = problem.shots.items, problem.sizes
-    where = {"gap": AFTER, "speed": SLIDING, "position": SLIDING}.get(form.covariate, TOUCHING)
-    acts = np.isin(phases, sorted(where))
-    direction = np.repeat([float(shot.direction) for shot in items], sizes)
-    indentation = trajectory.actuator_displacement_m - trajectory.part_displacement_m
+    acts = np.isin(phases, sorted(WHERE.get(form.covariate, TOUCHING)))
     if form.covariate == "force":
         acts &= problem.shots.channel == 0
     if not acts.any():
         return None
-    if form.covariate == "speed":
-        values = np.abs(trajectory.speed_m_s)
-    elif form.covariate == "position":
+    first = _range(_values(problem, trajectory, form.covariate)[acts], form)
+    if not form.second or first is None:
+        return first
+    second = _second(problem, trajectory, form, acts)
+    if second is None or _is_function_of(first.values, second.values):
+        return None
+    return replace(first, second=second)
+
+
+def _values(problem: Problem, trajectory: Trajectory, covariate: str) -> Samples:
+    """Evaluate a number of the motion at every sample, shape (N,)."""
+    items, sizes = problem.shots.items, problem.sizes
+    if covariate == "speed":
+        return np.abs(trajectory.speed_m_s)
+    if covariate == "position":
         start = np.repeat([shot.start_m for shot in items], sizes)
-        values = start + direction * trajectory.part_displacement_m
-    elif form.covariate == "indentation":
-        values = indentation
-    elif form.covariate == "indentation_rate":
-        values = np.repeat([shot.velocity_m_s for shot in items], sizes) - trajectory.speed_m_s
-    elif form.covariate == "gap":
-        values = -indentation
-    elif form.covariate == "force":
-        values = problem.shots.values * np.where(problem.shots.channel == 0, 1.0, 0.0)
-    else:
-        values = problem.shots.times
-    return _range(values[acts], form)
+        direction = np.repeat([float(shot.direction) for shot in items], sizes)
+        position: Samples = start + direction * trajectory.part_displacement_m
+        return position
+    if covariate == "indentation_rate":
+        return np.repeat([shot.velocity_m_s for shot in items], sizes) - trajectory.speed_m_s
+    if covariate == "force":
+        force: Samples = problem.shots.values * np.where(problem.shots.channel == 0, 1.0, 0.0)
+        return force
+    if covariate == "time":
+        return problem.shots.times
+    indentation = trajectory.actuator_displacement_m - trajectory.part_displacement_m
+    return -indentation if covariate == "gap" else indentation
+
+
+def _second(
+    problem: Problem, trajectory: Trajectory, form: FreeForm, acts: NDArray[np.bool_]
+) -> Visited | None:
+    """Range of the second covariate where a term acts."""
+    alone = replace(form, covariate=form.second, second="")
+    if not form.effect.columns:
+        return _range(_values(problem, trajectory, form.second)[acts], alone)
+    column = _of_shots(problem, alone)
+    return column and replace(column, values=np.repeat(column.values, problem.sizes)[acts])
+
+
+def _is_function_of(u: Samples, w: Samples) -> bool:
+    """Whether a cubic of the first covariate explains all but a little of the second."""
+    scaled = (u - u.mean()) / max(float(u.std()), 1e-300)
+    left = w - np.polynomial.Polynomial.fit(scaled, w, 3)(scaled)
+    return float(left.var()) <= (1.0 - MOST_SHARED) * float(w.var())
+
+
+def poor_columns(problem: Problem) -> tuple[str, ...]:
+    """Further columns of `shots.csv` with too few different values for a function of them."""
+    names = dict.fromkeys(name for shot in problem.shots.items for name, _ in shot.columns)
+    values = {name: {shot.covariates.get(name) for shot in problem.shots.items} for name in names}
+    return tuple(name for name, met in values.items() if len(met) < FEWEST_VALUES)
 
 
 def _of_shots(problem: Problem, form: FreeForm) -> Visited | None:

@@ -9,16 +9,9 @@ from impactcell.physics import LawKind
 if TYPE_CHECKING:
     from impactcell.discrepancy.laws.law import Law
 
-_SIGNATURES = {
-    LawKind.KINETIC: "a: float, _b: float, _c: float, _d: float",
-    LawKind.SCALE: "a: float, _b: float, _c: float, _d: float",
-    LawKind.PULL: "a: float, _b: float, _c: float, _d: float",
-    LawKind.SPEED: "a: float, _b: float, _c: float, _d: float",
-    LawKind.READING: "a: float, _b: float, _c: float, _d: float",
-    LawKind.BODY: "a: float, b: float, _c: float, _d: float",
-    LawKind.CONTACT: "a: float, b: float, _c: float, _d: float",
-}
-"""Arguments of a law of each kind, those that no free form reads with a line before them."""
+
+_RANGE_SAID = '"""Range that was gone through, in the column\'s own unit; beyond it nothing is known."""'
+"""What an effect file says of the range of its column."""
 
 
 def effect_file(law: "Law") -> str:
@@ -47,7 +40,7 @@ def _text_between_shots(law: "Law") -> str:
     column = law.place.covariate
     expression = re.sub(r"\bmax\(", "np.maximum(", law.expression.replace("math.", "np."))
     names = "".join(f"{item.name}, " for item in law.parameters)
-    tested = ", ".join(map(_python, law.tested))
+    tested = ", ".join(map(_python, law.tested[0]))
     return "\n".join(
         [
             f'"""Found in data: {law.functional_form} over {law.covariate}."""',
@@ -63,7 +56,7 @@ def _text_between_shots(law: "Law") -> str:
             f"COLUMN = {column!r}",
             '"""Column of `shots.csv`; where it is not known the friction is as without it."""',
             f"TESTED = ({tested})",
-            '"""Range that was gone through, in the column\'s own unit; beyond it nothing is known."""',
+            _RANGE_SAID,
             "",
             "",
             "def factors(parameters: Sequence[Samples], shots: Covariates) -> Factors:",
@@ -107,6 +100,9 @@ def _text_of_motion(law: "Law") -> str:
         if reach
         else ""
     )
+    column = law.place.second if law.place.effect.columns else ""
+    second = f"p[{len(law.parameters)}]" if column else law.place.second_argument
+    tested = ", ".join(map(_python, law.tested[-1]))
     phases = ", ".join(f"Phase.{phase.name}" for phase in law.place.effect.phases)
     return "\n".join(
         [
@@ -117,11 +113,23 @@ def _text_of_motion(law: "Law") -> str:
             "from impactcell.numerics.jit import FloatPointer",
             _imports(law, "Effect", "Kind", "LawKind", "Parameter", "Phase"),
             "",
+            *(
+                [
+                    f"COLUMN = {column!r}",
+                    '"""Column of `shots.csv`; where it is not known the law is not at work."""',
+                    f"TESTED = ({tested})",
+                    _RANGE_SAID,
+                    "",
+                ]
+                if column
+                else []
+            ),
             "",
-            f"def law({_SIGNATURES[kind]}, p: FloatPointer) -> float:",
+            f"def law({_signature(law)}, p: FloatPointer) -> float:",
             f'    """{law.place.effect.equation}."""',
             *lines,
             f"    u = {law.place.argument}",
+            *([f"    w = {second}"] if second else []),
             f"    s = {law.expression}",
             f"    return {law.place.around}",
             end,
@@ -136,10 +144,20 @@ def _text_of_motion(law: "Law") -> str:
             *_declaration(law),
             "    ),",
             f"    laws={{{laws}}},",
+            *(["    columns={COLUMN: TESTED},"] if column else []),
             ")",
             '"""Where it was tested, and with which values, says `result.json` beside it."""',
             "",
         ]
+    )
+
+
+def _signature(law: "Law") -> str:
+    """Arguments of the law, those that it does not read with a line before them."""
+    read = f"{law.place.argument} {law.place.second_argument} {law.place.around}"
+    return ", ".join(
+        f"{argument}: float" if re.search(rf"\b{argument}\b", read) else f"_{argument}: float"
+        for argument in "abcd"
     )
 
 

@@ -5,20 +5,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.laws.condense import rank_forms, tangent
-from impactcell.discrepancy.laws.free_term import SMOOTHNESS, FreeTerm, equations, fit_free_terms
+from impactcell.discrepancy.laws.condense import rank_forms
+from impactcell.discrepancy.laws.covariates import FEWEST_VALUES, poor_columns
+from impactcell.discrepancy.laws.fitted_function import (
+    FittedFunction,
+    effective_numbers,
+    fitted_function,
+    gives_energy,
+    slices_of,
+)
+from impactcell.discrepancy.laws.free_term import SMOOTHNESS, FreeTerm, fit_free_terms, pair_forms_of
 from impactcell.discrepancy.laws.law import Law
 from impactcell.discrepancy.laws.refit import FittedLaw, refit_forms, tied_with
-from impactcell.discrepancy.model import Fit, Problem, fit, parameter_name, refit_shot_parameters
+from impactcell.discrepancy.laws.tangent import tangent
+from impactcell.discrepancy.model import Fit, Problem, fit, refit_shot_parameters
 from impactcell.discrepancy.search import GapChange, GapMeasure, Part
 from impactcell.errors import DiscrepancyError
-from impactcell.physics.bspline import spline_basis
-from impactcell.records import Samples
+from impactcell.physics.free_column_forms import printed
 
-DRAWN = 60
-"""Points of the range at which a term is drawn and looked at."""
-BAND = 1.96
-"""Standard deviations of a 95 % band."""
 STRAIGHT = frozenset({"1", "u", "1 + u"})
 """Forms without a bend: what a spline at its smoothest bound is."""
 TIED_PLACES = 2.2
@@ -30,16 +34,6 @@ MOST_STEPS = 9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FittedFunction:
-    """A fitted function with its 95 % band, each of shape (n,)."""
-
-    covariate: Samples
-    function: Samples
-    low: Samples
-    high: Samples
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class LawFinding:
     """What was found where something remained.
 
@@ -48,6 +42,9 @@ class LawFinding:
     term : FreeTerm
         Free-form term at the place that predicts best.
     function : FittedFunction
+        Of two covariates at the median of the second.
+    slices : tuple of (float, FittedFunction)
+        The same at several values of the second covariate; empty where there is one alone.
     law : FittedLaw or None
         Functional form that does as well; None where only the spline does.
     equivalents : tuple of FittedLaw
@@ -66,6 +63,7 @@ class LawFinding:
 
     term: FreeTerm
     function: FittedFunction
+    slices: tuple[tuple[float, FittedFunction], ...]
     law: FittedLaw | None
     equivalents: tuple[FittedLaw, ...]
     rival_places: tuple[str, ...]
@@ -112,10 +110,45 @@ def find_law(
     """
     problem, coarse, base = training
     rough = base if coarse is problem else refit_shot_parameters(coarse, base)
-    terms = fit_free_terms(coarse, rough, seed)
+    single = _best_finding(training, rough, measure, held_base, fit_free_terms(coarse, rough, seed))
+    if single is None or not single.refused or single.change.after.trace <= MOST_LEFT:
+        return single
+    # No function of one covariate is enough: what it leaves may depend on a second one.
+    terms = fit_free_terms(coarse, rough, seed, pair_forms_of(coarse))
+    pair = _best_finding(training, rough, measure, held_base, terms)
+    if pair is None:
+        return replace(
+            single, refused=_none_of_two(single, "no second one was gone through far enough", coarse)
+        )
+    refused = pair.refused
+    if not refused and not measure.change(single.held_out, pair.held_out, (Part.TRACES,)).is_real():
+        refused = "on held-out shots it says no more than the best function of one by more than chance"
+    return replace(single, refused=_none_of_two(single, refused, coarse)) if refused else pair
+
+
+def _none_of_two(single: LawFinding, reason: str, problem: Problem) -> str:
+    """Say why nothing is proposed where functions of one covariate and of two were tried."""
+    poor = [printed(name) for name in poor_columns(problem)]
+    untried = (
+        f"; the {'column' if len(poor) == 1 else 'columns'} {' and '.join(poor)} had fewer than "
+        f"{FEWEST_VALUES} different values, too little variety for a function"
+        if poor
+        else ""
+    )
+    return f"{single.refused}; of two covariates: {reason}{untried}"
+
+
+def _best_finding(
+    training: tuple[Problem, Problem, Fit],
+    rough: Fit,
+    measure: GapMeasure,
+    held_base: Fit,
+    terms: list[FreeTerm],
+) -> LawFinding | None:
+    """Condense the first term, and prove what comes of it; None where there are no terms."""
     if not terms:
         return None
-    best = terms[0]
+    problem, best = training[0], terms[0]
     laws = refit_forms(rough, best, rank_forms(tangent(best)))
     if best.smoothness == SMOOTHNESS[-1]:
         laws = _straight_first(laws)
@@ -126,7 +159,8 @@ def find_law(
     change = measure.change(held_base, held, (_part(best),))
     return LawFinding(
         best,
-        _fitted_function(best),
+        fitted_function(best),
+        slices_of(best),
         law,
         () if law is None else _equivalents(laws),
         tuple(term.form.effect.identifier for term in terms[1:] if _predict_alike(best, term)),
@@ -178,17 +212,6 @@ def _spline_is_better(term: FreeTerm, law: FittedLaw) -> bool:
     return better > max(cost, TIED_PLACES * scatter)
 
 
-def effective_numbers(term: FreeTerm) -> float:
-    """Effective number of coefficients of penalised splines, tr((H + P)⁻¹ H) over them (Wood 2017).
-
-    Those of the term, and of any other that the model has.
-    """
-    H, _ = equations(term.problem, term.fit.state)
-    penalty = term.problem.penalty_matrix
-    share = np.linalg.pinv(H + penalty, rcond=1e-13, hermitian=True) @ H
-    return float(np.diag(share)[np.diag(penalty) > 0.0].sum())
-
-
 def _equivalents(laws: list[FittedLaw]) -> tuple[FittedLaw, ...]:
     """Forms that are tied with the first; one that merely contains it says nothing else."""
     best = laws[0]
@@ -207,19 +230,6 @@ def _predict_alike(best: FreeTerm, other: FreeTerm) -> bool:
     return float(np.mean(difference)) < TIED_PLACES * scatter
 
 
-def _fitted_function(term: FreeTerm) -> FittedFunction:
-    lower, upper = term.visited.lower, term.visited.upper
-    u = np.linspace(lower, upper, DRAWN)
-    basis = spline_basis(u, lower, upper, term.form.spans)
-    H, _ = equations(term.problem, term.fit.state)
-    covariance = np.linalg.pinv(H + term.problem.penalty_matrix, rcond=1e-13, hermitian=True)
-    scale = np.array([term.fit.coordinates[i].scale for i in term.columns.tolist()])
-    inside = covariance[np.ix_(term.columns, term.columns)] * np.outer(scale, scale)
-    std = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", basis, inside, basis), 0.0))
-    value = basis @ term.coefficients
-    return FittedFunction(u, value, value - BAND * std, value + BAND * std)
-
-
 def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange, most_left: float) -> str:
     """Why nothing is proposed, if so; `most_left` is the gap that it may leave."""
     if not change.is_real():
@@ -228,7 +238,7 @@ def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange, most_left
     if left > most_left:
         return (
             f"the best term, {term.form.effect.equation}, leaves {left:.3g} noise floors: what "
-            f"is missing is no function of {term.form.covariate.replace('_', ' ')} alone"
+            f"is missing is no function of {_named(term)}{'' if term.form.second else ' alone'}"
         )
     if gives_energy(term):
         return (
@@ -238,17 +248,11 @@ def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange, most_left
     if term.smoothness == SMOOTHNESS[-1] and law is None:
         return (
             "the smoothest spline predicts best, so that the data tell nothing of how the term bends; "
-            f"shots over a wider range of {term.form.covariate} would"
+            f"shots over a wider range of {_named(term)} would"
         )
     return ""
 
 
-def gives_energy(term: FreeTerm) -> bool:
-    """Whether a dissipative term, with the plant's own beside it, is negative beyond its band somewhere."""
-    if not term.form.dissipates:
-        return False
-    own = 0.0
-    for place, coordinate in enumerate(term.fit.coordinates):
-        if parameter_name(coordinate) == term.form.dissipates:
-            own = coordinate.value(float(term.fit.theta[place]))
-    return bool((own + _fitted_function(term).high < 0.0).any())
+def _named(term: FreeTerm) -> str:
+    """Say in words what a term is of."""
+    return " and ".join(printed(name).replace("_", " ") for name in term.form.covariates)

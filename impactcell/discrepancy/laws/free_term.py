@@ -7,28 +7,18 @@ import numpy as np
 
 from impactcell.discrepancy.data import IndexArray
 from impactcell.discrepancy.laws.covariates import Visited, visited
-from impactcell.discrepancy.model import (
-    Constraints,
-    Fit,
-    FitState,
-    Problem,
-    Roughness,
-    fit,
-    normal_equations,
-    refit_shot_parameters,
-)
+from impactcell.discrepancy.laws.term_start import TermStart, fit_free_term
+from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.errors import DiscrepancyError
+from impactcell.physics.bspline import spline_basis, tensor_basis
 from impactcell.physics.free_column_forms import column_form
 from impactcell.physics.free_form import FreeForm
-from impactcell.physics.free_forms import FINER, FREE_FORMS, LOWER, UPPER
+from impactcell.physics.free_forms import FINER, FREE_FORMS
+from impactcell.physics.free_pair_forms import FREE_PAIR_FORMS, column_pair_forms
 from impactcell.records import Samples
 
 SMOOTHNESS = (1e-6, 1e-4, 1e-2, 1.0)
 """Weights of the roughness that are tried, over the information that the data have of the coefficients."""
-RIDGE = 1e-9
-"""Weight, over the same, of the size of the term: what the data cannot see of it stays at zero."""
-MOST_STEPS = 9
-"""Gauss-Newton steps of a free-form fit."""
 PLACES = 4
 """Places that are fitted, of those that promise most to first order."""
 FIRST_TRY = 1e-4
@@ -85,11 +75,31 @@ class FreeTerm:
         items = self.fit.coordinates
         return np.array([items[i].value(float(self.fit.theta[i])) for i in self.columns.tolist()])
 
+    @property
+    def tested(self) -> tuple[tuple[str, str, tuple[float, float]], ...]:
+        """Each covariate with its unit and the range that was gone through."""
+        units = (self.form.covariate_unit, self.form.second_unit)
+        return tuple(zip(self.form.covariates, units, self.visited.ranges, strict=False))
+
+    def basis(self, points: Samples) -> Samples:
+        """Values of its splines, shape (n, K), at points of shape (n,) or, of two covariates, (n, 2)."""
+        span, spans = self.visited, self.form.spans
+        if span.second is None:
+            return spline_basis(points, span.lower, span.upper, spans)
+        ends = ((span.lower, span.upper), (span.second.lower, span.second.upper))
+        return tensor_basis(points, ends, spans)
+
 
 def free_forms_of(problem: Problem) -> list[FreeForm]:
     """Every place at which a free-form term may act: those of any plant, and each column of `shots.csv`."""
     columns = problem.shots.items[0].columns if problem.shots.excitation.tests_between_shots else ()
     return [*FREE_FORMS.values(), *(column_form(name) for name, _ in columns)]
+
+
+def pair_forms_of(problem: Problem) -> list[FreeForm]:
+    """Every place at which a term of two covariates may act."""
+    columns = problem.shots.items[0].columns if problem.shots.excitation.tests_between_shots else ()
+    return [*FREE_PAIR_FORMS.values(), *(form for name, _ in columns for form in column_pair_forms(name))]
 
 
 def candidate_terms(problem: Problem, base: Fit, forms: Sequence[FreeForm] = ()) -> list[FreeForm]:
@@ -110,13 +120,16 @@ def candidate_terms(problem: Problem, base: Fit, forms: Sequence[FreeForm] = ())
     return [form for _, form in sorted(promise, key=lambda entry: -entry[0])]
 
 
-def fit_free_terms(problem: Problem, base: Fit, seed: int) -> list[FreeTerm]:
-    """Fit a term at each of the most promising places; the one that predicts other shots best comes first."""
+def fit_free_terms(problem: Problem, base: Fit, seed: int, forms: Sequence[FreeForm] = ()) -> list[FreeTerm]:
+    """Fit a term at each of the most promising places; the one that predicts other shots best comes first.
+
+    Without `forms` every place of a single covariate is looked at.
+    """
     inner, check = problem.shots.excitation.split(problem.shots.items, seed)
     parts = problem.select(inner), problem.select(check)
     inner_base = _of_shots(base, inner, parts[0])
     trials: list[_Check] = []
-    for form in candidate_terms(problem, base)[:PLACES]:
+    for form in candidate_terms(problem, base, forms)[:PLACES]:
         span = visited(problem, base, form)
         if span is not None:
             trials.append(_Check(parts, inner_base, TermStart.at(parts[0], inner_base, form, span)))
@@ -163,7 +176,7 @@ class _Check:
 
     parts: tuple[Problem, Problem]
     base: Fit
-    start: "TermStart"
+    start: TermStart
     errors: dict[float, Samples] = field(default_factory=dict)
 
     @property
@@ -208,79 +221,3 @@ def _of_shots(base: Fit, indices: IndexArray, part: Problem) -> Fit:
     shot_parameters = base.shot_parameters.select(indices)
     residual = part.with_effects(base.effects).residual(base.theta, shot_parameters)
     return Fit(base.effects, base.coordinates, base.theta, shot_parameters, base.spread, residual)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TermStart:
-    """A model with a free-form term that is still at zero: where fits begin, whatever the roughness weighs.
-
-    Attributes
-    ----------
-    form : FreeForm
-    visited : Visited
-    problem : Problem
-        Nothing is said of the term's roughness.
-    state : FitState
-    information, gradient : ndarray, shapes (p, p) and (p,)
-        Of the shared coordinates, each shot's own eliminated.
-    """
-
-    form: FreeForm
-    visited: Visited
-    problem: Problem
-    state: FitState
-    information: Samples
-    gradient: Samples
-
-    @classmethod
-    def at(cls, problem: Problem, base: Fit, form: FreeForm, span: Visited) -> "TermStart":
-        """Add a term to a model; a term that is there already keeps its roughness."""
-        identifier, count = form.effect.identifier, len(form.coefficients)
-        held = {
-            **problem.constraints.held,
-            f"{identifier}.{LOWER}": span.lower,
-            f"{identifier}.{UPPER}": span.upper,
-        }
-        constraints = Constraints(held, problem.constraints.roughness)
-        bare = problem.constrained((*base.effects, identifier), constraints)
-        theta = np.concatenate([base.theta, np.zeros(count)])
-        state = bare.evaluate(theta, base.shot_parameters, base.spread)
-        return cls(form, span, bare, state, *equations(bare, state))
-
-    @property
-    def has_answer(self) -> bool:
-        """Whether the plant has one, and derivatives."""
-        return bool(np.isfinite(self.information).all() and np.isfinite(self.gradient).all())
-
-    def weighed(self, smoothness: float) -> Problem:
-        """Weigh the roughness by what the data know of the coefficients."""
-        if not np.isfinite(self.state.cost):
-            return self.problem
-        identifier, count = self.form.effect.identifier, len(self.form.coefficients)
-        scale = float(np.trace(self.information[-count:, -count:])) / count
-        differences = np.diff(np.eye(count), n=2, axis=0)
-        rows = np.vstack([np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(count)])
-        given = self.problem.constraints
-        roughness = (*given.roughness, Roughness(identifier, self.form.coefficients, rows))
-        constraints = Constraints(given.held, roughness)
-        return self.problem.constrained(self.problem.effects, constraints)
-
-    def fit(self, smoothness: float) -> tuple[Problem, Fit]:
-        """Fit the model, by a few steps."""
-        extended, state = self.weighed(smoothness), self.state
-        fitted = fit(extended, state.theta, state.shot_parameters, spread=state.spread, most_steps=MOST_STEPS)
-        return extended, fitted
-
-
-def equations(problem: Problem, state: FitState) -> tuple[Samples, Samples]:
-    """Information and gradient of the shared coordinates, each shot's own eliminated."""
-    J, Jl = problem.linearise(state)
-    H, g, _ = normal_equations(problem, J, Jl, state)
-    return H, g
-
-
-def fit_free_term(
-    problem: Problem, base: Fit, form: FreeForm, span: Visited, smoothness: float
-) -> tuple[Problem, Fit]:
-    """Fit a model with one free-form term more, from where it stands without."""
-    return TermStart.at(problem, base, form, span).fit(smoothness)

@@ -1,4 +1,4 @@
-"""The laws a free-form term may be: functions of one covariate, of right dimension by how they are made.
+"""The laws a free-form term may be: functions of one or two covariates, of right dimension by their making.
 
 A law is a sum of at most two terms; a term is an amplitude, in the unit of its place, times one or two atoms;
 an atom is a dimensionless function of the covariate over something of its own unit. Every atom is written
@@ -6,8 +6,9 @@ once, as the Python that also stands in an effect file.
 """
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,12 +63,19 @@ class Atom:
     shapes : tuple of Shape
     signed : bool
         It means something for negative u too.
+    second : bool
+        It is a function of the second covariate, w in its name; its source says u all the same.
     """
 
     name: str
     source: str
     shapes: tuple[Shape, ...] = ()
     signed: bool = True
+    second: bool = False
+
+    def of_second(self) -> "Atom":
+        """Give the same function of the second covariate."""
+        return replace(self, name=re.sub(r"\bu\b", "w", self.name), second=True)
 
     def values(self, u: Samples, reference: float, shapes: tuple[float, ...]) -> Samples:
         """Values at u, shape (n,)."""
@@ -76,10 +84,14 @@ class Atom:
 
 
 def evaluate(source: str, u: Samples, parameters: Mapping[str, float]) -> Samples:
-    """Values of a function of u that is made of atoms, its parameters by name, at u of shape (n,)."""
-    known = {"u": u, "math": _ArrayMath, "max": np.maximum, **parameters}
+    """Values of a function that is made of atoms, its parameters by name.
+
+    At u of shape (n,), or at u and w in columns of an array of shape (n, 2).
+    """
+    places = {"u": u} if u.ndim < 2 else {"u": u[:, 0], "w": u[:, 1]}
+    known = {**places, "math": _ArrayMath, "max": np.maximum, **parameters}
     out = eval(source, {"__builtins__": {}}, known)  # noqa: S307  # made of this file's atoms and nothing else
-    return np.broadcast_to(np.asarray(out, dtype=np.float64), u.shape)
+    return np.broadcast_to(np.asarray(out, dtype=np.float64), u.shape[:1])
 
 
 class _ArrayMath:
@@ -127,11 +139,15 @@ class Shaped:
     term: Term
     shapes: tuple[tuple[float, ...], ...]
 
-    def values(self, u: Samples, reference: float) -> Samples:
-        """Values at u without the amplitude, shape (n,)."""
-        out = np.ones_like(u)
+    def values(self, u: Samples, *references: float) -> Samples:
+        """Values without the amplitude, shape (n,), at u of shape (n,), or u and w of shape (n, 2).
+
+        There is a reference for each covariate.
+        """
+        out = np.ones(len(u))
         for atom, shapes in zip(self.term, self.shapes, strict=True):
-            out = out * atom.values(u, reference, shapes)
+            place = int(atom.second)
+            out = out * atom.values(u[:, place] if u.ndim > 1 else u, references[place], shapes)
         return out
 
     @property
@@ -165,6 +181,38 @@ def shaped_terms(lower: float, upper: float, *, constant: bool) -> Iterator[Shap
         ]
         for pair in itertools.product(*grids):
             yield Shaped((one, other), pair)
+
+
+def shaped_pairs(
+    first: tuple[float, float], second: tuple[float, float], *, constant: bool
+) -> Iterator[Shaped]:
+    """Every function of either covariate with one shape at most, and every product of one of each.
+
+    Waves are left out: over two covariates no campaign has shown one. Ends are of the ranges gone through.
+    """
+    alone = [list(_few_shaped(*first)), [_of_second(item) for item in _few_shaped(*second)]]
+    if constant:
+        yield Shaped((ATOMS[0],), ((),))
+    for items in alone:
+        yield from items
+    for one, other in itertools.product(*alone):
+        yield Shaped((*one.term, *other.term), (*one.shapes, *other.shapes))
+
+
+def _few_shaped(lower: float, upper: float) -> Iterator[Shaped]:
+    """Every atom with one shape at most, at few starts, but for a constant and waves."""
+    reference = max(abs(lower), abs(upper))
+    for atom in ATOMS[1:]:
+        if len(atom.shapes) > 1 or atom.name in WAVES or not (atom.signed or lower >= 0.0):
+            continue
+        for shapes in itertools.product(
+            *(_few(_starts(shape, lower, upper, reference)) for shape in atom.shapes)
+        ):
+            yield Shaped((atom,), (shapes,))
+
+
+def _of_second(item: Shaped) -> Shaped:
+    return Shaped(tuple(atom.of_second() for atom in item.term), item.shapes)
 
 
 def _few(starts: tuple[float, ...]) -> tuple[float, ...]:

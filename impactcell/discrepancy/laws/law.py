@@ -3,7 +3,7 @@
 import hashlib
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from impactcell.discrepancy.laws.condense import RankedForm
@@ -56,8 +56,8 @@ class Law:
         Name of the form, of u.
     expression : str
         Python of the function of u, its parameters by name.
-    tested : tuple of float
-        Range of the covariate that was gone through.
+    tested : tuple of (float, float)
+        Range of each covariate that was gone through.
     """
 
     identifier: str
@@ -65,12 +65,13 @@ class Law:
     functional_form: str
     expression: str
     parameters: tuple[LawParameter, ...]
-    tested: tuple[float, float]
+    tested: tuple[tuple[float, float], ...]
 
     @property
     def covariate(self) -> str:
-        """What u is, in words."""
-        return _WORDS.get(self.place.covariate, f"column {printed(self.place.covariate)}")
+        """What u is, in words; and w, where there is one."""
+        words = [_WORDS.get(name, f"column {printed(name)}") for name in self.place.covariates]
+        return " and w the ".join(words)
 
     @property
     def is_wave(self) -> bool:
@@ -85,14 +86,15 @@ class Law:
         )
         for parameter in self.parameters:
             function = re.sub(rf"\b{re.escape(parameter.name)}\b", _short(parameter.name), function)
-        return f"{self.place.effect.equation} with s(u) = {function}, u the {self.covariate}"
+        of = "u, w" if self.place.second else "u"
+        return f"{self.place.effect.equation} with s({of}) = {function}, u the {self.covariate}"
 
     def text(self) -> str:
         """Text of the effect file."""
         return effect_file(self)
 
     def values(self, u: Samples) -> Samples:
-        """Values of the function at u, shape (n,), its parameters as they stand."""
+        """Values at u, shape (n,), or at u and w, shape (n, 2), its parameters as they stand."""
         known = {item.name: item.first for item in self.parameters}
         return evaluate(self.expression, u, known)
 
@@ -140,9 +142,10 @@ def _short(parameter: str) -> str:
     return parameter
 
 
-def write_law(place: FreeForm, ranked: RankedForm, tested: tuple[float, float]) -> Law:
-    """Give a ranked form's numbers names, units and ranges; `tested` is that of the covariate."""
-    reference = max(map(abs, tested))
+def write_law(place: FreeForm, ranked: RankedForm, tested: tuple[tuple[float, float], ...]) -> Law:
+    """Give a ranked form's numbers names, units and ranges; `tested` are those of the covariates."""
+    references = [max(map(abs, ends)) for ends in tested]
+    reference = references[0]
     form_name = name(ranked.form)
     parameters: list[LawParameter] = []
     pieces: list[str] = []
@@ -155,14 +158,17 @@ def write_law(place: FreeForm, ranked: RankedForm, tested: tuple[float, float]) 
         parameters.append(LawParameter(label, place.unit, 0.0, -MANY * size, MANY * size, amplitude))
         factors = [label]
         for atom, values in zip(item.term, item.shapes, strict=True):
-            source = atom.source.replace("reference", repr(reference))
+            over = _OfCovariate(place, references, second=atom.second)
+            source = atom.source.replace("reference", repr(over.reference))
+            if atom.second:
+                source = re.sub(r"\bu\b", "w", source)
             for shape, value in zip(atom.shapes, values, strict=True):
                 key = shape.name
                 if wave and key in shared:
                     written = shared[key]
                 else:
-                    written = _shape_name(shape, place, {entry.name for entry in parameters})
-                    parameters.append(_shape_parameter(written, shape, place, value, reference))
+                    written = _shape_name(shape, over.unit, {entry.name for entry in parameters})
+                    parameters.append(_shape_parameter(written, shape, over, value))
                     shared[key] = written
                 source = re.sub(rf"\b{key}\b", written, source)
             if source != "1.0":
@@ -177,8 +183,17 @@ def write_law(place: FreeForm, ranked: RankedForm, tested: tuple[float, float]) 
     return Law(identifier, place, form_name, " + ".join(pieces), tuple(parameters), tested)
 
 
-def _shape_name(shape: Shape, place: FreeForm, taken: set[str]) -> str:
-    suffix = SUFFIX[place.covariate_unit] if shape.has_unit else ""
+class _OfCovariate:
+    """Covariate that an atom is of: its name, its unit and its largest magnitude."""
+
+    def __init__(self, place: FreeForm, references: Sequence[float], *, second: bool) -> None:
+        self.name = place.second if second else place.covariate
+        self.unit = place.second_unit if second else place.covariate_unit
+        self.reference = references[int(second)]
+
+
+def _shape_name(shape: Shape, unit: str, taken: set[str]) -> str:
+    suffix = SUFFIX[unit] if shape.has_unit else ""
     return next(candidate for candidate in _numbered(shape.name, suffix) if candidate not in taken)
 
 
@@ -188,15 +203,12 @@ def _numbered(stem: str, suffix: str) -> Iterator[str]:
         yield f"{stem}_{number}{suffix}"
 
 
-def _shape_parameter(
-    written: str, shape: Shape, place: FreeForm, value: float, reference: float
-) -> LawParameter:
+def _shape_parameter(written: str, shape: Shape, over: _OfCovariate, value: float) -> LawParameter:
+    reference = over.reference
     if shape.name == "centre":
-        lower = -reference if value < 0.0 or place.covariate == "position" else 1e-3 * reference
-        return LawParameter(written, place.covariate_unit, math.nan, lower, reference, value, "POSITION")
+        lower = -reference if value < 0.0 or over.name == "position" else 1e-3 * reference
+        return LawParameter(written, over.unit, math.nan, lower, reference, value, "POSITION")
     if shape.name == "exponent":
         return LawParameter(written, "1", math.nan, 0.05, 12.0, value)
-    kind = "PERIOD" if shape.name == "period" and place.covariate_unit == "m" else "VALUE"
-    return LawParameter(
-        written, place.covariate_unit, math.nan, 1e-3 * reference, 1e2 * reference, value, kind
-    )
+    kind = "PERIOD" if shape.name == "period" and over.unit == "m" else "VALUE"
+    return LawParameter(written, over.unit, math.nan, 1e-3 * reference, 1e2 * reference, value, kind)

@@ -64,7 +64,8 @@ class FittedLaw:
 
 def refit_forms(base: Fit, term: FreeTerm, ranked: Sequence[RankedForm]) -> list[FittedLaw]:
     """Fit forms through the simulation, the best first: of those that are tied the simplest."""
-    simple = [entry for entry in ranked[REFITTED:] if is_simple(entry.form)]
+    # Functions of one covariate have been tried before those of two.
+    simple = [entry for entry in ranked[REFITTED:] if is_simple(entry.form) and not term.form.second]
     fitted = _fitted(base, term, [*ranked[:REFITTED], *simple])
     known = {item.law.functional_form: item for item in fitted}
     simpler = {
@@ -107,10 +108,10 @@ def _single_terms(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
         shaped.append(
             (amplitude, Shaped(item.term, tuple(tuple(next(values) for _ in atom) for atom in item.shapes)))
         )
-    reference = max(abs(term.visited.lower), abs(term.visited.upper))
+    references = [max(map(abs, ends)) for ends in term.visited.ranges]
     singles = []
     for (amplitude, kept), (other, dropped) in (shaped, shaped[::-1]):
-        constant = other * float(np.mean(dropped.values(term.visited.values, reference)))
+        constant = other * float(np.mean(dropped.values(term.visited.points, *references)))
         others = _taken_up(term, fitted, constant)[:-of_law]
         singles.append(RankedForm((kept,), (amplitude,), -math.inf, -math.inf, others))
     return singles
@@ -129,7 +130,7 @@ def _taken_up(term: FreeTerm, fitted: FittedLaw, constant: float) -> Samples:
 
 
 def _refit(base: Fit, term: FreeTerm, entry: RankedForm) -> FittedLaw:
-    law = write_law(term.form, entry, (term.visited.lower, term.visited.upper))
+    law = write_law(term.form, entry, term.visited.ranges)
     law.effect()
     held = {name: value for name, value in term.problem.constraints.held.items() if not _of(term, name)}
     problem = term.problem.constrained((*base.effects, law.identifier), Constraints(held))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.laws.finding import effective_numbers
+from impactcell.discrepancy.laws.fitted_function import effective_numbers
 from impactcell.discrepancy.laws.free_term import FreeTerm
 from impactcell.discrepancy.model import Fit, Problem
 from impactcell.records import Samples

@@ -18,14 +18,9 @@ import numpy as np
 
 from impactcell.discrepancy.data import FORCE
 from impactcell.discrepancy.laws.covariates import visited
-from impactcell.discrepancy.laws.free_term import (
-    FIRST_TRY,
-    MOST_STEPS,
-    FreeTerm,
-    candidate_terms,
-    fit_free_term,
-)
+from impactcell.discrepancy.laws.free_term import FIRST_TRY, FreeTerm, candidate_terms
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_fit, score_term
+from impactcell.discrepancy.laws.term_start import MOST_STEPS, fit_free_term
 from impactcell.discrepancy.model import Fit, Problem, fit
 from impactcell.discrepancy.search import (
     POLICY,
@@ -214,9 +209,10 @@ def state_read(effect: Effect, kind: LawKind) -> frozenset[str]:
     """Which of the first two numbers of a law, its state, it reads: `a`, `b`, both or neither.
 
     The other two are numbers of the shot or of the plant. It reads what changes its value, with its
-    parameters at their typical sizes.
+    parameters at their typical sizes and its columns in the middle of their ranges.
     """
     law, typical = effect.laws[kind], [parameter.typical for parameter in effect.parameters]
+    typical += [0.5 * (low + high) for low, high in effect.columns.values()]
     varied = {
         "a": [{law(state, other, 1.0, 1.0, typical) for state in STATES} for other in STATES],
         "b": [{law(other, state, 1.0, 1.0, typical) for state in STATES} for other in STATES],

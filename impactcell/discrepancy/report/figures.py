@@ -8,10 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS
-from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.search import ALL, ModelEvidence
 from impactcell.discrepancy.workflow import DiscrepancyResult
-from impactcell.records import Samples
 
 UNITS = ("N", "mm", "mm")
 SCALES = (1.0, 1e3, 1e3)
@@ -40,7 +38,8 @@ STYLE: Any = {
 }
 
 
-def _svg(figure: Figure) -> str:
+def svg(figure: Figure) -> str:
+    """Write a figure as text that a page holds."""
     out = io.StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None}, bbox_inches="tight")
     text = out.getvalue()
@@ -80,7 +79,7 @@ def map_figure(evidence: ModelEvidence) -> str:
             spine.set_visible(False)
         bar = figure.colorbar(image, ax=axes, shrink=0.85, pad=0.02)
         bar.set_label("|score| over its spread")
-        return _svg(figure)
+        return svg(figure)
 
 
 def _label(name: str) -> str:
@@ -151,7 +150,7 @@ def trace_figure(result: DiscrepancyResult) -> str:
                 if row == len(channels) - 1:
                     lower.set_xlabel("time [ms]")
         figure.align_ylabels()
-        return _svg(figure)
+        return svg(figure)
 
 
 def _moving_average(values: np.ndarray, step: int) -> np.ndarray:
@@ -203,7 +202,7 @@ def factor_figure(result: DiscrepancyResult) -> str:
         axes.set_xlabel("shot, in order")
         axes.set_ylabel("friction factor [%]")
         axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
-        return _svg(figure)
+        return svg(figure)
 
 
 def shape_figure(result: DiscrepancyResult) -> str | None:
@@ -222,64 +221,4 @@ def shape_figure(result: DiscrepancyResult) -> str | None:
             axes.set_ylabel(
                 f"residual, times {shape.times} [noise std]" if shape.times else "mean residual [noise std]"
             )
-        return _svg(figure)
-
-
-def law_figure(result: DiscrepancyResult) -> str | None:
-    """Free-form term with its band, the law beside it, and where the covariate was met."""
-    finding = result.law
-    if finding is None or finding.refused:
-        return None
-    form, law = finding.term.form, finding.proposed
-    return function_figure(
-        finding.function,
-        None if law is None else (law.values(finding.function.covariate), law.functional_form),
-        finding.term.visited.values,
-        (form.covariate, form.covariate_unit, form.unit),
-        less_mean=bool(form.constant_is),
-    )
-
-
-def function_figure(
-    curve: FittedFunction,
-    law: tuple[Samples, str] | None,
-    met: Samples,
-    covariate_and_units: tuple[str, str, str],
-    *,
-    less_mean: bool,
-) -> str:
-    """Spline with its band, a law beside it, and where the covariate was met.
-
-    Parameters
-    ----------
-    curve : FittedFunction
-    law : (ndarray, str) or None
-        Values of the law where the curve has them, and its name.
-    met : ndarray
-        Values of the covariate.
-    covariate_and_units : (str, str, str)
-        Covariate, its unit and that of the function.
-    less_mean : bool
-        The model takes a constant up, so that it is no difference: both are drawn about their means.
-    """
-    covariate, covariate_unit, function_unit = covariate_and_units
-    level = float(np.mean(curve.function)) if less_mean else 0.0
-    scale, unit = (1e3, "mm") if covariate_unit == "m" else (1.0, covariate_unit)
-    u = scale * curve.covariate
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 3.4))
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
-        above.axhline(0.0, color="#8a97a3", linewidth=0.8)
-        above.fill_between(u, curve.low - level, curve.high - level, color=MEASURED, alpha=0.5, linewidth=0)
-        above.plot(u, curve.function - level, color=BEFORE, label="spline, 95 % band")
-        if law is not None:
-            function, name = law
-            shift = float(np.mean(function)) if less_mean else 0.0
-            above.plot(u, function - shift, "--", color=AFTER, label=name)
-        what = "s(u) less its mean" if less_mean else "s(u)"
-        above.set_ylabel(what if function_unit == "1" else f"{what} [{function_unit}]")
-        above.legend(frameon=False, fontsize=8)
-        below.hist(scale * met, bins=60, color=MEASURED)
-        below.set_yticks([])
-        below.set_xlabel(f"u, {covariate.replace('_', ' ')} [{unit}]; below: where samples lie")
-        return _svg(figure)
+        return svg(figure)

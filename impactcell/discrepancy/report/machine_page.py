@@ -8,7 +8,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.machine import CATALOGUE, VALUES, ChosenTerm, MachineFinding, motions
-from impactcell.discrepancy.report.figures import function_figure
+from impactcell.discrepancy.report.law_figures import function_figure
 from impactcell.discrepancy.report.machine_result import SYMBOLS, law_covariate, phrase
 from impactcell.discrepancy.report.page import format_number
 

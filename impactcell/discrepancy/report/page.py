@@ -7,7 +7,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.model import ParameterEstimate
-from impactcell.discrepancy.report import figures
+from impactcell.discrepancy.report import figures, law_figures
 from impactcell.discrepancy.report.result import locate_effect
 from impactcell.discrepancy.report.sentences import (
     advice,
@@ -89,7 +89,7 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
         "shape": figures.shape_figure(result),
         "unexplained": result.unexplained,
         "law": law_sentences(result),
-        "law_figure": figures.law_figure(result),
+        "law_figure": law_figures.law_figure(result),
         "apart": split_sentence(result),
         "candidates": _candidates(result),
         "alternatives": [

@@ -157,18 +157,15 @@ def _law(result: DiscrepancyResult) -> dict[str, Any]:
     estimates = estimate_parameters(finding.training, linearise(finding.model, finding.training))
     document = {
         "place": form.effect.equation,
-        "covariates": [form.covariate],
+        "covariates": list(form.covariates),
         "form": SPLINE_ONLY if law is None else law.functional_form,
         "equation": form.effect.equation if law is None else law.equation,
         "parameters": {} if law is None else _parameters([one for one in estimates if one.effect == effect]),
         "equivalents": [item.law.functional_form for item in finding.equivalents],
         "rival_places": [find_effect(place).equation for place in finding.rival_places],
         "tested_range": {
-            form.covariate: {
-                "low": round_digits(finding.term.visited.lower),
-                "high": round_digits(finding.term.visited.upper),
-                "unit": form.covariate_unit,
-            }
+            name: {"low": round_digits(low), "high": round_digits(high), "unit": unit}
+            for name, unit, (low, high) in finding.term.tested
         },
         "held_out": {**_change(finding.change), "p_value": round_digits(finding.change.p_value)},
         "file": None if law is None else f"{law.identifier}.py",

@@ -7,6 +7,7 @@ from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import find_effect
+from impactcell.physics.free_column_forms import printed
 
 
 def phrase(identifier: str) -> str:
@@ -24,10 +25,11 @@ def headline(result: DiscrepancyResult) -> str:
     falling = "friction factors' spread falls" if finding.term.form.is_between_shots else "traces fall"
     fall = f"{falling} from {before:.2f} to {after:.2f} noise floors"
     form = finding.term.form
-    u = form.covariate.replace("_", " ")
-    what = f"a free-form function of u, the {u}"
+    letters = "u and w" if form.second else "u"
+    u = " and ".join(printed(name).replace("_", " ") for name in form.covariates)
+    what = f"a free-form function of {letters}, the {u}"
     if finding.proposed is not None:
-        what = f"{finding.proposed.functional_form} of u, the {u}, a law that no library has"
+        what = f"{finding.proposed.functional_form} of {letters}, the {u}, a law that no library has"
     return f"{_conclusion(result)} With s in {form.effect.equation} as {what}, the {fall}."
 
 
@@ -84,8 +86,10 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     if finding is None:
         return None
     form, law = finding.term.form, finding.proposed
-    u, low, high = form.covariate.replace("_", " "), finding.term.visited.lower, finding.term.visited.upper
-    unit = form.covariate_unit
+    tested = [
+        f"{printed(name).replace('_', ' ')} from {low:.3g} to {high:.3g}{'' if unit == '1' else f' {unit}'}"
+        for name, unit, (low, high) in finding.term.tested
+    ]
     return {
         "refused": finding.refused,
         "equation": form.effect.equation if law is None else law.equation,
@@ -96,7 +100,7 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
         "p": finding.change.p_value,
         "equivalents": [item.law.functional_form for item in finding.equivalents],
         "rivals": [find_effect(place).equation for place in finding.rival_places],
-        "tested": f"{u} from {low:.3g} to {high:.3g} {unit}",
+        "tested": " and ".join(tested),
         "file": None if law is None else f"{law.identifier}.py",
         "parameters": [] if law is None else [(item.name, item.first, item.unit) for item in law.parameters],
     }

@@ -1,0 +1,96 @@
+"""Pictures of a law that nobody had listed: the free-form term with its band, and the law beside it."""
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from impactcell.discrepancy.laws import FittedFunction, LawFinding
+from impactcell.discrepancy.report.figures import AFTER, BEFORE, MEASURED, STYLE, svg
+from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.physics.free_column_forms import printed
+from impactcell.records import Samples
+
+
+def law_figure(result: DiscrepancyResult) -> str | None:
+    """Free-form term with its band, the law beside it, and where the covariate was met."""
+    finding = result.law
+    if finding is None or finding.refused:
+        return None
+    form, law = finding.term.form, finding.proposed
+    if finding.slices:
+        return _slices_figure(finding)
+    return function_figure(
+        finding.function,
+        None if law is None else (law.values(finding.function.covariate), law.functional_form),
+        finding.term.visited.values,
+        (form.covariate, form.covariate_unit, form.unit),
+        less_mean=bool(form.constant_is),
+    )
+
+
+def _slices_figure(finding: LawFinding) -> str:
+    """Draw a term of two covariates along the first at values of the second, with its bands and the law."""
+    form, law = finding.term.form, finding.proposed
+    scale, unit = (1e3, "mm") if form.covariate_unit == "m" else (1.0, form.covariate_unit)
+    second = printed(form.second).replace("_", " ")
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 3.4))
+        axes = figure.subplots()
+        axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
+        for (w, curve), style in zip(finding.slices, ("-", "--", ":"), strict=True):
+            u = scale * curve.covariate
+            at = f"w = {w:.3g} {form.second_unit.strip('1')}"
+            axes.fill_between(u, curve.low, curve.high, color=MEASURED, alpha=0.4, linewidth=0)
+            axes.plot(u, curve.function, style, color=BEFORE, label=f"spline, {at}")
+            if law is not None:
+                values = law.values(np.column_stack([curve.covariate, np.full(len(u), w)]))
+                axes.plot(u, values, style, color=AFTER, label=f"{law.functional_form}, {at}")
+        axes.set_ylabel("s(u, w)" if form.unit == "1" else f"s(u, w) [{form.unit}]")
+        axes.set_xlabel(f"u, {form.covariate.replace('_', ' ')} [{unit}]; w, {second}; 95 % bands")
+        axes.legend(frameon=False, fontsize=8)
+        return svg(figure)
+
+
+def function_figure(
+    curve: FittedFunction,
+    law: tuple[Samples, str] | None,
+    met: Samples,
+    covariate_and_units: tuple[str, str, str],
+    *,
+    less_mean: bool,
+) -> str:
+    """Spline with its band, a law beside it, and where the covariate was met.
+
+    Parameters
+    ----------
+    curve : FittedFunction
+    law : (ndarray, str) or None
+        Values of the law where the curve has them, and its name.
+    met : ndarray
+        Values of the covariate.
+    covariate_and_units : (str, str, str)
+        Covariate, its unit and that of the function.
+    less_mean : bool
+        The model takes a constant up, so that it is no difference: both are drawn about their means.
+    """
+    covariate, covariate_unit, function_unit = covariate_and_units
+    level = float(np.mean(curve.function)) if less_mean else 0.0
+    scale, unit = (1e3, "mm") if covariate_unit == "m" else (1.0, covariate_unit)
+    u = scale * curve.covariate
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 3.4))
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
+        above.axhline(0.0, color="#8a97a3", linewidth=0.8)
+        above.fill_between(u, curve.low - level, curve.high - level, color=MEASURED, alpha=0.5, linewidth=0)
+        above.plot(u, curve.function - level, color=BEFORE, label="spline, 95 % band")
+        if law is not None:
+            function, name = law
+            shift = float(np.mean(function)) if less_mean else 0.0
+            above.plot(u, function - shift, "--", color=AFTER, label=name)
+        what = "s(u) less its mean" if less_mean else "s(u)"
+        above.set_ylabel(what if function_unit == "1" else f"{what} [{function_unit}]")
+        above.legend(frameon=False, fontsize=8)
+        below.hist(scale * met, bins=60, color=MEASURED)
+        below.set_yticks([])
+        below.set_xlabel(f"u, {covariate.replace('_', ' ')} [{unit}]; below: where samples lie")
+        return svg(figure)
