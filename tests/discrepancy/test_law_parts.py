@@ -71,10 +71,11 @@ def test_a_range_that_begins_at_nought_has_the_atoms_of_positive_numbers() -> No
 def test_only_the_smoothest_spline_tells_nothing_of_how_a_term_bends(
     monkeypatch: pytest.MonkeyPatch, smoothness: float
 ) -> None:
-    monkeypatch.setattr(finding, "gives_energy", lambda _: False)
+    monkeypatch.setattr(finding, "gives_energy", lambda *_: False)
     form = SimpleNamespace(covariates=("speed",), second="", effect=SimpleNamespace(equation="s(v)"))
     term: Any = SimpleNamespace(smoothness=smoothness, form=form)
     change: Any = SimpleNamespace(is_real=lambda: True, after=SimpleNamespace(of=lambda _: 1.0), parts=())
     said = finding._refusal(term, None, change, 2.0)
     assert bool(said) is (smoothness == max(finding.SMOOTHNESS))
-    assert finding._refusal(term, SimpleNamespace(), change, 2.0) == ""  # type: ignore[arg-type]
+    law: Any = SimpleNamespace(function=None)
+    assert finding._refusal(term, law, change, 2.0) == ""

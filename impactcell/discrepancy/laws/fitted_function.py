@@ -1,5 +1,6 @@
 """A fitted free-form term as a function: its values with their band, and what it takes of energy."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ DRAWN = 60
 """Points of the range at which a term is drawn and looked at."""
 BAND = 1.96
 """Standard deviations of a 95 % band."""
+BELOW_BAND = 0.025
+"""Share of states below a band of 95 % by chance."""
 SLICES = (0.1, 0.5, 0.9)
 """Quantiles of a second covariate at which a term of two is drawn."""
 LOOKED_AT = 2000
@@ -71,8 +74,12 @@ def effective_numbers(term: FreeTerm) -> float:
     return float(np.diag(share)[np.diag(penalty) > 0.0].sum())
 
 
-def gives_energy(term: FreeTerm) -> bool:
-    """Whether a dissipative term, with the plant's own beside it, is negative beyond its band somewhere."""
+def gives_energy(term: FreeTerm, function: Callable[[Samples], Samples] | None = None) -> bool:
+    """Whether a dissipative term, with the plant's own beside it, is negative beyond its band somewhere.
+
+    Of two covariates: the law where there is one; else the spline at more of the visited states than
+    a band of 95 % leaves out by chance.
+    """
     if not term.form.dissipates:
         return False
     own = 0.0
@@ -82,5 +89,8 @@ def gives_energy(term: FreeTerm) -> bool:
     if term.visited.second is None:
         return bool((own + fitted_function(term).high < 0.0).any())
     points = term.visited.points
-    value, std = _with_deviation(term, points[:: max(len(points) // LOOKED_AT, 1)])
-    return bool((own + value + BAND * std < 0.0).any())
+    points = points[:: max(len(points) // LOOKED_AT, 1)]
+    if function is not None:
+        return bool((own + function(points) < 0.0).any())
+    value, std = _with_deviation(term, points)
+    return float(np.mean(own + value + BAND * std < 0.0)) > BELOW_BAND

@@ -8,7 +8,7 @@ import numpy as np
 
 from impactcell.discrepancy.laws.condense import RankedForm, is_simple
 from impactcell.discrepancy.laws.free_term import FreeTerm
-from impactcell.discrepancy.laws.grammar import Shaped, name
+from impactcell.discrepancy.laws.grammar import Shaped, evaluate, name
 from impactcell.discrepancy.laws.law import Law, write_law
 from impactcell.discrepancy.model import Constraints, Fit, Problem, fit
 from impactcell.errors import DiscrepancyError
@@ -60,6 +60,10 @@ class FittedLaw:
             for i, item in enumerate(self.fit.coordinates)
             if item.effect == self.law.identifier
         }
+
+    def function(self, u: Samples) -> Samples:
+        """Evaluate the law as it was fitted, at u of shape (n,), or u and w of shape (n, 2)."""
+        return evaluate(self.law.expression, u, self.values)
 
 
 def refit_forms(base: Fit, term: FreeTerm, ranked: Sequence[RankedForm]) -> list[FittedLaw]:
