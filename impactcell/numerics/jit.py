@@ -2,13 +2,15 @@
 
 # ruff: noqa: ARG001  # an intrinsic's arguments are read from its signature, not by name
 
+import fcntl
 import functools
 import hashlib
 import inspect
 import re
+import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, Protocol, TypeVar, cast
+from typing import IO, Any, Final, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
@@ -41,6 +43,11 @@ class IntPointer(Protocol):
 Law = Callable[[float, float, float, float, FloatPointer], float]
 """A law of the plant: four numbers and the parameters of its effect in, one number out."""
 
+MOST_LOOKS: Final = 1500
+"""Looks whether another process has compiled a function, half a minute in all: three times what the longest
+takes. Then it is compiled here as well."""
+_BETWEEN_LOOKS_S: Final = 0.02
+"""Between two of them, s."""
 _POINTERS: dict[Law, Any] = {}
 
 _IMPORTED_ROOM = re.compile(rb"^from impactcell\.(\w+)", re.MULTILINE)
@@ -69,18 +76,83 @@ def _room(function: Callable[..., Any]) -> Path:
     return package / source.relative_to(package).parts[0] if inside else source.parent
 
 
+class _Turns:
+    """Has one process at a time compile what a file defines, and write it to disk; the others then read it.
+
+    What is compiled on the way to a function comes from its file or from one that this imports, so two
+    processes never wait for each other. A process holds the turns of all files that it is at; numba has one
+    thread of a process compile at a time.
+    """
+
+    def __init__(self) -> None:
+        self._held: list[tuple[object, str, IO[bytes] | None]] = []
+
+    def take(self, holder: object, file: str) -> None:
+        """Wait for the turn of a file, unless this process has it, or that takes too long."""
+        source = None
+        if all(name != file for _, name, _ in self._held):
+            source = Path(file).open("rb")  # noqa: SIM115 - open as long as the turn is held
+            looks = 0
+            while not _is_locked(source) and looks < MOST_LOOKS:
+                looks += 1
+                threading.Event().wait(_BETWEEN_LOOKS_S)
+        self._held.append((holder, file, source))
+
+    def give_back(self, holder: object) -> None:
+        """End a turn, and with it those taken on the way whose functions could not be compiled."""
+        holders = [held for held, _, _ in self._held]
+        begin = len(holders) - 1 - holders[::-1].index(holder)
+        for _, _, source in self._held[begin:]:
+            if source is not None:
+                source.close()  # and so unlocked
+        del self._held[begin:]
+
+
+_turns = _Turns()
+
+
+def _is_locked(source: IO[bytes]) -> bool:
+    """Lock a file for this process if no other has; true as well where the file system knows no locks."""
+    try:
+        fcntl.flock(source, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
 class _Cache(FunctionCache):
     """Machine code on disk, used again only while the sources of its room and those it imports are the same.
 
     By itself numba looks at the function's own file, and would go on using code into which an older
-    version of a function from another file has been compiled.
+    version of a function from another file has been compiled. It also has every process compile for itself
+    that does not find the code, and lose what another wrote to an index meanwhile.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)  # type: ignore[no-untyped-call]
         self._digest = _digest(_room(function))
+        self._source = inspect.getfile(function)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Give machine code from disk; without any the caller compiles, and saves what came of it."""
+        code = self._loaded(sig, target_context)
+        if code is None:
+            _turns.take(self, self._source)
+            code = self._loaded(sig, target_context)  # another process may have compiled it meanwhile
+            if code is not None:
+                _turns.give_back(self)
+        return code
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Write machine code to disk."""
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        finally:
+            _turns.give_back(self)
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
         """Give machine code from disk; an index that names a class this version lacks is begun anew."""
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]

@@ -5,6 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from impactcell.numerics import jit
+
 CALLEE = "from impactcell.numerics.jit import compiled\n\n@compiled\ndef inner(x):\n    return {} * x\n"
 CALLER = (
     "from callee import inner\nfrom impactcell.numerics.jit import compiled\n\n"
@@ -13,24 +17,29 @@ CALLER = (
 )
 
 
-def run(directory: Path) -> list[str]:
-    done = subprocess.run(
+def start(directory: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
         [sys.executable, "caller.py"],
         cwd=directory,
         # Bytecode is told from its source by time and size, which a test below keeps.
         env={**os.environ, "NUMBA_CACHE_DIR": str(directory / "cache"), "PYTHONDONTWRITEBYTECODE": "1"},
-        capture_output=True,
+        stdout=subprocess.PIPE,
         text=True,
-        check=True,
     )
-    return done.stdout.split()
 
 
-def test_an_edited_callee_is_compiled_anew(tmp_path: Path) -> None:
+def run(directory: Path, processes: int = 1) -> list[str]:
+    """Give what processes that begin together print, in the order of what they say."""
+    started = [start(directory) for _ in range(processes)]
+    printed = [process.communicate()[0] for process in started]
+    assert [process.returncode for process in started] == [0] * processes
+    return " ".join(sorted(printed)).split()
+
+
+def test_of_two_processes_one_compiles_and_an_edited_callee_is_compiled_anew(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(CALLER)
     (tmp_path / "callee.py").write_text(CALLEE.format(2.0))
-    assert run(tmp_path) == ["2.0", "0"]
-    assert run(tmp_path) == ["2.0", "1"]
+    assert run(tmp_path, 2) == ["2.0", "0", "2.0", "1"]
     (tmp_path / "callee.py").write_text(CALLEE.format(3.0))
     assert run(tmp_path) == ["3.0", "0"]
 
@@ -54,6 +63,41 @@ def test_a_class_that_was_renamed_since_is_compiled_anew(tmp_path: Path) -> None
     os.utime(tmp_path / "caller.py", ns=(written.st_atime_ns, written.st_mtime_ns))
     assert run(tmp_path) == ["2.0", "0"]
     assert run(tmp_path) == ["2.0", "1"]
+
+
+def is_free(file: Path) -> bool:
+    with file.open("rb") as other:
+        return jit._is_locked(other)
+
+
+def test_a_turn_ends_with_those_on_its_way_that_were_never_given_back(tmp_path: Path) -> None:
+    """What is tried on the way and cannot be compiled is never written, so nothing gives its turn back."""
+    caller, callee = tmp_path / "caller.py", tmp_path / "callee.py"
+    for file in (caller, callee):
+        file.write_text("")
+    turns = jit._Turns()
+    turns.take("outer", str(caller))
+    turns.take("beside it, in the same file", str(caller))
+    turns.give_back("beside it, in the same file")
+    turns.take("not to be compiled", str(callee))
+    assert not is_free(caller)
+    assert not is_free(callee)
+    turns.give_back("outer")
+    assert is_free(caller)
+    assert is_free(callee)
+
+
+def test_who_waits_too_long_compiles_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "MOST_LOOKS", 0)
+    file = tmp_path / "caller.py"
+    file.write_text("")
+    first, second = jit._Turns(), jit._Turns()
+    first.take("here", str(file))
+    second.take("there", str(file))
+    second.give_back("there")
+    assert not is_free(file)
+    first.give_back("here")
+    assert is_free(file)
 
 
 def test_without_a_place_for_a_cache_it_still_runs(tmp_path: Path) -> None:
