@@ -31,9 +31,9 @@ from impactcell.service import Service
 SHOWN_CYCLES = 400
 """Cycles that the view remembers: more than a wide terminal has columns."""
 PATIENCE_S = 60.0
-"""Without a cycle for so long, the demo has failed ..."""
+"""Without a cycle for so long, a demo that was asked for a number of cycles has failed, s ..."""
 FIRST_PATIENCE_S = 300.0
-"""... and without the first one, before which a new machine compiles, s."""
+"""... and without the first one, before which a new machine compiles, s. Without a number it waits."""
 REDRAWN_S = 1.0
 """Between two looks at a view that waits for the first cycle, s."""
 QUIET_S = 4.0
@@ -43,26 +43,37 @@ QUIET_S = 4.0
 def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     """Run the demo until Ctrl-C, for `cycles` cycles, or until its last part is in place.
 
+    Parameters
+    ----------
+    cycles : int or None
+        Cycles after which it ends; None for as many as come.
+    scenario : str
+        One of `SCENARIOS` in `impactcell.demo.scenario_setup`.
+    as_json : bool
+        Draw nothing, and print a summary at the end, see `_DemoRun.summary`.
+
     Raises
     ------
     SettingsError
         There is no such scenario.
     ImpactCellError
         The simulator did not start, or no cycle came.
+    KeyboardInterrupt
+        After the summary, where Ctrl-C ended it.
     """
     if sys.stderr.isatty() and not is_quiet():
         sys.stderr.write("setting up; the first time on a machine takes a minute or two, to compile\n")
     # Until the event loop takes the signal over, an end has to pass through `set_up_scenario`: it cleans up.
     signal.signal(signal.SIGTERM, _end)
     with set_up_scenario(scenario, cycles) as setup:
-        show = _DemoRun(setup, cycles)
+        run = _DemoRun(setup, cycles)
         if as_json or is_quiet() or not sys.stdout.isatty():
-            interrupted = asyncio.run(show.run(_draw_nothing if as_json or is_quiet() else _print_line))
+            interrupted = asyncio.run(run.follow(_draw_nothing if as_json or is_quiet() else _print_line))
         else:
-            interrupted = asyncio.run(_live(show))
+            interrupted = asyncio.run(_live(run))
     if as_json:
-        print(json.dumps(show.summary()))  # noqa: T201 - the result of the verb
-    elif not is_quiet() and (table := show.table()) is not None:
+        print(json.dumps(run.summary()))  # noqa: T201 - the result of the verb
+    elif not is_quiet() and (table := run.table()) is not None:
         Console().print(table)
     if interrupted:
         raise KeyboardInterrupt
@@ -85,10 +96,10 @@ class _DemoRun:
     missed: int = 0
     messages: list[tuple[int, str]] = field(default_factory=list)
 
-    async def run(self, draw: Callable[["_DemoRun", Snapshot], None]) -> bool:
+    async def follow(self, draw: Callable[["_DemoRun", Snapshot], None]) -> bool:
         """Run to the end; True if it was ended by Ctrl-C."""
         stop, news = asyncio.Event(), asyncio.Event()
-        auto_teach = AutoTeach(self.setup.cell, self._tell)
+        auto_teach = AutoTeach(self.setup.cell, self._note)
 
         def observe(_: str, snapshot: Snapshot) -> None:
             self._take(snapshot)
@@ -107,12 +118,12 @@ class _DemoRun:
                 running = self.service.running.get(self.setup.cell.name)
                 self.outcomes = () if running is None else running.task_outcomes
                 await auto_teach.close()
-                watch.cancel()
+                watch.cancel()  # where it found the module silent it has ended, and its error comes out here
                 with contextlib.suppress(asyncio.CancelledError):
                     await watch
         return signal.SIGINT in signals
 
-    def _tell(self, text: str) -> None:
+    def _note(self, text: str) -> None:
         if not self.messages or self.messages[-1][1] != text:
             self.messages.append((self.snapshots[-1].cycle if self.snapshots else 0, text))
 
@@ -143,13 +154,13 @@ class _DemoRun:
             )
             patience_s = PATIENCE_S if self.snapshots else FIRST_PATIENCE_S
             try:
-                # Without an end, silence is part of the show.
+                # Where no number of cycles was asked for, the module may be silent as long as it likes.
                 async with asyncio.timeout(QUIET_S if last else None if self.cycles is None else patience_s):
                     await news.wait()
             except TimeoutError:
                 stop.set()
                 if last:
-                    self._tell("that was the last part")
+                    self._note("that was the last part")
                     return
                 reason = "" if self._status is None else self._status.reason
                 raise ImpactCellError(
@@ -190,7 +201,11 @@ class _DemoRun:
         return {"targets": targets_json(self.outcomes)} if has_targets else {}
 
     def summary(self) -> dict[str, Any]:
-        """One object that says how the demo went; null for what is not known."""
+        """One object that says how the demo went; null for what is not known.
+
+        Without a cycle it ends at `missed`. `mu_s` to `batch` are of the last cycle, `alarms` those raised,
+        `story` is what the scenario does at which cycle, and `told` what was done beside it.
+        """
         if not self.snapshots:
             return {
                 "cell": self.setup.cell.name,
@@ -236,7 +251,7 @@ def _end(*_: object) -> None:
     raise SystemExit(0)
 
 
-async def _live(show: _DemoRun) -> bool:
+async def _live(run: _DemoRun) -> bool:
     console = Console()
     logging.disable(logging.WARNING)  # a line of the log would push the view up; it shows the same itself
     try:
@@ -246,19 +261,19 @@ async def _live(show: _DemoRun) -> bool:
                 live.update(_rendered(now.scene()), refresh=True)
 
             async def draw_waiting() -> None:
-                while not show.snapshots:
-                    draw(show)
+                while not run.snapshots:
+                    draw(run)
                     await asyncio.sleep(REDRAWN_S)
 
             waiting = asyncio.create_task(draw_waiting())
             try:
-                interrupted = await show.run(draw)
+                interrupted = await run.follow(draw)
             finally:
                 waiting.cancel()
     finally:
         logging.disable(logging.NOTSET)
-    if show.snapshots:
-        console.print(_rendered(replace(show.scene(), link="")))
+    if run.snapshots:
+        console.print(_rendered(replace(run.scene(), link="")))
     return interrupted
 
 
