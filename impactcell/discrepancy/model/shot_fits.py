@@ -142,8 +142,8 @@ def normal_equations(
     Returns
     -------
     H, g, equations
-        Information, shape (p, p), and gradient, shape (p,), of the shared coordinates (Schur complement), and
-        the shots' own blocks.
+        Information, shape (p, p), and minus half the cost's gradient, shape (p,), of the shared coordinates
+        (Schur complement), so that a step is H^-1 g; and the shots' own blocks, their gradients alike.
     """
     q, p = len(Jl), len(J)
     rows = np.vstack([Jl, J, state.residual])

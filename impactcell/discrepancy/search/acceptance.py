@@ -1,4 +1,7 @@
-"""What a search says at its end: effects accepted, those tied with them, or none."""
+"""What a search says at its end: effects accepted, those tied with them, or none.
+
+Lists of candidate fits that are given here are not empty, and the likeliest out of shot is the first.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -49,6 +52,7 @@ class SelectionResult:
     ties : dict of str to tuple of str
         For each of them those that cannot be told from it.
     p_values : dict of str to float
+        Of each of `added`: against the nominal model, of the second of a pair beside the first.
     alternatives : tuple of Alternative
         Everything that was fitted, the likeliest first.
     unconverged : tuple of tuple of str
@@ -76,7 +80,11 @@ class SelectionResult:
 
 
 def exchanged(selection: SelectionResult) -> list[SelectionResult]:
-    """Return the same outcome with an effect exchanged for one that is tied with it, each in turn."""
+    """List the outcomes with an effect exchanged for one that is tied with it, each in turn.
+
+    A rival's p-value is that against the nominal model, also where it stands for the second of a pair: beside
+    the first it was not scanned in every case.
+    """
     variants = []
     for effect, rivals in selection.ties.items():
         for rival in rivals:
@@ -104,7 +112,7 @@ def _fit_with(selection: SelectionResult, added: tuple[str, ...]) -> Fit | None:
 def reject(
     nominal: ModelEvidence, final: ModelEvidence, alternatives: tuple[Alternative, ...]
 ) -> SelectionResult:
-    """Nothing suffices."""
+    """Accept nothing: no effect suffices."""
     return SelectionResult(nominal, final, None, (), {}, {}, alternatives)
 
 
@@ -174,8 +182,9 @@ def accept_pair(
     pairs: list[CandidateFit],
     order: Sequence[str],
     scans: Sequence[CandidateScan],
+    alternatives: tuple[Alternative, ...],
 ) -> SelectionResult:
-    """Accept the likeliest pair.
+    """Accept the likeliest pair, each of its effects with those that the shots do not tell from it.
 
     Parameters
     ----------
@@ -185,7 +194,9 @@ def accept_pair(
         Single effects, the likeliest first: the one that would have come first is the first of the pair.
     scans : sequence of CandidateScan
         Of the nominal model, then of models with one effect: the p-value of the second effect is that
-        beside the first, where it was scanned.
+        beside the first, where it was scanned, else that against the nominal model.
+    alternatives : tuple of Alternative
+        Everything that was fitted, the likeliest first.
     """
     nominal, final = evidence
     best = pairs[0].fit
@@ -201,4 +212,4 @@ def accept_pair(
             ties[replaced] = (*ties[replaced], instead)
     beside_first = next((scan for scan in scans[1:] if scan.fit.effects[-1:] == (first,)), scans[0])
     p_values = {first: scans[0].p_value_of(first), second: beside_first.p_value_of(second)}
-    return SelectionResult(nominal, final, best, (first, second), ties, p_values)
+    return SelectionResult(nominal, final, best, (first, second), ties, p_values, alternatives)

@@ -233,8 +233,8 @@ def accept_pair_of_effects(context: SearchContext, state: SearchState) -> Search
         return replace(state, result=reject(state.evidence, evidence, alternatives))
     order = [model.effects[-1] for model in state.screened]
     scans = (state.evidence.candidate_scan, *state.scans)
-    result = accept_pair(context.problem, (state.evidence, evidence), state.pairs, order, scans)
-    return replace(state, result=replace(result, alternatives=alternatives))
+    result = accept_pair(context.problem, (state.evidence, evidence), state.pairs, order, scans, alternatives)
+    return replace(state, result=result)
 
 
 Stage = Callable[[SearchContext, SearchState], SearchState]
