@@ -2,6 +2,8 @@
 
 import json
 import re
+import runpy
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -54,6 +56,26 @@ def test_every_module_has_its_line(pages: dict[str, str]) -> None:
     for path in (ROOT / "impactcell").rglob("*.py"):
         if path.name != "__init__.py" and path.parent.name != "effects" and path.parent.name != "impactcell":
             assert f"{path.stem}` |" in pages["rooms.md"], path
+
+
+def test_a_page_is_printed_in_a_checkout(
+    pages: dict[str, str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    monkeypatch.setattr(sys, "argv", ["generators", "rooms.md"])
+    runpy.run_module("generators", run_name="__main__")
+    assert capsys.readouterr().out == pages["rooms.md"] + "\n"
+    monkeypatch.setattr(sys, "argv", ["generators", "of_no_page.md"])
+    with pytest.raises(SystemExit, match=r"name some of alarms\.md"):
+        runpy.run_module("generators", run_name="__main__")
+
+
+def test_a_page_that_includes_one_says_how_to_print_it(pages: dict[str, str]) -> None:
+    for page in (ROOT / "docs").glob("*/*.md"):
+        text = page.read_text(encoding="utf-8")
+        for name in re.findall(r"\.\./_generated/([\w.]+)", text):
+            assert re.search(rf"% .*-m generators\b.* {re.escape(name)}", text), (page, name)
+            assert name in pages
 
 
 def test_every_verb_is_listed(pages: dict[str, str]) -> None:
