@@ -10,9 +10,10 @@ from typing import Any, Final
 import typer
 import yaml
 
+from impactcell.api.first_model import fit_first_model
 from impactcell.campaign import read
 from impactcell.cli.calibrate import calibrated_model
-from impactcell.cli.first_model import fit_first_model, say_first_model
+from impactcell.cli.first_model import say_first_model
 from impactcell.errors import SettingsError
 from impactcell.physics import Plant
 from impactcell.prediction import Model

@@ -111,6 +111,7 @@ def test_a_stroke_that_catches_up_with_the_part_is_told_with_the_way_out(
 def test_further_taps_are_taken_where_the_first_are_not_good_enough(
     begun: Path, shots: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from impactcell.api.first_model import FirstModel
     from impactcell.cli import first_model
 
     shutil.copytree(begun, tmp_path / "own")
@@ -120,9 +121,9 @@ def test_further_taps_are_taken_where_the_first_are_not_good_enough(
             journal.append(capture, make_snapshot(capture), b"", ())
     model, counts = read_cell(begun / "own.yaml").model, []
 
-    def fit(campaign: Campaign, *_: str) -> first_model.FirstModel:
+    def fit(campaign: Campaign, *_: str) -> FirstModel:
         counts.append(len(campaign.shots))
-        return first_model.FirstModel(PlantFit(model, (), 1.0), len(campaign.shots), ("strike more taps",))
+        return FirstModel(PlantFit(model, (), 1.0), len(campaign.shots), ("strike more taps",))
 
     monkeypatch.setattr(first_model, "fit_first_model", fit)
     monkeypatch.setattr(first_model, "TAPS", 3)
