@@ -77,7 +77,8 @@ def run(kind: str, seed: int) -> dict[str, Any]:
             else:
                 truth = WEDGE["coefficient_n_s_per_m"] / (1.0 - points[:, 1] / WEDGE["length_m"])
             fitted = law.values(points) if law else finding.term.basis(points) @ finding.term.coefficients
-            row["law"]["error"] = float(np.sqrt(np.mean((fitted - truth) ** 2) / np.mean(truth**2)))
+            error, force = points[:, 0] * (fitted - truth), points[:, 0] * truth
+            row["law"]["error"] = float(np.sqrt(np.mean(error**2) / np.mean(force**2)))
     return row
 
 
