@@ -151,7 +151,7 @@ def test_in_its_place_a_form_outdoes_a_name_only_where_it_keeps_ahead_with_a_sec
         patch("impactcell.discrepancy.laws.standing.score_fit", lambda *_: named),
     ):
         found = outdone_by(context, given, FreeForms(_leaving(20.0), (form,), {own: term}))
-    assert found == (Outdone("friction_patch", own, place_is_right=True) if outdone else None)
+    assert found == (Outdone("friction_patch", own, same_place=True) if outdone else None)
 
 
 @pytest.mark.parametrize(
@@ -240,6 +240,6 @@ def test_a_delay_is_not_established_in_the_place_of_a_lag() -> None:
     assert found.added == ()
     outcome = result_document(found)
     assert outcome["outdone"] == {
-        "effect": "channel_skew", "form": FORCE_FILTER.equation, "place_is_right": True
+        "effect": "channel_skew", "form": FORCE_FILTER.equation, "same_place": True
     }  # fmt: skip
     assert "Channel skew comes nearest, but a free function" in outcome["headline"]

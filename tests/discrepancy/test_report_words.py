@@ -32,3 +32,22 @@ def test_a_tie_and_a_name_are_told_as_what_they_are(ties: tuple[str, ...]) -> No
     said = sentences._conclusion(result)
     assert ("cannot tell apart" in said) is bool(ties)
     assert ("with it the held-out gap falls from 3.00 to 1.00" in said) is not bool(ties)
+
+
+@pytest.mark.parametrize(
+    ("depends_on", "said"),
+    [
+        (
+            ("velocity", "direction"),
+            "more values of velocity, all else unchanged; what remains is in free slide",
+        ),
+        (("direction",), "the same settings again; what remains is in free slide"),
+        ((), "the same settings again; what remains is in free slide"),
+    ],
+)
+def test_nobody_is_asked_for_more_values_of_what_has_no_more(depends_on: tuple[str, ...], said: str) -> None:
+    result: Any = SimpleNamespace(
+        conclusion=SimpleNamespace(verdict="unknown", remaining=SimpleNamespace(explained=False)),
+        unexplained=SimpleNamespace(phase="free_slide", depends_on=depends_on),
+    )
+    assert sentences.next_step(result) == said

@@ -9,8 +9,8 @@ from impactcell.discrepancy.laws.condense import rank_forms
 from impactcell.discrepancy.laws.covariates import FEWEST_VALUES, poor_columns
 from impactcell.discrepancy.laws.fitted_function import (
     FittedFunction,
+    drawn_function,
     effective_numbers,
-    fitted_function,
     gives_energy,
     slices_of,
 )
@@ -159,7 +159,7 @@ def _best_finding(
     change = measure.change(held_base, held, (_part(best),))
     return LawFinding(
         best,
-        fitted_function(best),
+        drawn_function(best),
         slices_of(best),
         law,
         () if law is None else _equivalents(laws),

@@ -10,8 +10,9 @@ from impactcell.discrepancy.laws.term_start import equations
 from impactcell.discrepancy.model import parameter_name
 from impactcell.records import Samples
 
-DRAWN = 60
-"""Points of the range at which a term is drawn and looked at."""
+DRAWN, DRAWN_PER_COEFFICIENT = 60, 5
+"""Points of the range at which a term is looked at; and at which it is drawn, if those are more, of each
+coefficient of its spline."""
 BAND = 1.96
 """Standard deviations of a 95 % band."""
 BELOW_BAND = 0.025
@@ -32,15 +33,20 @@ class FittedFunction:
     high: Samples
 
 
-def fitted_function(term: FreeTerm, quantile: float = 0.5) -> FittedFunction:
+def fitted_function(term: FreeTerm, quantile: float = 0.5, count: int = DRAWN) -> FittedFunction:
     """Evaluate a term along its covariate, at a quantile of the second one where there are two."""
-    u = np.linspace(term.visited.lower, term.visited.upper, DRAWN)
+    u = np.linspace(term.visited.lower, term.visited.upper, count)
     second = term.visited.second
     points = u
     if second is not None:
-        points = np.column_stack([u, np.full(DRAWN, np.quantile(second.values, quantile))])
+        points = np.column_stack([u, np.full(count, np.quantile(second.values, quantile))])
     value, std = _with_deviation(term, points)
     return FittedFunction(u, value, value - BAND * std, value + BAND * std)
+
+
+def drawn_function(term: FreeTerm) -> FittedFunction:
+    """Evaluate a term as finely as its spline may bend."""
+    return fitted_function(term, count=max(DRAWN, DRAWN_PER_COEFFICIENT * len(term.columns)))
 
 
 def slices_of(term: FreeTerm) -> tuple[tuple[float, FittedFunction], ...]:

@@ -119,7 +119,7 @@ def outdone_by(context: SearchContext, selection: SelectionResult, forms: FreeFo
     effect = selection.accepted.effects[-1]
     refitted = refine(context, [selection.accepted])
     if not refitted:
-        return Outdone(effect, "", place_is_right=False)
+        return Outdone(effect, "", same_place=False)
     named = score_fit(context.coarse, refitted[0], effect)
     if find_effect(effect).kind is Kind.BETWEEN_SHOTS:
         rivals = (

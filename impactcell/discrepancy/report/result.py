@@ -97,7 +97,7 @@ def _outdone(outdone: Outdone | None) -> dict[str, Any] | None:
     if outdone is None:
         return None
     form = find_effect(outdone.form).equation if outdone.form else ""
-    return {"effect": outdone.effect, "form": form, "place_is_right": outdone.place_is_right}
+    return {"effect": outdone.effect, "form": form, "same_place": outdone.same_place}
 
 
 def _parts(gap: Gap) -> dict[str, float | None]:

@@ -9,6 +9,9 @@ from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
 
+NOT_SET = frozenset({"direction", "order"})
+"""Covariates of which there are no more values to set: a shot goes one way or the other, and has its turn."""
+
 
 def phrase(identifier: str) -> str:
     """Name of an effect as one would say it."""
@@ -75,7 +78,7 @@ def next_step(result: DiscrepancyResult) -> str:
     place = result.unexplained or next(iter(conclusion.remaining.where), None)
     if place is None:
         return "the same settings again: held-out shots do not say yet where something remains"
-    varied = " and ".join(map(phrase, place.depends_on))
+    varied = " and ".join(phrase(name) for name in place.depends_on if name not in NOT_SET)
     what = f"more values of {varied}, all else unchanged" if varied else "the same settings again"
     return f"{what}; what remains is in {phrase(place.phase)}"
 
@@ -113,8 +116,8 @@ def _outdone(result: DiscrepancyResult) -> str:
         return ""
     name = phrase(outdone.effect).capitalize()
     form = f"a free function s, {find_effect(outdone.form).equation},"
-    if outdone.place_is_right:
-        return f" {name} comes nearest, but {form} follows better: the place is right, the law is not."
+    if outdone.same_place:
+        return f" {name} comes nearest, but {form} follows better in the same place: the law is another."
     return f" {name} comes nearest, but {form} explains as much: it is not the cause."
 
 

@@ -28,13 +28,14 @@ class Outdone:
     effect : str
     form : str
         Identifier of the free form's place.
-    place_is_right : bool
-        The form may be the law of the effect: it enters the equations of motion where that does.
+    same_place : bool
+        The form may be the law of the effect: it enters the equations of motion where that does,
+        and reads all that it reads.
     """
 
     effect: str
     form: str
-    place_is_right: bool
+    same_place: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -92,8 +92,8 @@ def _outdone(result: Mapping[str, Any]) -> str:
     if not outdone or not outdone["form"]:
         return ""
     name, form = german_effect(outdone["effect"]), f"eine freie Funktion s, {outdone['form']},"
-    says = "folgt besser: Die Stelle stimmt, das Gesetz nicht"
-    if not outdone["place_is_right"]:
+    says = "folgt an derselben Stelle besser: Das Gesetz ist ein anderes"
+    if not outdone["same_place"]:
         says = "erklärt ebenso viel: Das ist nicht die Ursache"
     return f" {name} kommt ihr am nächsten, aber {form} {says}."
 
