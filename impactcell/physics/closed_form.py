@@ -20,7 +20,6 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.physics.half_wave import Oscillator, Swing, separation_time, stop_time, swing_at, swing_from
 from impactcell.physics.linear_slide import (
-    CONVERGED,
     NEVER,
     NEWTON_STEPS,
     along_profile,
@@ -32,6 +31,7 @@ from impactcell.physics.linear_slide import (
 from impactcell.records import Samples
 
 MAX_RESTS = 4000  # of a part under one push, after which it is taken to creep without end
+CONVERGED_NEXT = 1e-8  # step, over the phase from halt to turn, after which Newton's method is at rounding
 SLOWEST_SWING = 1e-9  # of w², least squared frequency: a contact damped beyond that is taken as this
 
 TURNS: Final = 0  # how a half wave ends: compression turns into departure or back
@@ -90,26 +90,50 @@ def travel_after_halt(indentation: float, speed: float, contact: Contact) -> flo
         if amplitude <= rest:
             return indentation - rest + amplitude
         return indentation + along_profile(0.5 * (amplitude * amplitude - rest * rest) / rest, part)
-    z = 0.5 * viscous / mass
-    wd = math.sqrt(w2 - z * z)
+    z, wd = contact.unloading.decay, contact.unloading.frequency
     c = (z * e - speed) / wd  # e(t) = exp(-z t) (e cos wd t + c sin wd t), e'(0) = -speed
     p = (w2 * e - z * speed) / wd  # e'(t) = -exp(-z t) (speed cos wd t + p sin wd t)
-    turn = math.atan2(speed, -p) / wd
-    low, high = 0.0, turn
-    if math.exp(-z * turn) * (e * math.cos(wd * turn) + c * math.sin(wd * turn)) >= -rest:
-        return float(e - math.exp(-z * turn) * (e * math.cos(wd * turn) + c * math.sin(wd * turn)))
-    t = 0.5 * turn
+    turn = math.atan2(speed, -p)  # of the phase wd t
+    furthest = math.exp(-z / wd * turn) * (e * p - c * speed) / math.sqrt(speed * speed + p * p)
+    if furthest <= rest:
+        return float(e + furthest)
+    departure = furthest * wd * departing(z / wd, rest / furthest, turn)
+    return indentation + along_profile(slide_distance(departure, mass, friction, viscous), part)
+
+
+@compiled
+def departing(ratio: float, q: float, most: float) -> float:
+    """Speed of departure where contact is lost, over `furthest` wd.
+
+    Seen back from where the part would turn if it stuck to its actuator, a phase y before it, the
+    indentation is -furthest g(y), and contact is lost where g(y) = q::
+
+        g(y) = exp(ratio y) (cos y - ratio sin y),   g'(y) = -(1 + ratio²) exp(ratio y) sin y
+
+    Parameters
+    ----------
+    ratio : float
+        z / wd; usually some hundredths, so that its first order is where to begin.
+    q : float
+        0 < q < 1.
+    most : float
+        Phase from the halt to the turn.
+    """
+    y, sine = math.acos(q), math.sqrt(1.0 - q * q)
+    if sine > 0.0:
+        y += ratio * (y * q / sine - 1.0)
+    low, high = 0.0, most
+    y = min(max(y, low), high)
     for _ in range(NEWTON_STEPS):
-        decay, cosine, sine = math.exp(-z * t), math.cos(wd * t), math.sin(wd * t)
-        value = decay * (e * cosine + c * sine) + rest
-        slope = -decay * (speed * cosine + p * sine)
-        new, low, high = narrowed(t, value, slope, low, high)
-        converged = abs(new - t) <= CONVERGED * turn
-        t = new
+        growth, cosine, sine = math.exp(ratio * y), math.cos(y), math.sin(y)
+        value = growth * (cosine - ratio * sine) - q
+        slope = -(1.0 + ratio * ratio) * growth * sine
+        new, low, high = narrowed(y, value, slope, low, high)
+        converged = abs(new - y) <= CONVERGED_NEXT * most
+        y = new
         if converged:
             break
-    departure = math.exp(-z * t) * (speed * math.cos(wd * t) + p * math.sin(wd * t))
-    return indentation + along_profile(slide_distance(max(departure, 0.0), mass, friction, viscous), part)
+    return (1.0 + ratio * ratio) * math.exp(ratio * y) * math.sin(y)
 
 
 @compiled

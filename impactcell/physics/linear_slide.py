@@ -63,13 +63,16 @@ def speed_after(speed: float, t: float, mass: float, friction: float, viscous: f
 
 @compiled
 def narrowed(t: float, value: float, slope: float, low: float, high: float) -> tuple[float, float, float]:
-    """Newton step from t towards the zero that `value` falls through in (low, high); then the new bracket."""
+    """Newton step from t towards the zero that `value` falls through in (low, high); then the new bracket.
+
+    A step that rounding ends at t itself, which is now an end of the bracket, stays there: it has arrived.
+    """
     if value > 0.0:
         low = t
     else:
         high = t
     new = t - value / slope if slope < 0.0 else 0.5 * (low + high)
-    if not low < new < high:
+    if not low <= new <= high:
         new = 0.5 * (low + high)
     return new, low, high
 

@@ -7,6 +7,7 @@ import pytest
 
 from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.physics.closed_form import displacement_of, displacements
+from impactcell.physics.linear_slide import narrowed
 from impactcell.positioning.safety_limits import allowed_strokes, largest_force
 from simulator.plant import Plant as TruePlant
 from simulator.plant import TapInput as TrueStrike
@@ -75,6 +76,17 @@ def test_one_course_answers_for_every_stroke() -> None:
         displacements(row[6], strokes, row[:5], np.array([row[5], 9.81]), together)
         alone = np.array([of(row, stroke) for stroke in strokes])
         np.testing.assert_array_equal(together, alone)
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-300, -1e-300])
+def test_newton_stays_where_it_has_arrived(value: float) -> None:
+    new, _, _ = narrowed(0.3, value, -1.0, 0.0, 1.0)
+    assert new == 0.3
+
+
+def test_newton_outside_its_bracket_halves_it() -> None:
+    assert narrowed(0.25, 5.0, -1.0, 0.0, 1.0) == (0.625, 0.25, 1.0)
+    assert narrowed(0.5, -5.0, -1.0, 0.0, 1.0) == (0.25, 0.0, 0.5)
 
 
 def test_without_a_stroke_the_actuator_halts_at_separation() -> None:
