@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 
 from impactcell.api.findings import write_findings
-from impactcell.discrepancy.laws import condense, covariates, finding, fitted_function, grammar, refit
+from impactcell.discrepancy import workflow
+from impactcell.discrepancy.laws import (
+    condense,
+    covariates,
+    finding,
+    fitted_function,
+    free_term,
+    grammar,
+    refit,
+)
 from impactcell.discrepancy.laws.tangent import Tangent
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.bspline import tensor_basis
@@ -28,8 +37,11 @@ FEW = ("hertz_contact",)
 
 @pytest.fixture(scope="module")
 def oil() -> DiscrepancyResult:
-    """Fewer forms are refitted than a user has, for the sake of time."""
+    """Fewer forms and places are fitted than a user has, for the sake of time."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(workflow, "hold_against_free_forms", lambda _context, selection: selection)
+        patch.setattr(free_term, "PLACES", 2)
+        patch.setattr(free_term, "FINER", {})
         patch.setattr(refit, "REFITTED", 6)
         patch.setattr(refit, "is_simple", lambda _: False)
         return investigate(oil_campaign(8601, shots=SHOTS), seed=1, library=FEW)
