@@ -104,21 +104,27 @@ def _seconds(*models: ScoredModel) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("second", "ahead", "stays"),
+    ("left", "second", "ahead", "stays"),
     [
-        ("free_friction_over_speed", 50.0, False),
-        ("free_friction_over_speed", 40.0, False),
-        ("free_friction_over_speed", 39.0, True),
-        ("free_reading_over_force", 50.0, True),
+        (5.0, "free_friction_over_speed", 50.0, False),
+        (5.0, "free_friction_over_speed", 40.0, False),
+        (5.0, "free_friction_over_speed", 39.0, True),
+        (5.0, "free_reading_over_force", 50.0, True),
+        (2.0, "free_friction_over_speed", 39.0, True),
+        (1.9, "free_friction_over_speed", 39.0, False),
+        (1.0, "free_friction_over_speed", 39.0, False),
     ],
 )
-def test_a_name_that_shows_beside_a_form_falls_to_a_second_form_elsewhere(
-    second: str, ahead: float, *, stays: bool
+def test_a_name_that_shows_beside_a_form_falls_to_a_second_form_elsewhere_or_if_the_form_needs_it_little(
+    left: float, second: str, ahead: float, *, stays: bool
 ) -> None:
     """A gain of the force sensor was named beside friction over position, for friction that came late."""
-    named = _scored("force_sensor_gain", "free_friction_over_position", 1.01, 40.0)
+    place = "free_friction_over_position"
+    named = _scored("force_sensor_gain", place, 1.01, 40.0)
+    term: Any = SimpleNamespace(problem=None, fit=None)
+    forms = FreeForms(_leaving(20.0), (_scored("", place, left),), {place: term})
     with _seconds(_scored("", second, 1.0, ahead)):
-        assert stands_beside(SimpleNamespace(), named, SimpleNamespace(problem=None, fit=None)) is stays  # type: ignore[arg-type]
+        assert stands_beside(SimpleNamespace(), named, forms) is stays  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def hold_against_free_forms(context: SearchContext, selection: SelectionResult) 
             best.leaves_nothing
             and best.is_told_from(free)
             and best.p_value <= MAX_P_VALUE
-            and stands_beside(fewer, best, forms.terms[best.place])
+            and stands_beside(fewer, best, forms)
         ):
             return _accept(context, selection, best, _tied(best, beside))
     outdone = outdone_by(fewer, selection, forms)
