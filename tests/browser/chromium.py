@@ -15,6 +15,7 @@ from selenium.common.exceptions import (
     ElementNotInteractableException,
     StaleElementReferenceException,
     TimeoutException,
+    WebDriverException,
 )
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
@@ -109,6 +110,18 @@ class Browser:
     @property
     def text(self) -> str:
         return str(self.driver.find_element(By.TAG_NAME, "body").text)
+
+    def text_within(self, css: str) -> str:
+        """Text of a frame; empty while its document, which comes from a process of its own, is exchanged."""
+        self.driver.switch_to.frame(self.find(css))
+        try:
+            return self.text
+        except WebDriverException as error:
+            if "frame detached" not in str(error):
+                raise
+            return ""
+        finally:
+            self.driver.switch_to.default_content()
 
     @property
     def path(self) -> str:

@@ -103,9 +103,9 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
         begun = time.monotonic()
         browser.find('button[value="discrepancy"]').click()
         browser.find('[data-effect="stribeck_friction"]', STUDY_S)
-        browser.driver.switch_to.frame(browser.find("iframe.report"))
-        assert "Missing: stribeck friction" in browser.text
-        browser.driver.switch_to.default_content()
+        browser.until(
+            lambda: "Missing: stribeck friction" in browser.text_within("iframe.report"), "the report"
+        )
         return time.monotonic() - begun
 
     def accept() -> None:

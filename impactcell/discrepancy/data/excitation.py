@@ -108,15 +108,16 @@ class ExcitationStrategy(ABC):
     def split(self, shots: Sequence[PreparedShot], seed: int) -> tuple[IndexArray, IndexArray]:
         """Divide the shots into training and held-out ones: their indices, each in file order.
 
-        A quarter is held out, spread over the settings. Held-out shots come first from settings that have
-        replicates, so that no setting is lost to training.
+        A quarter is held out, spread over the settings: of one that has replicates a quarter of them, as near
+        as that can be, and of the shots that are alone in theirs a quarter too, so that the model is also
+        asked where it was not fitted.
         """
         n = len(shots)
         rng = np.random.default_rng([seed, 1])
         order = rng.permutation(n)
         strata = [_stratum(shot) for shot in shots]
-        # Round after round one shot of every stratum: the later rounds go to training last, so that
-        # the held-out shots are those of the first rounds of the fullest strata.
+        # Round after round one shot of every stratum, at evenly spread shares of it: the quarter with the
+        # smallest shares is a quarter of each.
         rank = np.empty(n, dtype=np.int64)
         count_of_stratum: dict[tuple[float, float], int] = {}
         for index in order.tolist():
