@@ -2,20 +2,21 @@
 
 import math
 
-from generators.markdown import code, table
+from generators.markdown import code
+from impactcell.physics.effect import Effect
 from impactcell.physics.effects import LIBRARY
 
 
 def library() -> str:
-    """Write a row an effect."""
-    rows = []
-    for identifier, effect in sorted(LIBRARY.items()):
-        parameters = "; ".join(
-            f"{code(parameter.name)} [{parameter.unit}], {parameter.lower:g} to {parameter.upper:g}"
-            + ("" if math.isnan(parameter.null) else f", vanishes at {parameter.null:g}")
-            for parameter in effect.parameters
-        )
-        rows.append(
-            (code(identifier), effect.kind.value, code(effect.equation), parameters, effect.reference)
-        )
-    return table(("effect", "acts on", "law", "parameters", "reference"), rows)
+    """Write a section an effect."""
+    return "\n".join(_section(identifier, effect) for identifier, effect in sorted(LIBRARY.items()))
+
+
+def _section(identifier: str, effect: Effect) -> str:
+    parameters = [
+        f"- {code(parameter.name)} [{parameter.unit}], {parameter.lower:g} to {parameter.upper:g}"
+        + ("" if math.isnan(parameter.null) else f", vanishes at {parameter.null:g}")
+        for parameter in effect.parameters
+    ]
+    law = f"Acts on: {effect.kind.value}. Law: {code(effect.equation)}"
+    return "\n".join((f"## {identifier}", "", law, "", *parameters, "", f"{effect.reference}.", ""))

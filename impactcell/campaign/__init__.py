@@ -1,7 +1,7 @@
 """Campaign directories: recorded shots on disk, read and written in one format."""
 
 from impactcell.campaign.contents import COLUMNS, Campaign, Coordinate, Excitation, Sensor
-from impactcell.campaign.faults import LARGEST
+from impactcell.campaign.faults import LARGEST, naming
 from impactcell.campaign.pretrigger import from_contact
 from impactcell.campaign.reading import read
 from impactcell.campaign.writing import write
@@ -14,6 +14,7 @@ __all__ = [
     "Excitation",
     "Sensor",
     "from_contact",
+    "naming",
     "read",
     "write",
 ]

@@ -1,6 +1,8 @@
 """Collects every fault of a campaign before any of them is reported."""
 
+import contextlib
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 from impactcell.errors import CampaignError
@@ -11,6 +13,17 @@ MOST_BYTES = 500_000_000
 """Of one file: an hour of three channels at 10 kHz as text."""
 MAX_FAULTS_SHOWN = 20
 """Faults told of one campaign; a reader mends twenty at a time."""
+
+
+@contextlib.contextmanager
+def naming(source: Path | None) -> Iterator[None]:
+    """Put where a campaign was read before what is found wrong with it later; None for one never read."""
+    try:
+        yield
+    except CampaignError as error:
+        if source is None:
+            raise
+        raise CampaignError(f"{source}: {error}") from error
 
 
 class Faults:

@@ -19,6 +19,8 @@ from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from impactcell.numerics.compilation import announce_compilation
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 pointer_to: Any = types.CPointer
@@ -139,6 +141,7 @@ class _Cache(FunctionCache):
         """Give machine code from disk; without any the caller compiles, and saves what came of it."""
         code = self._loaded(sig, target_context)
         if code is None:
+            announce_compilation()
             _turns.take(self, self._source)
             code = self._loaded(sig, target_context)  # another process may have compiled it meanwhile
             if code is not None:

@@ -39,7 +39,7 @@ def sample_taps(
     Returns
     -------
     ndarray, shape (samples,)
-        Not finite where the laws gave no numbers.
+        Not finite where the laws gave no numbers, or a tap needed more than `MAX_STEPS`, from there on.
     """
     samples = np.empty(times.size)
     outputs = np.empty((taps.parameters.shape[0], at.OUTPUT_COUNT))

@@ -82,6 +82,15 @@ def fill_after_end(t: float, state: FloatPointer, phase: SmoothPhase, record: Ta
 
 
 @compiled
+def fill_unknown(record: TapRecord) -> None:
+    """Fill the samples that a motion given up has not reached: NaN, so that no fit takes them for a rest."""
+    index = record.sample_index
+    for channel in range(at.CHANNEL_COUNT):
+        for i in range(index[channel], index[at.CHANNEL_COUNT + channel]):
+            record.samples[i] = np.nan
+
+
+@compiled
 def is_at_rest(t: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> bool:
     """Whether a part that nothing drives any more has come to rest and all is known of it.
 

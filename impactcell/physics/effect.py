@@ -138,9 +138,12 @@ class Factors(NamedTuple):
 ONE = np.ones(())
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Effect:
     """A named physical effect; each file of `impactcell.physics.effects` holds one.
+
+    Two effects are never equal, also where both have one identifier: what is remembered of one is not used
+    for the other.
 
     Attributes
     ----------

@@ -16,7 +16,6 @@ from impactcell.numerics.jit import address
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 from impactcell.physics.effects import LIBRARY, offer_effect, withdraw_effect
 from impactcell.physics.ensemble import Ensemble
-from impactcell.physics.law_table import build_law_table
 from impactcell.physics.plant import TapInput
 from impactcell.records import Samples
 
@@ -74,7 +73,6 @@ def contract_faults(effect: Effect) -> list[str]:
     finally:
         if is_new:
             withdraw_effect(effect.identifier)
-            build_law_table.cache_clear()
 
 
 def _statement(effect: Effect) -> list[str]:

@@ -96,6 +96,10 @@ class Ensemble:
             index[i][at.CHANNEL_COUNT + channel] = total
         self._times = np.concatenate(pieces) if pieces else NO_SAMPLES
         self._sample_index = np.array(index, dtype=np.int64).reshape(-1, at.SAMPLE_INDEX_COUNT)
+        self._owner = np.empty(total, dtype=np.int64)
+        for i, row in enumerate(index):
+            for channel in range(at.CHANNEL_COUNT):
+                self._owner[row[channel] : row[at.CHANNEL_COUNT + channel]] = i
         spans = [[(row[k], row[at.CHANNEL_COUNT + k]) for row in index] for k in range(at.CHANNEL_COUNT)]
         self._channels: list[slice | np.ndarray] = [
             np.concatenate([np.arange(begin, end) for begin, end in span])
@@ -125,7 +129,7 @@ class Ensemble:
 
     def parameters(self, plant: Plant) -> Samples:
         """Parameter vector of `plant`, shape (len(names),); its effects must be among the ensemble's."""
-        unknown = set(plant.effects) - set(self._table.effects)
+        unknown = set(plant.effects) - {effect.identifier for effect in self._table.effects}
         if unknown:
             raise PhysicsError(f"the ensemble was made without {', '.join(sorted(unknown))}")
         return parameter_vector(plant, self._table, self.batches)
@@ -180,13 +184,20 @@ class Ensemble:
         *,
         mass_kg: Samples | None = None,
         initial_speed_m_s: Samples | None = None,
+        onset_s: Samples | None = None,
     ) -> Samples:
-        """Return the samples of `traces` in one row, all taps and channels end to end."""
-        return self._sample(self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s))
+        """Return the samples of `traces` in one row, all taps and channels end to end.
 
-    def _sample(self, parameters: Samples) -> Samples:
+        `onset_s`, shape (n,): when first contact was, by the clock of the sample times; 0 unless given. No
+        sample may lie before it.
+        """
+        parameters = self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s)
+        return self._sample(parameters, onset_s)
+
+    def _sample(self, parameters: Samples, onset_s: Samples | None = None) -> Samples:
         taps = TapArrays(parameters, self._table.laws, self._drives, self._drive_ends)
-        return sample_taps(taps, self._sample_index, self._times)
+        times = self._times if onset_s is None else self._times - self._each_sample(onset_s)
+        return sample_taps(taps, self._sample_index, times)
 
     def _split(self, out: Samples) -> Traces:
         force, position, actuator, velocity = (out[..., channel] for channel in self._channels)
@@ -242,12 +253,7 @@ class Ensemble:
         return self._split(derivatives)
 
     def _each_sample(self, values: Samples) -> Samples:
-        by_sample = np.empty(self._times.size)
-        for channel in range(at.CHANNEL_COUNT):
-            for i in range(self._count):
-                by_sample[
-                    self._sample_index[i, channel] : self._sample_index[i, at.CHANNEL_COUNT + channel]
-                ] = values[i]
+        by_sample: Samples = values[self._owner]
         return by_sample
 
     def outputs(

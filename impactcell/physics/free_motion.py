@@ -65,8 +65,8 @@ def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
     values = parameter_vector(plant, program)
     mass, g, sign = tap.mass_kg, plant.gravity_m_s2, tap.direction
     total, arguments = np.zeros(len(speed_m_s)), np.zeros((len(speed_m_s), 4))
-    for identifier, spans in zip(program.effects, program.parameter_spans, strict=True):
-        laws, p = find_effect(identifier).laws, np.array([values[first] for first, _ in spans])
+    for effect, spans in zip(program.effects, program.parameter_spans, strict=True):
+        laws, p = effect.laws, np.array([values[first] for first, _ in spans])
         body, kinetic = laws.get(LawKind.BODY), laws.get(LawKind.KINETIC)
         if body is not None:
             arguments[:, 0], arguments[:, 1] = tap.start_m, sign * speed_m_s
@@ -97,8 +97,7 @@ def linear_resistance(plant: Plant) -> float:
     table = build_law_table(tuple(plant.effects))
     values = parameter_vector(plant, table)
     total = 0.0
-    for identifier, spans in zip(table.effects, table.parameter_spans, strict=True):
-        effect = find_effect(identifier)
+    for effect, spans in zip(table.effects, table.parameter_spans, strict=True):
         body = effect.laws.get(LawKind.BODY)
         if body is not None and not effect.columns:
             p = [values[first] for first, _ in spans]

@@ -10,6 +10,7 @@ from impactcell.physics import memory_layout as at
 from impactcell.physics.boundary_samples import (
     fill_after_end,
     fill_before_contact,
+    fill_unknown,
     finish_outputs,
     is_at_rest,
     last_sample_time,
@@ -39,7 +40,8 @@ from impactcell.records import Samples
 
 MAX_EVENTS = 20_000  # of a tap; one that has more is pushed on without end
 EVENTS_PER_DRIVE_SAMPLE = 10  # allowed beyond that under a measured force
-MAX_STEPS = 20_000_000  # of a tap: minutes of computing
+MAX_STEPS = 200_000  # of a tap, which needs some hundreds, or 30 000 to slide for ten minutes
+STEPS_PER_DRIVE_SAMPLE = 100  # allowed beyond that under a measured force
 MAX_STEP_S = 0.02  # beyond which events could be stepped over
 SHORTEST_STEP_S = 1e-14  # accepted whatever its error: rounding of the time
 SHORTEST_TRIAL_S = 1e-15  # below which laws that give no numbers are given up
@@ -169,8 +171,11 @@ def following_length(error: float, h: float) -> float:
 @compiled
 def gives_up(steps: int, error: float, h: float, drive: DrivingForce, outputs: FloatPointer) -> bool:
     """Whether a tap has no end or its laws give no numbers; its status says so."""
-    if steps > MAX_STEPS or outputs[at.EVENT_COUNT] > MAX_EVENTS + EVENTS_PER_DRIVE_SAMPLE * drive.samples:
+    if outputs[at.EVENT_COUNT] > MAX_EVENTS + EVENTS_PER_DRIVE_SAMPLE * drive.samples:
         outputs[at.STATUS] = at.TOO_MANY_EVENTS
+        return True
+    if steps > MAX_STEPS + STEPS_PER_DRIVE_SAMPLE * drive.samples:
+        outputs[at.STATUS] = at.TOO_MANY_STEPS
         return True
     if not math.isfinite(error) and h < SHORTEST_TRIAL_S:
         outputs[at.STATUS] = at.NOT_FINITE
@@ -221,7 +226,10 @@ def integrate_tap(
         # Held for good: the actuator has stalled against it, or nothing drives it any more.
         outputs[at.STATUS] = at.AT_REST
     outputs[at.STEP_COUNT] = steps
-    fill_after_end(t, step.state, phase, record)
+    if outputs[at.STATUS] == at.TOO_MANY_STEPS:
+        fill_unknown(record)
+    else:
+        fill_after_end(t, step.state, phase, record)
     finish_outputs(t, step.state, phase, outputs)
 
 

@@ -45,7 +45,7 @@ class LawTable:
         Of each effect, where the shot's values of the columns that its laws read begin; 0 where none do.
     """
 
-    effects: tuple[str, ...]
+    effects: tuple[Effect, ...]
     batches: int
     names: tuple[str, ...]
     parameter_spans: tuple[tuple[tuple[int, int], ...], ...]
@@ -56,7 +56,7 @@ class LawTable:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel to another process by name: addresses of laws mean nothing there."""
-        return build_law_table, (self.effects, self.batches)
+        return build_law_table, (tuple(effect.identifier for effect in self.effects), self.batches)
 
     def tap_parameters(self, values: Samples, gravity_m_s2: float, taps: Mapping[str, Samples]) -> Samples:
         """Parameters of taps, shape (n, width), of values, shape (n, len(names)), and the taps' columns."""
@@ -74,8 +74,7 @@ class LawTable:
         parameters[:, self.places] = values[:, 4:]
         self._set_columns(parameters, taps)
         shots: Covariates | None = None
-        for identifier, spans in zip(self.effects, self.parameter_spans, strict=True):
-            effect = find_effect(identifier)
+        for effect, spans in zip(self.effects, self.parameter_spans, strict=True):
             if effect.between is None:
                 continue
             if shots is None:
@@ -97,10 +96,9 @@ class LawTable:
     def _set_columns(self, parameters: Samples, taps: Mapping[str, Samples]) -> None:
         """Hand laws the shots' values of their columns; where one is not known the effect is at its null."""
         entries = zip(self.effects, self.parameter_spans, self.column_places, strict=True)
-        for identifier, spans, begin in entries:
+        for effect, spans, begin in entries:
             if not begin:
                 continue
-            effect = find_effect(identifier)
             given = _columns_of(effect, taps, np.full(len(parameters), np.nan))
             known = np.isfinite(np.column_stack(list(given.values()))).all(axis=1)
             for place, (name, column) in enumerate(given.items(), begin):
@@ -113,7 +111,6 @@ class LawTable:
                     )
 
 
-@lru_cache(maxsize=256)
 def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
     """Lay out the laws and parameters of a set of effects, in their given order.
 
@@ -122,24 +119,28 @@ def build_law_table(effects: tuple[str, ...], batches: int = 1) -> LawTable:
     PhysicsError
         For an effect that the library does not have, or one named twice.
     """
+    if len(set(effects)) != len(effects):
+        raise PhysicsError(f"an effect is named twice among {', '.join(effects)}")
+    return _law_table(tuple(find_effect(identifier) for identifier in effects), batches)
+
+
+@lru_cache(maxsize=256)
+def _law_table(effects: tuple[Effect, ...], batches: int) -> LawTable:
     names = list(NOMINAL_PARAMETERS)
     spans: list[tuple[tuple[int, int], ...]] = []
     column_places: list[int] = []
     places: list[int] = []
     width = at.FIRST_EFFECT_PARAMETER
     lists: dict[int, list[tuple[int, int, int]]] = {kind: [] for kind in range(at.LAW_KINDS)}
-    if len(set(effects)) != len(effects):
-        raise PhysicsError(f"an effect is named twice among {', '.join(effects)}")
-    for identifier in effects:
-        effect = find_effect(identifier)
+    for effect in effects:
         spans_of_effect: list[tuple[int, int]] = []
         named = len(names)
         for parameter in effect.parameters:
             begin = len(names)
             if parameter.per_batch:
-                names += [f"{identifier}.{parameter.name}[{i}]" for i in range(1, batches)]
+                names += [f"{effect.identifier}.{parameter.name}[{i}]" for i in range(1, batches)]
             else:
-                names.append(f"{identifier}.{parameter.name}")
+                names.append(f"{effect.identifier}.{parameter.name}")
             spans_of_effect.append((begin, len(names)))
         spans.append(tuple(spans_of_effect))
         first, numbers = width, len(names) - named
@@ -187,13 +188,12 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
         For a parameter that its effect does not have, one out of its range, or a wrong number of batches.
     """
     values = [plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k]
-    for identifier in program.effects:
-        given = plant.effects.get(identifier, {})
-        effect = find_effect(identifier)
+    for effect in program.effects:
+        given = plant.effects.get(effect.identifier, {})
         unknown = set(given) - {parameter.name for parameter in effect.parameters}
         if unknown:
             raise PhysicsError(
-                f"{identifier} has no parameter {', '.join(sorted(unknown))}; "
+                f"{effect.identifier} has no parameter {', '.join(sorted(unknown))}; "
                 f"it has {', '.join(parameter.name for parameter in effect.parameters)}"
             )
         for parameter in effect.parameters:
@@ -206,7 +206,7 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
             for number in several:
                 if not parameter.lower <= number <= parameter.upper:
                     raise PhysicsError(
-                        f"{identifier}: {parameter.name} is {number}, outside "
+                        f"{effect.identifier}: {parameter.name} is {number}, outside "
                         f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
                     )
             values += several

@@ -129,6 +129,7 @@ AT_REST: Final = 0.0  # value of STATUS
 STILL_MOVING: Final = 1.0  # value of STATUS: at the end of the time allowed
 TOO_MANY_EVENTS: Final = 2.0  # value of STATUS
 NOT_FINITE: Final = 3.0  # value of STATUS: the laws gave no numbers
+TOO_MANY_STEPS: Final = 4.0  # value of STATUS: far more than a tap needs, as of one that gains energy
 
 
 class SmoothPhase(NamedTuple):

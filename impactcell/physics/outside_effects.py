@@ -19,8 +19,8 @@ from impactcell.physics.effects import LIBRARY, offer_effect
 
 GROUP = "impactcell.effects"
 """Entry-point group of plug-ins: each entry point names an `EFFECT`, or a module that has one."""
-_SOURCES: dict[str, Path] = {}
-"""File that each effect on offer came from."""
+_SOURCES: dict[Effect, Path] = {}
+"""File that each effect came from; also of those that were withdrawn."""
 _PACKAGE = "impactcell_outside_effects"
 """Prefix of the names under which files are imported."""
 
@@ -31,11 +31,15 @@ def effect_files(path: Path) -> list[Path]:
     Raises
     ------
     PhysicsError
-        There is no such file or folder, or nothing in it.
+        There is no such file or folder, it cannot be read, or nothing is in it.
     """
-    if path.is_file():
+    try:
+        is_file, is_folder = path.is_file(), path.is_dir()
+    except OSError as error:
+        raise PhysicsError(f"{path}: cannot be read: {error.strerror}") from error
+    if is_file:
         return [path]
-    if not path.is_dir():
+    if not is_folder:
         raise PhysicsError(f"{path}: there is no such file or folder of effects")
     files = sorted(file for file in path.glob("*.py") if not file.name.startswith("_"))
     if not files:
@@ -85,7 +89,7 @@ def offer_effects(paths: Sequence[Path]) -> tuple[str, ...]:
     faults: list[str] = []
     for path in paths:
         for file in effect_files(path):
-            if _SOURCES.get(file.stem) == file.resolve():
+            if source_of(file.stem) == file.resolve():
                 continue
             try:
                 effect = load_effect(file)
@@ -103,13 +107,17 @@ def offer_effects(paths: Sequence[Path]) -> tuple[str, ...]:
         raise PhysicsError("\n".join(faults))
     for file, effect in loaded.items():
         offer_effect(effect)
-        _SOURCES[effect.identifier] = file
+        _SOURCES[effect] = file
     return tuple(effect.identifier for effect in loaded.values())
 
 
 def offered_texts() -> dict[str, str]:
     """Give the text of each file of effects on offer, by its effect: what another process needs."""
-    return {identifier: file.read_text(encoding="utf-8") for identifier, file in _SOURCES.items()}
+    return {
+        effect.identifier: file.read_text(encoding="utf-8")
+        for effect, file in _SOURCES.items()
+        if LIBRARY.get(effect.identifier) is effect
+    }
 
 
 def offer_texts(texts: Mapping[str, str]) -> None:
@@ -136,7 +144,8 @@ def offer_texts(texts: Mapping[str, str]) -> None:
 
 def source_of(identifier: str) -> Path | None:
     """File that an effect on offer came from; None for those of the product and of plug-ins."""
-    return _SOURCES.get(identifier)
+    effect = LIBRARY.get(identifier)
+    return None if effect is None else _SOURCES.get(effect)
 
 
 def offer_installed() -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """How a command line ends: its exit codes, and which error leads to which."""
 
 import enum
+import errno
 import sys
 from collections.abc import Callable
 
@@ -55,6 +56,11 @@ def exit_code_of(program: str, work: Callable[[], int | None]) -> int:
         return ExitCode.BAD_INPUT
     except ImpactCellError as error:
         sys.stderr.write(f"{program}: {error}\n")
+        return ExitCode.FAILED
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        sys.stderr.write(f"{program}: {error.filename}: {error.strerror}; name another\n")
         return ExitCode.FAILED
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED

@@ -6,10 +6,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from impactcell.process.console import print_note
+
 LINES_VARIABLE: Final = "IMPACTCELL_STEPS"
 """Variable of the environment that asks for a line a step on standard error."""
 STEP_PREFIX: Final = "step: "
 """Begins such a line."""
+COMPILING: Final = "compiling for this machine, once: up to a minute"
+"""Said when machine code is missing, after an installation or an update."""
 
 
 @contextmanager
@@ -53,6 +57,14 @@ def named_steps() -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=None)
         yield lambda step: bar.update(task, description=step)
+
+
+def say_compiling() -> None:
+    """Say why nothing happens for a while; to a program that asks for steps, as one."""
+    if LINES_VARIABLE in os.environ and not sys.stderr.isatty():
+        write_step(COMPILING)
+    else:
+        print_note(COMPILING)
 
 
 def write_step(name: str) -> None:

@@ -23,13 +23,6 @@ class CoreLoader(yaml.SafeLoader):
                 None, None, f"{shown} cannot be read as {kind}", node.start_mark
             ) from fault
 
-    def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> Any:
-        """Text of a node; one half of a surrogate pair, which no file can hold again, is refused."""
-        value = super().construct_scalar(node)
-        if any("\ud800" <= sign <= "\udfff" for sign in str(value)):
-            raise yaml.MarkedYAMLError(None, None, "half a surrogate pair is no character", node.start_mark)
-        return value
-
     def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[Hashable, Any]:  # noqa: FBT001, FBT002
         """Build a mapping whose keys are plain and come once."""
         seen: set[object] = set()

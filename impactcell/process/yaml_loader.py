@@ -7,11 +7,12 @@ PyYAML alone follows 1.1, where each of these surprises.
 import difflib
 import itertools
 import types
+import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar, Union, get_args, get_origin
+from typing import Final, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -27,6 +28,10 @@ MOST_BYTES = 10_000_000
 """Of one file; a map of every register there can be has 6 MB."""
 MOST_NODES = 200_000
 """A file of nested aliases or merges can describe more than memory holds; no honest one comes near this."""
+
+
+_LAYOUT: Final = "\t\n\r\x85"
+"""Control characters that a text of several lines may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +129,8 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
         if node in above:
             raise SettingsError(f"{path}:{place}: this part of the file contains itself")
         values[location] = place
+        if isinstance(node, yaml.ScalarNode):
+            _check_characters(path, place, _dotted(location), node.value)
         if next(visits) > MOST_NODES:
             raise SettingsError(f"{path}:{place}: aliases describe more than {MOST_NODES} values")
         within = (*above, node)
@@ -144,10 +151,21 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
                             key = integer(key_node.value)
                     here = (*location, key)
                     keys[here] = FilePosition(key_node.start_mark.line + 1, key_node.start_mark.column + 1)
+                    _check_characters(path, keys[here], _dotted(location), key_node.value)
                     visit(value_node, here, within)
 
     visit(root, (), ())
     return Positions(keys, values)
+
+
+def _check_characters(path: Path, place: FilePosition, name: str, text: str) -> None:
+    """Refuse what an escape can bring in, and no name, path or text has: it fails far from here."""
+    for character in text:
+        if unicodedata.category(character) in ("Cc", "Cs") and character not in _LAYOUT:
+            message = (
+                f"has the character U+{ord(character):04X}, which no name, path or text has; take it out"
+            )
+            raise SettingsError(format_error(path, place, f"{name}: {message}" if name else message))
 
 
 def read(path: Path, schema: type[M]) -> tuple[M, Positions]:

@@ -44,6 +44,18 @@ def test_of_two_processes_one_compiles_and_an_edited_callee_is_compiled_anew(tmp
     assert run(tmp_path) == ["3.0", "0"]
 
 
+TOLD = (
+    "from impactcell.numerics.compilation import on_compilation\non_compilation(lambda: print('compiling'))\n"
+)
+
+
+def test_that_machine_code_is_missing_is_told_once_and_only_then(tmp_path: Path) -> None:
+    (tmp_path / "caller.py").write_text(TOLD + CALLER)
+    (tmp_path / "callee.py").write_text(CALLEE.format(2.0))
+    assert run(tmp_path) == ["compiling", "2.0", "0"], "of two functions"
+    assert run(tmp_path) == ["2.0", "1"]
+
+
 NAMED = (
     "from typing import NamedTuple\nfrom impactcell.numerics.jit import compiled\n\n"
     "class {0}(NamedTuple):\n    x: float\n\n"

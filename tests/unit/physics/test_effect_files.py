@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from scipy.integrate import solve_ivp
 
-from impactcell.physics import Plant, TapInput, outside_effects, simulate_free_slide
+from impactcell.physics import Plant, TapInput, simulate_free_slide
 from impactcell.physics.effect_contract import contract_faults
 from impactcell.physics.effects import withdraw_effect
 from impactcell.physics.outside_effects import load_effect, offer_effects
@@ -30,7 +30,6 @@ def offered() -> Iterator[None]:
     yield
     for name in names:
         withdraw_effect(name)
-        outside_effects._SOURCES.pop(name, None)
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

@@ -56,6 +56,21 @@ def test_an_ensemble_is_its_taps() -> None:
     assert figures.at_rest.all()
 
 
+def test_contact_of_each_tap_may_be_at_another_time() -> None:
+    """It is the same as other times of its samples."""
+    onsets = np.linspace(-8e-5, 9e-5, len(TAPS))
+    channels = {"force_time_s": TIMES, "position_time_s": [t[::3] for t in TIMES], "actuator_time_s": TIMES}
+    by_onset = Ensemble(TAPS, tuple(EFFECTS), **channels, by_tap=True)
+    moved = {
+        name: [t - onset for t, onset in zip(times, onsets, strict=True)] for name, times in channels.items()
+    }
+    by_times = Ensemble(TAPS, tuple(EFFECTS), **moved, by_tap=True)
+    theta = by_onset.parameters(PLANT)
+    samples = by_onset.samples(theta, onset_s=onsets)
+    np.testing.assert_array_equal(samples, by_times.samples(theta))
+    assert np.abs(samples - by_onset.samples(theta)).max() > 1.0
+
+
 def test_names_say_what_a_vector_holds() -> None:
     ensemble = Ensemble(TAPS, tuple(EFFECTS))
     assert ensemble.names == (

@@ -3,22 +3,27 @@
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from impactcell.cli.app import run_verb
+from impactcell.discrepancy.model import effect_coordinates
 from impactcell.errors import EffectError, PhysicsError, SettingsError
 from impactcell.physics import Plant, TapInput, outside_effects, simulate_free_slide
 from impactcell.physics.effect_contract import contract_faults
 from impactcell.physics.effects import LIBRARY, withdraw_effect
+from impactcell.physics.ensemble import Ensemble
 from impactcell.physics.outside_effects import (
     load_effect,
     offer_effects,
     offer_installed,
     offer_texts,
     offered_texts,
+    source_of,
 )
 from impactcell.prediction.model import Model, Prior
 from impactcell.settings.model_file import read_model, write_model
@@ -52,7 +57,6 @@ def own(tmp_path: Path) -> Iterator[Path]:
     file.write_text(OWN, encoding="utf-8")
     yield file
     withdraw_effect("own_pull")
-    outside_effects._SOURCES.pop("own_pull", None)
 
 
 def test_a_file_is_all_it_takes(own: Path) -> None:
@@ -69,11 +73,36 @@ def test_a_model_says_where_its_effects_are(own: Path) -> None:
     path = own.parent / "model.yaml"
     write_model(Model("own", plant, Prior(1.0, 1.0, 0.1)), path)
     withdraw_effect("own_pull")
-    outside_effects._SOURCES.clear()
     assert read_model(path).plant.effects["own_pull"]["pull_n"] == 5.0
     path.write_text(path.read_text(encoding="utf-8").replace("own_pull.py", "gone.py"), encoding="utf-8")
     with pytest.raises(SettingsError, match=r"model\.yaml:\d+:\d+: .*gone\.py: there is no such file"):
         read_model(path)
+
+
+def test_an_effect_that_was_withdrawn_leaves_nothing_behind(own: Path) -> None:
+    offer_effects([own])
+    plant, tap = Plant(6.5e5, 465.0, 0.2, 0.152, effects={"own_pull": {"pull_n": 5.0}}), TapInput(1.0, 18.9)
+    helped = Ensemble([tap], ["own_pull"], initial_speed_m_s=np.array([0.1]))
+    assert simulate_free_slide(plant, tap, 0.1).displacement_m == pytest.approx(
+        0.1**2 / 2.0 / (0.152 * 9.81 - 5.0 / 18.9), rel=1e-9
+    )
+    (before,) = effect_coordinates("own_pull", 1)
+    withdraw_effect("own_pull")
+    assert offered_texts() == {}
+    assert source_of("own_pull") is None
+    with pytest.raises(PhysicsError, match="no effect is called 'own_pull'"):
+        simulate_free_slide(plant, tap, 0.1)
+    own.write_text(OWN.replace("return p[0]", "return -p[0]").replace("upper=10.0", "upper=20.0"), "utf-8")
+    assert offer_effects([own]) == ("own_pull",)  # the same file, with another law
+    assert simulate_free_slide(plant, tap, 0.1).displacement_m == pytest.approx(
+        0.1**2 / 2.0 / (0.152 * 9.81 + 5.0 / 18.9), rel=1e-9
+    )
+    (after,) = effect_coordinates("own_pull", 1)
+    assert (before.upper, after.upper) == (10.0, 20.0)
+    # Who has the old one goes on with all of it.
+    assert helped.parameters(plant)[-1] == 5.0
+    with pytest.raises(PhysicsError, match="outside -10 to 10"):
+        helped.parameters(replace(plant, effects={"own_pull": {"pull_n": 15.0}}))
 
 
 def test_every_effect_of_the_library_keeps_the_contract() -> None:
@@ -156,7 +185,7 @@ def test_another_process_is_given_the_text(own: Path) -> None:
     with pytest.raises(PhysicsError, match="another own_pull"):
         offer_texts({"own_pull": OWN.replace("return p[0]", "return -p[0]")})
     withdraw_effect("own_pull")
-    outside_effects._SOURCES.pop("own_pull")
+    assert offered_texts() == {}
     offer_texts(texts)
     assert "own_pull" in LIBRARY
     assert offered_texts() == texts

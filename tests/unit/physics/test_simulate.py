@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import NoBreakawayError, NoSeparationError, NoStopError, PhysicsError
-from impactcell.physics import Plant, TapEventKind, TapInput, simulate_free_slide, simulate_tap
+from impactcell.physics import Ensemble, Plant, TapEventKind, TapInput, simulate_free_slide, simulate_tap
 
 K, B, MU_S, MU_K, G = 6.5e5, 465.0, 0.2, 0.152, 9.81
 NOMINAL = Plant(K, B, MU_S, MU_K)
@@ -178,6 +178,21 @@ def test_a_part_on_a_slope_too_steep_never_stops() -> None:
     steep = Plant(K, B, 0.05, 0.04, effects={"surface_tilt": {"tilt_rad": -0.06}})
     with pytest.raises(NoStopError, match="still moving"):
         simulate_tap(steep, TapInput(0.05, 18.9, 1e-3))
+
+
+def test_a_part_that_runs_away_over_waves_is_given_up_and_no_sample_is_taken_for_a_rest() -> None:
+    # In the time allowed it would cross some 1e8 waves.
+    waves = {"amplitude": 1e-3, "period_m": 1e-4, "phase_rad": 0.0}
+    plant = Plant(K, B, 0.05, 0.04, effects={"surface_tilt": {"tilt_rad": -0.06}, "periodic_friction": waves})
+    tap = TapInput(0.05, 18.9, 1e-3)
+    with pytest.raises(NoStopError, match="ran away"):
+        simulate_tap(plant, tap)
+    ensemble = Ensemble([tap], tuple(plant.effects), position_time_s=[np.array([0.5, 0.75, 1.0, 590.0])])
+    *soon, late = ensemble.traces(ensemble.parameters(plant)).position_m
+    # The contact over, the acceleration is constant; over thousands of waves friction is its mean.
+    acceleration = G * (math.sin(0.06) - 0.04)
+    assert np.diff(soon, 2)[0] == pytest.approx(acceleration * 0.25**2, rel=1e-4)
+    assert math.isnan(late)
 
 
 @pytest.mark.parametrize(

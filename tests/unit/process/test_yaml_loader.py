@@ -125,7 +125,7 @@ def test_an_unknown_key_without_a_near_one_lists_what_is_allowed(tmp_path: Path)
         ("a: !!map one\n", "1:4: expected a mapping node"),
         ("b: 1\n!!int one: 1\n", "2:1: 'one' cannot be read as int"),
         (f"a: {'9' * 5000}\n", "1:4:"),
-        ('a: "\\ud800"\n', "1:4: half a surrogate pair is no character"),
+        ('a: "\\ud800"\n', "1:4: a: has the character U+D800, which no name, path or text has; take it out"),
     ],
 )
 def test_bad_files_are_refused_with_a_place(tmp_path: Path, text: str, message: str) -> None:

@@ -1,0 +1,19 @@
+"""Who is told that machine code is being compiled, which on a new machine takes up to a minute.
+
+Apart from `jit`, so that who asks to be told need not load the compiler.
+"""
+
+from collections.abc import Callable
+
+_listeners: list[Callable[[], None]] = []
+
+
+def on_compilation(listener: Callable[[], None]) -> None:
+    """Have `listener` called, and nobody else, the next time this process lacks machine code on disk."""
+    _listeners[:] = [listener]
+
+
+def announce_compilation() -> None:
+    """Tell who asked for it, once."""
+    if _listeners:
+        _listeners.pop()()
