@@ -25,6 +25,6 @@ class ReceivedCycle:
 
     capture: Capture
     cycle_id: CycleId
-    missed: int = 0
-    restarted: bool = False
-    faults: tuple[str, ...] = ()
+    missed: int
+    restarted: bool
+    faults: tuple[str, ...]

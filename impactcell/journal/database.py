@@ -82,6 +82,16 @@ def _io_error(path: Path, error: sqlite3.OperationalError) -> JournalUnavailable
     )
 
 
+def check_name(path: Path) -> None:
+    """Refuse what no file can be called; the system would not say which name it was."""
+    try:
+        possible = b"\0" not in os.fsencode(path)
+    except UnicodeEncodeError:
+        possible = False
+    if not possible:
+        raise JournalError(f"{str(path)!r}: no file can have this name; name another")
+
+
 def open_database(
     path: Path, cell: str | None, *, read_only: bool, upgrade: Upgrade | None = None
 ) -> sqlite3.Connection:

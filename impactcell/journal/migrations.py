@@ -181,6 +181,7 @@ STATE_MIGRATIONS: Final = (
         added=_under("cell.tracker.wear_blocks", _WEAR_BLOCKS_3_ADDED),
         dropped=("cell.tracker.wear_blocks.weighed_blocks",),
     ),
+    Migration(added={"last": None, "planner.uncounted_evidence": 0.0}),
 )
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

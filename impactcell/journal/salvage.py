@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from impactcell.errors import JournalDamagedError
+from impactcell.errors import JournalDamagedError, JournalError
+from impactcell.journal.capture_codec import decode_capture
 from impactcell.journal.checksums import CheckedTables
+from impactcell.records import CycleId
 
 _NEXT = "SELECT seq, blob FROM captures WHERE seq >= ? ORDER BY seq LIMIT 1"
 _ONE = "SELECT blob FROM captures WHERE seq = ?"
@@ -56,6 +58,19 @@ def stored_captures(database: sqlite3.Connection) -> Iterator[StoredCapture]:
             seq = row[0]
             yield StoredCapture(seq, _cycle(database, seq), bytes(row[1]))
         seq += 1
+
+
+def last_cycle_id(database: sqlite3.Connection, tables: CheckedTables) -> CycleId | None:
+    """Give the last cycle stored; of a damaged row its capture tells which it was, if that is whole."""
+    for row in database.execute("SELECT * FROM cycles ORDER BY seq DESC"):
+        values = dict(zip(tables.columns["cycles"], row, strict=True))
+        if tables.is_whole("cycles", row):
+            return CycleId(values["session"], values["cycle"])
+        stored = _one(database, values["seq"])
+        with contextlib.suppress(JournalError):
+            capture = decode_capture(None if stored is None else stored.blob)
+            return CycleId(capture.session, capture.cycle)
+    return None
 
 
 def salvaged_state(path: Path) -> bytes | None:

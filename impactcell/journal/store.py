@@ -19,12 +19,12 @@ from impactcell.errors import JournalDamagedError, JournalError
 from impactcell.journal.audit_entries import AuditEntry, stored_audit
 from impactcell.journal.capture_codec import decode_capture, encode_capture
 from impactcell.journal.checksums import CheckedTables
-from impactcell.journal.database import Upgrade, errors, open_database, set_aside
+from impactcell.journal.database import Upgrade, check_name, errors, open_database, set_aside
 from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
 from impactcell.journal.lock import lock_journal
 from impactcell.journal.presence import FilePresence
 from impactcell.journal.retention import Retention, prune
-from impactcell.journal.salvage import stored_captures
+from impactcell.journal.salvage import last_cycle_id, stored_captures
 from impactcell.journal.schema import cycle_row
 from impactcell.journal.stored_forms import ALARM, load_alarms
 from impactcell.records import Alarm, Capture, CycleId, Snapshot
@@ -63,6 +63,7 @@ class Journal:
         self.path = path
         self._last_stored: CycleId | None = None
         with errors(self.path):
+            check_name(path)
             if read_only and not path.is_file():
                 raise JournalError(f"{path}: there is no such journal")
             self._lock = None if read_only else lock_journal(path)
@@ -188,14 +189,14 @@ class Journal:
             self._db.execute("INSERT OR REPLACE INTO state_backup SELECT 1, blob, crc FROM state")
 
     def last_cycle_id(self) -> CycleId | None:
-        """Return the last durable cycle; None in a new journal. A row that is damaged does not count."""
+        """Return the last durable cycle; None in a new journal.
+
+        Of a damaged row its capture tells which cycle it was; where that is damaged as well, or was dropped,
+        the row does not count.
+        """
         if self._last_stored is None:
             with errors(self.path):
-                rows = self._db.execute("SELECT * FROM cycles ORDER BY seq DESC")
-                row = next((row for row in rows if self._tables.is_whole("cycles", row)), None)
-            if row is not None:
-                columns = self._tables.columns["cycles"]
-                self._last_stored = CycleId(row[columns.index("session")], row[columns.index("cycle")])
+                self._last_stored = last_cycle_id(self._db, self._tables)
         return self._last_stored
 
     def captures(

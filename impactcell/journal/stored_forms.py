@@ -14,7 +14,7 @@ from impactcell.errors import JournalError
 from impactcell.journal.migrations import ALARM_MIGRATIONS, ALARM_NAMES_1, MODEL_MIGRATIONS, STATE_MIGRATIONS
 from impactcell.positioning import PlannerPosterior
 from impactcell.prediction import Model
-from impactcell.records import Alarm, Snapshot
+from impactcell.records import Alarm, CycleId, Snapshot
 from impactcell.serialization import Versioned
 from impactcell.serialization.json_text import load_tree
 from impactcell.serialization.tree import Unknown
@@ -27,12 +27,15 @@ from impactcell.tracking.wear_batch import TrackerState
 class StoredState:
     """What a restart goes on from: the state, the last snapshot, what the planner has learned.
 
-    The alarms of the snapshot are not stored: they are those of the state.
+    The alarms of the snapshot are not stored: they are those of the state. `last` is the last cycle that the
+    state has taken in, None where a version before format 4 wrote it: the module may still show that cycle,
+    and a journal begun anew has no row of it.
     """
 
     cell: CellState
     snapshot: Snapshot | None = None
     planner: PlannerPosterior | None = None
+    last: CycleId | None = None
 
 
 STATE: Final = Versioned("the state", StoredState, STATE_MIGRATIONS)
@@ -76,7 +79,7 @@ def pack_state(stored: StoredState, unknown: Unknown | None = None) -> bytes:
     """Write a state, with what an earlier `unpack_state` had to set aside."""
     snapshot = stored.snapshot
     if snapshot is not None:
-        stored = StoredState(stored.cell, replace(snapshot, alarms=()), stored.planner)
+        stored = StoredState(stored.cell, replace(snapshot, alarms=()), stored.planner, stored.last)
     return STATE.pack(stored, unknown)
 
 

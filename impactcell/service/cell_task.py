@@ -26,6 +26,7 @@ from impactcell.records import (
     PositioningState,
     Snapshot,
 )
+from impactcell.records.uncertainty import plus_minus
 from impactcell.scada import Server
 from impactcell.service.factory import cell_design, module_link
 from impactcell.service.monitoring import CellHealth
@@ -193,7 +194,7 @@ class CellTask:
         await self.worker.warm_up()
         async with contextlib.aclosing(
             self._module.captures(
-                self.worker.last or self.worker.durable,
+                self.worker.last,
                 0 if self.worker.snapshot is None else self.worker.snapshot.time_ns,
             )
         ) as received_cycles:
@@ -215,8 +216,8 @@ class CellTask:
         self._publisher.publish_module(self.status)
         mu_s, late_s = snapshot.friction.mu_s, time.time() - 1e-9 * capture.time_ns
         self.log.debug(
-            "mu_s %.4f ± %.4f (%s), gap %.2f, published %s after its end",
-            mu_s.value, mu_s.std, mu_s.quality.name.lower(), snapshot.friction.gap,
+            "mu_s %s (%s), gap %.2f, published %s after its end",
+            plus_minus(mu_s.value, mu_s.std, ".4f"), mu_s.quality.name.lower(), snapshot.friction.gap,
             f"{1e3 * late_s:.0f} ms" if capture.time_ns else "some time", cycle=capture.cycle,
         )  # fmt: skip
         if result.durable is not None:

@@ -1,6 +1,7 @@
 """What a cell goes on from when the service starts: the state in its journal, or what is left of it."""
 
 import logging
+from dataclasses import replace
 
 from impactcell import cell as core
 from impactcell.cell import CellDesign
@@ -18,6 +19,9 @@ _log = logging.getLogger(__name__)
 def restored_state(writer: JournalWriter, design: CellDesign, unknown: Unknown) -> StoredState:
     """Read the state that the journal holds; a new one where there is none.
 
+    Its `last` is the cycle to go on behind: the last one that the state has taken in or, where a state of
+    before has to do, the last one of the journal, so that no cycle is journalled twice.
+
     Parameters
     ----------
     writer : JournalWriter
@@ -31,9 +35,9 @@ def restored_state(writer: JournalWriter, design: CellDesign, unknown: Unknown) 
         The state is of another version; it is left as it is.
     """
     initial, journal = core.initial_state(design), writer.journal
-    blob = None if journal is None else _stored_state(journal, writer)
+    blob, is_newest = (None, False) if journal is None else _stored_state(journal, writer)
     if journal is None or blob is None:
-        return StoredState(initial)
+        return StoredState(initial, last=writer.durable)
     try:
         stored = unpack_state(blob, initial, unknown)
     except ValueError as error:
@@ -41,13 +45,14 @@ def restored_state(writer: JournalWriter, design: CellDesign, unknown: Unknown) 
     log = CellLogger(_log, design.name)
     for alarms in unknown.values():
         log.warning("the journal has alarms of another version; they are kept: %s", ", ".join(alarms))
-    return stored
+    last = stored.last if is_newest else writer.durable
+    return replace(stored, last=last or writer.durable or stored.last)
 
 
-def _stored_state(journal: Journal, writer: JournalWriter) -> bytes | None:
-    """Return the state to go on from: the last one or, if that is damaged, the one kept beside it."""
+def _stored_state(journal: Journal, writer: JournalWriter) -> tuple[bytes | None, bool]:
+    """Return the state to go on from, and whether it is the last one: else it is the one kept beside it."""
     try:
-        return journal.state()
+        return journal.state(), True
     except JournalDamagedError as error:
         why = str(error)
     try:
@@ -59,4 +64,4 @@ def _stored_state(journal: Journal, writer: JournalWriter) -> bytes | None:
         if blob is not None
         else f"{why}; wear, batch, signature, and what positioning has learned, begin anew"
     )
-    return blob
+    return blob, False

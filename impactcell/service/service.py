@@ -13,9 +13,11 @@ from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import JournalError
 from impactcell.fieldbus.transports import Transports
+from impactcell.numerics.compilation import on_compilation
 from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
+from impactcell.process.progress import COMPILING
 from impactcell.process.signals import stop_on_signals
 from impactcell.scada import Server
 from impactcell.service.cell_task import CellTask, SnapshotCallback
@@ -209,6 +211,7 @@ def run(cells: Sequence[CellConfig]) -> None:
         Ended by Ctrl-C, after a clean shutdown.
     """
     log_lines.configure()
+    on_compilation(lambda: log.info(COMPILING))
     sys.setswitchinterval(SWITCH_S)
     try:
         interrupted = asyncio.run(_until_signalled(Service(cells)))

@@ -66,14 +66,14 @@ class CellWorker:
         self.log = CellLogger(logging.getLogger(__name__), design.name)
         self._journal_writer = JournalWriter(design.name, journal, keep)
         self._closing = threading.Event()
-        self.last: CycleId | None = None
-        """The last cycle taken in since the start, durable or not."""
         self._unknown = Unknown()
         """Alarms of another version that are kept for it."""
         restored = restored_state(self._journal_writer, design, self._unknown)
         self._state = self._fitted(design, restored.cell)
         self._snapshot = restored.snapshot
         self.belief = restored.planner
+        self.last = restored.last
+        """The last cycle taken in, durable or not; None: none ever."""
         self._told = self.alarms
         self._tell_alarms: Callable[[tuple[Alarm, ...]], object] | None = None
         self._store_model()
@@ -256,7 +256,7 @@ class CellWorker:
             self.log.exception("the journal could not be tidied")
 
     def _blob(self) -> bytes:
-        return pack_state(StoredState(self._state, self._snapshot, self.belief), self._unknown)
+        return pack_state(StoredState(self._state, self._snapshot, self.belief, self.last), self._unknown)
 
     def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> None:
         self._state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)

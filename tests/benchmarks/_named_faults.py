@@ -155,8 +155,8 @@ NAMED_FAULTS: Final = (
     NamedFault(
         "what the planner has learned not stored",
         "impactcell/service/worker.py",
-        "StoredState(self._state, self._snapshot, self.belief)",
-        "StoredState(self._state, self._snapshot, None)",
+        "StoredState(self._state, self._snapshot, self.belief, self.last)",
+        "StoredState(self._state, self._snapshot, None, self.last)",
         ("tests/unit/service/test_planner_restart.py",),
     ),
     NamedFault(

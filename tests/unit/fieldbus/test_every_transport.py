@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
+from impactcell.fieldbus.codec import FunctionCode, read_request
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE
 from impactcell.fieldbus.transports import transport_for
+from impactcell.fieldbus.transports.checked_pymodbus import CheckedPymodbus
 from simulator.faults import Fault, FaultInjector, FaultKind
 from tests.transports import KINDS, STREAMS, Image, connected, link_to, server_for
 
@@ -234,3 +236,22 @@ async def test_no_fault_gets_a_wrong_value_through(kind: str, seed: int, tmp_pat
             assert np.array_equal(words, np.arange(address, address + count))
     assert accepted > 10
     assert sum(faults.happened.values()) > 15
+
+
+@pytest.mark.parametrize("kind", ["tls", "udp", "rtu_over_tcp"])
+async def test_nothing_is_asked_of_a_line_that_is_not_open(kind: str, tmp_path: Path) -> None:
+    server, tls = server_for(kind, Image(), tmp_path)
+    async with server:
+        line = CheckedPymodbus(link_to(kind, server, tls), lambda: None)
+        request = read_request(FunctionCode.READ_HOLDING, 0, 1)
+        with pytest.raises(LinkError, match="not connected"):
+            await line.exchange(1, request)
+        await line.connect()
+        assert await line.exchange(1, request) == b"\x00\x00"
+        line._client.ctx.transport.abort()  # as the other end does
+        for _ in range(3):
+            await asyncio.sleep(0)
+        with pytest.raises(LinkError, match="not connected"):
+            await line.exchange(1, request)
+        await line.close()
+    assert server.requests == 1

@@ -235,6 +235,16 @@ def test_numbers_go_on_whatever_was_missed(kind: str) -> None:
         near = cycle
 
 
+@pytest.mark.parametrize("kind", ["u16", "bcd16"])
+def test_a_number_is_the_nearest_that_the_counter_can_mean(kind: str) -> None:
+    """Of a cycle before, or after, by less than half of all that the counter can count."""
+    numbers = CycleNumbers.of(kind)
+    period = {"u16": 65_536, "bcd16": 10_000}[kind]
+    near = 5 * period + 17
+    for apart in (-period // 2 + 1, -2 * period // 5, -1, 0, 1, 2 * period // 5, period // 2 - 1):
+        assert numbers.number((near + apart) % period, near) == near + apart
+
+
 SMALLEST = {
     "cycle_counter": {"address": 0, "type": "u16"},
     "velocity": {"value": 4000, "unit": "mm/min"},
@@ -260,6 +270,13 @@ def test_the_smallest_map_is_one_and_says_what_it_lacks() -> None:
         "an error of 1 % is assumed", "the time of a cycle is when it was read",
     ):  # fmt: skip
         assert lack in said, lack
+
+
+@pytest.mark.parametrize("std", [None, 0.5])
+def test_an_error_is_assumed_only_where_the_map_does_not_tell_it(std: float | None) -> None:
+    force = SMALLEST["peak_force"] | ({} if std is None else {"std": std})
+    said = not_promised(RegisterMap.from_mapping(changed("peak_force", force)))
+    assert any("peak_force has no `std`" in sentence for sentence in said) == (std is None)
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,14 @@ async def test_a_device_that_queues_has_sixteen_in_flight_and_begins_with_one() 
         assert client.window.size == 1
 
 
+@pytest.mark.parametrize(("count", "size", "requests"), [(1, 1, 0), (2, 2, 2), (15, 2, 2), (16, 16, 18)])
+async def test_as_many_are_tried_as_there_are_registers_to_read(count: int, size: int, requests: int) -> None:
+    """Each request of a trial has a length of its own, so that answers out of order are seen."""
+    async with ModbusServer(Image()) as server, linked(server, None) as client:
+        assert await client.find_window(100, count)
+        assert (client.window.size, server.requests) == (size, requests)
+
+
 @pytest.mark.parametrize(
     ("misbehaviour", "kept", "told"),
     [

@@ -26,6 +26,7 @@ class Gateway:
         self.connected = False
         self.connections = 0
         self.asked: list[int] = []
+        self.addresses: list[int] = []
         self.dead = self.busy = 0
         self.most_in_flight = self._in_flight = 0
         self._told_busy: set[Request] = set()
@@ -52,6 +53,7 @@ class Gateway:
             self._told_busy.add(request)
             raise ModbusExceptionError("busy", BUSY)
         address, count = int.from_bytes(request.pdu[1:3], "big"), int.from_bytes(request.pdu[3:5], "big")
+        self.addresses.append(address)
         return np.arange(address, address + count).astype(">u2").tobytes()
 
 
@@ -124,6 +126,41 @@ def test_a_dead_device_costs_the_others_its_turns_and_nothing_else() -> None:
     good, failures = run_virtually(share())
     assert good > 300
     assert failures > 300
+
+
+def test_what_waits_when_a_device_leaves_the_line_fails_at_once() -> None:
+    gateway, clients = line_of(2)
+
+    async def leave() -> float:
+        loop = asyncio.get_running_loop()
+        for client in clients:
+            await client.connect()
+        waiting = [asyncio.ensure_future(clients[0].read(0, 1000)) for _ in range(2)]
+        await asyncio.sleep(REPLY_S / 2)
+        begin_s = loop.time()
+        await clients[0].close()
+        for each in waiting:
+            with pytest.raises(LinkError, match="closed"):
+                await asyncio.wait_for(each, 60.0)
+        assert (await clients[1].read(3, 1)).tolist() == [3]
+        await clients[1].close()
+        return loop.time() - begin_s
+
+    assert run_virtually(leave()) < 10 * REPLY_S
+    assert gateway.asked.count(1) < 3
+
+
+def test_requests_are_sent_in_the_order_in_which_they_are_made() -> None:
+    gateway, (client,) = line_of(1)
+
+    async def read() -> None:
+        await client.connect()
+        blocks = [client.block(address, 1) for address in (30, 10, 20)]
+        await client.complete(*blocks)
+        await client.close()
+
+    run_virtually(read())
+    assert gateway.addresses == [30, 10, 20]
 
 
 def test_a_busy_device_is_asked_again_while_the_others_go_on() -> None:

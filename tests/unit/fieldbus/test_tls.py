@@ -1,5 +1,6 @@
 """Modbus/TCP Security: both sides show certificates, and nothing is said to a stranger."""
 
+import asyncio
 import ssl
 from pathlib import Path
 
@@ -99,3 +100,21 @@ def test_files_that_are_no_certificates_are_named(tmp_path: Path) -> None:
         TlsFiles(nonsense).context()
     with pytest.raises(LinkError, match=r"absent\.pem cannot be used"):
         TlsFiles(tmp_path / "absent.pem").context()
+
+
+async def test_a_module_that_never_answers_a_handshake_is_not_reached(tmp_path: Path) -> None:
+    """It takes the connection and is silent, as one does that speaks no TLS."""
+    authority = Authority(tmp_path, "plant")
+    tls = TlsFiles(authority.file, *authority.issue("service"))
+    async with await asyncio.start_server(_silent, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        client = ModbusClient(transport_for(ModuleLink(port=port, transport="tls", timeout_s=0.3, tls=tls)))
+        with pytest.raises(LinkError, match=f"127.0.0.1:{port}"):
+            await client.connect()
+        assert not client.connected
+        await client.close()
+
+
+async def _silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    await reader.read(-1)
+    writer.close()

@@ -98,11 +98,56 @@ def test_one_bit_in_a_cycle_is_not_believed(tmp_path: Path, column: str) -> None
     assert times == [make_capture(cycle).time_ns for cycle in range(1, 13) if cycle != 7]
 
 
-def test_a_damaged_last_cycle_comes_again_from_the_module(tmp_path: Path) -> None:
+@pytest.mark.parametrize("column", ["cycle", "session", "wear_level"])
+def test_of_a_damaged_last_row_the_capture_tells_which_cycle_it_was(tmp_path: Path, column: str) -> None:
+    filled(tmp_path / "j")
+    flip(tmp_path / "j", "cycles", column, 12)
+    with Journal(tmp_path / "j", "c") as journal:
+        assert journal.last_cycle_id() == CycleId(1, 12)
+        capture = make_capture(12)
+        with pytest.raises(JournalError, match="cycle 12 is stored already"):
+            journal.append(capture, make_snapshot(capture), b"state")
+
+
+def test_a_damaged_last_row_whose_capture_is_damaged_too_does_not_count(tmp_path: Path) -> None:
     filled(tmp_path / "j")
     flip(tmp_path / "j", "cycles", "cycle", 12)
+    flip(tmp_path / "j", "captures", "blob", 12)
     with Journal(tmp_path / "j", "c") as journal:
         assert journal.last_cycle_id() == CycleId(1, 11)
+
+
+@pytest.mark.parametrize("damaged", ["row and capture", "table", "backup"])
+async def test_a_cycle_counts_once_whatever_of_it_is_damaged(
+    tmp_path: Path, design: core.CellDesign, damaged: str
+) -> None:
+    path = tmp_path / "j"
+    with Journal(path, "c") as journal:
+        worker = CellWorker(design, journal, Retention())
+        for cycle in range(1, 8):
+            await process(worker, make_capture(cycle))
+            if cycle == 5:
+                journal.back_up_state()
+        await worker.close()
+    if damaged == "row and capture":
+        flip(path, "cycles", "cycle", 7)
+        flip(path, "captures", "blob", 7)
+    elif damaged == "table":  # put aside, so that the journal has a state and no cycle at all
+        database = sqlite3.connect(path)
+        [page] = database.execute("SELECT rootpage FROM sqlite_schema WHERE name = 'meta'").fetchone()
+        database.close()
+        with path.open("r+b") as file:
+            file.seek((page - 1) * PAGE)
+            file.write(b"\xff" * PAGE)
+    else:
+        flip(path, "state", "blob", 1)
+    journal, _ = open_journal(path, "c")
+    worker = CellWorker(design, journal, Retention())
+    assert worker.last == CycleId(1, 7)  # what the module's ring is read behind
+    assert bool(aside_of(path)) == (damaged == "table")
+    await process(worker, make_capture(8))
+    assert worker.last == CycleId(1, 8)
+    await worker.close()
 
 
 def test_one_bit_in_an_action_of_a_person_is_not_believed(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind, RuleResult
 from impactcell.cell import StepResult
 from impactcell.fieldbus.acquisition import ReceivedCycle
-from impactcell.records import Alarm, PositioningState, Snapshot
+from impactcell.records import Alarm, Capture, CycleId, PositioningState, Snapshot
 from impactcell.scada import Actor, RefusedError, Role
 from impactcell.service.cell_task import CellTask
 from impactcell.service.operator_commands import OperatorCommands
@@ -27,6 +27,12 @@ ALARM = "ModuleConnection"
 ANNA = Actor("anna", Role.OPERATOR, "10.0.0.7")
 STEPS = 6
 """Long enough for a cycle and an action to be through, one after the other."""
+
+
+def received(capture: Capture) -> ReceivedCycle:
+    """A cycle as acquisition gives it, with nothing wrong."""
+    identity = CycleId(capture.session, capture.cycle)
+    return ReceivedCycle(capture, identity, missed=0, restarted=False, faults=())
 
 
 class Thread:
@@ -123,7 +129,7 @@ async def running(cell: CellConfig) -> Callable[[], tuple[CellTask, Thread, Worl
 async def play(task: CellTask, thread: Thread, moves: str) -> list[Alarm]:
     """Play one order of moves, and then all that is left; the alarm after each piece of work."""
     capture, actions = make_capture(1), OperatorCommands({task.cell.name: task})
-    cycle = asyncio.ensure_future(task._process(ReceivedCycle(capture, ())))
+    cycle = asyncio.ensure_future(task._process(received(capture)))
     truth, going = [named(task.worker.alarms)], [cycle]
     for number, move in enumerate(moves + "JTT" * STEPS):
         task._positioning.state = PositioningState(taps=number)
@@ -169,7 +175,7 @@ async def test_positioning_is_shown_as_it_is_then(
     running: Callable[[], tuple[CellTask, Thread, World]],
 ) -> None:
     task, thread, world = running()
-    cycle = asyncio.ensure_future(task._process(ReceivedCycle(make_capture(1), ())))
+    cycle = asyncio.ensure_future(task._process(received(make_capture(1))))
     for number in range(10):
         task._positioning.state = PositioningState(taps=number)
         thread.step()

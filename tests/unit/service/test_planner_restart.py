@@ -37,6 +37,7 @@ def task_of(cell: CellConfig, design: core.CellDesign, worker: CellWorker) -> Po
 def assert_same(posterior: PlannerPosterior, expected: PlannerPosterior) -> None:
     for name in ("weights", "means", "covs", "scatter_weights", "hypotheses"):
         np.testing.assert_array_equal(getattr(posterior, name), getattr(expected, name))
+    assert posterior.uncounted_evidence == expected.uncounted_evidence
     assert (posterior.taps, posterior.surprise) == (expected.taps, expected.surprise)
 
 
@@ -53,6 +54,7 @@ async def test_the_planner_goes_on_after_a_restart(tmp_path: Path, cell: CellCon
         taps=7,
         surprise=0.25,
         hypotheses=untaught.hypotheses,
+        uncounted_evidence=1.5,
     )
     first.belief = learned
     await first.process(make_capture(1), PositioningState(), None)

@@ -136,7 +136,8 @@ def test_blocks_kept_by_an_earlier_version_are_weighed_once_and_go_on():
         "slopes": np.array([[1e-6, 0.5, 0.2, 1e-8], [2e-6, 0.5, 0.2, 1e-8]]),
         "weighed_blocks": 99,
     }
-    migrated = STATE_MIGRATIONS[-1]({"cell": {"tracker": {"wear_blocks": old}}})
+    from_format_2 = STATE_MIGRATIONS[1]
+    migrated = from_format_2({"cell": {"tracker": {"wear_blocks": old}}})
     wear = wear_blocks.WearBlocks(**migrated["cell"]["tracker"]["wear_blocks"])
     wear = wear_blocks.update(wear_blocks.append(wear, 1600, 0.2016, 1.0, SURELY_NONE), MODEL)
     found = wear_blocks.moments(wear, 1600)
@@ -147,7 +148,7 @@ def test_blocks_kept_by_an_earlier_version_are_weighed_once_and_go_on():
     assert abs(found.slope - line[0]) < 0.1 * std
     assert math.sqrt(found.slope_variance) == pytest.approx(std, rel=0.05)
     nothing = {"cell": {"tracker": {"wear_blocks": None}}}
-    assert STATE_MIGRATIONS[-1](nothing) == nothing
+    assert from_format_2(nothing) == nothing
 
 
 def test_the_probability_is_that_of_the_mixture():
