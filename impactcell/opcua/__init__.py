@@ -17,8 +17,8 @@ answers of `host_interface`, and starts it. Below it, from the wire inwards:
 `type_instances`             objects made from types, with NodeIds that stay the same
 `languages`                  texts in the language of a session, by its LocaleIds
 **transport**
-`tcp_connection`             frames in and out; refuses malformed Hellos, half-open connections, oversized
-                             messages, clients that do not read
+`message_frames`             the stream cut into frames; refuses malformed Hellos and oversized messages
+`tcp_connection`             frames in and out; refuses half-open connections, clients that do not read
 `connection_table`           which connections there are, and what they may hold together
 `secure_channel`             trust checked before a channel opens; renewal; limits
 `trust_list`                 the server's certificate and those it trusts

@@ -55,7 +55,7 @@ class HistoryService:
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
         return {
-            "HistoryRead": Service(ua.HistoryReadParameters, self.history_read),
+            "HistoryRead": Service(ua.HistoryReadParameters, self.history_read, waits=True),
             "HistoryUpdate": Service(None, self.history_update),
         }
 

@@ -19,6 +19,36 @@ NEVER: Final = 1_000_000_000
 """Threshold of the oldest generation at which the interpreter does not begin a full round by itself."""
 
 
+class Turn:
+    """One request's turn in the line; without a lock, that of a short one, it is always there."""
+
+    def __init__(self, lock: asyncio.Lock | None) -> None:
+        self._lock = lock
+        self._held = False
+
+    async def begin(self) -> None:
+        """Wait for those before."""
+        if self._lock is not None:
+            await self._lock.acquire()
+            self._held = True
+
+    def end(self) -> None:
+        """Let the next one begin."""
+        if self._lock is not None and self._held:
+            self._held = False
+            self._lock.release()
+
+    @contextlib.asynccontextmanager
+    async def left(self) -> AsyncIterator[None]:
+        """Let the others pass while something is awaited that does not need the loop, as a disk.
+
+        Whoever is done stands in line again for the answer; an error goes on without.
+        """
+        self.end()
+        yield
+        await self.begin()
+
+
 class LargeRequests:
     """The line of the long requests of all clients."""
 
@@ -26,13 +56,14 @@ class LargeRequests:
         self._lock = asyncio.Lock()
 
     @contextlib.asynccontextmanager
-    async def turn(self, size: int) -> AsyncIterator[None]:
+    async def turn(self, size: int) -> AsyncIterator[Turn]:
         """Have a request of so many bytes answered inside; a short one waits for nobody."""
-        if size < LARGE_BYTES:
-            yield
-            return
-        async with self._lock:
-            yield
+        turn = Turn(self._lock if size >= LARGE_BYTES else None)
+        await turn.begin()
+        try:
+            yield turn
+        finally:
+            turn.end()
 
     async def collect_garbage(self) -> None:
         """Look for garbage again and again, while no long request is being answered."""

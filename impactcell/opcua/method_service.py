@@ -58,7 +58,7 @@ class MethodService:
 
     def services(self) -> dict[str, Service]:
         """Give the services of this set."""
-        return {"Call": Service(ua.CallParameters, self.call)}
+        return {"Call": Service(ua.CallParameters, self.call, waits=True)}
 
     def bind(self, owner: ua.NodeId, method: ua.NodeId, bound: Method) -> None:
         """Make a method callable on an object."""

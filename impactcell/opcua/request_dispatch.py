@@ -23,7 +23,7 @@ from impactcell.opcua.binary_codec import (
     service_fault,
 )
 from impactcell.opcua.host_interface import Actor
-from impactcell.opcua.large_requests import LargeRequests
+from impactcell.opcua.large_requests import LargeRequests, Turn
 from impactcell.opcua.loop_share import LoopShare
 from impactcell.opcua.session_table import Session, SessionTable
 from impactcell.opcua.tcp_connection import TcpConnection
@@ -63,11 +63,18 @@ Handler = Callable[[RequestContext, Any], Awaitable[Any]]
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """One service: the structure its parameters come in, and who answers."""
+    """One service: the structure its parameters come in, and who answers.
+
+    Attributes
+    ----------
+    waits : bool
+        Answering may wait for a disk or another thread, however little there is to do on the loop.
+    """
 
     parameters: type | None
     handler: Handler
     needs_session: bool = True
+    waits: bool = False
 
 
 def request_id(name: str) -> int:
@@ -105,17 +112,17 @@ class RequestDispatcher:
         DecodingError
             The message has no header that could be answered.
         """
-        async with self.large_requests.turn(len(body)):
+        async with self.large_requests.turn(len(body)) as turn:
             connection.share.begin()
-            await self._handle(connection, request_id, body)
+            await self._handle(connection, request_id, body, turn)
 
-    async def _handle(self, connection: TcpConnection, request_id: int, body: bytes) -> None:
+    async def _handle(self, connection: TcpConnection, request_id: int, body: bytes, turn: Turn) -> None:
         buffer = StrictBuffer(body)
         kind = decode_type(buffer)
         header = decode(ua.RequestHeader, buffer)
         handle = header.RequestHandle
         try:
-            answer = await self._answer(connection, request_id, kind, header, buffer)
+            answer = await self._answer(connection, request_id, kind, header, buffer, turn)
         except StatusCodeError as fault:
             answer = service_fault(handle, fault.code)
         except DecodingError as error:
@@ -141,6 +148,7 @@ class RequestDispatcher:
         kind: ua.NodeId,
         header: ua.RequestHeader,
         body: StrictBuffer,
+        turn: Turn,
     ) -> Any:
         service = self._services.get(kind.Identifier) if kind.NamespaceIndex == 0 else None
         if service is None:
@@ -154,7 +162,12 @@ class RequestDispatcher:
         if service.parameters is not None:
             parameters = await decode_parameters(service.parameters, body, connection.share)
         context = RequestContext(connection, header, request_id, connection.share, session)
-        return await service.handler(context, parameters)
+        if not service.waits:
+            return await service.handler(context, parameters)
+        async with turn.left():
+            answer = await service.handler(context, parameters)
+        connection.share.begin()
+        return answer
 
 
 def check_operations(operations: list[Any] | None, limit: int = MAX_OPERATIONS) -> list[Any]:

@@ -56,7 +56,7 @@ class SessionService:
         return {
             "CreateSession": Service(ua.CreateSessionParameters, self.create_session, needs_session=False),
             "ActivateSession": Service(
-                ua.ActivateSessionParameters, self.activate_session, needs_session=False
+                ua.ActivateSessionParameters, self.activate_session, needs_session=False, waits=True
             ),
             "CloseSession": Service(None, self.close_session, needs_session=False),
             "Cancel": Service(ua.CancelParameters, self.cancel),

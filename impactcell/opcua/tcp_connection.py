@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import logging
 import socket
-import struct
 import time
 from typing import Final, Protocol, cast
 
@@ -19,13 +18,11 @@ from impactcell.opcua.binary_codec import DecodingError, StatusCodeError, encode
 from impactcell.opcua.connection_table import ConnectionTable
 from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.loop_share import LoopShare
+from impactcell.opcua.message_frames import HEADER, FrameStream
 from impactcell.opcua.secure_channel import MAX_CHUNK, ChannelSecurity, SecureChannel, SecureChannelError
 
 _log = logging.getLogger(__name__)
 
-HEADER: Final = struct.Struct("<3scI")
-MAX_HELLO_BYTES: Final = 8_192
-"""Longest Hello: its URL has 4096 characters at most (Part 6, 7.1.2.3)."""
 MAX_QUEUED_CHUNKS: Final = 64
 """Chunks read ahead of the one being answered; beyond, reading pauses."""
 LINGER_S: Final = 1.0
@@ -34,8 +31,6 @@ MAX_QUEUED_BYTES: Final = 4 * MAX_CHUNK
 """Bytes read ahead; beyond, reading pauses."""
 MAX_UNSENT_BYTES: Final = 4 * 1024 * 1024
 """Output a client may leave unread, bytes."""
-CHUNK_TYPES: Final = (b"F", b"C", b"A")
-SECURE_MESSAGE_TYPES: Final = (b"OPN", b"MSG", b"CLO")
 
 
 class RequestHandler(Protocol):
@@ -61,12 +56,12 @@ class TcpConnection(asyncio.Protocol):
         self._handler = handler
         self._limits = limits
         self._table = table
-        self._buffer = bytearray()
+        self._stream = FrameStream()
         self._frames: asyncio.Queue[tuple[ua.Header, bytes] | None] = asyncio.Queue()
         self._transport: asyncio.Transport | None = None
         self._task: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._greeted = False
+        self._admitted = False
         self._paused = False
         self._discards = False
         self._queued_bytes = 0
@@ -95,8 +90,10 @@ class TcpConnection(asyncio.Protocol):
             for option, value in (("TCP_KEEPIDLE", 15), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
                 if hasattr(socket, option):
                     wire.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        self._admitted = True
         loop = asyncio.get_running_loop()
         self._task = loop.create_task(self._serve(), name=f"opcua {self.address}")
+        self._task.add_done_callback(self._served)
         self._timer = loop.call_later(self._limits.hello_s, self._too_slow)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -106,33 +103,31 @@ class TcpConnection(asyncio.Protocol):
             self._timer.cancel()
         if self._task is not None:
             self._task.cancel()
+        if self._admitted:
             self._handler.disconnected(self)
         self._transport = None
-        self._buffer.clear()
+        self._stream.clear()
         self._frames = asyncio.Queue()
         self._queued_bytes = 0
         if exc is not None:
             _log.info("connection from %s lost: %s", self.address, exc)
 
+    def _served(self, task: asyncio.Task[None]) -> None:
+        # A task that was cancelled keeps its frames, and these keep the connection: without this link all is
+        # freed at once, and not in the next full round of the garbage collector.
+        self._task = None
+        if not task.cancelled() and (error := task.exception()) is not None:
+            _log.error("connection from %s", self.address, exc_info=error)
+            self.close()
+
     def data_received(self, data: bytes) -> None:
         """Cut the stream into frames."""
         if self._discards:
             return
-        self._buffer += data
         try:
-            while len(self._buffer) >= HEADER.size:
-                kind, chunk, size = HEADER.unpack_from(self._buffer)
-                self._check_header(kind, chunk, size)
-                if len(self._buffer) < size:
-                    break
-                start = 12 if kind in SECURE_MESSAGE_TYPES else 8
-                header = ua.Header(
-                    kind, chunk, int.from_bytes(self._buffer[8:12], "little") if start == 12 else 0
-                )
-                header.header_size, header.body_size, header.packet_size = start, size - start, size
-                self._frames.put_nowait((header, bytes(self._buffer[start:size])))
-                self._queued_bytes += size
-                del self._buffer[:size]
+            for frame in self._stream.feed(data):
+                self._frames.put_nowait(frame)
+                self._queued_bytes += frame[0].packet_size
         except SecureChannelError as error:
             self.abort_with_error(error.code, str(error))
             return
@@ -152,7 +147,7 @@ class TcpConnection(asyncio.Protocol):
     @property
     def unfinished_bytes(self) -> int:
         """Bytes that have come and are no request yet, or one that waits."""
-        return len(self._buffer) + self._queued_bytes + self.channel.unfinished_bytes
+        return len(self._stream) + self._queued_bytes + self.channel.unfinished_bytes
 
     @property
     def unsent_bytes(self) -> int:
@@ -165,25 +160,6 @@ class TcpConnection(asyncio.Protocol):
         self.channel.close()
         if self._transport is not None:
             self._transport.abort()
-
-    def _check_header(self, kind: bytes, chunk: bytes, size: int) -> None:
-        if not self._greeted:
-            if kind != b"HEL":
-                raise SecureChannelError(
-                    ua.StatusCodes.BadTcpMessageTypeInvalid, f"{kind!r} in place of Hello"
-                )
-            limit = MAX_HELLO_BYTES
-        elif kind in SECURE_MESSAGE_TYPES:
-            limit = MAX_CHUNK
-        else:
-            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of type {kind!r}")
-        if chunk not in CHUNK_TYPES or (kind != b"MSG" and chunk != b"F"):
-            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a chunk of type {chunk!r}")
-        if size > limit:
-            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTooLarge, f"a chunk of {size} bytes")
-        if size < (16 if kind in SECURE_MESSAGE_TYPES else 8):
-            raise SecureChannelError(ua.StatusCodes.BadTcpMessageTypeInvalid, f"a message of {size} bytes")
-        self._greeted = True
 
     async def _serve(self) -> None:
         while (frame := await self._frames.get()) is not None:
@@ -247,7 +223,7 @@ class TcpConnection(asyncio.Protocol):
 
     def _send(self, data: bytes) -> None:
         transport = self._transport
-        if transport is None or transport.is_closing():
+        if transport is None or transport.is_closing() or self._discards:
             return
         transport.write(data)
         unsent = transport.get_write_buffer_size()
@@ -256,8 +232,8 @@ class TcpConnection(asyncio.Protocol):
             transport.abort()
 
     def abort_with_error(self, code: int, reason: str) -> None:
-        """Send an Error message and close."""
-        if self._transport is not None and not self._transport.is_closing():
+        """Send an Error message and close; the first one is the last word."""
+        if self._transport is not None and not self._transport.is_closing() and not self._discards:
             level = logging.INFO if code == ua.StatusCodes.BadServerHalted else logging.WARNING
             # a client's words may stand in the reason: no line break or half character gets into the log
             _log.log(level, "connection from %s closed: %s", self.address, ascii(reason)[1:-1])
@@ -271,8 +247,6 @@ class TcpConnection(asyncio.Protocol):
     def _linger(self, transport: asyncio.Transport) -> None:
         # Closing while the peer still sends would reset the connection, and the Error message might be lost:
         # what comes is thrown away until the peer has closed its end too.
-        if self._discards:
-            return
         self._discards = True
         if self._paused:
             transport.resume_reading()

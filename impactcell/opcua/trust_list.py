@@ -157,7 +157,7 @@ class TrustList:
             private_key = serialization.load_pem_private_key(key_path.read_bytes(), None)
         except OSError as error:
             raise AccessError(
-                f"{key_path}: {error.strerror}; make one with `impactcell certs make`"
+                f"{key_path}: {error.strerror}; put it back, or move cert.der away too: both are made anew"
             ) from error
         except (ValueError, TypeError, UnsupportedAlgorithm) as error:
             raise AccessError(f"{key_path}: no private key in PEM without a passphrase") from error

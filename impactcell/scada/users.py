@@ -12,6 +12,7 @@ A YAML file that only its owner can read::
 """
 
 import logging
+import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -61,7 +62,8 @@ def read_users(path: Path) -> dict[str, User]:
         raise AccessError(str(error)) from error
     entries = data.get("users") if isinstance(data, dict) else None
     if not isinstance(entries, list):
-        raise AccessError(f"{path}: not a users file; make one with `impactcell users add {path}`")
+        command = f"impactcell users add {shlex.quote(str(path))} NAME"
+        raise AccessError(f"{path}: not a users file; move it away, and make one with `{command}`")
     users: dict[str, User] = {}
     for number, entry in enumerate(entries, 1):
         user = _user(entry, f"{path}: user {number}")

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import random
 import struct
 
@@ -94,6 +95,17 @@ async def test_bad_requests_on_an_open_channel() -> None:
                     await wire.send(frame(b"MSG", struct.pack("<II", channel, 13) + body, b"C"))
             assert await wire.error() == codes.BadTcpMessageTooLarge
         await alive(here)
+
+
+async def test_a_fault_behind_a_fault(caplog: pytest.LogCaptureFixture) -> None:
+    """The first is told, the connection ends, and the second, found while that is done, goes nowhere."""
+    async with site() as here:
+        for before in (hello(), hello() + message(1, 1, b"\0" * 20), hello() + hello()):
+            async with raw(here) as wire:
+                await wire.send(before + frame(b"XYZ", b"12345678"))
+                assert await wire.error() == codes.BadTcpMessageTypeInvalid
+        await alive(here)
+    assert [record.message for record in caplog.records if record.levelno >= logging.ERROR] == []
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -2,18 +2,24 @@
 
 import asyncio
 import contextlib
+import gc
 import struct
-from collections.abc import AsyncIterator
+import threading
+import weakref
+from collections.abc import AsyncIterator, Awaitable, Callable
+from datetime import UTC, datetime
 
 import pytest
 import pytest_asyncio
 from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_to_binary
 
+from impactcell.opcua.large_requests import LARGE_BYTES
 from impactcell.opcua.tcp_connection import TcpConnection
 from impactcell.opcua.view_service import MAX_BROWSE_POINTS
-from impactcell.scada import ServerLimits
-from tests.opcua_server import Site, site
+from impactcell.scada import ServerLimits, ValuePage
+from impactcell.scada.users import Users
+from tests.opcua_server import PASSWORDS, Site, site
 from tests.opcua_wire import frame, hello, message, raw
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -106,6 +112,38 @@ async def test_an_open_request_of_many_encrypted_blocks(here: Site) -> None:
         assert (await wire.receive())[0] == b"ACK"
         await wire.send(frame(b"OPN", struct.pack("<I", 0) + security + b"\1" * 256 * 17))
         assert await wire.error() == codes.BadTcpMessageTooLarge
+
+
+async def test_a_connection_that_has_ended_is_freed_at_once(
+    here: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It leaves no cycle for the garbage collector, whose rounds hold everybody: however it ended."""
+    freed: list[asyncio.Event] = []
+    made = TcpConnection.connection_made
+
+    def watched(self: TcpConnection, transport: asyncio.BaseTransport) -> None:
+        made(self, transport)
+        freed.append(asyncio.Event())
+        weakref.finalize(self, freed[-1].set)
+
+    monkeypatch.setattr(TcpConnection, "connection_made", watched)
+    gc.disable()
+    try:
+        async with raw(here) as wire:  # in the middle of a Hello
+            await wire.send(hello()[:20])
+        async with raw(here) as wire:  # in the middle of a message
+            channel, token = await wire.channel()
+            await wire.send(message(channel, token, b"\0" * 60_000, chunk=b"C"))
+        async with raw(here) as wire:  # by the server
+            await wire.send(hello() + frame(b"XYZ", b"12345678"))
+            assert await wire.error() == codes.BadTcpMessageTypeInvalid
+        async with await here.client() as client:  # as it should
+            await (await here.node(client, "Module/Connected")).read_data_value(False)
+        assert len(freed) >= 4
+        for ended in freed:
+            await asyncio.wait_for(ended.wait(), 30.0)
+    finally:
+        gc.enable()
 
 
 async def test_one_user_cannot_hold_all_sessions(here: Site) -> None:
@@ -304,3 +342,76 @@ async def test_an_answer_that_would_be_too_long_is_refused(
             await client.uaclient.protocol.send_request(request)
         assert refused.value.code == codes.BadResponseTooLarge
         await (await here.node(client, "Module/Connected")).read_data_value(False)
+
+
+FILLING = "x" * LARGE_BYTES
+"""Makes a request a long one."""
+
+
+async def _reset_wear(here: Site, client: Client) -> ua.StatusCode:
+    cell, reset = await here.node(client, ""), await here.node(client, "ResetWear")
+    first = ua.CallMethodRequest(cell.nodeid, reset.nodeid, [ua.Variant(ua.LocalizedText("new surface"))])
+    other = ua.CallMethodRequest(ua.NodeId(FILLING, 1), reset.nodeid)
+    return (await client.uaclient.call([first, other]))[0].StatusCode
+
+
+async def _read_history(here: Site, client: Client) -> ua.StatusCode:
+    node = await here.node(client, "Wear/Level")
+    details = ua.ReadRawModifiedDetails(
+        IsReadModified=False,
+        StartTime=datetime(2026, 1, 1, tzinfo=UTC),
+        EndTime=datetime(2026, 1, 2, tzinfo=UTC),
+        ReturnBounds=False,
+    )
+    parameters = ua.HistoryReadParameters(
+        HistoryReadDetails=details,
+        TimestampsToReturn=ua.TimestampsToReturn.Source,
+        ReleaseContinuationPoints=False,
+        NodesToRead=[
+            ua.HistoryReadValueId(node.nodeid),
+            ua.HistoryReadValueId(node.nodeid, ContinuationPoint=FILLING.encode()),
+        ],
+    )
+    return (await client.uaclient.history_read(parameters))[0].StatusCode
+
+
+async def _log_in_anew(here: Site, client: Client) -> ua.StatusCode:
+    del here
+    client._locale = [FILLING]
+    await client.activate_session(username="engineer", password=PASSWORDS["engineer"])
+    return ua.StatusCode(codes.Good)
+
+
+@pytest.mark.parametrize("request_of", [_reset_wear, _read_history, _log_in_anew])
+async def test_a_long_request_that_waits_lets_those_of_others_pass(
+    request_of: Callable[[Site, Client], Awaitable[ua.StatusCode]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It waits for the journal, for the history or for a password; another client reads much meanwhile."""
+    begun, may_end = threading.Event(), threading.Event()
+
+    def wait() -> None:
+        begun.set()
+        may_end.wait(60.0)
+
+    async def waiting(*_: object, **__: object) -> ValuePage:
+        await asyncio.to_thread(wait)
+        return ValuePage((), None)
+
+    async with site(limits=ServerLimits(**SLOW)) as here:
+        here.publish()
+        async with await here.client("engineer") as first, await here.client("observer") as second:
+            monkeypatch.setattr(here.actions, "reset_wear", waiting)
+            monkeypatch.setattr(here.history, "values", waiting)
+            monkeypatch.setattr(Users, "verify_password", lambda *_: wait() or True)
+            state = ua.NodeId(ua.ObjectIds.Server_ServerStatus_State)
+            values = [ua.ReadValueId(state, ua.AttributeIds.Value)] * (LARGE_BYTES // 16)
+            task = asyncio.create_task(request_of(here, first))
+            try:
+                assert await asyncio.to_thread(begun.wait, 60.0)
+                async with asyncio.timeout(60.0):
+                    read = await second.uaclient.read(ua.ReadParameters(NodesToRead=values))
+                assert {value.StatusCode.is_good() for value in read} == {True}
+                assert not task.done()
+            finally:
+                may_end.set()
+            assert (await task).value in (codes.Good, codes.GoodNoData)

@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import itertools
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
@@ -139,6 +140,46 @@ async def test_long_requests_are_answered_one_at_a_time_and_short_ones_at_once()
     await asyncio.gather(*tasks, return_exceptions=True)
     assert max(together) == 1
     assert len(together) == 3
+
+
+async def test_who_leaves_the_line_stands_in_it_again_and_an_error_does_not() -> None:
+    line, said = LargeRequests(), list[str]()
+
+    async def request(name: str, outside: asyncio.Event, *, fails: bool = False) -> None:
+        async with line.turn(LARGE_BYTES) as turn:
+            said.append(f"{name} begins")
+            async with turn.left():
+                await outside.wait()
+                if fails:
+                    raise ValueError(name)
+            said.append(f"{name} goes on")
+            await asyncio.sleep(0)
+            said.append(f"{name} ends")
+
+    disk = [asyncio.Event() for _ in range(4)]
+    tasks = [asyncio.ensure_future(request(str(n), disk[n], fails=n == 2)) for n in range(4)]
+    await until(lambda: len(said) == 4)
+    tasks[3].cancel()  # whoever hangs up while he waits
+    disk[2].set()
+    disk[1].set()
+    disk[0].set()
+    outcomes = await asyncio.gather(*tasks, return_exceptions=True)
+    assert said[4:] == ["1 goes on", "1 ends", "0 goes on", "0 ends"] or said[4:] == [
+        "0 goes on", "0 ends", "1 goes on", "1 ends",
+    ]  # fmt: skip
+    assert [type(outcome) for outcome in outcomes] == [
+        type(None),
+        type(None),
+        ValueError,
+        asyncio.CancelledError,
+    ]
+    async with line.turn(LARGE_BYTES):
+        said.append("the line is free")
+
+
+async def until(holds: Callable[[], bool]) -> None:
+    while not holds():
+        await asyncio.sleep(0)
 
 
 async def test_garbage_is_looked_for_between_long_requests(monkeypatch: pytest.MonkeyPatch) -> None:

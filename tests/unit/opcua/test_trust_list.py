@@ -86,6 +86,17 @@ def test_a_server_without_a_certificate_makes_its_own(pki: Path) -> None:
         TrustList(pki, "urn:another")
 
 
+def test_a_certificate_whose_key_is_gone_is_made_anew_as_it_says(tmp_path: Path) -> None:
+    TrustList(tmp_path, URI)
+    own = tmp_path / "own"
+    (own / "key.pem").unlink()
+    with pytest.raises(AccessError, match=r"key\.pem: No such file .*; put it back, or move cert\.der away"):
+        TrustList(tmp_path, URI)
+    (own / "cert.der").unlink()
+    TrustList(tmp_path, URI)
+    assert (own / "key.pem").is_file()
+
+
 def test_directly_trusted_and_not(pki: Path) -> None:
     trust, client = TrustList(pki, URI), certificate("client", 0)
     with pytest.raises(UntrustedError):

@@ -17,7 +17,7 @@ ENTRY = "name: eve, role: observer, password: x"
         ("users: !!timestamp 2026-13-45\n", r"users\.yaml:1:8: '2026-13-45' cannot be read as timestamp"),
         ("users: !!bool maybe\n", r"users\.yaml:1:8: 'maybe' cannot be read as bool"),
         ("users: " + "[" * 5000, r"users\.yaml:1:1: nested too deeply"),
-        ("users: 3\n", "not a users file; make one with `impactcell users add"),
+        ("users: 3\n", "not a users file; move it away, and make one with `impactcell users add /"),
         ("users: [3]\n", "user 1: has no name"),
         ("users: [{name: eve, role: [observer], password: x}]\n", "user 1: the role is one of"),
         ("users: [{name: eve, role: !!binary QQ==, password: x}]\n", "user 1: the role is one of"),
