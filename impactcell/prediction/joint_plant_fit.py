@@ -35,6 +35,7 @@ from impactcell.prediction.phase_reweighting import (
 )
 from impactcell.prediction.waveform import fit
 from impactcell.records import Samples
+from impactcell.records.uncertainty import plus_minus
 
 SHARED = slice(RATIO, DAMPING + 1)
 """Parameters that all taps share: mu_k/mu_s, k and b."""
@@ -78,6 +79,15 @@ class PlantFit:
     model: Model
     used: tuple[int, ...]
     gap: float
+
+    @property
+    def sentence(self) -> str:
+        """The parameters with what is told of their standard deviations."""
+        plant, prior = self.model.plant, self.model.prior
+        stiffness = plus_minus(plant.stiffness_n_per_m, prior.stiffness_std_n_per_m, ".6g", ".2g")
+        damping = plus_minus(plant.damping_n_s_per_m, prior.damping_std_n_s_per_m, ".5g", ".2g")
+        ratio = plus_minus(self.model.ratio, prior.ratio_std, ".4f", ".2g")
+        return f"k {stiffness} N/m, b {damping} N s/m, mu_k/mu_s {ratio} (± is 95 %)"
 
 
 def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted") -> PlantFit:

@@ -75,7 +75,9 @@ def interpolate_mass(model: Model, mass_kg: float, velocity_m_s: float) -> MassI
         The model has not been calibrated, or the mass or velocity is not known.
     """
     if not model.predictors:
-        raise PredictionError(f"model {model.name!r} has no predictors: run `impactcell calibrate`")
+        raise PredictionError(
+            f"model {model.name!r} has no predictors: run `impactcell calibrate` on its cell"
+        )
     if not (math.isfinite(mass_kg) and mass_kg > 0.0):
         raise PredictionError("the part's mass is not known")
     if not (math.isfinite(velocity_m_s) and velocity_m_s > 0.0):

@@ -26,7 +26,6 @@ from impactcell.discrepancy.machine import (
     Response,
     TermChoice,
     investigate_machine,
-    simulate_held_out,
 )
 from impactcell.records import Capture, Channel, Samples
 from tests.benchmarks.table import Table
@@ -282,8 +281,8 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
     if law is None:
         return {"refused": finding.law_refused}
     row: dict[str, Any] = {"place": law.place, "gap": [law.fall.before, law.fall.after]}
-    if law.choice is not None and law.choice.law is not None:
-        errors = [simulate_held_out(finding, model).rmse for model in (law.without, law.model)]
+    if law.choice is not None and law.choice.law is not None and law.simulated is not None:
+        errors = [error.rmse for error in law.simulated]
         row |= {"form": law.choice.law.name, "equivalents": list(law.equivalents), "rmse": errors}
     return row
 

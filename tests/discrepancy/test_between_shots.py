@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.search import between_shots, chance_by_exchange, chance_of_narrowing, trace_rivals
 
 
@@ -89,3 +90,25 @@ def test_a_name_between_shots_gives_way_to_what_narrows_the_factors_within_them(
 ) -> None:
     fitted: Any = SimpleNamespace(effects=("viscous_friction", rival), spread=spread)
     assert trace_rivals(0.02, [fitted], 30) == ((rival,) if tied else (), explains)
+
+
+@pytest.mark.parametrize(
+    ("effect", "sizes", "told"),
+    [
+        ("direction_asymmetry", [("relative_amplitude", -0.2, 0.22)], False),
+        ("direction_asymmetry", [("relative_amplitude", 0.004, 0.014)], True),
+        ("batch_shift", [("relative_change", -0.1, 0.1), ("relative_change", -0.05, 0.0)], False),
+        ("batch_shift", [("relative_change", -0.1, 0.1), ("relative_change", -0.05, -0.01)], True),
+    ],
+)
+def test_an_effect_has_a_size_whose_interval_does_not_hold_nothing(
+    monkeypatch: pytest.MonkeyPatch, effect: str, sizes: list[tuple[str, float, float]], told: bool
+) -> None:
+    """The interval is that of the report, with the error in it that the traces share."""
+    others = [ParameterEstimate("", "mu_k", -1, 0.2, -1.0, 1.0, at_bound=False)]
+    own = [ParameterEstimate(effect, name, 0, 0.0, low, high, at_bound=False) for name, low, high in sizes]
+    monkeypatch.setattr(between_shots, "estimate_parameters", lambda *_: (*others, *own))
+    monkeypatch.setattr(between_shots, "linearise", lambda *_: None)
+    monkeypatch.setattr(between_shots, "shared_error", lambda _: None)
+    evidence: Any = SimpleNamespace(fit=SimpleNamespace(effects=(effect,)))
+    assert between_shots.has_a_size(None, evidence) == told  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ import pytest
 from impactcell import campaign as campaigns
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.errors import DiscrepancyError
-from impactcell.physics import Ensemble, TapInput, outside_effects
+from impactcell.physics import Ensemble, TapInput
 from impactcell.physics.effects import withdraw_effect
 from impactcell.physics.outside_effects import offer_effects
 from tests.discrepancy.test_workflow import make
@@ -55,7 +55,6 @@ def test_workers_know_an_effect_of_the_users_own(tmp_path: Path) -> None:
                 np.testing.assert_allclose(position_m, parabola, rtol=1e-9, atol=1e-12)
     finally:
         withdraw_effect("own_pull")
-        outside_effects._SOURCES.pop("own_pull")
 
 
 @pytest.mark.filterwarnings("default")

@@ -17,10 +17,14 @@ from impactcell.discrepancy.machine import (
     BaseModel,
     MachineFinding,
     NumberPrior,
+    OpenLoopError,
     Response,
     investigate_machine,
+    law_search,
     simulate_held_out,
 )
+from impactcell.discrepancy.machine.finding import FittedModel
+from impactcell.discrepancy.report import machine_result
 from impactcell.errors import CampaignError, SettingsError
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import read_base_model
@@ -152,7 +156,17 @@ PENDULUM = BaseModel(
 )  # fmt: skip
 
 
-def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes() -> None:
+def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    simulated: list[FittedModel] = []
+
+    def counted(finding: MachineFinding, model: FittedModel) -> OpenLoopError:
+        simulated.append(model)
+        return simulate_held_out(finding, model)
+
+    monkeypatch.setattr(law_search, "simulate_held_out", counted)
+    monkeypatch.setattr(machine_result, "simulate_held_out", counted)
     finding = investigate_machine(pendulum(1e-3), PENDULUM)
     law = finding.law
     assert law is not None
@@ -160,6 +174,10 @@ def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes() -> 
     without, with_it = (simulate_held_out(finding, model).rmse for model in (law.without, law.model))
     assert with_it < 0.4 * without
     assert with_it < 4.0 * NOISE
+    written = machine_result.machine_document(finding)["law"]["simulation"]["rmse"]
+    assert written == pytest.approx({"before": without, "after": with_it}, rel=1e-4)
+    once = [sum(model is other for other in simulated) for model in (law.without, law.model)]
+    assert once == [1, 1]  # for the decision and for what is written
 
 
 LAW = """\

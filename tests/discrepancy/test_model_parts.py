@@ -44,7 +44,7 @@ def test_a_plant_that_is_given_is_where_the_fit_starts() -> None:
 def test_a_shot_at_rest_stays_at_rest_whatever_the_step() -> None:
     names = ("log_factor", "speed_m_s", "shift_m")
     problem: Any = SimpleNamespace(shot_parameter_names=names)
-    at = ShotParameters(np.zeros(3), np.ones(3), np.array([0.0, 0.2, -0.1]), np.zeros(3))
+    at = ShotParameters(np.zeros(3), np.ones(3), np.array([0.0, 0.2, -0.1]), np.zeros(3), np.zeros(3))
     moved = Problem.step_shot_parameters(problem, at, np.full((3, 3), 0.01))
     assert moved.speed_m_s == pytest.approx([0.0, 0.21, -0.09])
     assert moved.log_factor == pytest.approx([0.01] * 3)

@@ -2,12 +2,14 @@
 
 import functools
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import impactcell
 from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign
 from impactcell.cli.discrepancy import discrepancy
@@ -211,6 +213,23 @@ def test_a_unit_wrong_by_a_thousand_is_noticed(channel: str) -> None:
     wrong = [replace(shot, **{channel: scaled(getattr(shot, channel))}) for shot in given.shots]
     with pytest.raises(CampaignError, match=f"{channel}_"):
         investigate(replace(given, shots=tuple(wrong)))
+
+
+def test_a_unit_that_is_wrong_is_told_with_the_campaign_that_has_it(tmp_path: Path) -> None:
+    given = make(shots=12)
+    wrong = tuple(
+        replace(shot, position=replace(shot.position, values=1e3 * shot.position.values))
+        for shot in given.shots
+        if shot.position is not None
+    )
+    path = tmp_path / "campaign"
+    campaigns.write(replace(given, shots=wrong), path)
+    doors = (lambda: discrepancy(path, tmp_path / "out"), lambda: impactcell.discrepancy(path))
+    for door in doors:
+        with pytest.raises(CampaignError, match=f"^{re.escape(str(path))}: .*check the unit of position_m"):
+            door()
+    with pytest.raises(CampaignError, match=r"^train and test go with base"):
+        impactcell.discrepancy(path, train="1")
 
 
 def test_missing_channels_and_replicates_are_said() -> None:

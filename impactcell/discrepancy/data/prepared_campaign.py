@@ -6,7 +6,7 @@ test that follows.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,6 +71,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         Too few shots for any test, or a unit that is wrong by a large factor.
     """
     strategy = STRATEGIES[campaign.excitation]
+    recorded = {shot.cycle: shot for shot in campaign.shots}
     campaign, pretrigger = from_contact(campaign)
     data_faults = inspect_campaign(campaign)
     refuse_unusable(campaign, data_faults)
@@ -89,7 +90,9 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         key = _settings(capture) if strategy.has_replicates else (float(number),)
         group = groups.setdefault(key, len(groups))
         batch = batches.index(capture.batch_id or "")
-        shots.append(_prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group))
+        shot = _prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group)
+        begun_before = campaign.excitation is Excitation.TAP and capture is not recorded[capture.cycle]
+        shots.append(_with_open_onset(shot) if begun_before else shot)
     notes += strategy.missing_information(shots)
     notes += _time_gaps(shots)
     check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
@@ -178,6 +181,27 @@ def _prepared_shot(
         values=_channel_arrays(channels, "values"),
         drive=strategy.drive(capture),
         covariates=strategy.adjust_covariates(covariates),
+    )
+
+
+def _with_open_onset(shot: PreparedShot) -> PreparedShot:
+    """Let first contact lie within a sampling step of t = 0; the samples of that step say nothing.
+
+    Where a record begins before contact it shows contact by its samples only, and at 4000 mm/min the actuator
+    goes 13 um in a step of 0.2 ms. The step is that of the force, of the position where there is none.
+    """
+    time_s = next((times for times in shot.times if times.size > 1), NO_SAMPLES)
+    if not time_s.size:
+        return shot
+    step_s = float(np.median(np.diff(time_s)))
+    kept = [times > step_s for times in shot.times]
+    force, position, actuator = (times[part] for times, part in zip(shot.times, kept, strict=True))
+    values = [samples[part] for samples, part in zip(shot.values, kept, strict=True)]
+    return replace(
+        shot,
+        times=(force, position, actuator),
+        values=(values[0], values[1], values[2]),
+        onset_step_s=step_s,
     )
 
 

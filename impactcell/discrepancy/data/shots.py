@@ -47,6 +47,8 @@ class PreparedShot:
         `dwell` the base-10 logarithm of the dwell in seconds, at least that of `MIN_DWELL_S`.
     whitener : ndarray, shape (n, n)
         Makes residuals of a driven block independent and of unit variance; shape (0, 0) elsewhere.
+    onset_step_s : float
+        How far first contact may lie from t = 0: the sampling step where a record began before it; else 0.
     """
 
     number: int
@@ -64,6 +66,7 @@ class PreparedShot:
     drive: Samples
     covariates: dict[str, float]
     whitener: Samples = field(default_factory=lambda: np.empty((0, 0)))
+    onset_step_s: float = 0.0
 
     @property
     def columns(self) -> tuple[tuple[str, float], ...]:

@@ -1,12 +1,18 @@
 """Any machine with one coordinate: a base model without a cell, and what its records say it lacks."""
 
 from impactcell.discrepancy.machine.base_model import BaseModel, LawForm, NumberPrior, Response, TermChoice
-from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.finding import (
+    FallOfGap,
+    FittedModel,
+    MachineFinding,
+    MachineLaw,
+    OpenLoopError,
+)
 from impactcell.discrepancy.machine.free_forms import COVARIATES, FREE_FORMS, VALUES
 from impactcell.discrepancy.machine.investigation import investigate_machine
 from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep, Trial
-from impactcell.discrepancy.machine.simulation import OpenLoopError, motions, simulate_held_out
+from impactcell.discrepancy.machine.simulation import motions, simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE, Term
 
 __all__ = [

@@ -77,6 +77,25 @@ class FittedModel:
         return self.value((name, 0.0, 0))
 
 
+@dataclass(frozen=True, slots=True)
+class OpenLoopError:
+    """Error of a simulation over all held-out stretches.
+
+    Attributes
+    ----------
+    rmse : float
+        [m, rad, N or N m].
+    fit_percent : float
+        100 (1 - rmse / standard deviation of what was measured).
+    relative_force : float
+        rmse over the RMS of the measured force; nan where the position is predicted.
+    """
+
+    rmse: float
+    fit_percent: float
+    relative_force: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MachineLaw:
     """A function that the catalogue does not have, where something remains.
@@ -99,6 +118,8 @@ class MachineLaw:
         Without and with it; with the form where there is one, else with the spline.
     fall : FallOfGap
         Of the held-out gap, from the one to the other.
+    simulated : (OpenLoopError, OpenLoopError) or None
+        Of the held-out simulation, without and with it; None without a functional form.
     """
 
     place: str
@@ -110,6 +131,7 @@ class MachineLaw:
     without: FittedModel
     model: FittedModel
     fall: FallOfGap
+    simulated: tuple[OpenLoopError, OpenLoopError] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -81,8 +81,11 @@ def _find_law(study: Study, finding: MachineFinding) -> MachineLaw | str:
     law_model, blocks = (smooth, held_out) if chosen is None else laws.fitted(chosen)
     fall = fall_of_gap(blocks, model, law_model, finding.seed)
     curve = spline_function(tangent, best.penalty / variance, tested)
+    simulated = None
+    if chosen is not None and fall.is_real:
+        simulated = simulate_held_out(finding, model), simulate_held_out(finding, law_model)
     law = MachineLaw(
-        LAW_PREFIX + best.form, tested, curve, chosen, equivalents, rivals, model, law_model, fall
+        LAW_PREFIX + best.form, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated
     )
     return _refusal(finding, law) or law
 
@@ -97,10 +100,10 @@ def _refusal(finding: MachineFinding, law: MachineLaw) -> str:
     """Say why a law is not proposed; empty if it is."""
     if not law.fall.is_real:
         return "on held-out blocks the gap does not fall by more than chance"
-    if law.choice is None:
+    if law.simulated is None:
         return ""
-    without, with_it = (simulate_held_out(finding, model).rmse for model in (law.without, law.model))
-    if not with_it < without:
+    without, with_it = law.simulated
+    if not with_it.rmse < without.rmse:
         return "simulated open loop, the law that fits best errs no less on held-out records than no law"
     least, largest = resistance(finding, law.model)
     if least < -NEGATIVE_SHARE * largest:

@@ -17,7 +17,7 @@ from impactcell.discrepancy.machine.equations import (
     smoothed_acceleration,
     smoothed_speed,
 )
-from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
@@ -31,25 +31,6 @@ START_PERIODS = 1.0
 """Periods of the motion, or a quarter of a stretch, by which its first state is fitted."""
 START_NUDGE = 1e-3
 """Size of the nudges that tell how a motion follows from its first state, over its range."""
-
-
-@dataclass(frozen=True, slots=True)
-class OpenLoopError:
-    """Error of a simulation over all held-out stretches.
-
-    Attributes
-    ----------
-    rmse : float
-        [m, rad, N or N m].
-    fit_percent : float
-        100 (1 - rmse / standard deviation of what was measured).
-    relative_force : float
-        rmse over the RMS of the measured force; nan where the position is predicted.
-    """
-
-    rmse: float
-    fit_percent: float
-    relative_force: float
 
 
 def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopError:

@@ -107,4 +107,5 @@ def _sample(ensemble: Ensemble, parameters: Samples, shot_parameters: ShotParame
         np.exp(shot_parameters.log_factor),
         mass_kg=shot_parameters.mass_kg,
         initial_speed_m_s=shot_parameters.speed_m_s,
+        onset_s=shot_parameters.onset_s if shot_parameters.onset_s.any() else None,
     )

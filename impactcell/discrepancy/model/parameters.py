@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from impactcell.physics import Parameter, ParameterKind
+from impactcell.physics import Effect, Parameter, ParameterKind
 from impactcell.physics.effects import find_effect
 from impactcell.records import Samples
 
@@ -93,13 +93,17 @@ def nominal_coordinates(free: tuple[str, ...]) -> tuple[Coordinate, ...]:
     return tuple(coordinate for coordinate in NOMINAL_COORDINATES if coordinate.parameter in free)
 
 
-@lru_cache(maxsize=256)
 def effect_coordinates(identifier: str, batches: int) -> tuple[Coordinate, ...]:
     """Free numbers of an effect."""
+    return _coordinates(find_effect(identifier), batches)
+
+
+@lru_cache(maxsize=256)
+def _coordinates(effect: Effect, batches: int) -> tuple[Coordinate, ...]:
     coordinates: list[Coordinate] = []
-    for parameter in find_effect(identifier).parameters:
+    for parameter in effect.parameters:
         numbers = range(1, batches) if parameter.per_batch else (0,)
-        coordinates += [_coordinate(identifier, parameter, batch) for batch in numbers]
+        coordinates += [_coordinate(effect.identifier, parameter, batch) for batch in numbers]
     return tuple(coordinates)
 
 

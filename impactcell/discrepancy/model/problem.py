@@ -34,6 +34,8 @@ JUMP_FACTOR = 20.0
 """A sample that changes this many times more than its neighbours has been passed by a jump."""
 LARGEST_FACTOR_STEP, LARGEST_LOG_FACTOR = 0.7, 3.0
 """Of the logarithm of a friction factor, in one step and in all: a factor of two, and of twenty."""
+ONSET_STEP_S = 1e-7
+"""Step [s] of a finite difference by the moment of first contact: far below a sampling step."""
 LARGEST_MASS_STEP = 0.3
 """Of the logarithm of a mass in one step."""
 
@@ -101,9 +103,11 @@ class Problem:
         self.penalty_matrix = constraints.penalty(self.coordinates)
         self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items])
         self.unknown_mass &= shots.excitation.mass_is_visible
+        self.onset_step_s = np.array([shot.onset_step_s for shot in shots.items])
         self.shot_parameter_names = (
             *shots.excitation.shot_parameters,
             *(("mass_kg",) if self.unknown_mass.any() else ()),
+            *(("onset_s",) if self.onset_step_s.any() else ()),
         )
 
     def with_effects(self, effects: tuple[str, ...]) -> "Problem":
@@ -134,9 +138,9 @@ class Problem:
         """Where every shot's own numbers start, its state read off the first `share` of its record."""
         excitation, items = self.shots.excitation, self.shots.items
         states = np.array([excitation.initial_state(shot, share) for shot in items])
-        return ShotParameters(
-            np.zeros(self.count), excitation.initial_mass(items), states[:, 0].copy(), states[:, 1].copy()
-        )
+        speed, shift = states[:, 0].copy(), states[:, 1].copy()
+        zeros = np.zeros(self.count)
+        return ShotParameters(zeros, excitation.initial_mass(items), speed, shift, zeros.copy())
 
     def plant_parameters(self, theta: Samples) -> Samples:
         """Parameter vector of the plant at some coordinates."""
@@ -214,10 +218,17 @@ class Problem:
             size = DIFFERENCE_STEP
             if name == "speed_m_s":
                 size *= max(float(np.abs(speed).max()), SMALLEST_SPEED_M_S)
+            elif name == "onset_s":
+                size = ONSET_STEP_S
             # A part that starts at rest stays there until it breaks away: its speed is no free number.
             steps[:, column] = size if name != "speed_m_s" else size * (speed != 0.0)
+            if name == "onset_s":  # towards the middle of its range
+                steps[:, column] *= np.where(state.shot_parameters.onset_s > 0.0, -1.0, 1.0)
             ahead = self.residual(state.theta, self.step_shot_parameters(state.shot_parameters, steps))
-            if central:
+            if name == "onset_s":
+                change = remove_jumps(state.residual - ahead)
+                jacobian[column] = change / np.repeat(steps[:, column], self.sizes)
+            elif central:
                 back = self.residual(state.theta, self.step_shot_parameters(state.shot_parameters, -steps))
                 jacobian[column] = remove_jumps(back - ahead) / (2.0 * size)
             else:
@@ -236,6 +247,10 @@ class Problem:
                 changed[name] = np.clip(changed[name] + step, -LARGEST_LOG_FACTOR, LARGEST_LOG_FACTOR)
             elif name == "speed_m_s":
                 changed[name] = changed[name] + steps[:, column] * (changed[name] != 0.0)
+            elif name == "onset_s":
+                changed[name] = np.clip(
+                    changed[name] + steps[:, column], -self.onset_step_s, self.onset_step_s
+                )
             else:
                 changed[name] = changed[name] + steps[:, column]
         return replace(shot_parameters, **changed)

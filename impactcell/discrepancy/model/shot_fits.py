@@ -1,4 +1,4 @@
-"""What belongs to one shot only, eliminated and refitted shot by shot: friction, initial speed, mass."""
+"""What belongs to one shot only, eliminated and refitted shot by shot: friction, speed, mass, onset."""
 
 import math
 from dataclasses import dataclass, replace
@@ -120,7 +120,7 @@ def better_per_shot(problem: Problem, current: FitState, trial: FitState) -> Fit
     shot_parameters = ShotParameters(
         *(
             np.where(better, getattr(trial.shot_parameters, name), getattr(current.shot_parameters, name))
-            for name in ("log_factor", "mass_kg", "speed_m_s", "shift_m")
+            for name in ("log_factor", "mass_kg", "speed_m_s", "shift_m", "onset_s")
         )
     )
     residual = np.where(np.repeat(better, problem.sizes), trial.residual, current.residual)

@@ -19,12 +19,15 @@ class ShotParameters:
         Initial speed; nan where an actuator strikes.
     shift_m : ndarray
         Added to the positions: error of the first sample, which a free slide counts from.
+    onset_s : ndarray
+        When first contact was, by the times of the samples: 0, unless it lies between two of them.
     """
 
     log_factor: Samples
     mass_kg: Samples
     speed_m_s: Samples
     shift_m: Samples
+    onset_s: Samples
 
     def select(self, places: IndexArray) -> "ShotParameters":
         """Return the numbers of some of the shots."""

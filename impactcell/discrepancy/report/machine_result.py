@@ -147,11 +147,6 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
         return {"law": None, "law_refused": finding.law_refused or None}
     covariate, unit = law_covariate(finding)
     chosen = None if law.choice is None else ChosenTerm(law.choice, 0.0)
-    errors = (
-        None
-        if chosen is None
-        else (simulate_held_out(finding, law.without), simulate_held_out(finding, law.model))
-    )
     document = {
         "place": FREE_FORMS[LAW_PLACES[law.place]],
         "covariates": [covariate],
@@ -166,7 +161,7 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
             }
         },
         "held_out": {**_fall(law.fall), "p_value": round_digits(law.fall.p_value)},
-        "simulation": None if errors is None else _simulation(finding, errors),
+        "simulation": None if law.simulated is None else _simulation(finding, law.simulated),
         "file": None if law.choice is None else f"{law.place}.yaml",
     }  # fmt: skip
     return {"law": document, "law_refused": None}

@@ -20,6 +20,7 @@ from impactcell.discrepancy.report.sentences import (
 from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.effects import LIBRARY
+from impactcell.records.uncertainty import TOLD_STDS
 
 EFFECT_GUIDE = (Path(__file__).parents[1] / "README.md").as_uri() + "#a-new-effect"
 """Where the report sends whoever wants to write a new effect."""
@@ -133,7 +134,7 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
         "simulation_scale": MM_PER_M if result.simulation.unit == "m" else 1.0,
         "regions": _regions(result.validation),
         "large": LARGE_REGION_RMS,
-        "uncertain": 1.0 / math.sqrt(2.0 * max(len(result.held_out), 1)),
+        "uncertain": TOLD_STDS / math.sqrt(2.0 * max(len(result.held_out), 1)),
         "extended": extended,
         "change": lambda form, before, after: form % before + (f" → {form % after}" if extended else ""),
         "nominal_effects": [phrase(item) for item in result.nominal.effects],

@@ -4,21 +4,24 @@ What remains in the traces says nothing of them: they show in the friction facto
 independent. One is taken if it explains more of the variance of the factors than one without part in it would
 by chance, by the F test and by shots exchanged at random, and if nothing in the traces explains more of it:
 parts that slide apart by direction make friction by position look like friction by direction, and a fit of
-the traces narrows the factors then.
+the traces narrows the factors then. And its size is told from nothing: what the model lacks in the traces, in
+one direction more than in the other, say, makes the factors go with it as well.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import f as fisher
 
-from impactcell.discrepancy.model import Fit
+from impactcell.discrepancy.model import Fit, Problem, estimate_parameters, linearise
 from impactcell.discrepancy.search import candidate_scores
 from impactcell.discrepancy.search.acceptance import SelectionResult
 from impactcell.discrepancy.search.candidate_fits import FitTask, run_tasks
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
 from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits
+from impactcell.discrepancy.search.model_error import shared_error
 from impactcell.discrepancy.search.policy import POLICY
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
@@ -68,9 +71,25 @@ def accept_between_shots(
         [CandidateFit(fitted, fitted.log_likelihood(context.problem.shots)) for fitted in fits]
     )
     final = context.test_model(best)
+    if not has_a_size(context.problem, final):
+        return None
     return SelectionResult(
         evidence, final, best, (effect,), {effect: tied}, {effect: p_value}, alternatives, remains=True
     )
+
+
+def has_a_size(problem: Problem, evidence: ModelEvidence) -> bool:
+    """Whether the last effect of a model is told from nothing beside the error that all shots share.
+
+    An error that goes with a covariate makes the friction factors go with it too: the traces show how large
+    it is, and so how far an effect between shots is uncertain.
+    """
+    model = evidence.fit
+    effect = model.effects[-1]
+    nulls = {parameter.name: parameter.null for parameter in LIBRARY[effect].parameters}
+    estimates = estimate_parameters(model, linearise(problem, model), shared_error(evidence))
+    sizes = [one for one in estimates if one.effect == effect and not math.isnan(nulls[one.parameter])]
+    return not sizes or any(not one.low <= nulls[one.parameter] <= one.high for one in sizes)
 
 
 def trace_rivals(spread: float, rivals: Sequence[Fit], shots: int) -> tuple[tuple[str, ...], bool]:
