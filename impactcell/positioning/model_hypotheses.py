@@ -7,11 +7,16 @@ its own, and each tap shifts its probability by how well it foretold that tap (B
 Hoeting et al., Statistical Science 14, 1999). So scatter and discrepancy are told apart, large discrepancies
 are believed within a few taps, and a model that is right costs none.
 
-With nothing missing the Bayes factor of the others over the first has expectation 1 after any number of taps,
-so that it exceeds 1/alpha at any time with a probability of at most alpha (Ville, 1939).
+A model is complete where the first hypothesis holds and the contact is the same at each tap: one that gives
+way by some tenths more or less is not the one the model has, and such a scatter would explain away whatever
+is missing there. Friction and displacement may scatter. With nothing missing, the Bayes factor of all else
+over this has expectation 1 after any number of taps, so that it exceeds 1/alpha at any time with a
+probability of at most alpha (Ville, 1939). Of all scatters of the displacement the one counts that speaks
+most for the model, so that this holds for each of them and not for their mean.
 """
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -34,7 +39,12 @@ from impactcell.positioning.planner_posterior import (
     with_single_gaussian,
 )
 from impactcell.positioning.prediction_watch import ALARM, PredictionWatch, place_bets
-from impactcell.positioning.scatter_hypotheses import prior_weights
+from impactcell.positioning.scatter_hypotheses import (
+    GRID,
+    PRIOR_WEIGHTS,
+    prior_weights,
+    same_contact_by_displacement,
+)
 from impactcell.records import Evidence, Samples, TapPredictions
 
 WEIGHTS_STD = np.array([0.002, 0.005, 0.025, 0.16])
@@ -43,6 +53,8 @@ VISCOUS_STD = np.array([0.0, 60.0, 4.0, 24.0])
 """Of k_v beforehand on top of what the model says, N s/m: as much as slows a light part by half."""
 PROBABILITIES = np.array([0.72, 0.06, 0.15, 0.07])
 """Of the hypotheses before the first tap: most models are right but for friction; a choice."""
+COMPLETE = PROBABILITIES[0] * same_contact_by_displacement(PRIOR_WEIGHTS)
+"""Probability before the first tap that the model is complete, with each scatter of the displacement."""
 RESISTANCE = 1
 """The hypothesis that resistance grows with speed and nothing else is missing."""
 GRAVITY_M_S2 = 9.81
@@ -114,13 +126,30 @@ def reweighted(probabilities: Samples, log_evidence: Samples) -> Samples:
 
 
 def log_bayes_factor(posterior: PlannerPosterior) -> float:
-    """Evidence that something is missing: Bayes factor of the other hypotheses over the first, ln."""
+    """Evidence that something is missing: Bayes factor of all else over a complete model, ln."""
+    return _evidence_of_all_taps(posterior) - posterior.uncounted_evidence
+
+
+def _evidence_of_all_taps(posterior: PlannerPosterior) -> float:
+    """Return the logarithm of that factor as probabilities have it, whatever is told of it."""
     probabilities = posterior.probabilities
     if probabilities.size < WEIGHTS_STD.size:
         return 0.0
-    right = float(probabilities[0])
-    odds = math.log((1.0 - right) / right)
-    return odds - math.log((1.0 - PROBABILITIES[0]) / PROBABILITIES[0])
+    complete = probabilities[0] * same_contact_by_displacement(posterior.scatter_weights[0])
+    all_else = (1.0 - float(complete.sum())) / (1.0 - float(COMPLETE.sum()))
+    return math.log(all_else) - math.log(max(float((complete / COMPLETE).max()), sys.float_info.min))
+
+
+def with_evidence_of_a_tap(after: PlannerPosterior, before: PlannerPosterior) -> PlannerPosterior:
+    """Posterior after a tap, telling of what it said against the model no more than one tap may.
+
+    What it said beyond stays uncounted; later taps that speak for the model take it from there first.
+    """
+    said = _evidence_of_all_taps(after) - _evidence_of_all_taps(before)
+    uncounted = before.uncounted_evidence + max(said - MOST_EVIDENCE_OF_A_TAP, 0.0)
+    if said < 0.0 < uncounted:
+        uncounted = max(uncounted + said, 0.0)
+    return replace(after, uncounted_evidence=uncounted)
 
 
 def tap_predictions(posterior: PlannerPosterior) -> TapPredictions:
@@ -136,6 +165,12 @@ def tap_predictions(posterior: PlannerPosterior) -> TapPredictions:
             relative = SPEED_M_S / (part.mu_k * MASS_KG * GRAVITY_M_S2)
             depends_on, size = "velocity", -relative * float(part.mean[VISCOUS])
             std = relative * math.sqrt(float(part.cov[VISCOUS, VISCOUS]))
+        scatter = posterior.scatter_weights[0]
+        differs = float(probabilities[0]) * (1.0 - float(same_contact_by_displacement(scatter).sum()))
+        if differs > probabilities[1:].max(initial=0.0):
+            # the contact's, from tap to tap, of the indentation
+            depends_on, size = "contact", float(scatter @ GRID[:, 2])
+            std = math.sqrt(float(scatter @ (GRID[:, 2] - size) ** 2))
         evidence = Evidence(statistic=gap, threshold=GAP_EVIDENCE, size=size, size_std=std)
         return TapPredictions(posterior.taps, gap >= GAP_EVIDENCE, depends_on, evidence)
     off = math.log(posterior.watch.evidence)
@@ -160,15 +195,16 @@ def with_model_accepted(posterior: PlannerPosterior) -> PlannerPosterior:
         covs[:, weights, weights] += std**2
         covs[:, VISCOUS, VISCOUS] += viscous_std**2
         parts.append(replace(learned, covs=covs))
-    return join(parts, PROBABILITIES, replace(posterior, watch=PredictionWatch()))
+    accepted = join(parts, PROBABILITIES, replace(posterior, watch=PredictionWatch()))
+    return replace(accepted, uncounted_evidence=_evidence_of_all_taps(accepted))
 
 
 def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
     """Posterior after one more score of its predictions; where they turn out to be off, taps become cautious.
 
     A planner in doubt knows less of discrepancy and scatter than it thought: the probabilities of both move
-    halfway back to where they began. Predictions that are off are no evidence that the model is right: what
-    taps have said against the first hypothesis stays said.
+    halfway back to where they began. Predictions that are off are no evidence that the model is right, nor by
+    themselves that it lacks something: what taps have said against it stays said, and no more.
     """
     watched = place_bets(posterior.watch, score)
     probabilities = posterior.probabilities
@@ -181,7 +217,10 @@ def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
     halfway = np.sqrt(probabilities * PROBABILITIES)
     right = min(float(halfway[0] / halfway.sum()), float(probabilities[0]))
     lacking = (1.0 - right) * halfway[1:] / halfway[1:].sum()
-    return join(parts_of(doubting), np.append(right, lacking), doubting)
+    doubting = join(parts_of(doubting), np.append(right, lacking), doubting)
+    said = log_bayes_factor(posterior)
+    told = max(said, min(log_bayes_factor(doubting), 0.0))
+    return replace(doubting, uncounted_evidence=_evidence_of_all_taps(doubting) - told)
 
 
 def condition_on_friction(

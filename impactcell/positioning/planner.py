@@ -235,7 +235,7 @@ class TapPlanner:
             For a coefficient that is not positive or a deviation that is negative.
         """
         if not (math.isfinite(mu_k) and mu_k > 0.0 and math.isfinite(std) and std >= 0.0):
-            raise PositioningError(f"cannot use a friction of {mu_k} +- {std}")
+            raise PositioningError(f"cannot use a friction of {mu_k} with a standard deviation of {std}")
         self._posterior = model_hypotheses.condition_on_friction(
             self._posterior, mu_k, std, batch_changed=batch_changed
         )

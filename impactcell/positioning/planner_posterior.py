@@ -57,6 +57,9 @@ class PlannerPosterior:
         Whether predictions have been calibrated.
     hypotheses : ndarray, shape (c,)
         Number of the hypothesis to which each component belongs.
+    uncounted_evidence : float
+        Part of the ln of the Bayes factor against the model that is not told: what a single tap said beyond
+        what one may, what an extended model has taken in; negative for what a doubt would have taken back.
     """
 
     weights: Samples
@@ -67,6 +70,7 @@ class PlannerPosterior:
     surprise: float = 0.0
     watch: PredictionWatch = field(default_factory=PredictionWatch)
     hypotheses: Samples = field(default_factory=lambda: np.zeros(1))
+    uncounted_evidence: float = 0.0
 
     @property
     def probabilities(self) -> Samples:

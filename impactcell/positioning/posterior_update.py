@@ -20,7 +20,12 @@ from impactcell.positioning.displacement_discrepancy import (
     FEATURES,
     INDENTATION,
 )
-from impactcell.positioning.model_hypotheses import join, parts_of, reweighted
+from impactcell.positioning.model_hypotheses import (
+    join,
+    parts_of,
+    reweighted,
+    with_evidence_of_a_tap,
+)
 from impactcell.positioning.planner_posterior import (
     BATCH_STD,
     FRICTION,
@@ -77,7 +82,8 @@ def update_posterior(
         probabilities = reweighted(probabilities, log_evidence)
     surprise = float(probabilities @ np.array([part.surprise for part in parts]))
     learned = join(parts, probabilities, posterior)
-    return replace(learned, taps=posterior.taps + 1, surprise=surprise)
+    learned = replace(learned, taps=posterior.taps + 1, surprise=surprise)
+    return with_evidence_of_a_tap(learned, posterior)
 
 
 def update_hypothesis(

@@ -34,6 +34,8 @@ MEMORY = 400.0
 """Taps after which what was learned of the scatter fades."""
 LEAST_LOG_DENSITY = -700.0
 """Of a tap that no combination could have foretold: the least number's logarithm."""
+SAME_CONTACT_STD = 0.05
+"""sigma_c up to which a contact is the same at each tap, as far as the model's linearisation can tell."""
 REACH = np.concatenate([[0.0], np.geomspace(1e-4, 0.8, 120)])
 """Deviations at which the distribution of the scatter is tabulated."""
 
@@ -41,7 +43,8 @@ GRID = np.stack(np.meshgrid(FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD, indexin
     -1, 3
 )
 """All combinations, shape (g, 3)."""
-
+SHAPE = (FRICTION_STD.size, DISPLACEMENT_STD.size, CONTACT_STD.size)
+"""Of the grid."""
 
 TAILS = tuple(ndtr(-REACH / std[:, None]) for std in (FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD))
 """Of each standard deviation, the probability to reach further than each of these."""
@@ -62,6 +65,13 @@ def mean_variances(weights: Samples) -> Samples:
     """Return the expected squares of sigma_f, sigma_d and sigma_c, shape (3,)."""
     variances: Samples = weights @ GRID**2
     return variances
+
+
+def same_contact_by_displacement(weights: Samples) -> Samples:
+    """Probability of each sigma_d together with a contact that is the same at each tap, shape (7,)."""
+    cube: Samples = weights.reshape(SHAPE)[:, :, CONTACT_STD <= SAME_CONTACT_STD]
+    shares: Samples = cube.sum(axis=(0, 2))
+    return shares
 
 
 def update_weights(
@@ -99,8 +109,7 @@ def quantile_scales(weights: Samples, z: Samples) -> Samples:
     """
     nodes = np.maximum(np.abs(z), 0.05)
     scales = np.empty((z.size, 3))
-    shape = (FRICTION_STD.size, DISPLACEMENT_STD.size, CONTACT_STD.size)
-    cube = weights.reshape(shape)
+    cube = weights.reshape(SHAPE)
     for n, tails in enumerate(TAILS):
         share = cube.sum(axis=tuple(axis for axis in range(3) if axis != n))
         tail = share @ tails

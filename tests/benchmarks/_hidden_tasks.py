@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from impactcell.positioning import Tap, TapPlanner, Unreachable
 from simulator.plant import Plant, TapInput, simulate_tap
@@ -34,6 +35,10 @@ LEVEL_ERROR = 0.01
 """Relative error of the friction that the tracker tells."""
 RESOLUTION_M = 1e-6
 """Of the encoder: displacements that differ by less are one."""
+FURTHEST_NUISANCE = 0.7
+"""Of the logarithms of k, b and friction over the plant's own: a factor of two."""
+NUISANCE_STARTS = (np.zeros(3), np.array([-0.25, 0.0, 0.0]), np.array([0.0, 0.25, 0.0]))
+"""Of these logarithms, from where the nearest explanation without the effect is looked for."""
 TAPS_A_TASK = 3.3
 """About; how many shots an effect that grows from shot to shot takes a cell to have."""
 
@@ -58,6 +63,20 @@ class Attempt:
     tellable: float = (
         math.nan
     )  # what somebody who knows the effect has seen of it by now: expected ln of odds
+
+
+def nominal_displacements(taps: np.ndarray, logs: np.ndarray) -> np.ndarray:
+    """Displacements (m) without an effect, ln k, ln b and ln mu off by so much.
+
+    `taps` has k, b, mu_s, mass, velocity and stroke in a row, SI.
+    """
+    stiffness, damping, friction = np.exp(logs)
+    k, b, mu_s, mass, velocity, stroke = taps.T
+    mu_s = friction * mu_s
+    moved: np.ndarray = nominal_taps(
+        stiffness * k, damping * b, mu_s, RATIO * mu_s, mass, velocity, stroke
+    ).displacement_m
+    return moved
 
 
 class Cell:
@@ -87,7 +106,6 @@ class Cell:
             )
             return error * float(nominal.displacement_m[0])
         plant = Plant(task.stiffness, task.damping, mu_s, RATIO * mu_s, effects=self.hidden)
-        nuisances = self.without(task, tap, mu_s)
         strike = TapInput(
             tap.velocity_m_s, task.mass_kg, tap.stroke_m, start_m=position_m, dwell_s=dwell_s,
             shot=self.shot, shots=self.shots, batch=task.batch,
@@ -97,38 +115,38 @@ class Cell:
         except NeverAtRestError:
             return math.nan
         self.factor = motion.mu_k / plant.mu_k
-        self.seen.append(self.in_scatter(motion.displacement_m, nuisances))
+        self.seen.append(self.beside_nominal(task, tap, mu_s, motion.displacement_m))
         return error * motion.displacement_m
 
-    def without(self, task: CellTask, tap: Tap, mu_s: float) -> np.ndarray:
-        """Displacements (m) without the effect: of the plant, and with friction, k and b 1 % higher."""
-        return np.array(
-            [
-                nominal_taps(
-                    k * task.stiffness, b * task.damping, f * mu_s, f * RATIO * mu_s, task.mass_kg,
-                    tap.velocity_m_s, tap.stroke_m,
-                ).displacement_m[0]
-                for f, k, b in ((1.0, 1.0, 1.0), (1.01, 1.0, 1.0), (1.0, 1.01, 1.0), (1.0, 1.0, 1.01))
-            ]
-        )  # fmt: skip
-
-    def in_scatter(self, moved_m: float, nuisances: np.ndarray) -> np.ndarray:
-        """What the effect does to a tap, and what 1 % of friction, k and b would, in scatters of the tap."""
-        plain, slopes = nuisances[0], nuisances[1:] - nuisances[0]
-        by_friction = 100.0 * self.condition.friction_scatter * slopes[0]
+    def beside_nominal(self, task: CellTask, tap: Tap, mu_s: float, moved_m: float) -> np.ndarray:
+        """What a tap did, how far taps like it scatter (m), and what the plant without the effect needs."""
+        nominal = np.array(
+            [task.stiffness, task.damping, mu_s, task.mass_kg, tap.velocity_m_s, tap.stroke_m], dtype=float
+        )
+        plain = nominal_displacements(nominal[None], np.zeros(3))[0]
+        by_percent = nominal_displacements(nominal[None], np.array([0.0, 0.0, math.log(1.01)]))[0] - plain
+        by_friction = 100.0 * self.condition.friction_scatter * by_percent
         by_itself = self.condition.displacement_scatter * plain
-        return np.array([moved_m - plain, *slopes]) / math.hypot(by_friction, by_itself, RESOLUTION_M)
+        return np.array([moved_m, math.hypot(by_friction, by_itself, RESOLUTION_M), *nominal])
 
     def tellable(self) -> float:
-        """Half the squared effect that no change of friction, k and b explains: the expected log odds.
+        """Half the squared effect that no other friction, k and b explain: the expected log odds.
 
-        So much a likelihood ratio test with the effect known would see, all nuisances fitted.
+        So much a likelihood ratio test with the effect known would see, all nuisances fitted to the taps.
         """
         if not self.seen:
             return 0.0
         seen = np.array(self.seen)
-        fitted, *_ = np.linalg.lstsq(seen[:, 1:], seen[:, 0], rcond=None)
-        return 0.5 * float(((seen[:, 0] - seen[:, 1:] @ fitted) ** 2).sum())
+        moved, std, nominal = seen[:, 0], seen[:, 1], seen[:, 2:]
+        fits = [
+            least_squares(
+                lambda logs: (moved - nominal_displacements(nominal, logs)) / std,
+                start,
+                bounds=(-FURTHEST_NUISANCE, FURTHEST_NUISANCE),
+            )
+            for start in NUISANCE_STARTS
+        ]
+        return min(float(fit.cost) for fit in fits)
 
     def attempt(self, task: CellTask) -> Attempt:
         """One task from start to end in closed loop."""
