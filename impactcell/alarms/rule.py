@@ -14,6 +14,7 @@ from impactcell.records import (
     TapPredictions,
     WearState,
 )
+from impactcell.records.uncertainty import plus_minus
 
 
 class ConditionClass(enum.Enum):
@@ -42,9 +43,22 @@ NO_EVIDENCE = Evidence()
 """Of a rule without figures."""
 
 
-def german(value: float, form: str) -> str:
-    """Write a number as German has it, with a comma, in one of Python's format specifications."""
-    return format(value, form).replace(".", ",")
+def german(value: float, form: str, std: float | None = None) -> str:
+    """Write a number as German has it, with a comma, and with ± where its standard deviation is given."""
+    return (format(value, form) if std is None else plus_minus(value, std, form)).replace(".", ",")
+
+
+NEARLY_SURE, MOST_SURE = 0.99, 0.999
+"""Probabilities from which a message tells tenths of a per cent, and from which it says no more than "over":
+no model is surer of itself than that."""
+
+
+def percent_sure(probability: float) -> tuple[str, str]:
+    """Write a probability in per cent, English and German; never as 100."""
+    if probability > MOST_SURE:
+        return "over 99.9", "über 99,9"
+    form = ".1f" if probability > NEARLY_SURE else ".0f"
+    return format(100.0 * probability, form), german(100.0 * probability, form)
 
 
 @dataclass(frozen=True, slots=True)

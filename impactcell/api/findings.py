@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from impactcell.api.finding_files import write_files
 from impactcell.api.friction import calibrated
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
-from impactcell.campaign import Campaign, Excitation, read
+from impactcell.campaign import Campaign, Excitation, naming, read
 from impactcell.discrepancy.report import json_text, machine_document, result_document, write_report
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
@@ -117,15 +117,17 @@ def discrepancy(
     DiscrepancyError
         The nominal model cannot be fitted at all.
     """
+    source = None if isinstance(campaign, Campaign) else Path(campaign)
     data = campaign if isinstance(campaign, Campaign) else read(Path(campaign))
     if base is not None:
         if model is not None:
             raise CampaignError("base is a whole model of a machine: leave model out, or base")
-        return _of_machine(data, Path(base), (train, test), seed)
+        with naming(source):
+            return _of_machine(data, Path(base), (train, test), seed)
     if train is not None or test is not None:
         raise CampaignError("train and test go with base; without it the seed divides the shots")
     nominal = None if model is None else read_model(Path(model))
-    with _blas_as_in_the_service(), ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with naming(source), _blas_as_in_the_service(), ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         result = investigate(
             data,
             seed=seed,

@@ -47,13 +47,10 @@ class FirstModel:
 
     @property
     def sentence(self) -> str:
-        """What was found, with one standard deviation."""
-        plant, prior = self.fit.model.plant, self.fit.model.prior
+        """What was found, and in how many taps."""
         return (
-            f"k {plant.stiffness_n_per_m:.6g} ± {prior.stiffness_std_n_per_m:.2g} N/m, "
-            f"b {plant.damping_n_s_per_m:.5g} ± {prior.damping_std_n_s_per_m:.2g} N s/m, "
-            f"mu_k/mu_s {self.fit.model.ratio:.4f} ± {prior.ratio_std:.2g}, "
-            f"from {len(self.fit.used)} of {self.taps} taps; residuals {self.fit.gap:.3g} noise floors"
+            f"{self.fit.sentence}, from {len(self.fit.used)} of {self.taps} taps; "
+            f"residuals {self.fit.gap:.3g} noise floors"
         )
 
 

@@ -1,6 +1,7 @@
 """`impactcell users` and `impactcell certs`: who may connect over OPC UA."""
 
 import getpass
+import shlex
 import sys
 from pathlib import Path
 
@@ -91,7 +92,9 @@ def list_users(file: Path, *, rights: bool = False) -> None:
         The file is absent or cannot be used.
     """
     if not file.exists():
-        raise AccessError(f"{file}: is not there; make it with `impactcell users add {file} NAME`")
+        raise AccessError(
+            f"{file}: is not there; make it with `impactcell users add {shlex.quote(str(file))} NAME`"
+        )
     for user in read_users(file).values():
         ways = [way for way, has in (("password", user.password), ("certificate", user.certificate)) if has]
         _say(f"{user.name}\t{user.role.name.lower()}\t{' and '.join(ways)}")

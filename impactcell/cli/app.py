@@ -14,6 +14,8 @@ import typer
 from impactcell.cli.access_verbs import certs, users
 from impactcell.cli.model_verbs import model
 from impactcell.cli.options import AsJson, Cell, Cells, Directory, OptionalCell, verb
+from impactcell.numerics.compilation import on_compilation
+from impactcell.process.progress import say_compiling
 
 app = typer.Typer(
     add_completion=True,
@@ -94,6 +96,8 @@ def init(
     stroke_mm: Annotated[float | None, typer.Option(help="Stroke from first contact on.")] = None,
     max_velocity_mm_per_min: Annotated[float | None, typer.Option(help="Fastest tap.")] = None,
     wear_limit: Annotated[float | None, typer.Option(metavar="MU", help="mu_s that counts as worn.")] = None,
+    force_noise_n: Annotated[float | None, typer.Option(help="Of its force sensor, one sd.")] = None,
+    position_noise_um: Annotated[float | None, typer.Option(help="Of its position sensor.")] = None,
     campaign: Annotated[
         Path | None, typer.Option(metavar="CAMPAIGN", help="Taps to fit the first model to.")
     ] = None,
@@ -291,4 +295,5 @@ def run_verb(arguments: list[str] | None = None) -> None:
     """Run one verb; raises what the verb raises, and SystemExit for a mistake in the command line."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s", stream=sys.stderr)
     logging.getLogger("impactcell").setLevel(logging.INFO)
+    on_compilation(say_compiling)
     app(arguments)

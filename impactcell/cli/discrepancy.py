@@ -9,7 +9,7 @@ from pathlib import Path
 
 from impactcell.api.findings import write_findings
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
-from impactcell.campaign import Campaign, read
+from impactcell.campaign import Campaign, naming, read
 from impactcell.campaign.recorded import from_captures
 from impactcell.cli.paths import note_damage, open_journal
 from impactcell.discrepancy.report import headline, machine_headline
@@ -75,7 +75,8 @@ def discrepancy(
             plant, name = recording.plant, recording.name
     source, data = _read(campaign, journal, plant)
     with named_steps() as report_step, _mapper(scheduler) as mapper:
-        result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
+        with naming(campaign or journal):
+            result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
         report_step("writing the report")
         write_findings(result, data, output, source, name)
     if as_json:
@@ -115,7 +116,8 @@ def discrepancy_of_machine(
     data = read(campaign)
     with named_steps() as report_step:
         report_step("naming what the base model lacks")
-        finding = investigate_with_base(data, base, patterns, seed)
+        with naming(campaign):
+            finding = investigate_with_base(data, base, patterns, seed)
         report_step("writing the report")
         write_machine_findings(finding, data, output, str(campaign.name))
     if as_json:

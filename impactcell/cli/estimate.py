@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from impactcell.api.friction import calibrated, with_masses
-from impactcell.campaign import Campaign, Excitation, from_contact, read
+from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
 from impactcell.cli.paths import check_output
 from impactcell.discrepancy.data import check_campaign_units
 from impactcell.errors import CampaignError, PredictionError
@@ -67,8 +67,9 @@ def estimate(
     data_faults = inspect_campaign(campaign_data)
     for note in notes_of(data_faults):
         print_note(note)
-    refuse_unusable(campaign_data, data_faults)
-    check_campaign_units(campaign_data)
+    with naming(campaign):
+        refuse_unusable(campaign_data, data_faults)
+        check_campaign_units(campaign_data)
     if campaign_data.excitation is Excitation.FREE_SLIDE:
         rows = [
             (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots
@@ -109,12 +110,8 @@ def _model(campaign: Campaign, taps: Sequence[Features], cell: Path | None) -> t
         return read_cell(cell).model, 1.0
     with progress("fitting the plant", 1):
         fitted = fit_plant(taps, campaign.gravity_m_s2)
-    plant, prior = fitted.model.plant, fitted.model.prior
     print_note(
-        f"plant fitted to {len(fitted.used)} of {len(taps)} shots: k {plant.stiffness_n_per_m:.6g} ± "
-        f"{prior.stiffness_std_n_per_m:.2g} N/m, b {plant.damping_n_s_per_m:.5g} ± "
-        f"{prior.damping_std_n_s_per_m:.2g} N s/m, "
-        f"mu_k/mu_s {fitted.model.ratio:.4f} ± {prior.ratio_std:.2g}; "
+        f"plant fitted to {len(fitted.used)} of {len(taps)} shots: {fitted.sentence}; "
         f"residuals {fitted.gap:.3g} times the noise"
     )
     return fitted.model, fitted.gap

@@ -15,8 +15,9 @@ from impactcell.cli.accept_model import previous_model
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.paths import note_damage, open_journal
 from impactcell.errors import CampaignError, PredictionError, SettingsError
-from impactcell.process.console import print_result
+from impactcell.process.console import print_note, print_result
 from impactcell.settings import CellConfig, read_cell
+from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import write_model
 
 MOST_TAPS: Final = 240
@@ -51,6 +52,9 @@ def fit_model(
     previous_model(target).write_bytes(target.read_bytes())
     write_model(model, target)
     say_first_model(first, target, as_json=as_json)
+    for finding in judge_cell(read_cell(cell)):
+        if finding.is_fault or finding.section == "sensors":  # taps show what noise there is
+            print_note(str(finding))
 
 
 def _fit(config: CellConfig, campaign: Path | None, taps: int | None) -> FirstModel:

@@ -1,9 +1,11 @@
 """`impactcell init`: the files of an own cell, each with what it needs, from a few answers."""
 
 import math
+import shlex
 import shutil
+import statistics
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,10 +13,11 @@ import typer
 import yaml
 
 from impactcell.api.first_model import fit_first_model
-from impactcell.campaign import read
+from impactcell.campaign import Campaign, read
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.first_model import say_first_model
 from impactcell.errors import SettingsError
+from impactcell.features import noise_std
 from impactcell.physics import Plant
 from impactcell.prediction import Model
 from impactcell.prediction.model import Prior
@@ -47,6 +50,8 @@ class Answers:
     ----------
     register_map : str
         A map file, or the name of one that comes with the program.
+    force_noise_n, position_noise_um : float
+        One standard deviation; 0 where nobody knows.
     """
 
     name: str
@@ -57,6 +62,8 @@ class Answers:
     stroke_mm: float
     max_velocity_mm_per_min: float
     wear_limit: float
+    force_noise_n: float
+    position_noise_um: float
 
 
 QUESTIONS: Final[dict[str, tuple[str, Any]]] = {
@@ -68,6 +75,8 @@ QUESTIONS: Final[dict[str, tuple[str, Any]]] = {
     "stroke_mm": ("Stroke of the actuator from first contact on, mm", None),
     "max_velocity_mm_per_min": ("Fastest tap, mm/min", 6000.0),
     "wear_limit": ("mu_s at which the surface counts as worn", None),
+    "force_noise_n": ("Noise of its force sensor, one standard deviation in N (0: not known)", 0.0),
+    "position_noise_um": ("Noise of its position sensor, one standard deviation in µm (0: not known)", 0.0),
 }
 """What is asked for, and what is taken where nobody can be asked; None has to be said."""
 
@@ -115,7 +124,13 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
     has_map = target_map.exists()
     if has_map and target_map.read_bytes() != source.read_bytes():
         raise SettingsError(f"{target_map}: is there already, and is another map than {source}")
-    first = None if campaign is None else fit_first_model(read(campaign), answers.name, campaign.name)
+    first = None
+    if campaign is not None:
+        taps = read(campaign)
+        first, answers = (
+            fit_first_model(taps, answers.name, campaign.name),
+            _with_measured_noise(answers, taps),
+        )
     try:
         directory.mkdir(parents=True, exist_ok=True)
         if not has_map:
@@ -162,6 +177,22 @@ def provisional_model(answers: Answers) -> Model:
     )
 
 
+def _with_measured_noise(answers: Answers, taps: Campaign) -> Answers:
+    """Complete the noise of the sensors, where it was not said, by what the taps of a campaign show."""
+    force, position = (
+        statistics.median(noise_std(channel) for channel in channels) if channels else 0.0
+        for channels in (
+            [shot.force for shot in taps.shots if shot.force is not None],
+            [shot.position for shot in taps.shots if shot.position is not None],
+        )
+    )
+    return replace(
+        answers,
+        force_noise_n=answers.force_noise_n or force,
+        position_noise_um=answers.position_noise_um or 1e6 * position,
+    )
+
+
 def _map_file(name: str) -> Path:
     for path in (Path(name), shipped_config() / "maps" / f"{name}.yaml"):
         if path.is_file():
@@ -175,6 +206,10 @@ def _cell(answers: Answers, target_map: Path) -> dict[str, Any]:
         math.isfinite(v) and v > 0.0 for v in (answers.mass_kg, answers.stroke_mm, answers.wear_limit)
     ):
         raise SettingsError("mass, stroke and wear limit have to be above 0")
+    noise = {"force_noise_std_n": answers.force_noise_n, "position_noise_std_um": answers.position_noise_um}
+    if not all(math.isfinite(std) and std >= 0.0 for std in noise.values()):
+        raise SettingsError("the noise of a sensor has to be above 0; leave it out, or say 0, if not known")
+    sensors = {key: float(f"{std:.3g}") for key, std in noise.items() if std > 0.0}
     return {
         "format": 1,
         "cell": answers.name,
@@ -186,16 +221,18 @@ def _cell(answers: Answers, target_map: Path) -> dict[str, Any]:
             "max_stroke_mm": answers.stroke_mm,
             "max_velocity_mm_per_min": answers.max_velocity_mm_per_min,
         },
+        **({"sensors": sensors} if sensors else {}),
         "alarms": {"wear_limit": answers.wear_limit},
         "opcua": {"users_file": "users.yaml", "certificates_dir": "pki"},
         "journal": {"file": f"{answers.name}.sqlite"},
     }
 
 
-def _next_steps(cell: Path, directory: Path, *, is_provisional: bool) -> str:
+def _next_steps(cell_file: Path, directory: Path, *, is_provisional: bool) -> str:
+    cell, users = (shlex.quote(str(file)) for file in (cell_file, directory / "users.yaml"))
     steps = [
         f"impactcell probe {cell}        # what the module says, read as the map has it",
-        f"impactcell users add {directory / 'users.yaml'} NAME --role engineer    # asks for a password",
+        f"impactcell users add {users} NAME --role engineer    # asks for a password",
         f"impactcell run {cell}          # then open http://127.0.0.1:8480",
     ]
     if is_provisional:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from impactcell.cell.series_replay import TrackedSeries, replay
 from impactcell.errors import SeriesError
+from impactcell.records.uncertainty import plus_minus
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
@@ -163,10 +164,11 @@ def _cycles(count: float) -> str:
 
 def _as_text(series: TrackedSeries) -> str:
     wear = series.wear
+    rate = plus_minus(1e3 * wear.rate_per_cycle, 1e3 * wear.rate_std, "+.6f", ".6f")
     lines = [
         f"{series.used} cycles used",
-        f"level   {wear.level:.5f} ± {wear.level_std:.5f}",
-        f"wear    {wear.rate_per_cycle * 1e3:+.6f} ± {wear.rate_std * 1e3:.6f} per 1000 cycles",
+        f"level   {plus_minus(wear.level, wear.level_std, '.5f')} (95 %, as all ± below)",
+        f"wear    {rate} per 1000 cycles",
     ]
     if math.isfinite(wear.limit):
         left, low, high = map(
@@ -176,6 +178,8 @@ def _as_text(series: TrackedSeries) -> str:
     for r in series.alarms:
         e = r.evidence
         changed = f"changed at {e.change_cycle}, " if e.change_cycle else ""
-        lines.append(f"{r.alarm} at cycle {r.cycle}: {changed}{e.size:+.5f} ± {e.size_std:.5f}")
+        lines.append(
+            f"{r.alarm} at cycle {r.cycle}: {changed}{plus_minus(e.size, e.size_std, '+.5f', '.5f')}"
+        )
     lines.extend(f"cycle {cycle}: {note}" for cycle, note in series.notes)
     return "\n".join(lines)

@@ -8,11 +8,12 @@ from rich.text import Text
 
 from impactcell.alarms.rules import deviant_cycle
 from impactcell.records import Quality, Snapshot
+from impactcell.records.uncertainty import TOLD_STDS
 
 QUALITY_STYLE = {Quality.GOOD: "green", Quality.UNCERTAIN: "yellow", Quality.BAD: "red"}
 
 
-LEGEND = "mu_s  • cycle  ░ level ± 2 sd  ✗ deviant  ┆ shift"
+LEGEND = f"mu_s  • cycle  ░ level ± {TOLD_STDS:g} sd  ✗ deviant  ┆ shift"
 
 
 def chart(snapshots: Sequence[Snapshot], columns: int, rows: int) -> Text:
@@ -58,7 +59,7 @@ def _band(snapshot: Snapshot) -> tuple[float, float]:
     wear = snapshot.wear
     offset = snapshot.batch.offset if math.isfinite(snapshot.batch.offset) else 0.0
     centre = wear.level + offset
-    return centre - 2 * wear.level_std, centre + 2 * wear.level_std
+    return centre - TOLD_STDS * wear.level_std, centre + TOLD_STDS * wear.level_std
 
 
 def _mark(snapshot: Snapshot, row: int, scale: "_Scale", band: tuple[float, float]) -> tuple[str, str]:

@@ -26,6 +26,7 @@ from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.console import is_quiet, print_note
 from impactcell.process.signals import stop_on_signals
 from impactcell.records import ModuleStatus, Snapshot
+from impactcell.records.uncertainty import plus_minus
 from impactcell.service import Service
 
 SHOWN_CYCLES = 400
@@ -62,7 +63,7 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
         After the summary, where Ctrl-C ended it.
     """
     if sys.stderr.isatty() and not is_quiet():
-        sys.stderr.write("setting up; the first time on a machine takes a minute or two, to compile\n")
+        sys.stderr.write("setting up\n")
     # Until the event loop takes the signal over, an end has to pass through `set_up_scenario`: it cleans up.
     signal.signal(signal.SIGTERM, _end)
     with set_up_scenario(scenario, cycles) as setup:
@@ -284,12 +285,10 @@ def _rendered(scene: Scene) -> RenderableType:
 
 def _print_line(_: _DemoRun, snapshot: Snapshot) -> None:
     mu_s = snapshot.friction.mu_s
-    active = ", ".join(alarm.name for alarm in snapshot.alarms if alarm.active)
-    print(  # noqa: T201 - the view of a demo without a terminal
-        f"cycle {snapshot.cycle}: mu_s {mu_s.value:.4f} ± {mu_s.std:.4f}, batch {snapshot.batch.batch_id}"
-        f"{', ' + active if active else ''}",
-        flush=True,
-    )
+    active = (alarm.name for alarm in snapshot.alarms if alarm.active)
+    batch = f"batch {snapshot.batch.batch_id}"
+    facts = (f"mu_s {plus_minus(mu_s.value, mu_s.std, '.4f')}", batch, *active)
+    print(f"cycle {snapshot.cycle}: {', '.join(facts)}", flush=True)  # noqa: T201 - where there is no terminal
 
 
 def _draw_nothing(_: _DemoRun, __: Snapshot) -> None:

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from impactcell.demo.chart import LEGEND, QUALITY_STYLE, chart
 from impactcell.records import Alarm, Estimator, Snapshot
+from impactcell.records.uncertainty import plus_minus
 
 WIDE = 100
 """Columns from which on facts stand side by side and alarms in a table."""
@@ -106,7 +107,7 @@ def _plus_minus(value: float, std: float) -> str:
     if math.isnan(value):
         return "none"
     decimals = 4 if not 0.0 < std < 1e-4 else min(-math.floor(math.log10(std)), 7)
-    return f"{value:.{decimals}f} ± {std:.{decimals}f}" if math.isfinite(std) else f"{value:.4f}"
+    return plus_minus(value, std, f".{decimals}f") if math.isfinite(std) else f"{value:.4f}"
 
 
 def _measured(value: float, unit: str, decimals: int) -> str:

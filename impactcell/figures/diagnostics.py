@@ -12,6 +12,7 @@ import numpy as np
 from impactcell.features import extract
 from impactcell.figures._style import COLOURS, GREY, PALE, write_figures
 from impactcell.records import Capture, Channel, Samples
+from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.tracking import wear_batch
 from impactcell.tracking.signature import tracker
 from impactcell.tracking.wear_batch import (
@@ -64,8 +65,10 @@ def over_time(figure: "Figure") -> None:
     std = np.array([o.wear.level_std for o in results])
     axes = figure.subplots(1, 2)
     axes[0].plot(cycles, mu_s, ".", color=PALE, markersize=2, label="estimate of a cycle")
-    axes[0].fill_between(cycles, level - 2.0 * std, level + 2.0 * std, color=BLUE, alpha=0.4, linewidth=0)
-    axes[0].plot(cycles, level, color=BLUE, label="level ± 2 sd")
+    axes[0].fill_between(
+        cycles, level - TOLD_STDS * std, level + TOLD_STDS * std, color=BLUE, alpha=0.4, linewidth=0
+    )
+    axes[0].plot(cycles, level, color=BLUE, label=f"level ± {TOLD_STDS:g} sd")
     axes[0].plot(cycles, truth, "--", color=GREY, linewidth=1.0, label="truth")
     axes[0].axhline(LIMIT, color=RED, linewidth=1.0, label="wear limit")
     axes[0].set(xlabel="cycle", ylabel="static friction coefficient", ylim=(0.185, 0.225), title="level")
@@ -103,11 +106,11 @@ def over_batches(figure: "Figure") -> None:
     axes[1].errorbar(
         range(1, 6),
         [b.offset for b in last],
-        yerr=[2.0 * b.offset_std for b in last],
+        yerr=[TOLD_STDS * b.offset_std for b in last],
         fmt="o",
         color=BLUE,
         capsize=3,
-        label="offset ± 2 sd",
+        label=f"offset ± {TOLD_STDS:g} sd",
     )
     axes[1].plot(range(1, 6), offsets, "_", color=RED, markersize=14, label="truth")
     axes[1].set(xlabel="batch", ylabel="offset from the first batch", title="batch ids known")
@@ -136,13 +139,13 @@ def along_stroke(figure: "Figure") -> None:
         s = deviant.signature
         axes[0].fill_between(
             grid,
-            s.friction - 2 * s.friction_std,
-            s.friction + 2 * s.friction_std,
+            s.friction - TOLD_STDS * s.friction_std,
+            s.friction + TOLD_STDS * s.friction_std,
             color=RED,
             alpha=0.2,
             linewidth=0,
         )
-        axes[0].plot(grid, s.friction, color=RED, label="deviant cycle ± 2 sd")
+        axes[0].plot(grid, s.friction, color=RED, label=f"deviant cycle ± {TOLD_STDS:g} sd")
         axes[0].axvline(s.deviates_at_m * 1e3, color=RED, linestyle=":", linewidth=1.0, label="deviates most")
         axes[1].plot([100, 100], [s.spe, s.t_squared], "o", color=RED, label="both, deviant cycle")
     axes[0].plot([], [], color=PALE, label="normal cycles")

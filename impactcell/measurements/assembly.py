@@ -71,6 +71,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         notes += notes_of_taps
     else:
         captures = [_whole(number, record, given) for number, record in enumerate(records, 1)]
+        notes += _of_taps_only(given)
     if all(math.isnan(capture.mass_kg) for capture in captures):
         notes.append(
             "no mass is stated: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
@@ -103,6 +104,15 @@ def write_campaign(tables: Sequence[Table], mapping: Mapping, directory: Path) -
     imported = make_campaign(tables, mapping)
     write_directory(imported.campaign, directory)
     return imported
+
+
+def _of_taps_only(given: Given) -> list[str]:
+    """Tell what was given and counts for taps alone, where there are none."""
+    names = [name for name in ("velocity", "stroke", "direction") if name in given.constants]
+    names += [] if given.trigger is None else ["trigger"]
+    if not names:
+        return []
+    return [f"given, and not used, for it is of taps: {', '.join(names)} (--excitation tap says otherwise)"]
 
 
 def _said_of(tables: Sequence[Table], given: Given) -> list[str]:

@@ -117,7 +117,26 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
         if taken is None and item.column not in chosen:
             chosen[item.column] = quantities[item.meaning] = item
     assignments = tuple(chosen.get(name) or _further(column, given) for name, column in columns.items())
-    return Mapping(assignments, given, tuple(lacking(assignments, given.constants, tables)))
+    faults = [*lacking(assignments, given.constants, tables), *_without_use(assignments, given, tables)]
+    return Mapping(assignments, given, tuple(faults))
+
+
+def _without_use(assignments: Sequence[Assignment], given: Given, tables: Sequence[Table]) -> list[str]:
+    """Tell what was given and would change nothing: who gave it believes that it counts."""
+    columns = {item.meaning: item.column for item in assignments}
+    faults = [
+        f"a sign of the {meaning} was given, and no column is the {meaning}; name it with --column "
+        f"{meaning}=NAME, or take the sign away"
+        for meaning in given.signs
+        if meaning not in columns
+    ]
+    time = columns.get(ColumnMeaning.TIME)
+    if time is not None and "rate_hz" in given.constants and all(table.column(time) for table in tables):
+        faults.append(
+            f"the times are those of column {time!r}, so that the rate has no use; take the rate away, or "
+            f"say --column 'ignored={time}' for it to count"
+        )
+    return faults
 
 
 def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) -> None:

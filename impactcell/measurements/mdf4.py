@@ -1,6 +1,9 @@
 """Reads MDF files (ASAM) with asammdf; a channel group is a table with its own time."""
 
+import contextlib
+import io
 import logging
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +12,9 @@ from impactcell.measurements.arrays import tables_of
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.optional import reader_library
 from impactcell.measurements.table import Table
+
+_OPENED = ("_tempfile", "_mapped_file", "_file")
+"""What asammdf's reader holds open."""
 
 
 def read_mdf4(path: Path, limits: Limits) -> tuple[Table, ...]:
@@ -33,10 +39,33 @@ def read_mdf4(path: Path, limits: Limits) -> tuple[Table, ...]:
     except MeasurementError:
         raise
     except Exception as error:
+        _discard_half_made(error)
         raise MeasurementError(f"{path}: is a damaged MDF file: {error}") from error
     if not tables:
         raise MeasurementError(f"{path}: holds no channel")
     return tuple(tables)
+
+
+def _discard_half_made(error: BaseException | None) -> None:
+    """Close what asammdf was making when it failed: its destructor stumbles over what is not there yet.
+
+    Python would tell that on standard error, of an object that nobody can reach but through the error.
+    """
+    while error is not None:
+        for frame, _ in traceback.walk_tb(error.__traceback__):
+            if not frame.f_globals.get("__name__", "").startswith("asammdf."):
+                continue
+            half_made: Any = frame.f_locals.get("self")
+            parts: list[Any] = [
+                getattr(half_made, name, None) for name in ("_tempfile", "_mapped_file", "_file")
+            ]
+            parts += [local for local in frame.f_locals.values() if isinstance(local, io.IOBase)]
+            for part in parts:
+                with contextlib.suppress(Exception):  # whatever it is, or has become
+                    part.close()
+            if hasattr(half_made, "__del__"):
+                half_made._closed = True  # noqa: SLF001 - what its destructor looks at first
+        error = error.__context__
 
 
 def _group(file: Any, number: int, group: Any, path: Path) -> list[Table]:

@@ -68,9 +68,17 @@ def _referenced_files(path: Path) -> tuple[Path | None, Path | None]:
     cell = data if isinstance(data, dict) else {}
     module = cell.get("module")
     names = module.get("register_map") if isinstance(module, dict) else None, cell.get("model")
-    files = [path.parent / name if isinstance(name, str) else None for name in names]
-    files = [file if file is not None and file.is_file() else None for file in files]
-    return files[0], files[1]
+    map_file, model_file = (
+        _existing(path.parent / name) if isinstance(name, str) else None for name in names
+    )
+    return map_file, model_file
+
+
+def _existing(file: Path) -> Path | None:
+    try:
+        return file if file.is_file() else None
+    except OSError:
+        return None
 
 
 def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:

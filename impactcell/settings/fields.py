@@ -12,12 +12,27 @@ def _resolved(value: object, info: ValidationInfo) -> object:
     if not isinstance(value, str) or not value:
         return value
     directory: Path = (info.context or {}).get("directory", Path())
-    return (directory / Path(value).expanduser()).resolve()
+    try:
+        path = (directory / Path(value).expanduser()).resolve()
+        path.is_dir()  # what no file can be called, or nobody may look at, is found here
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ValueError(f"{value!r} cannot be used as a path ({reason}); name another") from error
+    return path
 
 
 def _existing_file(path: Path) -> Path:
     if not path.is_file():
         raise ValueError(f"there is no file {path}")
+    return path
+
+
+def _existing_model(path: Path) -> Path:
+    if not path.is_file():
+        raise ValueError(
+            f"there is no file {path}; `impactcell init` writes a first model, fitted to taps (`--campaign`) "
+            "or to record the first ones with"
+        )
     return path
 
 
@@ -31,6 +46,7 @@ def _existing_parent(path: Path) -> Path:
 
 AnyPath = Annotated[Path, BeforeValidator(_resolved)]
 InputFile = Annotated[AnyPath, AfterValidator(_existing_file)]
+ModelFile = Annotated[AnyPath, AfterValidator(_existing_model)]
 OutputFile = Annotated[AnyPath, AfterValidator(_existing_parent)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 """A finite number above 0."""

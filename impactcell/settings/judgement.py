@@ -1,13 +1,19 @@
 """A cell judged as a whole: files that are right each for itself, and do not fit each other."""
 
 import math
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
+from statistics import median
 from typing import Final
 
+from impactcell.errors import JournalError
+from impactcell.features import noise_std
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import unknown_names
+from impactcell.journal.store import Journal
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
 from impactcell.settings.cells import CellConfig
@@ -16,6 +22,12 @@ STROKE_TOLERANCE: Final = 0.01
 """A cell's stroke may differ from its model's by this share: less than a stroke is known to."""
 CONSTANT_TOLERANCE: Final = 1e-3
 """A constant of a map may differ from what the cell file says by this share: rounding."""
+LARGEST_NOISE: Final = 0.05
+"""Of the signal of the cell's fastest tap; a sensor with more tells nothing of it. Our choice."""
+NOISE_TOLERANCE: Final = 1.5
+"""Noise measured over noise said, beyond which a good model will have a gap of as much. Our choice."""
+NOISE_TAPS: Final = 10
+"""Taps of the journal in which noise is measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +38,15 @@ class CellFinding:
     ----------
     is_fault : bool
         The cell cannot do what it is for; else it can, but its user should know.
+    section : str
+        Section of the file that it is about; empty where it is about the whole.
     """
 
     path: Path
     position: FilePosition
     message: str
     is_fault: bool
+    section: str
 
     def __str__(self) -> str:
         return f"{self.path}:{self.position}: {'' if self.is_fault else 'note: '}{self.message}"
@@ -53,9 +68,15 @@ def judge_cell(cell: CellConfig) -> list[CellFinding]:
         Its file is not what it was.
     """
     _, positions = yaml_loader.load(cell.path)
-    remarks = [*_of_model(cell), *_of_map(cell), *_of_service(cell)]
+    remarks = [*_of_model(cell), *_of_sensors(cell), *_of_map(cell), *_of_service(cell)]
     findings = [
-        CellFinding(cell.path, positions.value(remark.place), remark.message, remark.is_fault)
+        CellFinding(
+            cell.path,
+            positions.value(remark.place),
+            remark.message,
+            remark.is_fault,
+            remark.place[0] if remark.place else "",
+        )
         for remark in remarks
     ]
     return sorted(findings, key=lambda finding: not finding.is_fault)
@@ -63,7 +84,8 @@ def judge_cell(cell: CellConfig) -> list[CellFinding]:
 
 def _of_model(cell: CellConfig) -> Iterator[_Remark]:
     settings, model = cell.settings, cell.model
-    calibrate = f"run `impactcell calibrate {cell.path} -o {settings.model.name}`"
+    command = shlex.join(["impactcell", "calibrate", str(cell.path), "-o", str(settings.model)])
+    calibrate = f"run `{command}`, which keeps its plant"
     if not model.predictors:
         yield _Remark(
             ("model",),
@@ -117,6 +139,54 @@ def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:
         )
 
 
+def _of_sensors(cell: CellConfig) -> Iterator[_Remark]:
+    """Say where the noise of a sensor was never said, cannot be, or is larger in recorded taps."""
+    sensors, plant = cell.settings.sensors, cell.model.plant
+    velocity, mass_kg = cell.settings.actuator.max_velocity_mm_per_min / 60e3, cell.settings.part.mass_kg
+    # of a tap without losses: all of m v²/2 in the contact's spring, and then into friction
+    peak_n = velocity * math.sqrt(plant.stiffness_n_per_m * (mass_kg or math.inf))
+    slide_um = 1e6 * velocity**2 / (2.0 * plant.mu_k * plant.gravity_m_s2)
+    for sensor, key, unit, per_si, largest in (
+        ("force", "force_noise_std_n", "N", 1.0, peak_n),
+        ("position", "position_noise_std_um", "µm", 1e6, slide_um),
+    ):
+        if sensor not in cell.register_map:
+            continue
+        said, measured = getattr(sensors, key), per_si * _measured_noise(cell, sensor)
+        shown = f"the first taps of its journal show {measured:.2g} {unit}"
+        if key not in sensors.model_fields_set:
+            message = f"how noisy the {sensor} sensor is was not said: {said:g} {unit} is taken, a guess"
+            message += "" if math.isnan(measured) else f"; {shown}"
+            yield _Remark(("sensors",), f"{message}; say `{key}` under `sensors`", is_fault=False)
+        elif said > LARGEST_NOISE * largest:
+            yield _Remark(
+                ("sensors", key),
+                f"a noise of {said:g} {unit} cannot be: the fastest tap shows some {largest:.0f} {unit}",
+            )
+        elif measured > NOISE_TOLERANCE * said:
+            yield _Remark(
+                ("sensors", key),
+                f"a noise of {said:g} {unit} is too little: {shown}; every cycle will look as if the model "
+                "lacked something",
+                is_fault=False,
+            )
+
+
+def _measured_noise(cell: CellConfig, sensor: str) -> float:
+    """Noise of a sensor in the journal's first taps, SI; nan without any, or where the module says it."""
+    journal = cell.settings.journal
+    if journal is None or not journal.file.is_file():
+        return math.nan
+    try:
+        with Journal(journal.file, None, read_only=True) as stored:
+            captures = list(islice(stored.captures(damaged=lambda _: None), NOISE_TAPS))
+    except JournalError:  # `run` and `model fit` say what is wrong with it
+        return math.nan
+    channels = [getattr(capture, sensor) for capture in captures]
+    noise = [noise_std(c) for c in channels if c is not None and c.noise_std is None]
+    return median(noise) if noise else math.nan
+
+
 def _of_map(cell: CellConfig) -> Iterator[_Remark]:
     registers = cell.register_map
     for text in (*unknown_names(registers.registers), *not_promised(registers)):
@@ -142,7 +212,7 @@ def _of_service(cell: CellConfig) -> Iterator[_Remark]:
         yield _Remark(
             ("opcua", "users_file"),
             f"there is no users file {users}: nobody can log in, over OPC UA or on the page; run "
-            f"`impactcell users add {users}`",
+            f"`impactcell users add {shlex.quote(str(users))} NAME --role engineer`",
             is_fault=False,
         )
     if settings.journal is None:

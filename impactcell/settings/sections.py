@@ -15,6 +15,7 @@ from impactcell.journal.retention import Retention
 from impactcell.settings.fields import (
     AnyPath,
     InputFile,
+    ModelFile,
     NotNegative,
     OutputFile,
     Positive,
@@ -253,8 +254,8 @@ class CellSettings(Section):
     """Name of the cell, in OPC UA, in logs and in messages."""
     identification: IdentificationSection = IdentificationSection()
     module: ModuleSection
-    model: InputFile
-    """Model of the plant and its calibration, made by `impactcell calibrate`."""
+    model: ModelFile
+    """Model of the plant and its calibration; `init` writes the first, `model fit` the cell's own."""
     part: PartSection = PartSection()
     actuator: ActuatorSection = ActuatorSection()
     sensors: SensorSection = SensorSection()

@@ -1,6 +1,9 @@
 """The cells: all of them at a glance, one of them in depth, and the stream that keeps both alive."""
 
-from typing import Any
+from dataclasses import replace
+from itertools import pairwise
+from statistics import median_low
+from typing import Any, Final
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
@@ -18,6 +21,11 @@ from impactcell.web.past import SPANS_S
 from impactcell.web.requests import RequestRefusedError
 from impactcell.web.sessions import BrowserSession
 
+STANDSTILL: Final = 5.0
+"""Usual distances between columns; farther apart, the cell stood still between them. Our choice."""
+NOTHING: Final = TrendColumn(0, 0, None, None, None, None, None, None)
+"""A column without a value, at which line and band of a chart break off."""
+
 
 async def overview(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show a card a cell."""
@@ -34,6 +42,7 @@ async def cell(context: PageContext, request: Request, session: BrowserSession) 
         spans=tuple(SPANS_S),
         folders=listed_values(context.language(request)),
         refusal=request.query_params.get("refused", ""),
+        was_reset=request.query_params.get("done") == "reset-wear",
     )
 
 
@@ -48,7 +57,7 @@ async def reset_wear(
         if error.code == "BadUserAccessDenied":
             raise RequestRefusedError(403, "error_role") from error
         return RedirectResponse(f"/cells/{name}?refused={error.code}", 303)
-    return RedirectResponse(f"/cells/{name}", 303)
+    return RedirectResponse(f"/cells/{name}?done=reset-wear", 303)
 
 
 async def live(context: PageContext, request: Request, session: BrowserSession) -> Response | ASGIApp:
@@ -90,6 +99,7 @@ def _trend_content(columns: tuple[TrendColumn, ...]) -> dict[str, Any]:
     def series(values: list[float | None]) -> list[float | None]:
         return [None if value is None else number(value) for value in values]
 
+    columns = _with_gaps(columns)
     batches: list[tuple[int, str]] = []
     for column in columns:
         if column.batch_id and (not batches or batches[-1][1] != column.batch_id):
@@ -103,3 +113,16 @@ def _trend_content(columns: tuple[TrendColumn, ...]) -> dict[str, Any]:
         "gap": series([column.gap for column in columns]),
         "batches": batches,
     }
+
+
+def _with_gaps(columns: tuple[TrendColumn, ...]) -> tuple[TrendColumn, ...]:
+    """Put a column without values into each standstill: nobody knows what friction was in it."""
+    steps = [later.time_ns - column.time_ns for column, later in pairwise(columns)]
+    if not steps:
+        return columns
+    longest, told = STANDSTILL * median_low(steps), [columns[0]]
+    for step, column in zip(steps, columns[1:], strict=True):
+        if step > longest:
+            told.append(replace(NOTHING, time_ns=column.time_ns - step // 2))
+        told.append(column)
+    return tuple(told)

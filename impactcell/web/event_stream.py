@@ -12,7 +12,7 @@ from impactcell.web.live_feed import LiveFeed
 FRAME_S: Final = 0.25
 """Shortest time between two frames: fast enough for an eye, and cheap with many cells and viewers."""
 HEARTBEAT_S: Final = 10.0
-"""Without news a comment is sent this often, which also finds out who has gone."""
+"""Without news a sign of life goes out this often: who hears none for long says so; who has gone is found."""
 STALLED_S: Final = 30.0
 """A viewer who takes nothing for so long is let go; the browser comes back by itself."""
 MAX_VIEWERS: Final = 100
@@ -71,7 +71,7 @@ class EventStream:
                 body = self._next_frame()
                 if not self._may_go_on():
                     break
-                await _send(send, body or b": still here\n\n")
+                await _send(send, body or b"event: alive\ndata: {}\n\n")
                 await asyncio.sleep(FRAME_S)
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(changed.wait(), HEARTBEAT_S)

@@ -8,7 +8,7 @@ from impactcell.records.quantity import DataType, Quantity, Ranges
 from impactcell.web.texts import LANGUAGES
 
 STD_SUFFIX = "StdDev"
-"""Ends the path of a value's standard deviation, which is written behind that value as ±2 of it."""
+"""Ends the path of a value's standard deviation, which is written behind that value, with ±."""
 
 
 @dataclass(frozen=True, slots=True)

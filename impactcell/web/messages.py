@@ -5,6 +5,7 @@ from typing import Any
 
 from impactcell.alarms import RULES, Message
 from impactcell.records import Alarm
+from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 from impactcell.web.texts.effects import GERMAN_EFFECTS
 from impactcell.web.texts.findings import (
@@ -104,6 +105,10 @@ class Messages:
         if "e+" in text and abs(value) < LARGE:
             text = f"{float(text):.0f}"
         return text.replace(".", ",") if self.language == "de" else text
+
+    def told_std(self, std: float) -> str:
+        """Write what stands behind a "±"."""
+        return self.number(TOLD_STDS * std, 2)
 
     def for_script(self) -> dict[str, str]:
         """Give the texts that the script writes, by their key without `live_`."""

@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
 from impactcell import __version__
+from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.scada import Role
 from impactcell.web.interface import PageBackend, PageContent, PageSettings
 from impactcell.web.live_feed import LiveFeed
@@ -108,6 +109,7 @@ class PageContext:
             may_engineer=session is not None and session.actor.role >= Role.ENGINEER,
             path=request.url.path,
             version=__version__,
+            told_stds=TOLD_STDS,
             static=f"/static/{STATIC_VERSION}",
             cells=self.content.cells,
             **values,

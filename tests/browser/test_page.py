@@ -281,3 +281,29 @@ async def test_a_screen_on_the_wall(shop: Shop, browser: Browser, tmp_path: Path
         assert not faults, json.dumps(faults, indent=1)
 
     await shop.beside(look)
+
+
+async def test_worn_parts_were_replaced(shop: Shop, browser: Browser) -> None:
+    """An engineer says so, the level is learned anew, the audit log has it; an observer is not offered it."""
+    form = f'form[action="/cells/{CELL}/reset-wear"]'
+
+    def look() -> int:
+        enter(browser, shop, "olga")
+        browser.open(f"{shop.page}{PAGES['cell']}")
+        browser.find(f'[data-cell="{CELL}"][data-cycle]')
+        return len(browser.all(form))
+
+    def press() -> None:
+        browser.forget()
+        enter(browser, shop, "eva")
+        browser.open(f"{shop.page}{PAGES['cell']}")
+        browser.find("summary").click()
+        browser.write(f"{form} input[name=comment]", "new plate")
+        browser.find(f"{form} button").click()
+        browser.find(".notice.good")
+
+    assert await shop.beside(look) == 0
+    await shop.beside(press)
+    said = [entry for entry in shop.audit() if entry.action == "ResetWear"]
+    assert [(entry.user, entry.result) for entry in said] == [("eva (engineer) from 127.0.0.1", "Good")]
+    assert "new plate" in said[0].arguments

@@ -14,6 +14,7 @@ from impactcell.alarms.rule import (
 )
 from impactcell.alarms.rules import model_gap
 from impactcell.records import Evidence
+from impactcell.records.uncertainty import plus_minus
 
 NAME = "BatchShift"
 """Published name."""
@@ -46,12 +47,12 @@ def _message(shift: Evidence) -> Message:
     size, std, since = abs(shift.size), shift.size_std, shift.change_cycle
     stds = size / std if std > 0.0 else float("inf")
     return Message(
-        f"The material has changed: since cycle {since} friction is {size:.4f} ± {std:.4f} "
-        f"{'higher' if shift.size > 0.0 else 'lower'} ({stds:.0f} standard deviations). "
+        f"The material has changed: since cycle {since} friction is {plus_minus(size, std, '.4f')} (95 %) "
+        f"{'higher' if shift.size > 0.0 else 'lower'}, which is {stds:.0f} standard deviations. "
         "Check which batch is being fed; if the change was meant, acknowledge it.",
-        f"Das Material hat gewechselt: seit Zyklus {since} ist die Reibung um {german(size, '.4f')} ± "
-        f"{german(std, '.4f')} {'höher' if shift.size > 0.0 else 'niedriger'} ({stds:.0f} "
-        "Standardabweichungen). Prüfen, welche Charge läuft; war der Wechsel gewollt, quittieren.",
+        f"Das Material hat gewechselt: seit Zyklus {since} ist die Reibung um {german(size, '.4f', std)} "
+        f"(95 %) {'höher' if shift.size > 0.0 else 'niedriger'}, das sind {stds:.0f} "
+        "Standardabweichungen. Prüfen, welche Charge läuft; war der Wechsel gewollt, quittieren.",
     )
 
 

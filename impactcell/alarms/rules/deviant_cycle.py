@@ -13,6 +13,7 @@ from impactcell.alarms.rule import (
 )
 from impactcell.alarms.rules import batch_shift, model_gap
 from impactcell.records import Evidence
+from impactcell.records.uncertainty import plus_minus
 
 NAME = "DeviantCycle"
 """Published name."""
@@ -47,11 +48,11 @@ def _message(cycle: int, deviation: Evidence, at_m: float) -> Message:
             "Teil beiseitelegen, Teil und Oberfläche ansehen.",
         )
     return Message(
-        f"Cycle {cycle} is unlike the others: {at_mm:.2f} mm along the stroke friction is {size:.4f} ± "
-        f"{std:.4f} {'higher' if is_higher else 'lower'}. "
+        f"Cycle {cycle} is unlike the others: {at_mm:.2f} mm along the stroke friction is "
+        f"{plus_minus(size, std, '.4f')} (95 %) {'higher' if is_higher else 'lower'}. "
         "Set the part aside and look at it and at the surface there.",
         f"Zyklus {cycle} weicht von den anderen ab: bei {german(at_mm, '.2f')} mm des Hubs ist die Reibung "
-        f"um {german(size, '.4f')} ± {german(std, '.4f')} {'höher' if is_higher else 'niedriger'}. "
+        f"um {german(size, '.4f', std)} (95 %) {'höher' if is_higher else 'niedriger'}. "
         "Teil beiseitelegen, Teil und Oberfläche an dieser Stelle ansehen.",
     )
 

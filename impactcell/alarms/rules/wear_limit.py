@@ -13,13 +13,13 @@ from impactcell.alarms.rule import (
     RuleResult,
     RuleSettings,
     german,
+    percent_sure,
 )
 from impactcell.records import Evidence, WearState
+from impactcell.records.uncertainty import TOLD_STDS, plus_minus
 
 NAME = "WearLimit"
 """Published name."""
-INTERVAL_STDS = 1.96
-"""Half of the interval that is told, in standard deviations: 95 % of a normal distribution."""
 
 
 def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
@@ -43,16 +43,16 @@ def _passed(wear: WearState, cycle: int, above: float) -> int:
 
 
 def _message(wear: WearState, evidence: Evidence, cycle: int) -> Message:
-    since, sure, reach = evidence.change_cycle, 100.0 * evidence.statistic, INTERVAL_STDS * wear.level_std
+    since, reach = evidence.change_cycle, TOLD_STDS * wear.level_std
+    sure, sure_in_german = percent_sure(evidence.statistic)
     first, last = (_passed(wear, cycle, evidence.size + edge) for edge in (reach, -reach))
     return Message(
-        f"The surface is worn: friction is {wear.level:.4f} ± {wear.level_std:.4f}, its limit "
-        f"{wear.limit:.4f} was passed at about cycle {since} ({first} to {last}; {sure:.1f} % sure). "
-        "Renew the surface, then call ResetWear.",
-        f"Die Oberfläche ist verschlissen: Reibung {german(wear.level, '.4f')} ± "
-        f"{german(wear.level_std, '.4f')}, Grenze {german(wear.limit, '.4f')} etwa bei Zyklus {since} "
-        f"überschritten ({first} bis {last}; {german(sure, '.1f')} % sicher). "
-        "Oberfläche erneuern, danach ResetWear aufrufen.",
+        f"The surface is worn: friction is {plus_minus(wear.level, wear.level_std, '.4f')} (95 %), "
+        f"its limit {wear.limit:.4f} was passed at about cycle {since} ({first} to {last}; "
+        f"{sure} % sure). Renew the surface, then call ResetWear.",
+        f"Die Oberfläche ist verschlissen: Reibung {german(wear.level, '.4f', wear.level_std)} (95 %), "
+        f"Grenze {german(wear.limit, '.4f')} etwa bei Zyklus {since} überschritten ({first} bis {last}; "
+        f"{sure_in_german} % sicher). Oberfläche erneuern, danach ResetWear aufrufen.",
     )
 
 

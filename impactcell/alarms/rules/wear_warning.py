@@ -16,9 +16,11 @@ from impactcell.alarms.rule import (
     RuleResult,
     RuleSettings,
     german,
+    percent_sure,
 )
 from impactcell.alarms.rules import wear_limit
 from impactcell.records import Evidence, WearState
+from impactcell.records.uncertainty import plus_minus
 
 NAME = "WearWarning"
 """Published name."""
@@ -39,15 +41,17 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
 
 
 def _message(wear: WearState, probability: float, horizon: float) -> Message:
-    sure, rate = 100.0 * probability, 1000.0 * wear.rate_per_cycle
+    rate = 1000.0 * wear.rate_per_cycle
+    sure, sure_in_german = percent_sure(probability)
     english, german_words = (_cycles(wear, words) for words in (("to", "or more"), ("bis", "oder mehr")))
     return Message(
-        f"The surface will be worn soon: friction is {wear.level:.4f} ± {wear.level_std:.4f} and rises by "
-        f"{rate:.4f} per 1000 cycles; about {english} cycles are left to its limit {wear.limit:.4f}. It is "
-        f"{sure:.0f} % sure to be passed within {horizon:.0f} cycles. Plan to renew the surface.",
-        f"Die Oberfläche ist bald verschlissen: Reibung {german(wear.level, '.4f')} ± "
-        f"{german(wear.level_std, '.4f')}, sie steigt um {german(rate, '.4f')} je 1000 Zyklen; bis zur "
-        f"Grenze {german(wear.limit, '.4f')} bleiben etwa {german_words} Zyklen. Zu {sure:.0f} % wird sie "
+        f"The surface will be worn soon: friction is {plus_minus(wear.level, wear.level_std, '.4f')} "
+        f"(95 %) and rises by {rate:.4f} per 1000 cycles; about {english} cycles are left to its limit "
+        f"{wear.limit:.4f}. It is {sure} % sure to be passed within {horizon:.0f} cycles. "
+        "Plan to renew the surface.",
+        f"Die Oberfläche ist bald verschlissen: Reibung {german(wear.level, '.4f', wear.level_std)} "
+        f"(95 %), sie steigt um {german(rate, '.4f')} je 1000 Zyklen; bis zur Grenze "
+        f"{german(wear.limit, '.4f')} bleiben etwa {german_words} Zyklen. Zu {sure_in_german} % wird sie "
         f"innerhalb von {horizon:.0f} Zyklen überschritten. Erneuern der Oberfläche einplanen.",
     )
 

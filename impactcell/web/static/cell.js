@@ -1,7 +1,7 @@
 // One cell in depth: its last tap, its trend, its signature.
 import { Chart } from "./charts.js";
 import { moment } from "./frame.js";
-import { coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, withUnit } from "./live.js";
+import { TOLD_STDS, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, toldStd, withUnit } from "./live.js";
 
 const root = document.querySelector(".cell"), cell = root.dataset.cell;
 const edges = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
@@ -32,7 +32,7 @@ function showDetail(detail) {
     showCurve(charts.force, detail.force, place("force").getAttribute("aria-label"));
     showCurve(charts.position, detail.position, place("position").getAttribute("aria-label"));
     const s = detail.signature, none = s.x.map(() => null);
-    const edge = (sign) => s.low.map((value, i) => (value === null || s.std[i] === null ? null : value + sign * 2 * s.std[i]));
+    const edge = (sign) => s.low.map((value, i) => (value === null || s.std[i] === null ? null : value + sign * TOLD_STDS * s.std[i]));
     const deviant = detail.deviant?.friction.length === s.x.length ? detail.deviant : null;
     charts.signature.show([s.x, s.usual_low ?? none, s.usual_high ?? none, s.low, edge(1), edge(-1), deviant?.friction ?? none],
       deviant ? [{ x: deviant.at, text: `▼ ${texts.cycle} ${deviant.cycle} ${texts.deviates}`, colour: "bad" }] : []);
@@ -57,7 +57,7 @@ function showCard(card) {
   const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
   const said = {
     cycle_time: moment(card.time_ms),
-    batch_offset: offset === null ? "" : `${coefficient(offset)} ± ${std === null ? "–" : number(2 * std, 2)}`,
+    batch_offset: offset === null ? "" : `${coefficient(offset)}${std === null ? "" : ` ${toldStd(std)}`}`,
     estimator: texts[card.estimator],
     mass: withUnit(card.mass, "kg"),
     signature_reason: reasons.signature,

@@ -12,6 +12,9 @@ export function coefficient(value) {
   if (value === null || value === undefined) return "–";
   return new Intl.NumberFormat(language, { minimumFractionDigits: 4, maximumFractionDigits: 4 }).format(value);
 }
+/** What stands behind a "±": as many standard deviations as the service tells everywhere. */
+export const TOLD_STDS = Number(document.body.dataset.toldStds);
+export const toldStd = (std) => `± ${number(TOLD_STDS * std, 2)}`;
 export const withUnit = (value, unit, digits) => (value === null || value === undefined ? "–" : `${number(value, digits)} ${unit}`);
 
 export function set(root, field, text) {
@@ -33,7 +36,7 @@ export function showValues(root, card) {
     else if (form === "count") text = number(value, 10);
     else text = unit ? withUnit(value, unit) : number(value);
     const std = card.values[`${path}StdDev`];
-    if (std !== undefined && std !== null && text !== "–") text += ` ± ${number(2 * std, 2)}`;
+    if (std !== undefined && std !== null && text !== "–") text += ` ${toldStd(std)}`;
     const kind = quality(card, path);
     if (text !== "–" && kind !== "good") text += ` (${texts[kind]})`;
     if (place.textContent !== text) place.textContent = text;
@@ -64,7 +67,7 @@ export function showFriction(root, card) {
   const { values } = card, level = values["Wear/Level"], limit = values["Wear/Limit"] ?? 1;
   const std = values["Friction/StaticFrictionStdDev"], kind = quality(card, "Friction/StaticFriction");
   set(root, "mu_s", coefficient(values["Friction/StaticFriction"]));
-  set(root, "mu_s_band", std === null ? "" : `± ${number(2 * std, 2)}`);
+  set(root, "mu_s_band", std === null ? "" : toldStd(std));
   set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons[language].mu_s}`);
   set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}`);
   for (const meter of root.querySelectorAll('[data-field="wear_meter"]')) {
@@ -86,7 +89,7 @@ export const isOpen = (alarm) => alarm.enabled && alarm.shelved === "unshelved" 
 export function evidence(alarm) {
   const e = alarm.evidence, parts = [];
   if (e.statistic !== null) parts.push(`${texts.statistic} ${number(e.statistic, 3)}` + (e.threshold === null ? "" : `, ${texts.threshold} ${number(e.threshold, 3)}`));
-  if (e.size !== null) parts.push(`${texts.size} ${number(e.size, 2)}` + (e.size_std === null ? "" : ` ± ${number(e.size_std, 2)}`));
+  if (e.size !== null) parts.push(`${texts.size} ${number(e.size, 2)}` + (e.size_std === null ? "" : ` ${toldStd(e.size_std)}`));
   if (e.change_cycle) parts.push(`${texts.since_cycle} ${e.change_cycle}`);
   return parts.join(", ");
 }
@@ -114,31 +117,67 @@ export function showTour(card) {
   }
 }
 
+/** Without the service nothing on the page is live: it says so at the top, and wherever it said that it was. */
+function showOffline(since) {
+  const notice = document.getElementById("offline");
+  if (!notice.hidden) return;
+  notice.textContent = `✕ ${texts.offline} (${since.toLocaleTimeString(language)})`;
+  notice.hidden = false;
+  document.body.classList.add("is-offline");
+  for (const place of document.querySelectorAll('[data-field="state"]')) {
+    place.className = "state plain";
+    place.textContent = `? ${texts.unknown}`;
+    place.title = texts.offline;
+  }
+}
+
+const SILENCE_MS = 25000; // two and a half signs of life: a link that is cut without a word ends no stream
+
 /** Keeps a stream open; the browser reconnects by itself, the end of a session leads to the login. */
 export function follow(address, handlers) {
   const openAlarms = new Map();
-  const offline = document.getElementById("offline"), count = document.getElementById("open-alarms");
-  const source = new EventSource(address);
-  source.addEventListener("open", () => { offline.hidden = true; });
-  source.addEventListener("error", async () => {
-    offline.hidden = false;
+  const count = document.getElementById("open-alarms");
+  let source, heard = new Date();
+  const hear = () => {
+    heard = new Date();
+    document.getElementById("offline").hidden = true;
+    document.body.classList.remove("is-offline");
+  };
+  const lose = async () => {
+    showOffline(heard);
     const answer = await fetch("/alarms/rows", { redirect: "manual" }).catch(() => null);
     if (answer && answer.status === 401) location.reload();
     else if (source.readyState === EventSource.CLOSED) setTimeout(() => location.reload(), 5000);
-  });
-  source.addEventListener("ended", () => { source.close(); setTimeout(() => location.reload(), 1000); });
-  const listen = (kind, show) => source.addEventListener(kind, (event) => show(JSON.parse(event.data)));
-  listen("alarms", (cell) => {
+  };
+  const heardOf = { alive() {} };
+  heardOf.alarms = (cell) => {
     openAlarms.set(cell.cell, cell.alarms.filter(isOpen).length);
     const total = [...openAlarms.values()].reduce((sum, n) => sum + n, 0);
     count.hidden = total === 0;
     count.textContent = total;
     count.setAttribute("aria-label", `${total} ${total === 1 ? texts.open_one : texts.open_many}`);
     handlers.alarms?.(cell);
-  });
-  for (const kind of ["recent", "card", "detail"]) listen(kind, (content) => {
+  };
+  for (const kind of ["recent", "card", "detail"]) heardOf[kind] = (content) => {
     handlers[kind]?.(content);
     if (kind === "card") showTour(content);
-  });
+  };
+  function connect() {
+    source?.close();
+    source = new EventSource(address);
+    source.addEventListener("open", hear);
+    source.addEventListener("error", lose);
+    source.addEventListener("ended", () => { source.close(); setTimeout(() => location.reload(), 1000); });
+    for (const [kind, show] of Object.entries(heardOf)) source.addEventListener(kind, (event) => {
+      hear();
+      show(JSON.parse(event.data));
+    });
+  }
+  connect();
+  setInterval(() => {
+    if (new Date() - heard < SILENCE_MS) return;
+    showOffline(heard);
+    if (source.readyState === EventSource.OPEN) connect();
+  }, 1000);
   addEventListener("pagehide", () => source.close());
 }

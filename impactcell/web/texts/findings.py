@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from impactcell.process.progress import COMPILING
 from impactcell.web.texts.effects import GERMAN_EFFECTS
 
 GERMAN_PHASES: Final = {
@@ -27,6 +28,7 @@ GERMAN_STEPS: Final = {
     "estimate": "Reibung schätzen",
     "discrepancy": "Abweichung suchen",
     "model accept": "Vorhersagen, was das Annehmen ändert",
+    COMPILING: "Übersetzen für diesen Rechner, einmal: bis zu einer Minute",
     "fitting the nominal model": "Modell anpassen",
     "locating the gap and naming effects": "Abweichung orten und Effekte nennen",
     "holding names against free forms": "Namen gegen freie Formen halten",

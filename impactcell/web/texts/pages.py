@@ -1,10 +1,12 @@
 """What the pages say of cells, alarms and the system."""
 
+from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts.text import Texts
 
 PAGE_TEXTS: Texts = {
     # navigation and frame
     "cells": ("Cells", "Zellen"),
+    "worries": ("To look at:", "Ansehen:"),
     "alarms": ("Alarms", "Alarme"),
     "system": ("System", "System"),
     "skip": ("Skip to content", "Zum Inhalt springen"),
@@ -67,6 +69,10 @@ PAGE_TEXTS: Texts = {
         "Misfit of model and measurement; 1 is what the noise of the sensors alone makes.",
         "Abweichung zwischen Modell und Messung; 1 ist, was das Rauschen der Sensoren allein ausmacht.",
     ),
+    "plus_minus_help": (
+        f"± is {TOLD_STDS:g} standard deviations: the true value is within with about 95 % certainty.",
+        f"± sind {TOLD_STDS:g} Standardabweichungen: mit etwa 95 % Sicherheit liegt der wahre Wert darin.",
+    ),
     # a cell's page
     "last_tap": ("Last tap", "Letzter Stoß"),
     "last_tap_help": (
@@ -86,13 +92,17 @@ PAGE_TEXTS: Texts = {
     "span_month": ("Month", "Monat"),
     "signature": ("Friction along the stroke", "Reibung entlang des Wegs"),
     "signature_help": (
-        "Line: last cycle with ±2 standard deviations; band: cycles before; dashed: the last deviant cycle.",
-        "Linie: letzter Zyklus mit ±2 Standardabweichungen; Band: davor; gestrichelt: letzter abweichender.",
+        "Line: last cycle with ± beside it; band: cycles before; dashed: the last deviant cycle.",
+        "Linie: letzter Zyklus mit ± daneben; Band: davor; gestrichelt: letzter abweichender.",
     ),
     "reset_wear": ("Worn parts were replaced", "Verschlissene Teile wurden ersetzt"),
     "reset_wear_help": (
         "The wear level is learned anew. Who did it, and the comment, are kept in the audit trail.",
         "Das Verschleißniveau wird neu gelernt. Wer es war und der Kommentar werden festgehalten.",
+    ),
+    "reset_wear_done": (
+        "The wear level is learned anew, from the next cycle on.",
+        "Das Verschleißniveau wird ab dem nächsten Zyklus neu gelernt.",
     ),
     "reset_wear_now": ("Reset wear", "Verschleiß zurücksetzen"),
     "positioning": ("Positioning", "Positionieren"),

@@ -3,10 +3,13 @@
 import math
 from dataclasses import replace
 
+import numpy as np
+import pytest
+
 from impactcell import alarms
 from impactcell.alarms import AlarmEvent, AlarmSettings, CycleInputs, EventKind, RuleResult, RuleSettings
 from impactcell.alarms.rules import module_connection
-from impactcell.records import Evidence, Quality, Shelving, TapPredictions, WearState
+from impactcell.records import Evidence, Quality, Shelving, Signature, TapPredictions, WearState
 from impactcell.serialization import pack, unpack
 
 WEAR = "WearLimit"
@@ -98,6 +101,22 @@ def test_wear_says_when_the_limit_was_crossed():
     assert found.evidence.change_cycle == 500
 
 
+@pytest.mark.parametrize(
+    ("probability", "english", "german"),
+    [
+        (0.974, "97 % sure", "97 % sicher"),
+        (0.9949, "99.5 % sure", "99,5 % sicher"),
+        (0.9996, "over 99.9 % sure", "über 99,9 % sicher"),
+        (1.0, "over 99.9 % sure", "über 99,9 % sicher"),
+    ],
+)
+def test_a_message_is_never_sure_of_all(probability: float, english: str, german: str):
+    message = judge(SETTINGS, NORMAL, CycleInputs(1000, wear(probability)), WEAR).message
+    assert f"; {english})" in message.english
+    assert f"; {german})" in message.german
+    assert judge(SETTINGS, NORMAL, rising(1000.0, 1.0), WARNING).message.english.count("100 %") == 0
+
+
 def test_an_unknown_wear_leaves_the_alarm_alone():
     for unknown in (wear(math.nan), wear(0.99, Quality.BAD)):
         assert judge(SETTINGS, ACTIVE, CycleInputs(1, unknown), WEAR).holds is None
@@ -147,14 +166,39 @@ def test_a_shift_stands_for_a_while_and_clears_by_itself():
     evidence = Evidence(12.0, 11.0, 4, 0.01, 0.002)
     state, moved = alarms.update(settings, state, [shift(evidence)], 5, 0)
     assert moved[0].alarm.evidence == evidence
-    assert "since cycle 4 friction is 0.0100 ± 0.0020 higher" in moved[0].alarm.message
-    assert "seit Zyklus 4 ist die Reibung um 0,0100 ± 0,0020 höher" in moved[0].alarm.message_de
+    assert (
+        "since cycle 4 friction is 0.0100 ± 0.0040 (95 %) higher, which is 5 standard deviations"
+        in moved[0].alarm.message
+    )
+    assert (
+        "seit Zyklus 4 ist die Reibung um 0,0100 ± 0,0040 (95 %) höher, das sind 5 Standardabweichungen"
+        in moved[0].alarm.message_de
+    )
     cleared = []
     for i in range(6, 12):
         state, moved = alarms.update(settings, state, [shift(None)], i, 0)
         cleared.extend(i for t in moved if not t.alarm.active)
     assert cleared == [9]
     assert not state.alarm(BATCH).acknowledged
+
+
+def test_every_message_tells_two_standard_deviations():
+    friction = np.full(2, 0.2)
+    odd_signature = Signature(friction, friction, friction, 9.0, 9.0, 0.001, Quality.GOOD)
+    worn, at = wear(0.99), CycleInputs(2000, wear(0.99))
+    soon = replace(at, probability_at_horizon=0.95, horizon=5000.0)
+    odd = replace(at, deviation=Evidence(6.0, 5.0, 7, 0.01, 0.002), judged=True, signature=odd_signature)
+    for name, inputs, told in (
+        (WEAR, at, "0.2100 ± 0.0020 (95 %)"),
+        (WARNING, soon, "0.2100 ± 0.0020 (95 %)"),
+        (DEVIANT, odd, "0.0100 ± 0.0040 (95 %) higher"),
+    ):
+        message = judge(SETTINGS, NORMAL, inputs, name).message
+        assert told in message.english
+        assert told.replace(".", ",").removesuffix(" higher") in message.german
+    # 0.005 above a limit at 1e-5 a cycle: 500 cycles ago, 200 to either side
+    assert worn.level - worn.limit == pytest.approx(0.005)
+    assert "at about cycle 1500 (1300 to 1700;" in judge(SETTINGS, NORMAL, at, WEAR).message.english
 
 
 def test_an_announced_batch_keeps_the_batch_alarm_silent():

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
@@ -201,7 +202,7 @@ def test_a_unit_that_is_wrong_is_told(tmp_path: Path, channel: str, told: str) -
     write(
         Campaign(Excitation.TAP, shots, stroke_m=1.5e-3, sensors=SENSORS, columns=COVARIATES), tmp_path / "c"
     )
-    with pytest.raises(CampaignError, match=told):
+    with pytest.raises(CampaignError, match=f"^{re.escape(str(tmp_path / 'c'))}: .*{told}"):
         estimate(tmp_path / "c")
 
 

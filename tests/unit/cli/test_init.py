@@ -1,7 +1,10 @@
 """An own cell from nothing: init, check, the model of its first taps; cells that do not fit together."""
 
+import contextlib
 import json
 import math
+import re
+import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
+from impactcell.api.first_model import FirstModel
 from impactcell.campaign import Campaign, read
 from impactcell.cli.app import run_verb
 from impactcell.errors import CampaignError, ImpactCellError, PredictionError, SettingsError
@@ -68,7 +72,12 @@ def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
     run("check", begun / "own.yaml", "--json")
     said = json.loads(capsys.readouterr().out)
     assert said["faults"] == []
-    assert ["no users file" in note["message"] for note in said["notes"]] == [True]
+    assert [note["message"].partition(" is")[0] for note in said["notes"]] == [
+        "how noisy the force sensor",
+        "how noisy the position sensor",
+        "there",
+    ]
+    assert "0.4 N is taken, a guess; say `force_noise_std_n` under `sensors`" in said["notes"][0]["message"]
     with pytest.raises(SettingsError, match="is there already"):
         run_verb(["init", str(begun), *ANSWERS])
 
@@ -111,7 +120,6 @@ def test_a_stroke_that_catches_up_with_the_part_is_told_with_the_way_out(
 def test_further_taps_are_taken_where_the_first_are_not_good_enough(
     begun: Path, shots: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from impactcell.api.first_model import FirstModel
     from impactcell.cli import first_model
 
     shutil.copytree(begun, tmp_path / "own")
@@ -179,6 +187,49 @@ def test_the_first_model_is_that_of_the_plant(
     assert "good enough to estimate friction with" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("campaign", [False, True])
+def test_the_noise_of_the_sensors_is_what_was_said_or_what_the_taps_show(
+    begun: Path, shots: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, campaign: bool
+) -> None:
+    model, taps = read_cell(begun / "own.yaml").model, read(shots)
+    silent = [replace(s, force=replace(s.force, noise_std=None)) for s in taps.shots[:3] if s.force]
+    monkeypatch.setattr("impactcell.cli.init.calibrated_model", lambda _: model)
+    monkeypatch.setattr("impactcell.cli.init.read", lambda _: replace(taps, shots=tuple(silent)))
+    first = FirstModel(PlantFit(model, (), 1.0), 3, ())
+    monkeypatch.setattr("impactcell.cli.init.fit_first_model", lambda *_: first)
+    recorded = ["--campaign", shots] if campaign else []
+    run("init", tmp_path, *ANSWERS, "--position-noise-um", "2.5", *recorded)
+    sensors = yaml.safe_load((tmp_path / "own.yaml").read_text())["sensors"]
+    assert sensors.pop("position_noise_std_um") == 2.5
+    assert sensors == ({"force_noise_std_n": pytest.approx(0.4, rel=0.1)} if campaign else {})
+    for wrong in ("nan", "-1"):
+        with pytest.raises(SettingsError, match="noise of a sensor has to be above 0"):
+            run_verb(["init", str(tmp_path / "d"), *ANSWERS, "--force-noise-n", wrong])
+
+
+def test_more_noise_in_the_taps_than_was_said_is_told(
+    begun: Path, shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(begun, tmp_path / "own")
+    cell = tmp_path / "own" / "own.yaml"
+    with Journal(tmp_path / "own" / "own.sqlite", "own") as journal:
+        for shot in read(shots).shots[:4]:
+            captured = replace(shot, force=replace(shot.force, noise_std=None), position=None)
+            journal.append(captured, make_snapshot(captured), b"", ())
+    written = cell.read_text()
+    for said, told in (
+        (0.1, "a noise of 0.1 N is too little: the first taps of its journal show 0.4"),
+        (0.4, ""),
+    ):
+        cell.write_text(f"{written}sensors: {{force_noise_std_n: {said}, position_noise_std_um: 1.5}}\n")
+        run("check", cell, "--json")
+        notes = [note["message"] for note in json.loads(capsys.readouterr().out)["notes"]]
+        assert [told in note for note in notes if note.startswith("a noise")] == [True] * bool(told)
+    cell.write_text(f"{written}sensors: {{position_noise_std_um: 1.5}}\n")
+    run("check", cell)
+    assert "0.4 N is taken, a guess; the first taps of its journal show 0.4" in capsys.readouterr().err
+
+
 def test_the_first_taps_of_the_journal_make_the_model(
     begun: Path, shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -202,13 +253,19 @@ def test_the_first_taps_of_the_journal_make_the_model(
         for capture in captures[5:]:
             journal.append(capture, make_snapshot(capture), b"", ())
     run("model", "fit", cell, "--json")
-    told = json.loads(capsys.readouterr().out)
+    out, told_beside = capsys.readouterr()
+    told = json.loads(out)
     assert told["good_enough"] is True
     slow = sum(capture.velocity_m_s < 0.04 for capture in captures[:30])
     assert 0 < slow < 10, "in these the actuator meets the part again"
     assert (told["taps"], told["used"]) == (30, 30 - slow)
     assert abs(told["stiffness_n_per_m"]["value"] - 3e5) < 4 * told["stiffness_n_per_m"]["std"]
     assert read_cell(cell).model.name == "own"
+    assert re.findall(r"yaml:\d+:\d+: note: (.*?) was not said", told_beside) == [
+        "how noisy the force sensor is",
+        "how noisy the position sensor is",
+    ]
+    assert "users file" not in told_beside, "which is nothing that taps show"
     run("model", "restore", cell)
     assert read_cell(cell).model.name == "own-provisional"
 
@@ -231,6 +288,8 @@ def change(content: dict[str, Any], path: str, value: Any) -> None:
             "the stroke is 3 mm, model 'prototype' was calibrated for 1.5",
         ),
         ("actuator.max_velocity_mm_per_min", 900.0, "actuator", "taps are at most 900 mm/min"),
+        ("sensors.force_noise_std_n", 400.0, "sensors", "400 N cannot be: the fastest tap shows some 350 N"),
+        ("sensors.position_noise_std_um", 1500.0, "sensors", "a noise of 1500 µm cannot be"),
         ("alarms.wear_limit", 0.2, "alarms", "the wear limit 0.2 is not above the friction of the model"),
         ("predictors", [], "model", "has no predictors"),
     ],
@@ -255,6 +314,46 @@ def test_a_cell_that_does_not_fit_together_is_refused(
         text for text in reversed(cell.read_text().splitlines()[:line]) if not text.startswith(" ")
     )
     assert section.startswith(place)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("part.mass_kg", 4.2),
+        ("actuator.stroke_mm", 2.0),
+        ("alarms.wear_limit", 0.9),
+        ("predictors", []),
+    ],
+)
+def test_what_is_advised_can_be_typed_as_it_stands_and_helps(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    path: str,
+    value: Any,
+) -> None:
+    for swept in ("VELOCITIES", "FRICTIONS", "MASSES"):
+        monkeypatch.setattr(f"impactcell.cli.calibrate.{swept}", 5)
+    config = tmp_path / "my cells"  # the model lies elsewhere, and its path has to be quoted
+    shutil.copytree(shipped_config(), config)
+    for file in ("cells/prototype.yaml", "models/prototype.yaml"):
+        content = yaml.safe_load((config / file).read_text())
+        if (path == "predictors") == file.startswith("models"):
+            change(content, path, value)
+        (config / file).write_text(yaml.safe_dump(content))
+    monkeypatch.chdir(tmp_path)
+    cell = "my cells/cells/prototype.yaml"
+
+    def advice() -> list[str]:
+        with contextlib.suppress(SettingsError, SystemExit):
+            run_verb(["check", cell, "--json"])
+        said = json.loads(capsys.readouterr().out)
+        return re.findall("`(impactcell calibrate .*?)`", json.dumps(said["faults"] + said["notes"]))
+
+    [command] = advice()
+    run(*shlex.split(command)[1:])
+    capsys.readouterr()
+    assert advice() == []
 
 
 def test_faults_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,6 +46,18 @@ def test_slope_and_shift_of_a_known_series(tmp_path, capsys, batch):
     assert abs(shift["size"] - 0.006) < 3.0 * shift["size_std"]
 
 
+def test_people_read_two_standard_deviations_and_data_hold_one(tmp_path, capsys):
+    path = write(tmp_path / "s.csv", truth())
+    data = run(capsys, path)
+    track(path)
+    text = capsys.readouterr().out
+    (shift,) = data["alarms"]
+    for value, std in ((data["level"], data["level_std"]), (shift["size"], shift["size_std"])):
+        assert f"{value:.5f} ± {2.0 * std:.5f}" in text
+    assert f"{1e3 * data['slope_per_cycle']:+.6f} ± {2e3 * data['slope_std']:.6f} per 1000 cycles" in text
+    assert text.count("95 %") == 1
+
+
 def test_the_wear_limit(tmp_path, capsys):
     mu_s = truth(4000, slope=5e-6, step=0.0)
     found = run(capsys, write(tmp_path / "s.csv", mu_s), limit=0.21)

@@ -5,10 +5,12 @@ import gzip
 import io
 import json
 import logging
+import re
+import sys
 import tracemalloc
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -121,16 +123,6 @@ def test_round_trip(name: str, count: int, seed: int, dtype: str, tmp_path: Path
     }  # fmt: skip
 
 
-@pytest.fixture
-def collected() -> Iterator[None]:
-    """Collect what a test leaves before the next begins."""
-    yield
-    gc.collect()
-
-
-# asammdf's destructor stumbles over what its constructor did not get to.
-@pytest.mark.usefixtures("collected")
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @every
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
@@ -151,6 +143,30 @@ def test_a_damaged_file_is_refused_or_read(name: str, data: st.DataObject, tmp_p
     except MeasurementError as error:
         told = str(error)
     assert str(damaged) in told
+
+
+@pytest.mark.parametrize("kept", [8, 64, 100, 400, 1500])
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_of_a_damaged_mdf_file_only_the_error_is_told(
+    kept: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    path = tmp_path / "a.mf4"
+    write_mdf(path, arrays(200))
+    content = path.read_bytes()
+    for damaged in (
+        content[:kept],
+        content[:kept] + bytes(len(content) - kept),
+        b"MDF     3.30" + content[12:kept],
+    ):
+        path.write_bytes(damaged)
+        with pytest.raises(MeasurementError, match=re.escape(str(path))):
+            read_tables(path)
+    gc.collect()
+    assert told == []
+    assert capfd.readouterr() == ("", "")
+    assert path.resolve() not in [link.resolve() for link in Path("/proc/self/fd").iterdir()]
 
 
 @every

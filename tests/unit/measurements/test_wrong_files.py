@@ -101,6 +101,51 @@ def test_what_is_given_for_all_shots_goes_before_a_column_that_cannot_be(tmp_pat
     assert campaign.read(out).shots[0].mass_kg == 18.9
 
 
+def test_a_rate_beside_a_column_of_time_is_refused_and_counts_without_one(tmp_path: Path) -> None:
+    rate = ("--set", "rate=500 Hz")
+    told = refused(tmp_path, text(), *VELOCITY, *rate)
+    assert "the times are those of column 'time', so that the rate has no use; take the rate away" in told
+    assert "--column 'ignored=time'" in told
+    (shot,) = campaign.read(run(tmp_path, text(), *VELOCITY, *rate, "--column", "ignored=time")).shots
+    assert shot.force is not None
+    assert np.diff(shot.force.time_s) == pytest.approx(2e-3)
+
+
+def test_a_rate_counts_for_the_files_that_have_no_time(tmp_path: Path) -> None:
+    without = "\n".join(line.partition(",")[2] for line in text().splitlines())
+    (tmp_path / "b.csv").write_text(without, encoding="utf-8")
+    out = run(
+        tmp_path, text(), str(tmp_path / "b.csv"), *VELOCITY, "--set", f"rate={1.0 / np.diff(TIME)[0]:.0f} Hz"
+    )
+    first, second = campaign.read(out).shots
+    assert first.force is not None
+    assert second.force is not None
+    np.testing.assert_allclose(np.diff(first.force.time_s), np.diff(second.force.time_s), rtol=1e-3)
+
+
+def test_a_sign_of_what_was_not_recorded_is_refused(tmp_path: Path) -> None:
+    told = refused(tmp_path, text(), *VELOCITY, "--sign", "actuator=-1")
+    assert "no column is the actuator; name it with --column actuator=NAME, or take the sign away" in told
+
+
+def test_what_counts_for_taps_alone_is_told_where_there_are_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(
+        tmp_path,
+        text(),
+        *VELOCITY,
+        "--set",
+        "stroke=1.5 mm",
+        "--trigger",
+        "5 N",
+        "--excitation",
+        "free_slide",
+    )
+    shown = capsys.readouterr()
+    assert "given, and not used, for it is of taps: velocity, stroke, trigger" in shown.out + shown.err
+
+
 def test_a_column_whose_noise_is_small_has_one_value(tmp_path: Path) -> None:
     out = run(tmp_path, text(f"{HEAD},mass_kg", lambda row: 18.9 + 1e-3 * (row % 2)), *VELOCITY)
     assert campaign.read(out).shots[0].mass_kg == pytest.approx(18.9005, abs=1e-4)

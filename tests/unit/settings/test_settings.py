@@ -45,6 +45,7 @@ def test_every_fault_at_once_with_its_place(config: Path) -> None:
         "did you mean 'port'",
         "as in press-1",
         "there is no file",
+        "`impactcell init` writes a first model",
         "no directory",
         "opc.tcp://127.0.0.1",
     ):

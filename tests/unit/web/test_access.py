@@ -9,6 +9,8 @@ import msgspec
 import pytest
 
 from impactcell.alarms import EventKind
+from impactcell.records import Evidence
+from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, write_users
 from impactcell.web import system_page
@@ -291,6 +293,17 @@ async def test_an_observer_is_offered_nothing_to_do(page: Page) -> None:
             text = (await client.get("/alarms")).text
         assert "friction is off" in text
         assert ('action="/alarms/act"' in text) == (role >= Role.OPERATOR)
+
+
+async def test_what_stands_behind_plus_minus_is_said_where_it_is_read(page: Page) -> None:
+    await put(page, CellNews(CELL, alarms=(raised(evidence=Evidence(12.0, 11.0, 4, 0.01, 0.002)),)))
+    async with page.logged_in(Role.OBSERVER) as client:
+        alarms = (await client.get("/alarms?lang=de")).text
+        assert "Größe 0,01 ± 0,004" in alarms
+        for path in ("/", f"/cells/{CELL}", "/alarms"):
+            text = (await client.get(path)).text
+            assert f'data-told-stds="{TOLD_STDS}"' in text
+            assert "± sind 2 Standardabweichungen: mit etwa 95 % Sicherheit" in text
 
 
 async def test_wear_is_reset_by_an_engineer_and_a_refusal_is_said(page: Page) -> None:

@@ -89,7 +89,7 @@ async def test_the_trend_of_a_cell(tmp_path: Path) -> None:
     now = time.time_ns()
     store(
         tmp_path / "j.sqlite",
-        [now - 7200 * SECOND, *(now - i * SECOND for i in (30, 20, 10))],
+        [now - 7200 * SECOND, *(now - i * SECOND for i in (600, 400, 200))],
         {1: "A", 4: "B"},
     )
     page = make_page(tmp_path, tmp_path / "j.sqlite")
@@ -100,7 +100,15 @@ async def test_the_trend_of_a_cell(tmp_path: Path) -> None:
         assert (await client.get("/cells/press-2/trend")).status_code == 404
     assert hour["mu_s_high"] == pytest.approx([0.002, 0.003, 0.004])
     assert [batch for _, batch in hour["batches"]] == ["A", "B"]
+    # after two hours in which it stood still, line and band begin anew
+    assert [shift[name][1] for name in ("mu_s_low", "mu_s_high", "level", "level_std")] == [None] * 4
+    assert [value is None for value in shift["mu_s_low"]] == [False, True] + [False] * (
+        len(shift["mu_s_low"]) - 2
+    )
     assert shift["mu_s_low"][0] == pytest.approx(0.001)
+    assert None not in hour["mu_s_low"]
+    assert shift["time_ms"] == sorted(shift["time_ms"])
+    assert [batch for _, batch in shift["batches"]] == ["A", "B"]
 
 
 async def test_a_journal_that_cannot_be_read_is_said(tmp_path: Path) -> None:

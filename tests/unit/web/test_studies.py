@@ -163,7 +163,9 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         await client.post(f"/studies/{study}/run", data={"csrf": await csrf_of(client), "goal": "estimate"})
         found = await until(page, study, Stage.DONE)
         assert found.result["mu_s"] == pytest.approx({"mean": 0.215, "spread": 0.00707, "n": 2}, abs=1e-5)
-        assert "0.215" in (await client.get(f"/studies/{study}")).text
+        text = (await client.get(f"/studies/{study}")).text
+        assert "0.215" in text
+        assert "<td>0.002</td>" in text, "two standard deviations behind ±; the file has one"
         assert (await client.get(f"/studies/{study}/files/friction.csv")).text.startswith("shot,")
     assert "--cell" not in verbs.asked[0]
 

@@ -1,0 +1,176 @@
+"""A page that hears nothing says so, and what is worth a look among many cells is named above them."""
+
+import asyncio
+import contextlib
+import os
+import time
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+import pytest_asyncio
+
+from impactcell.records import ModuleStatus
+from impactcell.scada import Role
+from impactcell.scada.users import User, write_users
+from impactcell.web import CellFacts, CellNews, PageServer, PageSettings
+from impactcell.web.interface import Freshness
+from tests.browser.chromium import PHONE, Browser, need_chromium
+from tests.snapshots import make_capture, make_snapshot
+from tests.unit.web.page import PASSWORD, Backend, raised
+
+pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="module")]
+
+CELLS = [f"press-{number}" for number in range(1, 9)]
+CONNECTED, LOST = ModuleStatus(connected=True), ModuleStatus(connected=False, reason="no answer")
+LATER = """
+    const Now = Date;
+    globalThis.Date = class extends Now {
+        constructor(...at) { if (at.length) super(...at); else super(Now.now() + 60000); }
+    };
+"""
+"""A minute passes in the browser."""
+
+
+class Relay:
+    """What lies between browser and service, and can be cut: with a word, or in silence."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+        self._server: asyncio.Server | None = None
+        self._writers: set[asyncio.StreamWriter] = set()
+        self._passes = asyncio.Event()
+        self._passes.set()
+        self.port = 0
+
+    async def open(self) -> None:
+        self._server = await asyncio.start_server(self._relay, "127.0.0.1", self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def cut(self) -> None:
+        assert self._server is not None
+        self._server.close()
+        for writer in self._writers:
+            writer.transport.abort()
+        await self._server.wait_closed()
+
+    def freeze(self) -> None:
+        self._passes.clear()
+
+    def thaw(self) -> None:
+        self._passes.set()
+
+    async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        inside, outside = await asyncio.open_connection("127.0.0.1", self._port)
+        self._writers |= {writer, outside}
+        await asyncio.gather(self._pass(reader, outside), self._pass(inside, writer))
+        self._writers -= {writer, outside}
+
+    async def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError):
+            while data := await reader.read(2**16):
+                await self._passes.wait()
+                writer.write(data)
+                await writer.drain()
+        writer.close()
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def server(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[PageServer]:
+    need_chromium()
+    directory: Path = tmp_path_factory.mktemp("page")
+    users = directory / "users.yaml"
+    write_users(users, {"olga": User("olga", Role.OBSERVER, password="x")})
+    settings = PageSettings("http://127.0.0.1:0", users, directory / "pki", directory / "studies")
+    server = PageServer(settings, [CellFacts(name, "", "") for name in CELLS], Backend(users))
+    server.start()
+    try:
+        yield server
+    finally:
+        await asyncio.to_thread(server.stop)
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def relay(server: PageServer) -> AsyncIterator[Relay]:
+    relay = Relay(urlsplit(server.endpoint).port or 0)
+    await relay.open()
+    snapshot = replace(make_snapshot(make_capture(1)), time_ns=time.time_ns())
+    for cell in CELLS:
+        server.feed.put(CellNews(cell, status=CONNECTED))
+        server.feed.put(CellNews(cell, snapshot, freshness=Freshness.LIVE))
+    try:
+        yield relay
+    finally:
+        relay.thaw()
+        await relay.cut()
+
+
+def states(browser: Browser) -> set[str]:
+    return {place.text for place in browser.all(".card .state")}
+
+
+def enter(browser: Browser, relay: Relay) -> None:
+    browser.open(f"http://127.0.0.1:{relay.port}/")
+    browser.log_in("olga", PASSWORD)
+    browser.until(lambda: states(browser) == {"● live"}, "cells that are live")
+    assert not browser.find("main").get_attribute("class")
+
+
+def is_offline(browser: Browser) -> bool:
+    return "No connection to the service" in browser.text and states(browser) == {"? unknown"}
+
+
+async def test_a_link_that_is_cut(relay: Relay, browser: Browser) -> None:
+    await asyncio.to_thread(enter, browser, relay)
+    await relay.cut()
+    await asyncio.to_thread(browser.until, lambda: is_offline(browser), "that nothing is heard")
+    await relay.open()
+    back = lambda: states(browser) == {"● live"} and not browser.all("#offline:not([hidden])")  # noqa: E731
+    await asyncio.to_thread(browser.until, back, "cells that are live again")
+
+
+async def test_a_link_that_falls_silent(relay: Relay, browser: Browser) -> None:
+    """As with a cable that is pulled: no end of the connection ever comes."""
+    await asyncio.to_thread(enter, browser, relay)
+    relay.freeze()
+    await asyncio.to_thread(browser.run, LATER)
+    await asyncio.to_thread(browser.until, lambda: is_offline(browser), "that nothing is heard")
+    relay.thaw()
+    back = lambda: states(browser) == {"● live"} and not browser.all("#offline:not([hidden])")  # noqa: E731
+    await asyncio.to_thread(browser.until, back, "cells that are live again")
+
+
+async def test_the_notice_stays_in_sight(relay: Relay, browser: Browser) -> None:
+    browser.show_as("light", PHONE)
+    await asyncio.to_thread(enter, browser, relay)
+    await relay.cut()
+    await asyncio.to_thread(browser.until, lambda: is_offline(browser), "that nothing is heard")
+    top = browser.run(
+        "scrollTo(0, document.body.scrollHeight);"
+        "return [scrollY, document.getElementById('offline').getBoundingClientRect().top];"
+    )
+    if pictures := os.environ.get("IMPACTCELL_SCREENSHOTS"):
+        await asyncio.to_thread(browser.screenshot, Path(pictures) / "page-offline-phone.png")
+    await relay.open()
+    assert top[0] > 1000
+    assert 0 <= top[1] < 20
+
+
+async def test_what_to_look_at_is_named_above_many_cells(
+    server: PageServer, relay: Relay, browser: Browser
+) -> None:
+    await asyncio.to_thread(enter, browser, relay)
+    assert not browser.find(".cards").find_elements("css selector", "#worries:not([hidden])")
+    snapshot = replace(make_snapshot(make_capture(2)), cycle=2, time_ns=time.time_ns(), alarms=(raised(),))
+    server.feed.put(CellNews("press-7", snapshot, freshness=Freshness.LIVE))
+    server.feed.put(CellNews("press-3", status=LOST, freshness=Freshness.LOST))
+    named = lambda: {link.text for link in browser.all("#worries a")}  # noqa: E731
+    await asyncio.to_thread(
+        browser.until, lambda: named() == {"▲ press-7", "✕ press-3"}, "the two cells that are named"
+    )
+    if pictures := os.environ.get("IMPACTCELL_SCREENSHOTS"):
+        await asyncio.to_thread(browser.screenshot, Path(pictures) / "page-worries-light.png")
+    await asyncio.to_thread(lambda: browser.all("#worries a")[-1].click())
+    await asyncio.to_thread(browser.until, lambda: browser.path == "/cells/press-7", "the cell's page")
