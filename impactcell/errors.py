@@ -24,6 +24,7 @@
     │   ├── WrongDeviceError      identity or map version is not what the cell file says
     │   ├── LinkError             not connected, lost, or no answer in time          (retry)
     │   ├── ProtocolError         the peer broke the protocol; nothing of it is used  (retry)
+    │   │   └── NotDecimalError   a decimal code with a digit above 9
     │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry)
     ├── JournalError
     │   ├── ForeignJournalError   not our file, or of another version; never overwritten
@@ -157,6 +158,10 @@ class ProtocolError(FieldbusError):
     """The peer broke the protocol; nothing of its reply has been used."""
 
     retry: ClassVar[bool] = True
+
+
+class NotDecimalError(ProtocolError):
+    """A register of binary coded decimals shows a digit above 9, so that it says no number."""
 
 
 class ModbusExceptionError(FieldbusError):

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from impactcell.errors import FieldbusError, ModbusExceptionError, ProtocolError
+from impactcell.errors import FieldbusError, ModbusExceptionError, NotDecimalError, ProtocolError
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
@@ -116,8 +116,7 @@ class CaptureReader:
         Raises
         ------
         LinkError, ProtocolError, ModbusExceptionError
-            If the link fails, or the module cannot answer now; the next call for the same cycle goes on where
-            this one stopped.
+            If link or module fail now; the next call for the same cycle goes on where this one stopped.
         """
         if self._target is None or self._target.cycle_id != target.cycle_id:
             self._target, self._attempts, self._link_failures, self._partial = target, 0, 0, None
@@ -134,7 +133,8 @@ class CaptureReader:
                 reason = fault
             except FieldbusError as error:
                 progressed = self._progressed()
-                if isinstance(error, ModbusExceptionError) and (progressed or error.code in _REQUEST_FAULTS):
+                code = error.code if isinstance(error, ModbusExceptionError) else None
+                if isinstance(error, NotDecimalError) or code in _REQUEST_FAULTS or (code and progressed):
                     reason = str(error)
                     if progressed:
                         continue

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from impactcell.fieldbus.status_block import StatusBlock
+from impactcell.fieldbus.status_block import UNREADABLE, StatusBlock
 from impactcell.records import CycleId
 
 _PERIOD: Final[Mapping[str, int]] = {"u16": 2**16, "bcd16": 10**4, "bcd32": 10**8}
@@ -46,10 +46,13 @@ class CycleNumbers:
         return number if self.period is None else number % self.period
 
     def status(self, status: StatusBlock, last: CycleId | None) -> StatusBlock:
-        """Return a status block with numbers that go on from the last cycle taken."""
-        if self.period is None:
+        """Return a status block with numbers that go on from the last cycle taken.
+
+        A slot of the ring whose number cannot be read counts as empty.
+        """
+        if self.period is None and UNREADABLE not in status.ring:
             return status
         near = last.cycle if last is not None and last.session == status.session else 0
         counter = self.number(status.cycle_counter, near)
-        ring = tuple(self.number(cycle, counter) for cycle in status.ring)
+        ring = tuple(0 if cycle == UNREADABLE else self.number(cycle, counter) for cycle in status.ring)
         return replace(status, cycle_counter=counter, ring=ring)

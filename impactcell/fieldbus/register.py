@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impactcell.errors import MapError
+from impactcell.errors import MapError, NotDecimalError
 from impactcell.fieldbus.bcd import NO_BCD, from_bcd, to_bcd
 from impactcell.fieldbus.register_types import KINDS, SI_FACTOR, WIRE
 
@@ -149,12 +149,15 @@ class Register:
     def decode(self, words: Words) -> Value:
         """Value in `words`: text, a number, or an array (also a shorter one than `count`).
 
-        Plain codes stay integers; all else comes in SI as float64, with nan for `not_a_number`.
+        Plain codes stay integers; all else comes in SI as float64, with nan for `not_a_number`. An array of
+        decimal codes is float64, too, where one of them has a digit above 9, with nan for that.
 
         Raises
         ------
         MapError
             If a single value is asked for from the wrong number of words.
+        NotDecimalError
+            If a single decimal code has a digit above 9.
         """
         if self.kind == "string":
             text = self._in_order(words).tobytes().split(b"\0", 1)[0]
@@ -165,9 +168,8 @@ class Register:
         if self._is_bcd:
             raw = from_bcd(raw)
         if self.is_code:
-            if self._is_bcd and (raw == NO_BCD).any():
-                raise MapError(f"register {self.name} ({self.address}) shows what is no decimal")
-            return raw.astype(np.int64)
+            unreadable = self._is_bcd and (raw == NO_BCD).any()
+            return np.where(raw == NO_BCD, np.nan, raw) if unreadable else raw.astype(np.int64)
         codes = raw.astype(raw.dtype.newbyteorder("="))
         values: NDArray[np.float64] = np.multiply(codes, self.si_factor, dtype=np.float64)
         if self.offset:
@@ -190,10 +192,12 @@ class Register:
         if self.bit is not None:
             return int(code) >> self.bit & 1
         if self._is_bcd:
+            shown = code
             code = int(from_bcd(self._in_order(words).view(KINDS[self.kind]))[0])
             if code == NO_BCD:
                 if self.is_code:
-                    raise MapError(f"register {self.name} ({self.address}) shows what is no decimal")
+                    where = f"register {self.name} ({self.address})"
+                    raise NotDecimalError(f"{where} shows {shown:#x}, which is no {self.kind}")
                 return math.nan
         if self.is_code:
             return code

@@ -3,11 +3,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from impactcell.fieldbus.registers import Register, RegisterMap, Value
 from impactcell.records import BatchAnnouncement
+
+UNREADABLE: Final = -1
+"""Cycle of a slot of the ring that shows no number: a decimal code with a digit above 9."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +46,10 @@ class PositioningStatus:
 
 @dataclass(frozen=True, slots=True)
 class StatusBlock:
-    """The status block of one poll; the ring of a module with one buffer is its last cycle."""
+    """The status block of one poll.
+
+    The ring of a module with one buffer is its last cycle; a slot that shows no number is `UNREADABLE`.
+    """
 
     state: str
     session: int
@@ -100,12 +107,12 @@ def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> Status
             accepted_command=integer(values["command_accepted"]),
             cycle=integer(values["command_cycle"]),
         )
-    ring = np.atleast_1d(np.asarray(values.get("ring_cycle", values["cycle_counter"])))
+    ring = np.atleast_1d(np.asarray(values.get("ring_cycle", values["cycle_counter"]), dtype=np.float64))
     return StatusBlock(
         state=_code_name(registers["state"], values["state"]) if "state" in values else "not told",
         session=integer(values.get("session", 0)),
         cycle_counter=integer(values["cycle_counter"]),
-        ring=tuple(int(cycle) for cycle in ring),
+        ring=tuple(UNREADABLE if math.isnan(cycle) else int(cycle) for cycle in ring),
         batch=batch,
         positioning=positioning,
     )

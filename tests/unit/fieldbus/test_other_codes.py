@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from impactcell.errors import MapError
+from impactcell.errors import MapError, NotDecimalError
 from impactcell.fieldbus.map_validation import validate_map
 from impactcell.fieldbus.register_types import KINDS
 from impactcell.fieldbus.registers import WIRE, Register
@@ -69,8 +69,10 @@ def test_decimals_are_written_as_one_reads_them(kind: str, digits: int, data: st
 @given(st.integers(0, 0xFFFF).filter(lambda code: not f"{code:x}".isdecimal()))
 def test_what_is_no_decimal_is_never_a_number(code: int) -> None:
     shown = np.array([code], dtype=WIRE)
-    with pytest.raises(MapError, match="no decimal"):
+    with pytest.raises(NotDecimalError, match=rf"register x \(0\) shows {code:#x}, which is no bcd16"):
         Register("x", 0, "bcd16").decode(shown)
+    codes = Register("x", 0, "bcd16", count=2).decode(np.array([code, 0x10], dtype=WIRE))
+    np.testing.assert_array_equal(codes, [math.nan, 10.0])
     assert math.isnan(float(Register("x", 0, "bcd16", unit="N").decode(shown)))  # type: ignore[arg-type]
     values = Register("x", 0, "bcd16", count=2, unit="N").decode(np.array([code, 0x10], dtype=WIRE))
     np.testing.assert_array_equal(values, [math.nan, 10.0])
