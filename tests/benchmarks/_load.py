@@ -38,7 +38,7 @@ COMMISSIONED_S = 1.1 * TrackerSettings().commissioning_cycles * PERIOD_S
 EVERY_CORE = sorted(os.sched_getaffinity(0))
 ITS_CORE, OTHERS = EVERY_CORE[:1], EVERY_CORE[1:] or EVERY_CORE
 """The service has one core of its own; modules and client have the others."""
-PASSWORD = "benchmark"
+USER, PASSWORD = "bench", "benchmark"
 CLIENT_URI = "urn:test:client"
 
 
@@ -69,6 +69,11 @@ class Load:
     delays_ms: list[float]
     waiting: float
 
+    @property
+    def cpu_per_cycle_ms(self) -> float:
+        """Processor time of the service for each cycle that comes, ms."""
+        return 1e3 * self.cpu / (self.cells / PERIOD_S)
+
     def row(self) -> tuple[str, ...]:
         """Give its row of the table."""
         p50, p99 = (f"{np.percentile(self.delays_ms, q):.0f}" for q in (50, 99)) if self.delays_ms else "--"
@@ -76,7 +81,7 @@ class Load:
             f"{self.cells}",
             "commissioned" if self.commissioned else "new",
             f"{100 * self.cpu:.0f} %",
-            f"{1e3 * self.cpu / (self.cells / PERIOD_S):.1f} ms",
+            f"{self.cpu_per_cycle_ms:.1f} ms",
             f"{self.memory_mb:.0f} MB",
             f"{self.received}",
             f"{self.settling_s:.0f} s, {self.missed_before} missed",
@@ -113,6 +118,7 @@ def cell_file(directory: Path, name: str, port: int, monitor: int, *, journal: b
         "model": str(CONFIG / "models" / "prototype.yaml"),
         "alarms": {"wear_limit": 0.25},
         "opcua": {"endpoint": "opc.tcp://127.0.0.1:0/"},
+        "web": {"endpoint": "http://127.0.0.1:0/"},
         "monitoring": {"port": monitor},
     }
     if journal:
@@ -120,6 +126,26 @@ def cell_file(directory: Path, name: str, port: int, monitor: int, *, journal: b
     path = directory / f"{name}.yaml"
     path.write_text(yaml.safe_dump(cell))
     return path
+
+
+@contextlib.contextmanager
+def page_viewers(log: Path, cells: list[str]) -> Iterator[None]:
+    """Streams of the page that is served by who writes `log`, read by a process of its own."""
+    (endpoint,) = re.findall(r"page at (http\S+)", log.read_text())
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.benchmarks._page_viewers", endpoint, USER, PASSWORD, *cells],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+    )
+    try:
+        psutil.Process(process.pid).cpu_affinity(OTHERS)
+        assert process.stdout is not None
+        assert process.stdout.readline(), "the viewers ended"
+        yield
+        assert process.poll() is None, "the viewers ended"
+    finally:
+        process.kill()
+        process.communicate()
 
 
 @contextlib.contextmanager
@@ -187,7 +213,7 @@ async def listen(
                 delays.append(1e3 * (time.time() - value.SourceTimestamp.timestamp()))
 
     client = Client(endpoint, timeout=60)
-    client.set_user("bench")
+    client.set_user(USER)
     client.set_password(PASSWORD)
     client.application_uri = CLIENT_URI
     certificate, key = (str(file) for file in pair)
@@ -223,17 +249,21 @@ def trusted_client(directory: Path) -> tuple[Path, Path]:
     return pair
 
 
-def load(number: int, seconds: float, *, commissioned: bool = False) -> Load:
-    """Run so many cells for so long after they have settled, or after they have learned their noise."""
+def load(number: int, seconds: float, *, commissioned: bool = False, viewed: bool = False) -> Load:
+    """Run so many cells for so long after they have settled, or after they have learned their noise.
+
+    With `viewed`, many read the page meanwhile.
+    """
     with tempfile.TemporaryDirectory() as temporary, modules(number, PERIOD_S) as ports:
         directory = Path(temporary)
-        write_users(
-            directory / "users.yaml", {"bench": with_password(User("bench", Role.OBSERVER), PASSWORD)}
-        )
+        write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.OBSERVER), PASSWORD)})
         pair = trusted_client(directory)
         names = [f"cell-{i}" for i in range(number)]
         files = [cell_file(directory, n, p, 0, journal=True) for n, p in zip(names, ports, strict=True)]
-        with service(files) as (process, endpoint, monitor):
+        with contextlib.ExitStack() as stack:
+            process, endpoint, monitor = stack.enter_context(service(files))
+            if viewed:
+                stack.enter_context(page_viewers(directory / "service.log", names))
             at: list[tuple[float, float, dict[str, float]]] = []
 
             def look() -> None:

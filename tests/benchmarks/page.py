@@ -7,7 +7,7 @@ import sys
 from asyncio.subprocess import PIPE
 from collections.abc import AsyncIterator
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import urlencode, urlsplit
 
 import numpy as np
 
@@ -40,7 +40,8 @@ async def page(rate_hz: float = RATE_HZ) -> AsyncIterator[tuple[str, asyncio.Str
 class Viewer:
     """An open page, as far as the service sees it: logged in, and reading its stream."""
 
-    def __init__(self) -> None:
+    def __init__(self, user: str = "olga", password: str = "x") -> None:
+        self._form = urlencode({"user": user, "password": password}).encode()
         self.received = 0
         self.cards = 0
 
@@ -48,7 +49,7 @@ class Viewer:
         """Read until cancelled."""
         host, port = urlsplit(endpoint).hostname, urlsplit(endpoint).port
         reader, writer = await asyncio.open_connection(host, port)
-        form = b"user=olga&password=x"
+        form = self._form
         kind = "application/x-www-form-urlencoded"
         head = (
             f"POST /login HTTP/1.1\r\nHost: h\r\nContent-Type: {kind}\r\nContent-Length: {len(form)}\r\n\r\n"
