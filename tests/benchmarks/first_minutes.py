@@ -5,7 +5,6 @@ clone is of what is committed here; what it needs is installed anew, without a c
 """
 
 import argparse
-import json
 import os
 import re
 import shutil
@@ -13,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +29,9 @@ PERIOD_S = 0.1
 """Between two cycles of the module, which always has one ready, s."""
 FIRST_CYCLE = r"mu_s [0-9]\.\d+ ± "
 """What the service says at `--verbose` of each cycle that it has published."""
+PAGE = r"page at (http\S+): user "
+FIRST_OF_DEMO = r"cycle \d+: mu_s [0-9]"
+"""What the demo says of its page and of each cycle."""
 COLUMNS = ("what", "bar", "measured", "interval")
 
 
@@ -102,20 +105,31 @@ def clone() -> list[tuple[str, str, str, str]]:
         make = [shutil.which("make") or "make", f"PYTHON={python}"]
         subprocess.run([*make, "install"], cwd=directory / "clone", env=environment, check=True)
         installed_s = time.monotonic() - began_s
-        said = subprocess.run(
-            [*make, "--silent", "demo", "ARGS=--cycles 1 --json"],
-            cwd=directory / "clone", env=environment, check=True, stdout=subprocess.PIPE, text=True,
-        ).stdout  # fmt: skip
-        whole_s = time.monotonic() - began_s
-    summary = json.loads(re.sub(r"^[^{]*", "", said))
-    assert summary["cycles"] >= 1, summary
+        demo = subprocess.Popen(
+            [*make, "--silent", "demo", "ARGS=--cycles 1"],
+            cwd=directory / "clone", env=environment, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        assert demo.stdout is not None
+        page_s, first_s = None, None
+        for line in demo.stdout:
+            if page := re.match(PAGE, line):
+                with urllib.request.urlopen(page[1], timeout=60) as answer:
+                    assert "password" in answer.read().decode()
+                page_s = time.monotonic() - began_s
+            elif re.match(FIRST_OF_DEMO, line):
+                first_s = time.monotonic() - began_s
+        assert demo.wait() == 0
+        assert page_s, "the demo told no page"
+        assert first_s, "the demo told no mu_s"
     return [
         (
             "fresh clone to the first mu_s, packages not cached",
             "<= 90 s",
-            f"{whole_s:.0f} s",
+            f"{first_s:.0f} s",
             f"one run; clone and install {installed_s:.0f} s",
-        )
+        ),
+        ("fresh clone to the live page, open to log in", "<= 120 s", f"{page_s:.0f} s", "the same run"),
     ]
 
 
@@ -126,7 +140,7 @@ def table(rows: list[tuple[str, str, str, str]]) -> Table:
         COLUMNS,
         rows,
         "One cell on a module that always has a cycle ready; what is compiled is on disk. Clone: `make demo` "
-        "until it ends with its first cycle; the system's own package of Python is there already.",
+        "until it tells its first mu_s; the system's own package of Python is there already.",
     )
 
 
