@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from impactcell.fieldbus.backoff import CEILING_S, Backoff
+from impactcell.fieldbus.link import SerialLine
 from impactcell.fieldbus.poll_schedule import COARSE_S, FINE_S, IDLE_S, QUIET_S, PollSchedule
 
 ROUND_TRIP_S = 1e-4
@@ -36,6 +37,21 @@ def follow(
         late.append(now_s - due_s)
         schedule.update(clock(due_s))
     return late, polls / len(periods_s)
+
+
+@pytest.mark.parametrize(
+    ("baudrate", "parity", "stop_bits", "silence_s"),
+    [
+        (9600, "E", 1, 4.0104e-3), (9600, "N", 2, 4.0104e-3), (9600, "N", 1, 3.6458e-3),
+        (19_200, "E", 1, 2.0052e-3), (38_400, "E", 1, 1.75e-3), (115_200, "N", 1, 1.75e-3),
+    ],
+)  # fmt: skip
+def test_the_silence_that_ends_a_frame_is_that_of_the_standard(
+    baudrate: int, parity: str, stop_bits: int, silence_s: float
+) -> None:
+    """Modbus over Serial Line V1.02, 2.5.1.1: 3.5 characters of 11 bits (or 10), 1.75 ms above 19 200."""
+    line = SerialLine("port", baudrate, parity, stop_bits)
+    assert line.silence_s == pytest.approx(silence_s, rel=1e-4)
 
 
 def test_regular_cycles_are_seen_soon_with_few_polls() -> None:
