@@ -75,14 +75,16 @@ def test_no_shots_are_missing_where_there_are_just_enough() -> None:
     assert missing_shots(MIN_TRAINING, MIN_HELD_OUT - 1) > 0
 
 
+@pytest.mark.parametrize("off", [0.0, 3.0], ids=["at the optimum", "short of it"])
 def test_likelihood_out_of_shot_is_that_of_an_exact_refit_of_quadratic_losses(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, off: float
 ) -> None:
     rng = np.random.default_rng(6)
     shots, p = 9, 3
     roots = rng.normal(size=(shots, p, 2 * p))
     H, best = roots @ roots.transpose(0, 2, 1), rng.normal(size=(shots, p))
     best -= np.linalg.solve(H.sum(0), np.einsum("iab,ib->a", H, best))  # so that all together are best at 0
+    best += off
     group = [0, 0, 1, 2, 3, 4, 5, 6, 6]
 
     def losses(theta: np.ndarray) -> np.ndarray:
@@ -95,7 +97,9 @@ def test_likelihood_out_of_shot_is_that_of_an_exact_refit_of_quadratic_losses(
     monkeypatch.setattr(indistinguishability, "MAX_FOLD_SHARE", 0.5)
     items = [SimpleNamespace(group=number) for number in group]
     problem: Any = SimpleNamespace(shots=SimpleNamespace(items=items), count=shots)
-    model: Any = SimpleNamespace(log_likelihood=lambda _: -losses(np.zeros(p)))
+    problem.penalty_matrix, problem.bounds = np.zeros((p, p)), lambda: (np.full(p, -9.0), np.full(p, 9.0))
+    problem.with_effects = lambda _: problem
+    model: Any = SimpleNamespace(log_likelihood=lambda _: -losses(np.zeros(p)), effects=(), theta=np.zeros(p))
     each = indistinguishability.evaluate_out_of_shot(problem, model).each
     for shot in range(shots):
         others = np.array(group) != group[shot]

@@ -116,6 +116,13 @@ def test_traces_that_gain_what_the_friction_factors_lose_confirm_nothing(viscous
     nested = [("a", replace(viscous.held_final, shot_parameters=scattered))]
     assert measure.change(viscous.held_nominal, nested[0][1], (Part.TRACES,)).is_real()
     assert confirmed(measure, nested, viscous.held_nominal) == {}
+    # A second effect was missing, which brings the factors together: of two that act, neither is denied.
+    both = [*nested, ("b", viscous.held_final)]
+    assert list(confirmed(measure, both, viscous.held_nominal)) == ["a", "b"]
+    wider = replace(wide, log_factor=wide.log_factor + 1.5 * gap * spread)
+    in_vain = [*nested, ("b", replace(viscous.held_final, shot_parameters=wider))]
+    assert measure.change(nested[0][1], in_vain[1][1]).is_real()
+    assert confirmed(measure, in_vain, viscous.held_nominal) == {}
 
 
 def test_the_first_effect_that_is_not_confirmed_ends_the_list(viscous: DiscrepancyResult) -> None:

@@ -19,6 +19,7 @@ from impactcell.discrepancy.model.linearisation import (
     direction_products,
     linearise,
     scores,
+    unmet_gradient,
 )
 from impactcell.discrepancy.model.parameters import (
     NOMINAL_PARAMETERS,
@@ -64,5 +65,6 @@ __all__ = [
     "scores",
     "simulate_open_loop",
     "trajectory_of",
+    "unmet_gradient",
     "usable_blocks",
 ]

@@ -113,6 +113,18 @@ def linearise(problem: Problem, fit: Fit) -> LinearisedFit:
     return LinearisedFit(bounds, r[0], pr[0], B, PB, J, PJ, H.sum(0), H, u)
 
 
+def unmet_gradient(problem: Problem, fit: Fit, linearisation: LinearisedFit) -> Samples:
+    """Return minus half the cost's gradient where a fit has come to rest, shape (p,); 0 at an optimum.
+
+    At a bound it is 0, too, where the cost falls only beyond it.
+    """
+    model = problem.with_effects(fit.effects)
+    gradient = linearisation.shot_gradient.sum(0) - model.penalty_matrix @ fit.theta
+    lower, upper = model.bounds()
+    held = ((fit.theta <= lower) & (gradient < 0.0)) | ((fit.theta >= upper) & (gradient > 0.0))
+    return np.where(held, 0.0, gradient)
+
+
 def _shot_products(a: Samples, b: Samples, bounds: np.ndarray) -> Samples:
     sums: Samples = np.add.reduceat(a * b, bounds[:-1])
     return sums

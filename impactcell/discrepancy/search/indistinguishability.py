@@ -2,7 +2,7 @@
 
 What a model says of a shot is judged by parameters to which that shot and its replicates did not contribute,
 so that an effect with more parameters has no advantage. The parameters without them are one Gauss-Newton step
-away from those with them.
+away from those with them, and what a fit has come to rest short of its optimum is no part of that step.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.data import IndexArray
-from impactcell.discrepancy.model import Fit, Problem, linearise
+from impactcell.discrepancy.model import Fit, Problem, linearise, unmet_gradient
 from impactcell.records import Samples
 
 MAX_DEVIATION = 2.2
@@ -64,14 +64,16 @@ def folds(problem: Problem) -> IndexArray:
 def evaluate_out_of_shot(problem: Problem, model: Fit) -> CandidateFit:
     """Log-likelihood of every shot under parameters fitted without its fold.
 
-    With u and H the gradient and information of a fold and H_0 those of all shots, the parameters without it
-    lie at -(H_0 - H)^-1 u, where the fold's misfit is larger by 2 u's + s'H s with s = (H_0 - H)^-1 u. What
-    only one fold tells has no such parameters: its leverage is held below one.
+    With u and H the gradient and information of a fold, and u_0 and H_0 those of all shots, the parameters
+    without it lie at -s = (H_0 - H)^-1 (u_0 - u), where the fold's misfit is larger by 2 u's + s'H s. At an
+    optimum u_0 is zero; short of it, where one fold tells nearly all of a direction, u_0 must not be taken
+    for what the others say. What only one fold tells has no such parameters: its leverage is held below one.
     """
     linearisation = linearise(problem, model)
     scale = np.sqrt(np.maximum(np.diag(linearisation.information), 1e-300))
     H = linearisation.shot_information / np.outer(scale, scale)
     u = linearisation.shot_gradient / scale
+    unmet = unmet_gradient(problem, model, linearisation) / scale
     log_likelihood = model.log_likelihood(problem.shots)
     fold = folds(problem)
     whitener = _whitener(H.sum(0))
@@ -79,7 +81,7 @@ def evaluate_out_of_shot(problem: Problem, model: Fit) -> CandidateFit:
         in_fold = fold == number
         leverage, axes = np.linalg.eigh(whitener.T @ H[in_fold].sum(0) @ whitener)
         axes = whitener @ axes
-        step = axes @ ((axes.T @ u[in_fold].sum(0)) / (1.0 - np.minimum(leverage, MAX_LEVERAGE)))
+        step = axes @ ((axes.T @ (u[in_fold].sum(0) - unmet)) / (1.0 - np.minimum(leverage, MAX_LEVERAGE)))
         log_likelihood[in_fold] -= u[in_fold] @ step + 0.5 * np.einsum("a,iab,b->i", step, H[in_fold], step)
     return CandidateFit(model, log_likelihood)
 

@@ -87,10 +87,6 @@ class GapChange:
         """Whether independent shots agree that the gap falls, and by more than a trifle."""
         return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= max_p
 
-    def rises(self, counted: Sequence[Part]) -> bool:
-        """Whether the whole gap rises although some part of it falls."""
-        return self.after.of(counted) > self.before.of(counted)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GapMeasure:
@@ -277,18 +273,26 @@ def confirmed(
 ) -> dict[str, GapChange]:
     """Effects that held-out shots confirm, one by one in their order; the first that they do not ends it.
 
+    Each has to close a part of the gap, in the traces or in the friction factors. Where the whole gap, which
+    is that of the wider part, rises nevertheless, an effect that is still missing may be why: then those
+    after it have to bring the gap below where it was, or it is not confirmed either.
+
     Parameters
     ----------
     nested : sequence of (str, Fit)
         Effect, and the model with it and all before it, fitted to each held-out shot.
     """
     changes: dict[str, GapChange] = {}
-    before = nominal
+    waiting: dict[str, GapChange] = {}
+    before = agreed = nominal
     for effect, model in nested:
-        change = measure.change(before, model)
-        if not change.is_real(max_p) or change.rises(counted_parts(measure, (before, model), [change])):
+        waiting[effect] = measure.change(before, model)
+        if not waiting[effect].is_real(max_p):
             break
-        changes[effect] = change
+        parts = counted_parts(measure, (agreed, model), waiting.values())
+        if measure.gap(model).of(parts) <= measure.gap(agreed).of(parts):
+            changes |= waiting
+            waiting, agreed = {}, model
         before = model
     return changes
 
