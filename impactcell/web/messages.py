@@ -4,17 +4,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from impactcell.alarms import RULES, Message
-from impactcell.records import Alarm
-from impactcell.records.uncertainty import TOLD_STDS
-from impactcell.web.texts import CATALOGUE, LANGUAGES
-from impactcell.web.texts.effects import GERMAN_EFFECTS
-from impactcell.web.texts.findings import (
+from impactcell.german.effects import GERMAN_EFFECTS
+from impactcell.german.findings import (
     ENGLISH_STEPS,
     GERMAN_QUANTITIES,
     GERMAN_STEPS,
     german_effect,
     german_headline,
 )
+from impactcell.records import Alarm
+from impactcell.records.uncertainty import TOLD_STDS
+from impactcell.web.texts import CATALOGUE, LANGUAGES
 
 LARGE = 1e9
 """From here on a number is written with an exponent, in any unit."""

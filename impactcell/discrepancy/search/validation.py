@@ -224,8 +224,8 @@ class Validation:
     ----------
     train_before, train_after : Gap
     held_out : GapChange
-        From the nominal model to the final one, judged in the traces, and in the friction factors where
-        their gap is beyond their own scatter, or where an effect that was established acts.
+        From nominal to final model, judged in the traces, and in the friction factors where their gap is
+        beyond their own scatter, or where an effect that was established acts.
     of_effects : dict of str to GapChange
         What each effect that was established does beside those before it.
     expected : tuple of Gap
@@ -273,17 +273,15 @@ def confirmed(
 ) -> dict[str, GapChange]:
     """Effects that held-out shots confirm, one by one in their order; the first that they do not ends it.
 
-    Each has to close a part of the gap, in the traces or in the friction factors. Where the whole gap, which
-    is that of the wider part, rises nevertheless, an effect that is still missing may be why: then those
-    after it have to bring the gap below where it was, or it is not confirmed either.
+    Each has to close a part of the gap. Where the whole of it, that of the wider part, rises nevertheless,
+    an effect still missing may be why: those after it have to bring it below where it was.
 
     Parameters
     ----------
     nested : sequence of (str, Fit)
         Effect, and the model with it and all before it, fitted to each held-out shot.
     """
-    changes: dict[str, GapChange] = {}
-    waiting: dict[str, GapChange] = {}
+    changes, waiting = dict[str, GapChange](), dict[str, GapChange]()
     before = agreed = nominal
     for effect, model in nested:
         waiting[effect] = measure.change(before, model)

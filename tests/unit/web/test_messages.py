@@ -8,6 +8,8 @@ import pytest
 import impactcell.web
 from impactcell.alarms import EventKind
 from impactcell.alarms.lifecycle import Refusal
+from impactcell.german.effects import GERMAN_EFFECTS
+from impactcell.german.findings import GERMAN_PHASES, GERMAN_STEPS
 from impactcell.physics.effect import Phase
 from impactcell.physics.effects import LIBRARY
 from impactcell.quantities import FOLDERS
@@ -19,8 +21,6 @@ from impactcell.web.page_context import THEMES
 from impactcell.web.past import SPANS_S
 from impactcell.web.studies.study import Stage
 from impactcell.web.texts import CATALOGUE, LANGUAGES
-from impactcell.web.texts.effects import GERMAN_EFFECTS
-from impactcell.web.texts.findings import GERMAN_PHASES, GERMAN_STEPS
 from tests.unit.web.page import make_page
 
 ROOM = Path(impactcell.web.__file__).parent

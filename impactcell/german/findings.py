@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from impactcell.german.effects import GERMAN_EFFECTS
 from impactcell.process.progress import COMPILING
-from impactcell.web.texts.effects import GERMAN_EFFECTS
 
 GERMAN_PHASES: Final = {
     "preload": "Vorspannen",
