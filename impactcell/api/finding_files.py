@@ -8,8 +8,9 @@ from impactcell.process.whole_files import directory_beside
 
 FILES = ("result.json", "model.extended.yaml", "report.html")
 """What a run leaves in its directory."""
-LAW_FILES = "law_of_*"
-"""And where it proposes a law that nobody had listed, its effect file; with a base model, that with it."""
+MORE_FILES = ("law_of_*", "report.*.html")
+"""And where it proposes a law that nobody had listed, its effect file, with a base model that with it;
+of shots, the report in further languages."""
 
 
 def write_files(output: Path, write: Callable[[Path], None]) -> None:
@@ -24,9 +25,10 @@ def write_files(output: Path, write: Callable[[Path], None]) -> None:
         with directory_beside(output) as beside:
             write(beside)
             output.mkdir(exist_ok=True)
-            for stale in output.glob(LAW_FILES):
+            for stale in [file for pattern in MORE_FILES for file in output.glob(pattern)]:
                 stale.unlink()
-            for file in [*beside.glob(LAW_FILES), *(beside / name for name in FILES)]:
+            more = [file for pattern in MORE_FILES for file in beside.glob(pattern)]
+            for file in [*more, *(beside / name for name in FILES)]:
                 file.replace(output / file.name)
     except OSError as error:
         raise CampaignError(f"{output}: cannot be written: {error.strerror}") from error

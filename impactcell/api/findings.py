@@ -15,7 +15,7 @@ from impactcell.api.finding_files import write_files
 from impactcell.api.friction import calibrated
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
 from impactcell.campaign import Campaign, Excitation, naming, read
-from impactcell.discrepancy.report import json_text, machine_document, result_document, write_report
+from impactcell.discrepancy.report import json_text, machine_document, result_document, write_reports
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.physics import Plant
@@ -190,7 +190,7 @@ def write_findings(
     def write(beside: Path) -> None:
         (beside / "result.json").write_text(json_text(result_document(result)), encoding="utf-8")
         write_model(extended_model(result, data, source, nominal), beside / "model.extended.yaml")
-        write_report(result, source, beside / "report.html")
+        write_reports(result, source, beside)
         law = result.law.proposed if result.law else None
         if law is not None:
             (beside / f"{law.identifier}.py").write_text(law.text(), encoding="utf-8")

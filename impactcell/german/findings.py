@@ -6,6 +6,8 @@ from typing import Any, Final
 from impactcell.german.effects import GERMAN_EFFECTS
 from impactcell.process.progress import COMPILING
 
+REPORTS: Final[Mapping[str, str]] = {"en": "report.html", "de": "report.de.html"}
+"""Files of the report by the language that it is in; the first is always there."""
 GERMAN_PHASES: Final = {
     "preload": "Vorspannen",
     "loading": "Belasten",
@@ -58,12 +60,12 @@ def german_effect(identifier: str) -> str:
     return GERMAN_EFFECTS.get(identifier, (identifier.replace("_", " "),))[0]
 
 
-def german_headline(result: Mapping[str, Any]) -> str:
+def german_headline(result: Mapping[str, Any], decimal_point: str = ",") -> str:
     """Say the outcome in German; as it was said where its format does not have what it takes."""
     gap = result.get("gap", {}).get("held_out")
     if not gap:
         return str(result.get("headline", ""))
-    before, after = (_number(gap[when]) for when in ("before", "after"))
+    before, after = (f"{gap[when]:.2f}".replace(".", decimal_point) for when in ("before", "after"))
     match result["verdict"]:
         case "untested":
             said = f"Zu wenige Messungen für eine Aussage; Abweichung des Modells: {before}."
@@ -115,7 +117,3 @@ def _where(result: Mapping[str, Any]) -> str:
         places = [result["unexplained"]]
     names = [GERMAN_PHASES.get(place["phase"], place["phase"].replace("_", " ")) for place in places]
     return f" (Phase: {', '.join(names)})" if names else ""
-
-
-def _number(value: float) -> str:
-    return f"{value:.2f}".replace(".", ",")

@@ -8,7 +8,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from impactcell.discrepancy.report import figures
+from impactcell.discrepancy.report import figures, sentences
 from impactcell.discrepancy.report.page import (
     format_number,
     page_context,
@@ -107,8 +107,8 @@ def test_noise_alone_is_drawn_thin(tied: DiscrepancyResult, monkeypatch: pytest.
     """Four standard deviations of noise take a fifth of a panel, a per cent of friction a tenth, at most."""
     drawn: list[Any] = []
     monkeypatch.setattr(figures, "svg", lambda figure: drawn.append(figure) or "")
-    figures.trace_figure(tied)
-    figures.factor_figure(tied)
+    figures.trace_figure(tied, sentences)
+    figures.factor_figure(tied, sentences)
     residuals = drawn[0].axes[1::2]
     assert len(residuals) == 9
     for axes, noise in (*((axes, 4.0) for axes in residuals), (drawn[1].axes[0], 2.0)):

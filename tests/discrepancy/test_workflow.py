@@ -176,6 +176,7 @@ def test_files_are_whole_and_the_same_to_the_byte(tmp_path: Path) -> None:
     assert outcome["effects"][0]["effect"] == "viscous_friction"
     assert sorted(path.name for path in (tmp_path / "one").iterdir()) == [
         "model.extended.yaml",
+        "report.de.html",
         "report.html",
         "result.json",
     ]
@@ -191,7 +192,7 @@ def test_an_interrupt_leaves_nothing_half_written(tmp_path: Path, monkeypatch: p
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("impactcell.api.findings.write_report", interrupt)
+    monkeypatch.setattr("impactcell.api.findings.write_reports", interrupt)
     with pytest.raises(KeyboardInterrupt):
         discrepancy(tmp_path / "campaign", tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["campaign"]

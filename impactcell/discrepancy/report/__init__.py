@@ -2,7 +2,7 @@
 
 from impactcell.discrepancy.report.machine_page import write_machine_report
 from impactcell.discrepancy.report.machine_result import machine_document, machine_headline
-from impactcell.discrepancy.report.page import write_report
+from impactcell.discrepancy.report.page import write_reports
 from impactcell.discrepancy.report.result import json_text, result_document
 from impactcell.discrepancy.report.sentences import headline
 
@@ -13,5 +13,5 @@ __all__ = [
     "machine_headline",
     "result_document",
     "write_machine_report",
-    "write_report",
+    "write_reports",
 ]

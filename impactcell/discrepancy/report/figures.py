@@ -1,6 +1,7 @@
 """Pictures of the report as inline SVG."""
 
 import io
+from types import ModuleType
 from typing import Any
 
 import matplotlib as mpl
@@ -46,7 +47,7 @@ def svg(figure: Figure) -> str:
     return text[text.index("<svg") :]
 
 
-def map_figure(evidence: ModelEvidence) -> str:
+def map_figure(evidence: ModelEvidence, said: ModuleType) -> str:
     """Map of phases against covariates: colour for the statistic, a ring if significant, grey if untested."""
     residual_map = evidence.map
     rows, columns = len(residual_map.rows), len(residual_map.columns)
@@ -68,9 +69,9 @@ def map_figure(evidence: ModelEvidence) -> str:
                 if np.isfinite(adjusted[place]) and adjusted[place] <= 0.05:
                     axes.plot(column, row, "o", color="white", markeredgecolor=INK, markersize=6)
         axes.set_xticks(
-            range(columns), [_label(name) for name in residual_map.columns], rotation=30, ha="right"
+            range(columns), [_column(name, said) for name in residual_map.columns], rotation=30, ha="right"
         )
-        axes.set_yticks(range(rows), [name.replace("_", " ") for name in residual_map.rows])
+        axes.set_yticks(range(rows), [said.phrase(name) for name in residual_map.rows])
         axes.set_xticks(np.arange(columns + 1) - 0.5, minor=True)
         axes.set_yticks(np.arange(rows + 1) - 0.5, minor=True)
         axes.grid(which="minor", color="white", linewidth=1.5)
@@ -78,24 +79,25 @@ def map_figure(evidence: ModelEvidence) -> str:
         for spine in axes.spines.values():
             spine.set_visible(False)
         bar = figure.colorbar(image, ax=axes, shrink=0.85, pad=0.02)
-        bar.set_label("|score| over its spread")
+        bar.set_label(said.label("|score| over its spread"))
         return svg(figure)
 
 
-def _label(name: str) -> str:
-    return {ALL: "all shots", "shot": "order"}.get(name, name.replace("_", " "))
+def _column(name: str, said: ModuleType) -> str:
+    special = {ALL: "all shots", "shot": "order"}.get(name)
+    return str(said.phrase(name) if special is None else said.label(special))
 
 
-def trace_figure(result: DiscrepancyResult) -> str:
+def trace_figure(result: DiscrepancyResult, said: ModuleType) -> str:
     """Three held-out shots, slow to fast: measured and modelled, and the residuals before and after."""
     problem = result.held_problem
     shots = problem.shots
     nominal_fit, extended_fit = result.held_nominal, result.held_final
     extended = result.final is not result.nominal
     models = (
-        ((nominal_fit, BEFORE, "before"), (extended_fit, AFTER, "after"))
+        ((nominal_fit, BEFORE, said.label("before")), (extended_fit, AFTER, said.label("after")))
         if extended
-        else ((nominal_fit, AFTER, "nominal"),)
+        else ((nominal_fit, AFTER, said.label("nominal")),)
     )
     misfit = nominal_fit.misfit(shots) / problem.sizes
     missed = shots.unwhiten(extended_fit.residual)
@@ -120,13 +122,20 @@ def trace_figure(result: DiscrepancyResult) -> str:
                 upper = figure.add_subplot(grid[2 * row, column])
                 lower = figure.add_subplot(grid[2 * row + 1, column], sharex=upper)
                 step = max(len(t) // 400, 1)
-                upper.plot(t[::step], measured[::step], ".", color=MEASURED, markersize=4, label="measured")
+                upper.plot(
+                    t[::step],
+                    measured[::step],
+                    ".",
+                    color=MEASURED,
+                    markersize=4,
+                    label=said.label("measured"),
+                )
                 upper.plot(
                     t,
                     fitted,
                     color=AFTER,
                     linewidth=1.1,
-                    label="extended model" if extended else "nominal model",
+                    label=said.label("extended model" if extended else "nominal model"),
                 )
                 upper.tick_params(labelbottom=False)
                 lower.tick_params(labelbottom=row == len(channels) - 1)
@@ -137,10 +146,10 @@ def trace_figure(result: DiscrepancyResult) -> str:
                 low, high = lower.get_ylim()
                 lower.set_ylim(min(low, -RESIDUAL_SCALE), max(high, RESIDUAL_SCALE))
                 if column == 0:
-                    upper.set_ylabel(f"{CHANNELS[channel]} [{UNITS[channel]}]")
-                    lower.set_ylabel("residual\n[noise std]")
+                    upper.set_ylabel(f"{said.phrase(CHANNELS[channel])} [{UNITS[channel]}]")
+                    lower.set_ylabel(said.label("residual\n[noise std]"))
                 if row == 0:
-                    upper.set_title(_setting(item), fontsize=9)
+                    upper.set_title(_setting(item, said), fontsize=9)
                     if column == 0:
                         upper.legend(frameon=False, fontsize=8)
                         if extended:
@@ -148,7 +157,7 @@ def trace_figure(result: DiscrepancyResult) -> str:
                                 frameon=False, fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1, 0.8)
                             )
                 if row == len(channels) - 1:
-                    lower.set_xlabel("time [ms]")
+                    lower.set_xlabel(said.label("time [ms]"))
         figure.align_ylabels()
         return svg(figure)
 
@@ -159,8 +168,8 @@ def _moving_average(values: np.ndarray, step: int) -> np.ndarray:
     return np.convolve(values, np.ones(step) / step, mode="same")
 
 
-def _setting(shot: Any) -> str:
-    parts = [f"shot {shot.number}"]
+def _setting(shot: Any, said: ModuleType) -> str:
+    parts = [f"{said.label('shot')} {shot.number}"]
     if np.isfinite(shot.velocity_m_s):
         parts.append(f"{shot.velocity_m_s * 6e4:.0f} mm/min")
     if np.isfinite(shot.mass_kg):
@@ -169,7 +178,7 @@ def _setting(shot: Any) -> str:
     return ", ".join(parts)
 
 
-def factor_figure(result: DiscrepancyResult) -> str:
+def factor_figure(result: DiscrepancyResult, said: ModuleType) -> str:
     """Friction factor of every shot in order, before and after, training and held out."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.5, 2.3))
@@ -185,7 +194,7 @@ def factor_figure(result: DiscrepancyResult) -> str:
                 "o",
                 color=colour,
                 markersize=3.5,
-                label=label,
+                label=said.label(label),
             )
             axes.plot(
                 result.held_out + 1,
@@ -194,18 +203,18 @@ def factor_figure(result: DiscrepancyResult) -> str:
                 color=colour,
                 markersize=4.5,
                 markerfacecolor="white",
-                label=f"{label}, held out".removeprefix("training, "),
+                label=", ".join(said.label(part) for part in (label, "held out") if part != "training"),
             )
         axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, -FACTOR_SCALE_PERCENT), max(high, FACTOR_SCALE_PERCENT))
-        axes.set_xlabel("shot, in order")
-        axes.set_ylabel("friction factor [%]")
+        axes.set_xlabel(said.label("shot, in order"))
+        axes.set_ylabel(said.label("friction factor [%]"))
         axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
         return svg(figure)
 
 
-def shape_figure(result: DiscrepancyResult) -> str | None:
+def shape_figure(result: DiscrepancyResult, said: ModuleType) -> str | None:
     """Free-form term of what is left unexplained."""
     gap = result.unexplained
     if gap is None or not gap.shapes or gap.phase == BETWEEN_SHOTS:
@@ -216,9 +225,8 @@ def shape_figure(result: DiscrepancyResult) -> str | None:
             axes = figure.add_subplot(1, len(gap.shapes), number + 1)
             axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
             axes.plot(shape.place, shape.size, "o-", color=BEFORE, markersize=4)
-            axes.set_title(f"{shape.channel}, {shape.phase.replace('_', ' ')}", fontsize=9)
-            axes.set_xlabel("place within the phase, 0 = start, 1 = end")
-            axes.set_ylabel(
-                f"residual, times {shape.times} [noise std]" if shape.times else "mean residual [noise std]"
-            )
+            axes.set_title(f"{said.phrase(shape.channel)}, {said.phrase(shape.phase)}", fontsize=9)
+            axes.set_xlabel(said.label("place within the phase, 0 = start, 1 = end"))
+            what = "residual, times {} [noise std]" if shape.times else "mean residual [noise std]"
+            axes.set_ylabel(said.label(what).format(said.phrase(shape.times)))
         return svg(figure)

@@ -1,5 +1,7 @@
 """Pictures of a law that nobody had listed: the free-form term with its band, and the law beside it."""
 
+from types import ModuleType
+
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,28 +13,29 @@ from impactcell.physics.free_column_forms import printed
 from impactcell.records import Samples
 
 
-def law_figure(result: DiscrepancyResult) -> str | None:
+def law_figure(result: DiscrepancyResult, said: ModuleType) -> str | None:
     """Free-form term with its band, the law beside it, and where the covariate was met."""
     finding = result.law
     if finding is None or finding.refused:
         return None
     form, law = finding.term.form, finding.proposed
     if finding.slices:
-        return _slices_figure(finding)
+        return _slices_figure(finding, said)
     return function_figure(
         finding.function,
         None if law is None else (law.values(finding.function.covariate), law.functional_form),
         finding.term.visited.values,
         (form.covariate, form.covariate_unit, form.unit),
         less_mean=bool(form.constant_is),
+        said=said,
     )
 
 
-def _slices_figure(finding: LawFinding) -> str:
+def _slices_figure(finding: LawFinding, said: ModuleType) -> str:
     """Draw a term of two covariates along the first at values of the second, with its bands and the law."""
     form, law = finding.term.form, finding.proposed
     scale, unit = (1e3, "mm") if form.covariate_unit == "m" else (1.0, form.covariate_unit)
-    second = printed(form.second).replace("_", " ")
+    second = said.phrase(printed(form.second))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 3.4))
         axes = figure.subplots()
@@ -41,12 +44,12 @@ def _slices_figure(finding: LawFinding) -> str:
             u = scale * curve.covariate
             at = f"w = {w:.3g} {form.second_unit.strip('1')}"
             axes.fill_between(u, curve.low, curve.high, color=MEASURED, alpha=0.4, linewidth=0)
-            axes.plot(u, curve.function, style, color=BEFORE, label=f"spline, {at}")
+            axes.plot(u, curve.function, style, color=BEFORE, label=f"{said.label('spline')}, {at}")
             if law is not None:
                 values = law.values(np.column_stack([curve.covariate, np.full(len(u), w)]))
                 axes.plot(u, values, style, color=AFTER, label=f"{law.functional_form}, {at}")
         axes.set_ylabel("s(u, w)" if form.unit == "1" else f"s(u, w) [{form.unit}]")
-        axes.set_xlabel(f"u, {form.covariate.replace('_', ' ')} [{unit}]; w, {second}; 95 % bands")
+        axes.set_xlabel(f"u, {said.phrase(form.covariate)} [{unit}]; w, {second}; {said.label('95 % bands')}")
         axes.legend(frameon=False, fontsize=8)
         return svg(figure)
 
@@ -58,6 +61,7 @@ def function_figure(
     covariate_and_units: tuple[str, str, str],
     *,
     less_mean: bool,
+    said: ModuleType,
 ) -> str:
     """Spline with its band, a law beside it, and where the covariate was met.
 
@@ -72,6 +76,8 @@ def function_figure(
         Covariate, its unit and that of the function.
     less_mean : bool
         The model takes a constant up, so that it is no difference: both are drawn about their means.
+    said : module
+        `sentences`, or the one of another language.
     """
     covariate, covariate_unit, function_unit = covariate_and_units
     level = float(np.mean(curve.function)) if less_mean else 0.0
@@ -82,15 +88,15 @@ def function_figure(
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
         above.axhline(0.0, color="#8a97a3", linewidth=0.8)
         above.fill_between(u, curve.low - level, curve.high - level, color=MEASURED, alpha=0.5, linewidth=0)
-        above.plot(u, curve.function - level, color=BEFORE, label="spline, 95 % band")
+        above.plot(u, curve.function - level, color=BEFORE, label=said.label("spline, 95 % band"))
         if law is not None:
             function, name = law
             shift = float(np.mean(function)) if less_mean else 0.0
             above.plot(u, function - shift, "--", color=AFTER, label=name)
-        what = "s(u) less its mean" if less_mean else "s(u)"
+        what = said.label("s(u) less its mean") if less_mean else "s(u)"
         above.set_ylabel(what if function_unit == "1" else f"{what} [{function_unit}]")
         above.legend(frameon=False, fontsize=8)
         below.hist(scale * met, bins=60, color=MEASURED)
         below.set_yticks([])
-        below.set_xlabel(f"u, {covariate.replace('_', ' ')} [{unit}]; below: where samples lie")
+        below.set_xlabel(f"u, {said.phrase(covariate)} [{unit}]; {said.label('below: where samples lie')}")
         return svg(figure)

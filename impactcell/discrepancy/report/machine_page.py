@@ -1,6 +1,5 @@
 """The page of an investigation with a base model, in the style of the report of shots."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.machine import CATALOGUE, VALUES, ChosenTerm, MachineFinding, motions
+from impactcell.discrepancy.report import sentences
 from impactcell.discrepancy.report.law_figures import function_figure
 from impactcell.discrepancy.report.machine_result import SYMBOLS, law_covariate, phrase
 from impactcell.discrepancy.report.page import format_number
@@ -25,9 +25,7 @@ def write_machine_report(finding: MachineFinding, document: dict[str, Any], sour
         loader=loader, autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(number=format_number, share=format_share)
-    text, _, _ = loader.get_source(environment, "report.html.j2")
-    style = re.search(r"<style>(.*?)</style>", text, re.DOTALL)
-    context = machine_page_context(finding, document, source) | {"style": style.group(1) if style else ""}
+    context = machine_page_context(finding, document, source)
     page = environment.get_template("machine.html.j2").render(**context)
     file.write_text(page, encoding="utf-8")
 
@@ -88,4 +86,5 @@ def _law_figure(finding: MachineFinding) -> str:
         met[(met >= law.tested[0]) & (met <= law.tested[1])],
         (covariate, unit, force),
         less_mean=True,
+        said=sentences,
     )

@@ -1,24 +1,19 @@
 """One self-contained page: verdict, map, traces, evidence, parameters, held-out gap, what to measure next."""
 
 import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.model import ParameterEstimate
-from impactcell.discrepancy.report import figures, law_figures
+from impactcell.discrepancy.report import figures, german_sentences, law_figures, sentences
 from impactcell.discrepancy.report.result import locate_effect
-from impactcell.discrepancy.report.sentences import (
-    advice,
-    headline,
-    law_sentences,
-    next_step,
-    noise_floor_sentence,
-    phrase,
-)
 from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.german.findings import REPORTS
 from impactcell.physics.effects import LIBRARY
 from impactcell.records.uncertainty import TOLD_STDS
 
@@ -32,16 +27,28 @@ PARAMETER_LABELS = {"ratio": "mu_s/mu_k"}
 PLANT_UNITS = {"stiffness_n_per_m": "N/m", "damping_n_s_per_m": "N s/m"}
 
 
-def write_report(result: DiscrepancyResult, source: str, file: Path) -> None:
-    """Write the report; pictures and style are inside the page."""
+SENTENCES: Mapping[str, ModuleType] = {"en": sentences, "de": german_sentences}
+"""What is said beside the templates, by language: functions of the same names."""
+
+
+def write_reports(result: DiscrepancyResult, source: str, directory: Path) -> None:
+    """Write the report in every language."""
+    for language, name in REPORTS.items():
+        write_report(result, source, directory / name, language)
+
+
+def write_report(result: DiscrepancyResult, source: str, file: Path, language: str = "en") -> None:
+    """Write the report in one language; pictures and style are inside the page."""
     environment = Environment(
         loader=PackageLoader("impactcell.discrepancy.report", "templates"),
         autoescape=select_autoescape(default=True),
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(zip=zip, number=format_number, grouped=format_thousands)
-    page = environment.get_template("report.html.j2").render(**page_context(result, source))
+    words = SENTENCES[language].phrase
+    environment.filters.update(zip=zip, number=format_number, grouped=format_thousands, words=words)
+    template = environment.get_template(f"{REPORTS[language]}.j2")
+    page = template.render(**page_context(result, source, language))
     file.write_text(page, encoding="utf-8")
 
 
@@ -56,43 +63,34 @@ def format_thousands(value: float, decimals: int) -> str:
     return f"{value:,.{decimals}f}".replace(",", " ")
 
 
-def split_sentence(result: DiscrepancyResult) -> str:
-    """How far contact and slide of taps stay from the floor when each is fitted alone; empty if unknown."""
-    alone = result.unexplained.split_fits if result.unexplained else None
-    if alone is None or math.isnan(alone.contact + alone.slide):
-        return ""
-    return (
-        f" Fitted apart from each other, the contacts stay at {alone.contact:.2f} noise floors, "
-        f"the slides after them at {alone.slide:.2f}."
-    )
-
-
-def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
+def page_context(result: DiscrepancyResult, source: str, language: str = "en") -> dict[str, Any]:
     """Everything the template shows."""
+    said = SENTENCES[language]
+    phrase, label = said.phrase, said.label
     search = result.selection
     extended = result.final is not result.nominal
     return {
         "source": source,
         "verdict": result.verdict,
-        "sentence": headline(result),
-        "noise_floor": noise_floor_sentence(result),
-        "advice": advice(result),
-        "next_step": next_step(result),
+        "sentence": said.headline(result),
+        "noise_floor": said.noise_floor_sentence(result),
+        "advice": said.advice(result),
+        "next_step": said.next_step(result),
         "shots": len(result.prepared.shots),
         "training": len(result.training),
         "held_out": len(result.held_out),
         "excitation": str(result.prepared.excitation.excitation),
         "notes": [*result.prepared.notes, *result.floor.notes],
-        "map_before": figures.map_figure(search.nominal),
-        "map_after": figures.map_figure(search.final) if search.final is not search.nominal else None,
-        "traces": figures.trace_figure(result),
-        "factors": figures.factor_figure(result),
-        "shape": figures.shape_figure(result),
+        "map_before": figures.map_figure(search.nominal, said),
+        "map_after": figures.map_figure(search.final, said) if search.final is not search.nominal else None,
+        "traces": figures.trace_figure(result, said),
+        "factors": figures.factor_figure(result, said),
+        "shape": figures.shape_figure(result, said),
         "unexplained": result.unexplained,
-        "law": law_sentences(result),
-        "law_figure": law_figures.law_figure(result),
-        "apart": split_sentence(result),
-        "candidates": _candidates(result),
+        "law": said.law_sentences(result),
+        "law_figure": law_figures.law_figure(result, said),
+        "apart": said.split_sentence(result),
+        "candidates": _candidates(result, phrase),
         "alternatives": [
             {
                 "effects": " + ".join(phrase(item) for item in alternative.effects),
@@ -116,9 +114,9 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
         ],
         "parameters": [
             {
-                "effect": phrase(item.effect) if item.effect else "nominal plant",
+                "effect": phrase(item.effect) if item.effect else label("nominal plant"),
                 "name": PARAMETER_LABELS.get(item.parameter, item.parameter)
-                + (f" [batch {item.batch + 1}]" if item.batch else ""),
+                + (f" [{phrase('batch')} {item.batch + 1}]" if item.batch else ""),
                 "value": item.value,
                 "low": item.low,
                 "high": item.high,
@@ -146,6 +144,8 @@ def page_context(result: DiscrepancyResult, source: str) -> dict[str, Any]:
         "seed": result.seed,
         "guide": EFFECT_GUIDE,
         "words": phrase,
+        "setting": said.setting,
+        "shape_in_words": said.shape,
     }
 
 
@@ -174,7 +174,7 @@ def _regions(proof: Validation) -> dict[str, Any]:
     }
 
 
-def _candidates(result: DiscrepancyResult) -> list[dict[str, Any]]:
+def _candidates(result: DiscrepancyResult, phrase: Callable[[str], str]) -> list[dict[str, Any]]:
     """Evidence for every candidate against the nominal model."""
     evidence = result.selection.nominal
     gains = evidence.candidate_scan.gains()

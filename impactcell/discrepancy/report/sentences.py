@@ -83,6 +83,32 @@ def next_step(result: DiscrepancyResult) -> str:
     return f"{what}; what remains is in {phrase(place.phase)}"
 
 
+def split_sentence(result: DiscrepancyResult) -> str:
+    """How far contact and slide of taps stay from the floor when each is fitted alone; empty if unknown."""
+    alone = result.unexplained.split_fits if result.unexplained else None
+    if alone is None or math.isnan(alone.contact + alone.slide):
+        return ""
+    return (
+        f" Fitted apart from each other, the contacts stay at {alone.contact:.2f} noise floors, "
+        f"the slides after them at {alone.slide:.2f}."
+    )
+
+
+def label(english: str) -> str:
+    """Say a label of a figure or a table."""
+    return english
+
+
+def setting(english: str) -> str:
+    """Say a setting of the next experiment."""
+    return english
+
+
+def shape(english: str) -> str:
+    """Say what is left along a phase."""
+    return english
+
+
 def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     """Say what the page tells of a law that nobody had listed; None where none was looked for."""
     finding = result.law

@@ -7,6 +7,7 @@ from typing import Final
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
 
+from impactcell.german.findings import REPORTS
 from impactcell.scada import RefusedError, Role
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError
@@ -18,7 +19,7 @@ MAX_TITLE: Final = 80
 """Longest title, in characters."""
 MAX_RECEIVING: Final = 5
 """Files that are received at once: each holds a connection, and they share one disk."""
-DOWNLOADS: Final = ("result.json", "model.extended.yaml", "report.html", "friction.csv")
+DOWNLOADS: Final = ("result.json", "model.extended.yaml", *REPORTS.values(), "friction.csv")
 """Files of a result that can be taken home."""
 REPORT_POLICY: Final = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'self'; sandbox"
@@ -130,13 +131,26 @@ def _rendered(context: PageContext, request: Request, session: BrowserSession, t
         study=shown,
         place=context.studies.place(shown),
         may_accept=may_accept,
-        has_report=(context.studies.store.results(shown) / "report.html").is_file(),
+        report=REPORTS.get(_report_language(context, request, shown), ""),
     )
+
+
+def _report_language(context: PageContext, request: Request, study: Study) -> str:
+    """Language in which the report is shown: that of the page where there is one; empty without a report."""
+    there = [
+        language
+        for language, name in REPORTS.items()
+        if (context.studies.store.results(study) / name).is_file()
+    ]
+    asked = context.language(request)
+    return asked if asked in there else next(iter(there), "")
 
 
 async def report(context: PageContext, request: Request, _: BrowserSession) -> Response:
     """Give the report, which may do nothing but show itself."""
-    path = context.studies.store.results(_study(context, request)) / "report.html"
+    study = _study(context, request)
+    language = _report_language(context, request, study) or next(iter(REPORTS))
+    path = context.studies.store.results(study) / REPORTS[language]
     response = _file(path, "text/html; charset=utf-8")
     response.headers["content-security-policy"] = REPORT_POLICY
     return response

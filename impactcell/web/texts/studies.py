@@ -74,7 +74,7 @@ STUDY_TEXTS: Texts = {
     "report": ("Report", "Bericht"),
     "report_alone": ("Report alone", "Bericht allein"),
     "report_language": ("All of it, with figures; to send on it is one file.",
-                        "Alles, mit Bildern und auf Englisch; zum Weitergeben eine einzige Datei."),
+                        "Alles, mit Bildern; zum Weitergeben eine einzige Datei."),
     "remove": ("Remove this measurement", "Diese Messung entfernen"),
     "error_kind": ("Files of this kind cannot be read.", "Dateien dieser Art sind nicht lesbar."),
     "error_file_too_large": ("The file is too large: 500 MB at most, all files together.",

@@ -428,6 +428,25 @@ async def test_a_report_can_do_nothing(page: Page) -> None:
         assert "script-src 'self'" in page_shown.headers["content-security-policy"]
 
 
+async def test_a_report_is_shown_in_the_language_of_who_reads_it(page: Page) -> None:
+    async with page.logged_in(Role.OBSERVER) as client:
+        store = page.studies.store
+        study = store.begin("rail", "otto", CELL)
+        store.results(study).mkdir()
+        study.stage, study.result = Stage.DONE, dict(RESULT)
+        (store.results(study) / "report.html").write_text("English")
+        address = f"/studies/{study.id}"
+        only_english = (await client.get(f"{address}/report?lang=de")).text
+        (store.results(study) / "report.de.html").write_text("Deutsch")
+        shown = {code: (await client.get(f"{address}/report?lang={code}")).text for code in ("en", "de")}
+        linked = (await client.get(f"{address}?lang=de")).text
+        taken = await client.get(f"{address}/files/report.de.html")
+    assert only_english == "English"
+    assert shown == {"en": "English", "de": "Deutsch"}
+    assert f"{address}/files/report.de.html" in linked
+    assert taken.text == "Deutsch"
+
+
 async def test_a_restart_keeps_what_is_done_and_says_what_was_not(tmp_path: Path) -> None:
     store = StudyStore(tmp_path)
     done, open_ = store.begin("done", "otto", CELL), store.begin("open", "otto", CELL)

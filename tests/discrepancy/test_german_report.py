@@ -1,0 +1,173 @@
+"""The German report says what the English one says, and says it in German."""
+
+import ast
+import re
+from collections import Counter
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from impactcell.campaign import Excitation
+from impactcell.discrepancy.data import CHANNELS
+from impactcell.discrepancy.data.shots import OWN_COVARIATES
+from impactcell.discrepancy.report import german_sentences, sentences
+from impactcell.discrepancy.report.page import PARAMETER_LABELS, SENTENCES, write_reports
+from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.german.findings import GERMAN_PHASES, REPORTS
+from impactcell.physics.effects import LIBRARY
+from tests.discrepancy.test_report import Page
+from tests.discrepancy.test_workflow import investigated
+
+REPORT = Path(sentences.__file__).parent
+SAME = {"Position", "Parameter", "model.extended.yaml", "Log", "RMS"}
+"""Words that both languages write alike."""
+
+
+class Told(HTMLParser):
+    """Pieces of text that a reader sees, but for what is marked as English, code, references and formulas."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.hidden: list[str] = []
+        self.pieces: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        marked = tag in {"style", "code", "title", "a", "metadata"} or ("lang", "en") in attrs
+        if (marked and tag != "html") or self.hidden:
+            self.hidden.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if self.hidden and self.hidden[-1] == tag:
+            self.hidden.pop()
+
+    def handle_data(self, data: str) -> None:
+        if not self.hidden and (piece := " ".join(data.split())):
+            self.pieces.append(piece)
+
+
+@pytest.fixture(scope="module", params=["mass_error", "actuator_vibration"])
+def found(request: pytest.FixtureRequest) -> DiscrepancyResult:
+    return investigated(request.param, shots=18)
+
+
+def pages(found: DiscrepancyResult, directory: Path) -> dict[str, str]:
+    write_reports(found, "eine Kampagne", directory)
+    return {language: (directory / name).read_text(encoding="utf-8") for language, name in REPORTS.items()}
+
+
+def test_both_are_whole_and_show_the_same_numbers(found: DiscrepancyResult, tmp_path: Path) -> None:
+    both = {}
+    for language, text in pages(found, tmp_path).items():
+        both[language] = page = Page()
+        page.feed(text)
+        assert page.open == []
+        assert f'<html lang="{language}">' in text
+    english, german = both["en"], both["de"]
+    assert len(english.headings) == len(german.headings)
+    assert english.pictures == german.pictures
+    assert english.outside() == german.outside()
+    in_tables = [re.findall(r'<td class="n[^"]*">([^<]*)', text) for text in pages(found, tmp_path).values()]
+    assert [re.sub(" to ", " bis ", cell) for cell in in_tables[0]] == in_tables[1]
+
+
+def test_nothing_is_left_in_english(found: DiscrepancyResult, tmp_path: Path) -> None:
+    told = {}
+    for language, text in pages(found, tmp_path).items():
+        reader = Told()
+        reader.feed(text)
+        told[language] = reader.pieces
+    references = " ".join(effect.reference + effect.equation for effect in LIBRARY.values())
+    alike = {
+        piece
+        for piece in set(told["en"]) & set(told["de"])
+        if re.search(r"[A-Za-z]{4}", piece)
+        and piece not in {*SAME, *PARAMETER_LABELS.values()}
+        and piece not in references
+        and not re.fullmatch(r"[a-z]+(_[a-z]+)+( \[.*\])?", piece)  # a parameter by its name
+    }
+    assert alike == set()
+    german = " ".join(told["de"])
+    for word in (" the ", " and ", " shots", " with ", " held", " noise", " gap"):
+        assert word not in german, word
+
+
+def test_templates_show_the_same_things() -> None:
+    """What is computed for one page is on the other, too, whatever its sentences are."""
+
+    def shown(name: str) -> Counter[str]:
+        text = (REPORT / "templates" / f"{name}.j2").read_text(encoding="utf-8")
+        pieces = re.findall(r"\{\{.*?\}\}|\{%.*?%\}", text)
+        names = [re.sub(r'"[^"]*"', "", piece) for piece in pieces]
+        ignored = ("words", "setting", "shape_in_words", "replace", "map", "lower", "join", "format")
+        return Counter(
+            word
+            for piece in names
+            for word in re.findall(r"[a-z_]+(?:\.[a-z_]+)*", piece)
+            if word not in ignored
+        )
+
+    assert shown("report.html") == shown("report.de.html")
+
+
+def test_every_function_of_one_language_is_in_the_other() -> None:
+    def public(module: object) -> set[str]:
+        return {name for name in ("headline", "noise_floor_sentence", "advice", "next_step", "split_sentence",
+                                  "law_sentences", "phrase", "label", "setting", "shape")
+                if callable(getattr(module, name, None))}  # fmt: skip
+
+    assert public(sentences) == public(german_sentences)
+    assert list(SENTENCES) == list(REPORTS)
+
+
+def test_every_label_of_a_figure_is_known() -> None:
+    labels = {"before", "after", "training", "nominal"}  # those that reach `label` in a variable
+    for file in ("figures.py", "law_figures.py", "page.py"):
+        for node in ast.walk(ast.parse((REPORT / file).read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "label":
+                labels |= {
+                    part.value
+                    for argument in node.args
+                    for part in ast.walk(argument)
+                    if isinstance(part, ast.Constant) and isinstance(part.value, str)
+                }
+    labels |= {"all shots", "order", "residual, times {} [noise std]", "mean residual [noise std]"}
+    for label in labels:
+        assert german_sentences.label(label) != label or label in SAME
+    with pytest.raises(KeyError):
+        german_sentences.label("a label that nobody has put into German")
+
+
+def test_phases_channels_covariates_and_effects_have_german_names() -> None:
+    names = [*GERMAN_PHASES, *CHANNELS, *OWN_COVARIATES, *Excitation, *LIBRARY]
+    verdicts = ["named", "tied", "no_gap", "unknown", "untested"]
+    for name in [*names, *verdicts]:
+        assert german_sentences.phrase(name) != sentences.phrase(name), name
+    assert german_sentences.phrase("oil_temperature") == "oil temperature"
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        ("6000 mm/min, 18.9 kg, direction -1, after 30 s at rest",
+         "6000 mm/min, 18.9 kg, Richtung -1, nach 30 s Ruhe"),
+        ("batch 2 again, after the others", "Charge 2 noch einmal, nach den anderen"),
+        ("record the actuator's position", "die Position des Antriebs aufzeichnen"),
+    ],
+)  # fmt: skip
+def test_settings_are_said_in_german(english: str, german: str) -> None:
+    assert german_sentences.setting(english) == german
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        ("S-shaped in force, times direction, largest in the middle in the phase",
+         "S-förmig in Kraft, mal Richtung, am größten in der Mitte der Phase"),
+        ("oscillating (5 changes of sign) in position, largest late in the phase",
+         "schwingend (5 Vorzeichenwechsel) in Position, am größten spät in der Phase"),
+        ("no smooth shape along the phase", "kein glatter Verlauf über die Phase"),
+    ],
+)  # fmt: skip
+def test_shapes_are_said_in_german(english: str, german: str) -> None:
+    assert german_sentences.shape(english) == german
