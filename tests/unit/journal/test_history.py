@@ -1,15 +1,19 @@
 """Pages of the past, put together, are the past: nothing twice, nothing missing, in order."""
 
+import io
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from impactcell.errors import JournalError
 from impactcell.journal.history import HistoryQuery, Page, StoredValue
+from impactcell.journal.history_reader import LENGTH, Answer, Question, serve
 from impactcell.journal.store import Journal
 from impactcell.records import Alarm, Coefficient, Evidence, Quality
 from tests.snapshots import make_capture, make_snapshot
@@ -78,3 +82,29 @@ def test_what_has_no_past_is_said(journal: Journal) -> None:
         journal.values("Friction/PeakForce", HistoryQuery())
     with pytest.raises(JournalError, match="token"):
         journal.values("Wear/Level", HistoryQuery(resume=b"x"))
+
+
+def test_questions_from_another_process_are_answered_in_turn(journal: Journal, tmp_path: Path) -> None:
+    """As the journal itself answers them; half a question, as a process leaves that dies, ends it."""
+    nobody = str(tmp_path / "nobody.sqlite")
+    variable = "Friction/StaticFriction"
+    asked = [
+        Question(str(journal.path), variable, HistoryQuery(limit=5)),
+        Question(nobody, variable, HistoryQuery()),
+        Question(str(journal.path), "", HistoryQuery(limit=3)),
+    ]
+    documents = [msgspec.msgpack.encode(question) for question in asked]
+    sent = b"".join(LENGTH.pack(len(one)) + one for one in documents) + LENGTH.pack(7)[:2]
+    out = io.BytesIO()
+    serve(io.BytesIO(sent), out)
+    out.seek(0)
+    answers = []
+    while head := out.read(LENGTH.size):
+        answers.append(msgspec.msgpack.decode(out.read(*LENGTH.unpack(head)), type=Answer))
+    values, missing, alarms = answers
+    page = journal.values(variable, asked[0].query)
+    assert values.times_ns == [entry.time_ns for entry in page.entries]
+    assert values.values == [entry.value for entry in page.entries]
+    assert values.resume == page.resume
+    assert nobody in missing.error
+    assert (len(alarms.alarms), alarms.error) == (3, "")
