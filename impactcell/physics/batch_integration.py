@@ -39,7 +39,7 @@ def sample_taps(
     Returns
     -------
     ndarray, shape (samples,)
-        Not finite where the laws gave no numbers, or a tap needed more than `MAX_STEPS`, from there on.
+        Not finite from where a tap was given up for `MAX_STEPS` or `MAX_EVENTS`.
     """
     samples = np.empty(times.size)
     outputs = np.empty((taps.parameters.shape[0], at.OUTPUT_COUNT))

@@ -226,7 +226,7 @@ def integrate_tap(
         # Held for good: the actuator has stalled against it, or nothing drives it any more.
         outputs[at.STATUS] = at.AT_REST
     outputs[at.STEP_COUNT] = steps
-    if outputs[at.STATUS] == at.TOO_MANY_STEPS:
+    if outputs[at.STATUS] in (at.TOO_MANY_EVENTS, at.TOO_MANY_STEPS):
         fill_unknown(record)
     else:
         fill_after_end(t, step.state, phase, record)

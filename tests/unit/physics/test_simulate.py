@@ -195,6 +195,14 @@ def test_a_part_that_runs_away_over_waves_is_given_up_and_no_sample_is_taken_for
     assert math.isnan(late)
 
 
+def test_stick_slip_without_end_is_given_up_and_no_sample_is_taken_for_a_rest() -> None:
+    # Pushed on without a stroke it sticks and slips some hundred times a second, for ever.
+    ensemble = Ensemble([TapInput(0.001, 0.9)], (), position_time_s=[np.array([1.0, 2.0, 590.0])])
+    first, second, late = ensemble.traces(ensemble.parameters(Plant(1.6e6, 20.0, 0.3, 0.2))).position_m
+    assert second - first == pytest.approx(0.001, rel=0.01)
+    assert math.isnan(late)
+
+
 @pytest.mark.parametrize(
     ("plant", "message"),
     [
