@@ -15,7 +15,6 @@ from impactcell.discrepancy.laws import (
     condense,
     covariates,
     finding,
-    fitted_function,
     free_term,
     grammar,
     refit,
@@ -130,22 +129,3 @@ def test_a_law_over_a_column_is_null_where_a_cycle_does_not_say_it() -> None:
         assert list(form.effect.columns) == [COLUMN]
         assert form.second_argument.startswith("p[")
         assert all(math.isnan(item.null) for item in form.effect.parameters[:4])
-
-
-@pytest.mark.parametrize(("lowest", "is_one"), [(0.5, False), (-0.5, True)])
-def test_a_law_of_two_that_gives_energy_is_told(
-    monkeypatch: pytest.MonkeyPatch, lowest: float, is_one: bool
-) -> None:
-    points = np.column_stack([np.linspace(0.0, 1.0, 400), np.linspace(0.0, 9.0, 400)])
-    visited = SimpleNamespace(second=object(), points=points)
-    form = SimpleNamespace(dissipates="0")
-    term: Any = SimpleNamespace(form=form, visited=visited, fit=SimpleNamespace(coordinates=()))
-    law = np.full(400, 2.0)
-    law[137] = lowest
-    assert fitted_function.gives_energy(term, lambda _: law) is is_one
-    # A spline is below its band at some of the states by chance; at a tenth of them it is not by chance.
-    for share, gives in ((1, False), (40, True)):
-        value = np.full(400, 2.0)
-        value[:share] = -2.0
-        monkeypatch.setattr(fitted_function, "_with_deviation", lambda *_, v=value: (v, np.full(400, 0.1)))
-        assert fitted_function.gives_energy(term) is gives

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from impactcell.discrepancy.data import PHASES, Trajectory
 from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
+from impactcell.physics import LawKind
 from impactcell.physics.free_form import FreeForm
 from impactcell.records import Samples
 
@@ -42,12 +43,16 @@ class Visited:
         At the samples at which the term acts; of a column of `shots.csv` a value a shot.
     second : Visited or None
         The second covariate at the same samples; None where there is one alone.
+    power : ndarray, shape (n,) or None
+        What a dissipative function is multiplied with in the power that it takes at those samples, but for
+        what is the same at all of them; None where it need not dissipate.
     """
 
     lower: float
     upper: float
     values: Samples
     second: "Visited | None" = None
+    power: Samples | None = None
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
@@ -74,6 +79,8 @@ def visited(problem: Problem, model: Fit, form: FreeForm) -> Visited | None:
     if not acts.any():
         return None
     first = _range(_values(problem, trajectory, form.covariate)[acts], form)
+    if first is not None and form.dissipates:
+        first = replace(first, power=_power(problem, trajectory, form)[acts])
     if not form.second or first is None:
         return first
     second = _second(problem, trajectory, form, acts)
@@ -101,6 +108,15 @@ def _values(problem: Problem, trajectory: Trajectory, covariate: str) -> Samples
         return problem.shots.times
     indentation = trajectory.actuator_displacement_m - trajectory.part_displacement_m
     return -indentation if covariate == "gap" else indentation
+
+
+def _power(problem: Problem, trajectory: Trajectory, form: FreeForm) -> Samples:
+    """Power that a function of one takes at every sample, shape (N,); friction's over the load."""
+    if form.law_kind is LawKind.KINETIC:
+        return np.abs(trajectory.speed_m_s)
+    relative = "indentation_rate" if form.law_kind is LawKind.CONTACT else "speed"
+    power: Samples = _values(problem, trajectory, relative) ** 2
+    return power
 
 
 def _second(

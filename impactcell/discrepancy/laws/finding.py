@@ -240,7 +240,7 @@ def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange, most_left
             f"the best term, {term.form.effect.equation}, leaves {left:.3g} noise floors: what "
             f"is missing is no function of {_named(term)}{'' if term.form.second else ' alone'}"
         )
-    if gives_energy(term, None if law is None else law.function):
+    if gives_energy(term, law):
         return (
             f"the term would give energy: {term.form.effect.equation} becomes negative in the range that was "
             "gone through, so that something else is missing"
