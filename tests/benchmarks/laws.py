@@ -22,6 +22,8 @@ from tests.benchmarks._laws_run import (
     job_of,
     run,
 )
+from tests.benchmarks._null_laws_run import ROWS as NULL_ROWS
+from tests.benchmarks._null_laws_run import SHOTS as NULL_SHOTS
 from tests.benchmarks._pair_laws_run import KINDS, PLACES
 from tests.benchmarks._pair_laws_run import ROWS as PAIR_ROWS
 from tests.benchmarks.positioning import Share
@@ -110,6 +112,36 @@ def pair_table() -> list[Table]:
         "place, with a held-out gap of 1.2 at most."
     )
     return [Table("Laws of two covariates", columns, detail, note)]
+
+
+def null_table() -> list[Table]:
+    """Campaigns that leave something in which there is no law, where the study of them has been run."""
+    if not NULL_ROWS.exists():
+        return []
+    rows: list[Row] = [json.loads(text) for text in NULL_ROWS.read_text().splitlines()]
+    detail = []
+    for kind in dict.fromkeys(row["kind"] for row in rows):
+        of = [row for row in rows if row["kind"] == kind]
+        gaps = [row["law"]["before"] for row in of if row["law"]]
+        detail.append(
+            [
+                kind,
+                str(len(of)),
+                str(sum(row["verdict"] == "no_gap" for row in of)),
+                str(sum(bool(row["added"]) for row in of)),
+                str(len(gaps)),
+                f"{min(gaps):.2f} to {max(gaps):.2f}" if gaps else "",
+                str(sum(map(proposed, of))),
+            ]
+        )
+    columns = ("kind", "campaigns", "no gap", "named", "looked for a law", "gap of the traces then", "law")
+    looked = sum(row["law"] is not None for row in rows)
+    note = (
+        f"{len(rows)} campaigns of {NULL_SHOTS} shots, `_null_laws_run`, which says what the kinds are. "
+        f"A law was proposed in {sum(map(proposed, rows))} of the {looked} "
+        "in which one was looked for. The seeds are for tuning."
+    )
+    return [Table("Laws where there are none", columns, detail, note)]
 
 
 def tables() -> list[Table]:
@@ -213,4 +245,5 @@ def tables() -> list[Table]:
         ),
         Table("Laws that nobody had listed: what was hidden", columns, detail),
         *pair_table(),
+        *null_table(),
     ]
