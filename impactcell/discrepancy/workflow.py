@@ -35,6 +35,7 @@ from impactcell.discrepancy.search import (
     HeldOutOutcome,
     Mapper,
     ModelEvidence,
+    NestedModels,
     OpenedShots,
     Proposal,
     SearchContext,
@@ -179,12 +180,12 @@ def investigate(
     report_step("proving on held-out shots")
     held_problem = _problem(prepared, floor, held_out)
     if prepared.excitation.selects_blocks:
-        largest = nested[-1][1] if nested else nominal
-        held_out = held_out[decided_blocks(held_problem, refit_shot_parameters(held_problem, largest))]
+        largest = refit_shot_parameters(held_problem, nested.largest)
+        held_out = held_out[decided_blocks(held_problem, largest)]
         held_problem = _problem(prepared, floor, held_out)
         missing = missing or missing_shots(len(training), len(held_out))
     opened = OpenedShots(prepared, floor, (training, held_out), (problem, held_problem), seed)
-    outcome = opened.validate(nominal, () if missing else nested)
+    outcome = opened.validate(NestedModels(nominal) if missing else nested)
     search_evidence = selection
     if not missing and len(outcome.validation.of_effects) < len(selection.added):
         selection, outcome = _confirmed_rival(context, selection, opened, outcome)
@@ -230,9 +231,7 @@ def _confirmed_rival(
     """
     variants = exchanged(selection)
     for variant in variants:
-        tried = opened.validate(
-            selection.nominal.fit, nested_models(context, variant), MAX_P_VALUE / len(variants)
-        )
+        tried = opened.validate(nested_models(context, variant), MAX_P_VALUE / len(variants))
         if len(tried.validation.of_effects) > len(outcome.validation.of_effects):
             selection, outcome = variant, tried
     return selection, outcome

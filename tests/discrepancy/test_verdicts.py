@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,8 @@ from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search.conclusion import missing_shots
-from impactcell.discrepancy.search.validation import GapMeasure, Part, confirmed
+from impactcell.discrepancy.search.confirmation import NestedModels, confirmed
+from impactcell.discrepancy.search.validation import Gap, GapChange, GapMeasure, Part
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture, Channel
 from tests.benchmarks._discrepancy_driven import Job, record
@@ -115,22 +118,52 @@ def test_traces_that_gain_what_the_friction_factors_lose_confirm_nothing(viscous
     scattered = replace(wide, log_factor=wide.log_factor + 2.0 * gap * spread)
     nested = [("a", replace(viscous.held_final, shot_parameters=scattered))]
     assert measure.change(viscous.held_nominal, nested[0][1], (Part.TRACES,)).is_real()
-    assert confirmed(measure, nested, viscous.held_nominal) == {}
+    assert confirmed(measure, NestedModels(viscous.held_nominal, nested)) == {}
     # A second effect was missing, which brings the factors together: of two that act, neither is denied.
     both = [*nested, ("b", viscous.held_final)]
-    assert list(confirmed(measure, both, viscous.held_nominal)) == ["a", "b"]
+    assert list(confirmed(measure, NestedModels(viscous.held_nominal, both))) == ["a", "b"]
     wider = replace(wide, log_factor=wide.log_factor + 1.5 * gap * spread)
     in_vain = [*nested, ("b", replace(viscous.held_final, shot_parameters=wider))]
     assert measure.change(nested[0][1], in_vain[1][1]).is_real()
-    assert confirmed(measure, in_vain, viscous.held_nominal) == {}
+    assert confirmed(measure, NestedModels(viscous.held_nominal, in_vain)) == {}
 
 
 def test_the_first_effect_that_is_not_confirmed_ends_the_list(viscous: DiscrepancyResult) -> None:
     measure, nominal = measure_of(viscous), viscous.held_nominal
     half, whole = blended(viscous, 0.6), viscous.held_final
-    assert list(confirmed(measure, [("a", half), ("b", whole)], nominal)) == ["a", "b"]
-    assert list(confirmed(measure, [("a", half), ("b", half), ("c", whole)], nominal)) == ["a"]
-    assert confirmed(measure, [("a", nominal), ("b", whole)], nominal) == {}
+    assert list(confirmed(measure, NestedModels(nominal, [("a", half), ("b", whole)]))) == ["a", "b"]
+    three = NestedModels(nominal, [("a", half), ("b", half), ("c", whole)])
+    assert list(confirmed(measure, three)) == ["a"]
+    assert confirmed(measure, NestedModels(nominal, [("a", nominal), ("b", whole)])) == {}
+
+
+def test_of_two_effects_each_may_be_seen_only_beside_the_other(viscous: DiscrepancyResult) -> None:
+    measure, nominal, whole = measure_of(viscous), viscous.held_nominal, viscous.held_final
+    both = NestedModels(nominal, [("a", nominal), ("b", whole)], {"b": nominal})
+    assert list(confirmed(measure, both)) == ["a", "b"]
+    assert all(change.is_real() for change in confirmed(measure, both).values())
+    only_b = NestedModels(nominal, [("a", nominal), ("b", whole)], {"b": whole})
+    assert list(confirmed(measure, only_b)) == ["b"]
+    assert only_b.by_effects["b",] is whole
+    neither = NestedModels(nominal, [("a", nominal), ("b", nominal)], {"b": nominal})
+    assert confirmed(measure, neither) == {}
+
+
+@pytest.mark.parametrize(("p_value", "is_sure"), [(0.0005, True), (0.04, True), (0.06, False)])
+def test_an_effect_may_be_sure_in_the_part_that_falls_less(p_value: float, is_sure: bool) -> None:
+    """The factors of a few shots may fall farther by chance than the traces of all do for certain."""
+    gaps = {"before": Gap(1.36, 1.65), "after": Gap(1.01, 1.15)}
+
+    def change(before: Any, after: Any, parts: Any = None) -> GapChange:
+        told = gaps[before], gaps[after]
+        if parts == [Part.TRACES]:
+            return GapChange((Part.TRACES,), *told, closed=0.97, low=0.9, high=1.02, p_value=p_value)
+        return GapChange((Part.FACTORS,), *told, closed=0.77, low=-0.35, high=1.37, p_value=0.093)
+
+    wide = Gap(2.0, 2.0)
+    measure: Any = SimpleNamespace(change=change, gap=gaps.__getitem__, expected=lambda _: (wide, wide))
+    nested: Any = NestedModels("before", [("adhesion", "after")])  # type: ignore[arg-type, list-item]
+    assert [one.parts for one in confirmed(measure, nested).values()] == [(Part.TRACES,)] * is_sure
 
 
 def test_what_held_out_shots_do_not_confirm_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,10 +14,12 @@ from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.noise_floor import replicate_spread
-from impactcell.discrepancy.model.least_squares import fit
+from impactcell.discrepancy.model.least_squares import Fit, fit
 from impactcell.discrepancy.model.problem import remove_jumps
 from impactcell.discrepancy.model.shot_fits import fit_shot_parameters
 from impactcell.discrepancy.report.result import json_text, result_document
+from impactcell.discrepancy.search.candidate_fits import finalists
+from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.indistinguishability import (
     are_indistinguishable,
     evaluate_out_of_shot,
@@ -72,6 +74,16 @@ def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
     half = 0.5 * (estimate.high - estimate.low)
     assert abs(estimate.value - truth) < 3.0 * half
     assert found.validation.held_out.after.trace < 1.05
+
+
+def test_a_confound_that_is_lost_on_few_samples_is_tied_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    def without_mass(context: SearchContext, rough: list[Fit]) -> list[Fit]:
+        return [one for one in finalists(context, rough) if one.effects[-1] != "mass_error"]
+
+    monkeypatch.setattr("impactcell.discrepancy.search.model_selection.finalists", without_mass)
+    found = investigate(make("mass_error", shots=18))
+    assert found.verdict == "tied"
+    assert answer(found)[1] == {"mass_error", "force_sensor_gain"}
 
 
 def test_a_jump_at_one_sample_is_no_slope() -> None:

@@ -25,6 +25,7 @@ from impactcell.discrepancy.search.conclusion import (
     conclude,
     missing_shots,
 )
+from impactcell.discrepancy.search.confirmation import NestedModels
 from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan, ModelEvidence, scan_candidates
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
@@ -65,6 +66,7 @@ __all__ = [
     "Mapper",
     "ModelError",
     "ModelEvidence",
+    "NestedModels",
     "OpenedShots",
     "Outdone",
     "Part",

@@ -142,6 +142,27 @@ def finalists(context: SearchContext, rough: list[Fit]) -> list[Fit]:
     ]
 
 
+def fit_alike(context: SearchContext, scanned: CandidateScan, best: Fit, tried: Sequence[Fit]) -> list[Fit]:
+    """Fit effects to which the residuals point as much as to the likeliest model's, from where that stands.
+
+    An exact confound points in the same direction; on few samples its fit may come to rest elsewhere, and
+    then nobody would hear of it.
+    """
+    gains = scanned.gains()
+    known = {model.effects[-1] for model in tried}
+    own = gains.get(best.effects[-1], 0.0)
+    (base,) = without_each_effect(scanned.fit, best)
+    tasks = []
+    for effect in (name for name, gain in gains.items() if abs(gain - own) <= POLICY.alike_share * own):
+        if effect not in known:
+            model = context.problem.with_effects((*scanned.fit.effects, effect))
+            starts = candidate_scores.starting_points(
+                scanned.candidates, scanned.scores, effect, POLICY.starts_per_effect
+            )
+            tasks.append(FitTask(model, tuple(starts), base, POLICY.final_steps))
+    return run_tasks(context, [task for task in tasks if task.starts])
+
+
 def without_each_effect(nominal: Fit, model: Fit) -> list[Fit]:
     """Start fits of a model without each of its new effects in turn, from where it stands.
 

@@ -1,6 +1,5 @@
 """The shots that the search never saw, opened once."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +12,8 @@ from impactcell.discrepancy.data import (
     replicate_spread,
 )
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
-from impactcell.discrepancy.search.validation import (
-    MAX_P_VALUE,
-    GapMeasure,
-    Validation,
-    confirmed,
-    counted_parts,
-)
+from impactcell.discrepancy.search.confirmation import NestedModels, confirmed
+from impactcell.discrepancy.search.validation import MAX_P_VALUE, GapMeasure, Validation, counted_parts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,38 +56,37 @@ class OpenedShots:
     problems: tuple[Problem, Problem]
     seed: int
 
-    def validate(
-        self, nominal: Fit, nested: Sequence[tuple[str, Fit]], max_p: float = MAX_P_VALUE
-    ) -> HeldOutOutcome:
+    def validate(self, nested: NestedModels, max_p: float = MAX_P_VALUE) -> HeldOutOutcome:
         """Add effects to the nominal model as long as held-out shots confirm them.
 
         Parameters
         ----------
-        nested : sequence of (str, Fit)
-            Effect, and the model with it and all before it.
+        nested : NestedModels
+            The effects, and the models with and without them, fitted to the training shots.
         max_p : float
             One-sided error for each of them.
         """
         problem, held_problem = self.problems
-        models = [nominal, *(model for _, model in nested)]
-        held = [refit_shot_parameters(held_problem, model) for model in models]
-        replicates = self._replicates(models[-1], held[-1])
+        models = nested.by_effects
+        held = {names: refit_shot_parameters(held_problem, model) for names, model in models.items()}
+        held_nested = nested.with_models([*held.values()])
+        replicates = self._replicates(nested.largest, held_nested.largest)
         measure = GapMeasure(held_problem, self.floor, replicates, self.seed)
         training = GapMeasure(problem, self.floor, replicates, self.seed)
-        effects = [effect for effect, _ in nested]
-        changes = confirmed(measure, list(zip(effects, held[1:], strict=True)), held[0], max_p)
-        final, held_final = models[len(changes)], held[len(changes)]
-        parts = counted_parts(measure, (held[0], held_final), changes.values())
+        changes = confirmed(measure, held_nested, max_p)
+        nominal, held_nominal = nested.nominal, held_nested.nominal
+        final, held_final = models[tuple(changes)], held[tuple(changes)]
+        parts = counted_parts(measure, (held_nominal, held_final), changes.values())
         validation = Validation(
             training.gap(nominal),
             training.gap(final),
-            measure.change(held[0], held_final, parts),
+            measure.change(held_nominal, held_final, parts),
             changes,
             measure.expected(held_final),
             measure.is_at_floor(held_final) and training.is_at_floor(final),
-            measure.regions(held[0], held_final),
+            measure.regions(held_nominal, held_final),
         )
-        return HeldOutOutcome(final, held[0], held_final, replicates, validation)
+        return HeldOutOutcome(final, held_nominal, held_final, replicates, validation)
 
     def _replicates(self, trained: Fit, held: Fit) -> ReplicateSpread:
         log_factor = np.empty(len(self.prepared.shots))

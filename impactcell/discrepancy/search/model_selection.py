@@ -21,6 +21,7 @@ from impactcell.discrepancy.search.acceptance import (
 from impactcell.discrepancy.search.between_shots import accept_between_shots
 from impactcell.discrepancy.search.candidate_fits import (
     finalists,
+    fit_alike,
     fit_all_samples,
     is_at_bound,
     prefer_interior,
@@ -28,6 +29,7 @@ from impactcell.discrepancy.search.candidate_fits import (
     screen,
     without_each_effect,
 )
+from impactcell.discrepancy.search.confirmation import NestedModels
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.convergence import converge
 from impactcell.discrepancy.search.dominance import accept_dominant
@@ -121,17 +123,20 @@ def only_test(context: SearchContext, nominal: Fit) -> SelectionResult:
     return SelectionResult(evidence, evidence, accepted, (), {}, {})
 
 
-def nested_models(context: SearchContext, selection: SelectionResult) -> list[tuple[str, Fit]]:
-    """Effects that were added, each with the model that has it and all before it."""
-    best = selection.accepted
+def nested_models(context: SearchContext, selection: SelectionResult) -> NestedModels:
+    """Models with the effects that were added, and with some of them."""
+    nominal, best = selection.nominal.fit, selection.accepted
     if best is None or not selection.added:
-        return []
-    models = [(selection.added[-1], best)]
-    if len(selection.added) > 1:
-        nominal, first = selection.nominal.fit, selection.added[0]
-        reduced = fit_all_samples(context, without_each_effect(nominal, best))
-        models[:0] = [(first, single) for single in reduced if single.effects[-1] == first]
-    return models
+        return NestedModels(nominal)
+    steps, last = [(selection.added[-1], best)], selection.added[-1]
+    if len(selection.added) == 1:
+        return NestedModels(nominal, steps)
+    reduced = fit_all_samples(context, without_each_effect(nominal, best))
+    singles = {single.effects[-1]: single for single in reduced}
+    first = selection.added[0]
+    if first in singles:
+        steps.insert(0, (first, singles[first]))
+    return NestedModels(nominal, steps, {last: singles[last]} if singles.keys() >= {first, last} else {})
 
 
 def test_nominal(context: SearchContext, state: SearchState) -> SearchState:
@@ -153,6 +158,10 @@ def fit_single_effects(context: SearchContext, state: SearchState) -> SearchStat
     if not converged:
         return replace(state, result=reject(state.evidence, state.evidence, ()))
     singles = prefer_interior(context.problem, rank_out_of_shot(context.problem, converged))
+    alike = fit_alike(context, state.evidence.candidate_scan, singles[0].fit, converged)
+    if alike:
+        more, _ = converge(context, alike, [state.evidence.fit])
+        singles = prefer_interior(context.problem, rank_out_of_shot(context.problem, [*converged, *more]))
     return replace(state, singles=singles, single_evidence=context.test_model(singles[0].fit))
 
 

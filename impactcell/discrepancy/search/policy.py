@@ -21,6 +21,9 @@ class SearchPolicy:
         Screened models that are refined.
     min_finalists, max_finalists : int
         Refined models that are fitted to all samples: so many, and more where few samples do not tell.
+    alike_share : float
+        Share of its gain by which another effect's may differ from that of the likeliest for it to be fitted,
+        whatever became of it on few samples.
     max_rms_at_floor : float
         RMS, in noise floors, up to which a model comes near the noise.
     min_gain : float
@@ -66,6 +69,7 @@ class SearchPolicy:
     max_refined: int = 5
     min_finalists: int = 2
     max_finalists: int = 6
+    alike_share: float = 0.01
     max_rms_at_floor: float = 1.1
     min_gain: float = 30.0
     max_spread_ratio: float = 0.85

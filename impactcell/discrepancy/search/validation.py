@@ -268,33 +268,6 @@ def counted_parts(
     return (Part.TRACES, Part.FACTORS) if is_wide or Part.FACTORS in acting else (Part.TRACES,)
 
 
-def confirmed(
-    measure: GapMeasure, nested: Sequence[tuple[str, Fit]], nominal: Fit, max_p: float = MAX_P_VALUE
-) -> dict[str, GapChange]:
-    """Effects that held-out shots confirm, one by one in their order; the first that they do not ends it.
-
-    Each has to close a part of the gap. Where the whole of it, that of the wider part, rises nevertheless,
-    an effect still missing may be why: those after it have to bring it below where it was.
-
-    Parameters
-    ----------
-    nested : sequence of (str, Fit)
-        Effect, and the model with it and all before it, fitted to each held-out shot.
-    """
-    changes, waiting = dict[str, GapChange](), dict[str, GapChange]()
-    before = agreed = nominal
-    for effect, model in nested:
-        waiting[effect] = measure.change(before, model)
-        if not waiting[effect].is_real(max_p):
-            break
-        parts = counted_parts(measure, (agreed, model), waiting.values())
-        if measure.gap(model).of(parts) <= measure.gap(agreed).of(parts):
-            changes |= waiting
-            waiting, agreed = {}, model
-        before = model
-    return changes
-
-
 def _closed_share(before: float, after: float) -> float:
     """Share of what was above the noise floor, 1, that is gone."""
     return (before - after) / (before - 1.0)
