@@ -1,9 +1,12 @@
 """Held parameters, penalties, and free-form terms fitted to plants with a law that no library has."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from impactcell.discrepancy.data import prepare, sensor_noise, shot_set, split_held_out
+from impactcell.discrepancy.laws.finding import settled
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
 from impactcell.discrepancy.model import (
     Constraints,
@@ -65,6 +68,13 @@ def test_quadratic_drag_is_found_as_a_straight_line_over_speed() -> None:
     u = np.linspace(0.3, 1.0, 8) * best.visited.upper
     drag = spline_basis(u, best.visited.lower, best.visited.upper, best.form.spans) @ best.coefficients
     np.testing.assert_allclose(drag, 250.0 * u, rtol=0.05)
+    # Where its fit was ended early does not matter for what is proposed.
+    start = np.append(nominal.theta, np.zeros(best.fit.theta.size - nominal.theta.size))
+    model = best.problem
+    short = fit(model, start, nominal.shot_parameters, spread=nominal.spread, most_steps=1)
+    early = replace(best, fit=short)
+    assert not np.allclose(early.coefficients, best.coefficients, rtol=0.005, atol=0.5)
+    np.testing.assert_allclose(settled(early).coefficients, settled(best).coefficients, rtol=0.002, atol=0.2)
 
 
 def test_a_contact_that_bends_is_found_over_indentation() -> None:

@@ -31,6 +31,8 @@ MOST_LEFT = 1.2
 """Gap of the held-out traces, in noise floors, up to which a term is the law that was missing."""
 MOST_STEPS = 9
 """Gauss-Newton steps with all samples, from where few came to rest."""
+SETTLING_STEPS = 40
+"""And with few, of a spline that is proposed itself: most rest long before."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,6 +155,7 @@ def _best_finding(
     if best.smoothness == SMOOTHNESS[-1]:
         laws = _straight_first(laws)
     law = laws[0] if laws and not _spline_is_better(best, laws[0]) else None
+    best = settled(best) if law is None else best
     source = best if law is None else law
     model, fitted = _with_all_samples(problem, source.problem, source.fit)
     held = refit_shot_parameters(measure.problem.constrained(fitted.effects, model.constraints), fitted)
@@ -172,6 +175,18 @@ def _best_finding(
             best, law, change, MOST_LEFT if _part(best) is Part.TRACES else measure.expected(held)[1].factor
         ),
     )
+
+
+def settled(term: FreeTerm) -> FreeTerm:
+    """Run the fit of a term on until it rests: a few steps only had to tell places and weights apart."""
+    model = term.fit
+    try:
+        fitted = fit(
+            term.problem, model.theta, model.shot_parameters, spread=model.spread, most_steps=SETTLING_STEPS
+        )
+    except DiscrepancyError:
+        return term
+    return replace(term, fit=fitted)
 
 
 def _straight_first(laws: list[FittedLaw]) -> list[FittedLaw]:
