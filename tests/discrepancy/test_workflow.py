@@ -96,6 +96,16 @@ def test_a_jump_at_one_sample_is_no_slope() -> None:
     assert np.array_equal(remove_jumps(30.0 * slope), 30.0 * slope)
 
 
+def test_where_a_step_leaves_the_plant_without_an_answer_there_is_no_slope() -> None:
+    slope = np.sin(np.linspace(0.0, 6.0, 200))
+    unknown = slope.copy()
+    unknown[90:120] = np.nan
+    unknown[130] = np.inf
+    expected = slope.copy()
+    expected[[*range(90, 120), 130]] = 0.0
+    assert np.array_equal(remove_jumps(unknown), expected)
+
+
 def test_likelihood_out_of_shot_is_that_of_a_fit_without_the_shot() -> None:
     found = investigated(shots=20)
     problem, model = found.problem, found.nominal

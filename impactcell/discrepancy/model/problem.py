@@ -267,9 +267,13 @@ def remove_jumps(change: Samples) -> Samples:
     """Take out, in place, single samples in which a tiny step of a parameter changed the prediction a lot.
 
     The contact force jumps to b v when the contact closes. A sample that the jump passes during the step says
-    nothing about the slope, but divided by the step it would outweigh all others.
+    nothing about the slope, but divided by the step it would outweigh all others. Nor does one that is not
+    finite: there the step came to where the plant has no answer.
     """
     size = np.abs(change)
+    if not np.isfinite(size).all():
+        change[~np.isfinite(size)] = 0.0
+        size = np.abs(change)
     if not (size > 1.0).any():
         return change
     beside = np.maximum(size[:-2], size[2:])
