@@ -11,9 +11,11 @@ from impactcell.discrepancy.report import figures, sentences
 
 def test_a_figure_names_the_setting_of_its_shot() -> None:
     shot = SimpleNamespace(number=7, velocity_m_s=0.02, mass_kg=1.5, direction=-1.0)
-    assert figures._setting(shot) == "shot 7, 1200 mm/min, 1.5 kg, −"
+    assert figures._setting(shot, sentences) == "shot 7, 1200 mm/min, 1.5 kg, −"
     assert (
-        figures._setting(SimpleNamespace(number=7, velocity_m_s=math.nan, mass_kg=math.nan, direction=1.0))
+        figures._setting(
+            SimpleNamespace(number=7, velocity_m_s=math.nan, mass_kg=math.nan, direction=1.0), sentences
+        )
         == "shot 7, +"
     )
 
