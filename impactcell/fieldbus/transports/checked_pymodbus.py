@@ -108,7 +108,6 @@ class CheckedPymodbus:
             await self.close()
             raise LinkError(self._unreachable()) from self._why
         await asyncio.sleep(0)  # a serial port begins to be read in the next step of the loop
-        client.ctx.next_tid = self._transaction
         if self._rtu and not self._in_step:
             await self._listen()
         self._in_step, self._heard = True, False
@@ -118,7 +117,6 @@ class CheckedPymodbus:
         client, self._client = self._client, None
         if client is None:
             return
-        self._transaction = client.ctx.next_tid % _LAST_TRANSACTION
         transport = client.ctx.transport
         if isinstance(transport, asyncio.Transport | asyncio.DatagramTransport):
             transport.abort()
@@ -141,13 +139,13 @@ class CheckedPymodbus:
             raise LinkError("not connected")
         if self._heard:
             raise ProtocolError("more bytes than were asked for")
-        if client.ctx.next_tid >= _LAST_TRANSACTION:
-            client.ctx.next_tid = 0
+        client.ctx.next_tid = self._transaction % _LAST_TRANSACTION
+        self._transaction = client.ctx.next_tid + 1  # as pymodbus counts
         if self._rtu:
             self._watch = RtuWatch(device_id, request)
         else:
-            transaction, datagram = client.ctx.next_tid + 1, link.transport == "udp"
-            self._watch = MbapWatch(transaction, device_id, request, datagram=datagram)
+            datagram = link.transport == "udp"
+            self._watch = MbapWatch(self._transaction, device_id, request, datagram=datagram)
         self._reply, self._in_step = None, False
         timeout_s = link.timeout_s + self._on_line_s(len(request.pdu) + request.longest_reply)
         try:

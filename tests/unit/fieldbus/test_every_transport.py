@@ -1,6 +1,7 @@
 """What every transport promises (see `protocol.Transport`), over each of them, against the simulator."""
 
 import asyncio
+import socket
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import FunctionCode, read_request
+from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE
 from impactcell.fieldbus.transports import transport_for
@@ -211,6 +213,33 @@ async def test_nobody_there_is_a_link_error(kind: str, tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="no connection"):
         await client.connect()
     await client.close()
+
+
+async def test_transactions_go_on_over_connections_also_over_one_that_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("random.randrange", lambda stop: stop - 1)
+    transactions: list[int] = []
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while head := await reader.read(7):
+            transactions.append(int.from_bytes(head[:2]))
+            await reader.readexactly(int.from_bytes(head[4:6]) - 1)
+            writer.write(head[:4] + b"\0\5" + head[6:] + b"\3\2\0\7")
+        writer.close()
+
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))  # and does not listen yet
+        client = CheckedPymodbus(ModuleLink(port=listener.getsockname()[1], timeout_s=5.0), lambda: None)
+        with pytest.raises(LinkError, match="nothing listens"):
+            await client.connect()
+        async with await asyncio.start_server(answer, sock=listener):
+            for _ in range(2):
+                await client.connect()
+                for _ in range(2):
+                    assert await client.exchange(1, read_request(FunctionCode.READ_HOLDING, 0, 1)) == b"\0\7"
+                await client.close()
+    assert transactions == [64_000, 1, 2, 3]
 
 
 @every
