@@ -61,9 +61,8 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
     ),
     (
         (
-            "**Explain.** With the rules before format 2 of its result, not run again since: one effect "
-            "hidden in a campaign, gap of 2 or more: named, or tied with it, in"
-            " {named}; nothing hidden: something named in {nothing}."
+            "**Explain.** One effect hidden in a simulated campaign, gap of 2 or more: named, or tied with "
+            "it, in {named}; nothing hidden: something named in {nothing}."
         ),
         _of(
             "Discrepancy: bars",
