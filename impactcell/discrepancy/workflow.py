@@ -15,7 +15,7 @@ from impactcell.discrepancy.data import (
     shot_set,
     split_held_out,
 )
-from impactcell.discrepancy.laws import LawFinding, find_law, hold_against_free_forms
+from impactcell.discrepancy.laws import LawFinding, estimate_effects, find_law, hold_against_free_forms
 from impactcell.discrepancy.model import (
     Fit,
     ParameterEstimate,
@@ -78,6 +78,8 @@ class DiscrepancyResult:
         The same with the held-out shots' own factors.
     parameters : tuple of ParameterEstimate
         Of the final model.
+    effect_parameters : tuple of ParameterEstimate
+        Of its effects, beside a free form of what remains, if anything does.
     law : LawFinding or None
         Where something remains, the law that may be missing; None where nothing does, or nothing can be said.
     """
@@ -96,6 +98,7 @@ class DiscrepancyResult:
     held_final: Fit
     selection: SelectionResult
     parameters: tuple[ParameterEstimate, ...]
+    effect_parameters: tuple[ParameterEstimate, ...]
     validation: Validation
     simulation: Simulation
     unexplained: UnexplainedGap | None
@@ -198,6 +201,7 @@ def investigate(
         measure = GapMeasure(held_problem, floor, outcome.replicates, seed)
         law = find_law((problem, context.coarse, final), measure, outcome.held_final, seed)
     report_step("planning the next experiment")
+    parameters = estimate_parameters(final, linearise(problem, final), shared_error(evidence))
     return DiscrepancyResult(
         conclusion=conclusion,
         prepared=prepared,
@@ -212,7 +216,8 @@ def investigate(
         held_nominal=outcome.held_nominal,
         held_final=outcome.held_final,
         selection=selection,
-        parameters=estimate_parameters(final, linearise(problem, final), shared_error(evidence)),
+        parameters=parameters,
+        effect_parameters=estimate_effects(context, evidence, parameters),
         validation=outcome.validation,
         simulation=simulate_held_out(held_problem, nominal, final),
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,

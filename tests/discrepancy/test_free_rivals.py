@@ -22,7 +22,7 @@ from impactcell.discrepancy.search import Outdone
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY as EFFECTS
 from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
-from tests.discrepancy.study import Job, campaign
+from tests.discrepancy.study import Job, campaign, strengths
 
 SHOTS = 16
 LIBRARY = ("hertz_contact", "friction_patch", "periodic_friction", "force_sensor_gain")
@@ -35,12 +35,20 @@ def _investigated(hidden: tuple[str, ...], multiples: tuple[float, ...], seed: i
         return investigate(campaign(job, multiples), seed=seed, library=LIBRARY)
 
 
-def test_an_effect_is_named_beside_a_force_of_which_nobody_knows_the_form() -> None:
-    found = _investigated(("force_sensor_gain", "wandering_force"), (1.0, 0.15), 600_000)
+def test_an_effect_is_named_and_measured_beside_a_force_of_which_nobody_knows_the_form() -> None:
+    strength = 1.0
+    found = _investigated(("force_sensor_gain", "wandering_force"), (strength, 0.15), 600_000)
     assert found.added == ("force_sensor_gain",)
     assert found.verdict == "named"
     assert not found.conclusion.remaining.explained
     assert found.validation.gap_after < found.validation.gap_before
+    truth = strengths("force_sensor_gain", strength, 600_000)["relative_error"]
+    (alone,) = (one for one in found.parameters if one.effect)
+    (beside,) = found.effect_parameters
+    told = result_document(found)["effects"][0]["parameters"]["relative_error"]
+    assert told["value"] == pytest.approx(beside.value, rel=1e-5)
+    assert beside.low < truth < beside.high
+    assert beside.high - beside.low < 0.5 * (alone.high - alone.low)  # what remains pulls less
 
 
 @pytest.mark.parametrize("seed", [600_000])
@@ -98,7 +106,7 @@ def _seconds(*models: ScoredModel) -> Any:
     """Make second forms, beside a name or beside a form, come out as given."""
     of = {"": [model for model in models if not model.effect], "named": [m for m in models if m.effect]}
     return patch(
-        "impactcell.discrepancy.laws.standing._with_second",
+        "impactcell.discrepancy.laws.standing.with_second",
         lambda _context, _problem, _base, effect: of["named" if effect else ""],
     )
 

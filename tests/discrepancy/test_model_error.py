@@ -93,6 +93,18 @@ def test_an_error_that_all_shots_share_widens_intervals_by_its_size() -> None:
     assert widened[0, 0] == pytest.approx(3.0**2 * 0.5 / SHOTS**2)
 
 
+def test_a_penalty_adds_to_what_the_shots_know() -> None:
+    gradient = np.random.default_rng(5).standard_normal((SHOTS, 1))
+    linearisation: Any = SimpleNamespace(
+        information=np.array([[float(SHOTS)]]),
+        shot_gradient=gradient,
+        shot_information=np.zeros((SHOTS, 1, 1)),
+    )
+    free = covariance(linearisation)
+    held = covariance(linearisation, None, np.array([[3.0 * SHOTS]]))
+    assert held[0, 0] == pytest.approx(free[0, 0] / 4.0**2)
+
+
 def test_an_effect_is_established_although_something_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "RATE_HZ", 2000.0)
     monkeypatch.setattr("impactcell.discrepancy.workflow.find_law", lambda *_: None)  # has tests of its own

@@ -9,6 +9,7 @@ from impactcell.discrepancy.laws.grammar import ATOMS, Atom, Shaped
 from impactcell.discrepancy.laws.grammar import name as form_name
 from impactcell.discrepancy.laws.law import Law
 from impactcell.discrepancy.laws.refit import FittedLaw
+from impactcell.discrepancy.laws.remainder import estimate_effects
 from impactcell.discrepancy.laws.tangent import Tangent
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "RankedForm",
     "Shaped",
     "Tangent",
+    "estimate_effects",
     "find_law",
     "fit_free_terms",
     "form_name",

@@ -14,7 +14,7 @@ import numpy as np
 from impactcell.discrepancy.data import decimate
 from impactcell.discrepancy.laws.free_term import FreeTerm, candidate_terms
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_term
-from impactcell.discrepancy.laws.standing import FreeForms, fit_free_forms, outdone_by, stands_beside
+from impactcell.discrepancy.laws.standing import SAMPLES, FreeForms, fit_free_forms, outdone_by, stands_beside
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.discrepancy.search import (
     CandidateFit,
@@ -34,8 +34,6 @@ from impactcell.physics.effects import LIBRARY
 from impactcell.physics.free_form import FreeForm
 from impactcell.physics.remainder_forms import REMAINDER_FORMS
 
-SAMPLES = 100
-"""Samples of a channel and shot that the competition reads: gains are in the thousands [1]."""
 SCREENED_EFFECTS, FIRST_EFFECTS = 6, 3
 """Effects that are tried alone, and those of them, the likeliest, beside which places are looked for [1]."""
 PLACES_EACH = 2

@@ -45,6 +45,8 @@ seen to close 0.83 of what a smooth curve of no name makes."""
 MIN_SHARE_BESIDE = 0.05
 """Share of the squared gap above the noise that a name has to close beside a term [1]: what only rounds off
 what a term leaves has been seen to close 0.034 at most, an effect that was there 0.12 at least."""
+SAMPLES = 100
+"""Samples of a channel and shot that the competition reads: gains are in the thousands [1]."""
 SECOND_FORMS = 3
 """Free forms that are fitted beside a name or a form, of those that promise most there [1]. Own choice."""
 STATES = tuple(10.0**power for power in range(-6, 3))
@@ -146,7 +148,7 @@ def stands_beside(context: SearchContext, named: ScoredModel, forms: FreeForms) 
     if alone.mean_square - named.mean_square < MIN_SHARE_BESIDE * gap:
         return False
     term = forms.terms[named.place]
-    seconds = _with_second(context, term.problem, term.fit, "")
+    seconds = with_second(context, term.problem, term.fit, "")
     return not any(
         form.score >= named.score for form in seconds if not is_in_its_place(named.effect, form.place)
     )
@@ -165,14 +167,14 @@ def _another_law(context: SearchContext, named: ScoredModel, forms: FreeForms) -
     if form is None:
         return None
     problem, term = context.coarse.with_effects(named.fit.effects), forms.terms[form.place]
-    with_name = _with_second(context, problem, named.fit, named.effect)
-    with_form = _with_second(context, term.problem, term.fit, "")
+    with_name = with_second(context, problem, named.fit, named.effect)
+    with_form = with_second(context, term.problem, term.fit, "")
     best = max(with_name, key=lambda model: model.score, default=named)
     rival = max(with_form, key=lambda model: model.score, default=form)
     return form if rival.is_told_from(best) else None
 
 
-def _with_second(context: SearchContext, problem: Problem, base: Fit, effect: str) -> list[ScoredModel]:
+def with_second(context: SearchContext, problem: Problem, base: Fit, effect: str) -> list[ScoredModel]:
     """Fit free forms beside a model, each by itself, of those that promise most there."""
     there = replace(context, coarse=problem)
     forms = [form for form in REMAINDER_FORMS.values() if form.effect.identifier not in base.effects]

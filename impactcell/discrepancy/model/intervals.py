@@ -51,15 +51,17 @@ class SharedError:
     variance: Samples
 
 
-def covariance(linearisation: LinearisedFit, shared_error: SharedError | None = None) -> Samples:
+def covariance(
+    linearisation: LinearisedFit, shared_error: SharedError | None = None, penalty: Samples | None = None
+) -> Samples:
     """Covariance of the shared coordinates, shape (p, p).
 
     H^-1 (sum u_i u_i') H^-1 n/(n - p), with the leverage of every shot taken out of its own score
     (Bell and McCaffrey 2002), since with some forty shots the plain sandwich is too narrow. What all shots
     have in common does not scatter between them: with shapes s_q of variance c_q it adds sum c_q s_q s_q' to
-    the middle.
+    the middle. A penalty theta' P theta, shape (p, p), adds P to H.
     """
-    H = linearisation.information
+    H = linearisation.information if penalty is None else linearisation.information + penalty
     n, p = linearisation.shot_gradient.shape
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     inverse = np.linalg.pinv(H / np.outer(scale, scale), rcond=1e-12, hermitian=True) / np.outer(scale, scale)
@@ -77,12 +79,19 @@ def covariance(linearisation: LinearisedFit, shared_error: SharedError | None = 
 
 
 def estimate_parameters(
-    fit: Fit, linearisation: LinearisedFit, shared_error: SharedError | None = None
+    fit: Fit,
+    linearisation: LinearisedFit,
+    shared_error: SharedError | None = None,
+    penalty: Samples | None = None,
 ) -> tuple[ParameterEstimate, ...]:
-    """Every shared parameter with its interval."""
+    """Every shared parameter with its interval; a penalty is that of the fit, shape (p, p).
+
+    Penalised coordinates take no degree of freedom: a shot has many more samples than they are.
+    """
     shots = len(linearisation.bounds) - 1
-    spread = np.sqrt(np.maximum(np.diag(covariance(linearisation, shared_error)), 0.0))
-    quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, max(shots - len(fit.theta), 2)))
+    spread = np.sqrt(np.maximum(np.diag(covariance(linearisation, shared_error, penalty)), 0.0))
+    numbers = len(fit.theta) if penalty is None else int((np.diag(penalty) == 0.0).sum())
+    quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, max(shots - numbers, 2)))
     parameter_estimates = []
     for coordinate, theta, std in zip(fit.coordinates, fit.theta, spread, strict=True):
         half = float(quantile * std)

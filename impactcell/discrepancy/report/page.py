@@ -123,7 +123,10 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
                 "at_bound": item.at_bound,
                 "unit": _unit(item),
             }
-            for item in result.parameters
+            for item in (
+                *(one for one in result.parameters if not one.effect),
+                *result.effect_parameters,
+            )
         ],
         "proof": result.validation,
         "change_of_gap": result.validation.held_out,

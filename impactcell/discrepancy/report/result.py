@@ -184,7 +184,7 @@ def _effect(result: DiscrepancyResult, effect: str) -> dict[str, Any]:
         "p_search": round_digits(result.selection.p_values.get(effect, 1.0)),
         "held_out": _change(change) | {"parts": [str(part) for part in change.parts]},
         "where": locate_effect(result, effect),
-        "parameters": _parameters([estimate for estimate in result.parameters if estimate.effect == effect]),
+        "parameters": _parameters([one for one in result.effect_parameters if one.effect == effect]),
     }
 
 

@@ -31,7 +31,12 @@ from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan, ModelEv
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
 from impactcell.discrepancy.search.held_out import HeldOutOutcome, OpenedShots
 from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits
-from impactcell.discrepancy.search.model_error import ModelError, estimate_model_error, shared_error
+from impactcell.discrepancy.search.model_error import (
+    ModelError,
+    estimate_beside_error,
+    estimate_model_error,
+    shared_error,
+)
 from impactcell.discrepancy.search.model_selection import nested_models, only_test, select_model
 from impactcell.discrepancy.search.open_loop import Simulation, SimulationError, simulate_held_out
 from impactcell.discrepancy.search.policy import POLICY
@@ -85,6 +90,7 @@ __all__ = [
     "compare_fits",
     "conclude",
     "describe_gap",
+    "estimate_beside_error",
     "estimate_model_error",
     "exchanged",
     "fit_all_samples",

@@ -11,9 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from impactcell.discrepancy.data import CHANNELS, IndexArray
-from impactcell.discrepancy.model import Fit, Problem, SharedError
+from impactcell.discrepancy.data import CHANNELS, IndexArray, PreparedCampaign
+from impactcell.discrepancy.model import (
+    Fit,
+    ParameterEstimate,
+    Problem,
+    Scores,
+    SharedError,
+    estimate_parameters,
+    linearise,
+    scores,
+)
 from impactcell.discrepancy.search.evidence import ModelEvidence
+from impactcell.discrepancy.search.residual_map import MapDirections, map_directions
 from impactcell.records import Samples
 
 SMALL_CORRELATION = 0.1
@@ -97,24 +107,39 @@ def largest_rival_excess(left: ModelError, probability: float) -> float:
 
 
 def shared_error(evidence: ModelEvidence) -> SharedError:
+    """Estimate the error that all shots share, from the evidence against a fitted model."""
+    return shared_error_of(evidence.map, evidence.map_scores)
+
+
+def shared_error_of(chart: MapDirections, chart_scores: Scores) -> SharedError:
     """Estimate the error that all shots share, from the sizes of the map's shapes against a fitted model.
 
     In every cell and channel of the map the sizes a_q of its shapes are compared with what they would
     scatter by if shots were all that scatters, v_q: what is left of mean(a² - v) is the variance of a size,
     where it is beyond the scatter of such a mean (two of its standard deviations).
     """
-    scores, chart = evidence.map_scores, evidence.map
-    seen = (scores.information > 0.0) & (chart.channel >= 0)
-    information = np.where(seen, scores.information, 1.0)
-    by_chance = (scores.each**2).sum(0) / information**2
+    seen = (chart_scores.information > 0.0) & (chart.channel >= 0)
+    information = np.where(seen, chart_scores.information, 1.0)
+    by_chance = (chart_scores.each**2).sum(0) / information**2
     variance = np.zeros(len(chart.cell))
     for cell, channel in {*zip(chart.cell[seen].tolist(), chart.channel[seen].tolist(), strict=True)}:
         inside = seen & (chart.cell == cell) & (chart.channel == channel)
-        squared, chance = scores.amplitude[inside] ** 2, by_chance[inside]
+        squared, chance = chart_scores.amplitude[inside] ** 2, by_chance[inside]
         ratio = float(np.mean(squared / np.maximum(chance, 1e-300)))
         if ratio > 1.0 + 2.0 * math.sqrt(2.0 / int(inside.sum())):
             variance[inside] = float(np.mean(np.maximum(squared - chance, 0.0)))
     return SharedError(chart.products.shared.sum(0), variance)
+
+
+def estimate_beside_error(
+    problem: Problem, model: Fit, prepared: PreparedCampaign
+) -> tuple[ParameterEstimate, ...]:
+    """Every shared parameter of a model, its interval widened by the error that all shots share."""
+    linearisation = linearise(problem, model)
+    chart = map_directions(problem, model, linearisation, prepared)
+    shared = shared_error_of(chart, scores(linearisation, chart.products))
+    penalty = problem.with_effects(model.effects).penalty_matrix
+    return estimate_parameters(model, linearisation, shared, penalty)
 
 
 def _channels_of(residual: Samples, channel: IndexArray) -> list[Samples]:
