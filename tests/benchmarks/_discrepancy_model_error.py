@@ -22,11 +22,12 @@ from impactcell.discrepancy.workflow import investigate
 from simulator.effects import LIBRARY as LAWS
 from tests.benchmarks import _discrepancy_judge as judge
 from tests.benchmarks._discrepancy_plan import CONFOUNDED, calibrated
-from tests.benchmarks._discrepancy_run import covered, rows, study
+from tests.benchmarks._discrepancy_run import covered, intervals, rows, study
 from tests.benchmarks.table import Table
 from tests.discrepancy.study import Job, campaign
 
-ROWS = Path("bench-results/discrepancy-model-error.jsonl")
+ROWS = Path("tests/benchmarks/rows/discrepancy-model-error.jsonl")
+TUNING_ROWS = Path("bench-results/discrepancy-model-error-tuning.jsonl")
 WANDERING = "wandering_force"
 GAPS = (1.5, 6.0)
 """Gap that the effect alone makes, even in its logarithm."""
@@ -80,11 +81,13 @@ def run(job: Job) -> dict[str, Any]:
         "verdict": outcome["verdict"],
         "named": [one["effect"] for one in outcome["effects"]],
         "unconfirmed": outcome["unconfirmed"],
+        "outdone": outcome["outdone"],
         "tied": {one["effect"]: one["tied_with"] for one in outcome["effects"]},
         "remaining": outcome["remaining"],
         "gap": outcome["gap"],
         "tried": [[*one.effects, round(one.deficit, 1)] for one in found.selection.alternatives[:6]],
         "covered": covered(job, multiples, outcome),
+        "intervals": intervals(job, multiples, outcome),
         "seconds": round(time.process_time() - started, 2),
     }
 
@@ -125,7 +128,7 @@ def table(found: list[dict[str, Any]]) -> Table:
 def main() -> None:
     """Run what the arguments say, then print the table."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--rows", type=Path, default=ROWS)
+    parser.add_argument("--rows", type=Path, help="by default apart for reporting and tuning")
     parser.add_argument("--campaigns", type=int, default=300)
     parser.add_argument("--limit", type=int, help="only the first so many of them")
     parser.add_argument(
@@ -135,10 +138,11 @@ def main() -> None:
     parser.add_argument("--table", action="store_true", help="only print the table of the rows there are")
     given = parser.parse_args()
     plan = jobs(given.campaigns, TUNING if given.tuning else REPORTING)[: given.limit]
+    file = given.rows or (TUNING_ROWS if given.tuning else ROWS)
     if not given.table:
-        study(given.rows, plan, given.workers, run)
+        study(file, plan, given.workers, run)
     by_key = {job.key: job for job in plan}
-    found = [row | {"level": level(by_key[row["key"]])} for row in rows(given.rows) if row["key"] in by_key]
+    found = [row | {"level": level(by_key[row["key"]])} for row in rows(file) if row["key"] in by_key]
     print(table(found).markdown())
 
 
