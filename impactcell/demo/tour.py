@@ -8,10 +8,12 @@ from impactcell.web import TourStop
 WEAR = "Trend of the cell: the level rises towards the dashed limit, and the cycles left become fewer."
 POSITIONING = "Positioning on the page of the cell: target, what remains, and the tap that comes next."
 KNOWN_BATCH = "Trend of the cell: a mark where the batch begins; its offset is learned within some cycles."
-UNKNOWN_BATCH = "Alarms: BatchShift comes by itself, with its evidence. Acknowledge it, with a comment."
-DEVIATION = "Friction along the stroke: the dashed curve and the place where it deviates; alarm DeviantCycle."
+UNKNOWN_BATCH = "Alarms: “Batch shift” comes by itself, with its evidence. Acknowledge it, with a comment."
+DEVIATION = (
+    "Friction along the stroke: the dashed curve and the place where it deviates; alarm “Deviant cycle”."
+)
 APPEARANCE = (
-    "Model and gap: the gap rises above 1 and the alarm ModelGap comes. Then the workflow names the effect, "
+    "Model and gap: the gap rises above 1 and the alarm “Model gap” comes. Then the workflow names the effect, "
     "the extended model goes into service by itself, and the gap closes."
 )
 MEASUREMENTS = "Measurements: drop a CSV of your own there; it is read, studied and compared with this cell."

@@ -129,10 +129,10 @@ def _take_covariate(
         if len(distinct) == 1 and distinct[0]:
             scalars[name] = distinct[0]
         return
-    factor = 1.0 if item.unit is None else item.unit.factor
+    factor, offset = (1.0, 0.0) if item.unit is None else (item.unit.factor, item.unit.offset)
     present = column.values[np.isfinite(column.values)]
     if present.size:
-        scalars[name] = float(factor * (present[0] if np.ptp(present) == 0.0 else present.mean()))
+        scalars[name] = float(factor * (present[0] if np.ptp(present) == 0.0 else present.mean()) + offset)
 
 
 def covariate_names(mapping: Mapping) -> dict[str, str]:

@@ -3,7 +3,7 @@
 import enum
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 
@@ -38,12 +38,15 @@ class MeasuredUnit:
         As it is printed.
     dimension : Dimension
     factor : float
-        A number in this unit times `factor` is in SI; for temperatures of a difference only.
+        A number in this unit times `factor`, and `offset` on top, is in SI.
+    offset : float
+        Where the unit's zero lies, SI; 0 for all but temperatures.
     """
 
     symbol: str
     dimension: Dimension
     factor: float
+    offset: float = 0.0
 
 
 _PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
@@ -87,12 +90,12 @@ _FURTHER = (
     ("psi", Dimension.PRESSURE, _POUND_KG * _KILOPOND_N / _INCH_M**2),
     ("rpm", Dimension.ANGULAR_VELOCITY, 2.0 * math.pi / 60.0),
     ("K", Dimension.TEMPERATURE, 1.0),
-    ("degC", Dimension.TEMPERATURE, 1.0),
-    ("degF", Dimension.TEMPERATURE, 5.0 / 9.0),
     ("%", Dimension.NONE, 0.01),
     ("1", Dimension.NONE, 1.0),
 )
 """Symbol, dimension and factor of units that take no prefix (BIPM, The International System of Units)."""
+_TEMPERATURES = (("degC", 1.0, 273.15), ("degF", 5.0 / 9.0, 459.67 * 5.0 / 9.0))
+"""Symbol, kelvins a degree, and where its zero lies [K] (BIPM; Fahrenheit's by ITS-90)."""
 _WORDS = {
     "sec": "s", "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "msec": "ms",
     "millisekunden": "ms", "milliseconds": "ms", "microseconds": "us", "usec": "us", "minutes": "min",
@@ -123,6 +126,8 @@ def _symbols() -> dict[str, MeasuredUnit]:
             table[prefix + symbol] = MeasuredUnit(prefix + symbol, dimension, _PREFIXES[prefix] * factor)
     for symbol, dimension, factor in _FURTHER:
         table[symbol] = MeasuredUnit(symbol, dimension, factor)
+    for symbol, factor, offset in _TEMPERATURES:
+        table[symbol] = MeasuredUnit(symbol, Dimension.TEMPERATURE, factor, offset)
     return table
 
 
@@ -135,6 +140,8 @@ def parse_unit(text: str) -> MeasuredUnit | None:
     0.001
     >>> parse_unit("kg·m²").dimension.value
     'kg m²'
+    >>> parse_unit("°C").offset
+    273.15
     >>> parse_unit("furlong") is None
     True
     """
@@ -143,7 +150,7 @@ def parse_unit(text: str) -> MeasuredUnit | None:
     if not plain:
         return None
     unit = _single(plain) or _rate(plain)
-    return None if unit is None else MeasuredUnit(shown, unit.dimension, unit.factor)
+    return None if unit is None else replace(unit, symbol=shown)
 
 
 def _single(plain: str) -> MeasuredUnit | None:

@@ -146,6 +146,7 @@ def cell_facts(cell: CellConfig, endpoint: str) -> CellFacts:
         None if journal is None else journal.file,
         cell.path.resolve(),
         None if cell.settings.actuator.stroke_mm is None else cell.settings.actuator.stroke_mm * MM,
+        cell.settings.positioning is not None,
     )
 
 

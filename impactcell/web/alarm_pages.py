@@ -66,6 +66,8 @@ async def alarms(context: PageContext, request: Request, session: BrowserSession
         session,
         open_alarms=_open_alarms(context),
         history=history[:SHOWN_HISTORY],
+        is_cut=len(history) >= SHOWN_HISTORY,
+        most=EXPORTED_HISTORY,
         chosen=cell,
         refusal=request.query_params.get("refused", ""),
     )

@@ -60,6 +60,8 @@ class CellFacts:
         Its cell file, which says which model it runs with.
     stroke_m : float or None
         Stroke of its actuator from first contact on, where it is the same for every tap.
+    has_positioning : bool
+        Whether it places parts, beside watching.
     tour : sequence of TourStop
         What happens in a cell that is a demo; empty in a real one.
     """
@@ -70,6 +72,7 @@ class CellFacts:
     journal: Path | None = None
     file: Path | None = None
     stroke_m: float | None = None
+    has_positioning: bool = False
     tour: Sequence[TourStop] = ()
 
 

@@ -16,6 +16,8 @@ from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 
+LEAST_WHOLE = 9.95
+"""From here on two significant digits are a whole number."""
 LARGE = 1e9
 """From here on a number is written with an exponent, in any unit."""
 
@@ -61,7 +63,9 @@ class Messages:
         return RULES[alarm].title.text(self.language)
 
     def reason(self, alarm: Alarm) -> str:
-        """Say why an alarm came."""
+        """Say why an alarm came; of one that has not come, why it is watched or not."""
+        if not alarm.message:
+            return self["suppressed_why" if alarm.suppressed else "watched_again"] if alarm.enabled else ""
         return Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
 
     def refusal(self, code: str) -> str:
@@ -107,8 +111,14 @@ class Messages:
         return text.replace(".", ",") if self.language == "de" else text
 
     def told_std(self, std: float) -> str:
-        """Write what stands behind a "±"."""
-        return self.number(TOLD_STDS * std, 2)
+        """Write what stands behind a "±", to two significant digits, also where the second is a 0.
+
+        >>> Messages("en").told_std(0.001)
+        '0.0020'
+        """
+        told = TOLD_STDS * std
+        text = f"{told:#.2g}" if told < LEAST_WHOLE else self.number(told, 2)
+        return text.replace(".", ",") if self.language == "de" else text
 
     def for_script(self) -> dict[str, str]:
         """Give the texts that the script writes, by their key without `live_`."""

@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
 from impactcell import __version__
+from impactcell.records import Shelving
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.scada import Role
 from impactcell.web.interface import PageBackend, PageContent, PageSettings
@@ -112,12 +113,23 @@ class PageContext:
             told_stds=TOLD_STDS,
             static=f"/static/{STATIC_VERSION}",
             cells=self.content.cells,
+            open_alarm_count=self._open_alarm_count() if session is not None else 0,
             **values,
         )
         response = HTMLResponse(html, status)
         if asked is not None and asked in LANGUAGES:
             response.set_cookie("language", asked, max_age=YEAR_S, samesite="strict", httponly=True)
         return response
+
+    def _open_alarm_count(self) -> int:
+        """Count what is beside "Alarms" in the head of every page, as its script does on those that are live."""
+        return sum(
+            alarm.enabled
+            and alarm.shelving is Shelving.UNSHELVED
+            and (alarm.active or not alarm.acknowledged)
+            for view in self.feed.views.values()
+            for alarm in view.conditions.values()
+        )
 
     def error_page(self, request: Request, status: int, reason: str) -> Response:
         """Say why a request is not carried out."""

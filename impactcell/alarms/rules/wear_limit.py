@@ -49,10 +49,10 @@ def _message(wear: WearState, evidence: Evidence, cycle: int) -> Message:
     return Message(
         f"The surface is worn: friction is {plus_minus(wear.level, wear.level_std, '.4f')} (95 %), "
         f"its limit {wear.limit:.4f} was passed at about cycle {since} ({first} to {last}; "
-        f"{sure} % sure). Renew the surface, then call ResetWear.",
+        f"{sure} % sure). Renew the surface, then reset wear.",
         f"Die Oberfläche ist verschlissen: Reibung {german(wear.level, '.4f', wear.level_std)} (95 %), "
         f"Grenze {german(wear.limit, '.4f')} etwa bei Zyklus {since} überschritten ({first} bis {last}; "
-        f"{sure_in_german} % sicher). Oberfläche erneuern, danach ResetWear aufrufen.",
+        f"{sure_in_german} % sicher). Oberfläche erneuern, danach Verschleiß zurücksetzen.",
     )
 
 

@@ -38,6 +38,7 @@ function showDetail(detail) {
       deviant ? [{ x: deviant.at, text: `▼ ${texts.cycle} ${deviant.cycle} ${texts.deviates}`, colour: "bad" }] : []);
   }
   const table = place("taps");
+  if (!table) return; // a cell that places nothing
   table.hidden = detail.taps.length === 0;
   table.tBodies[0].replaceChildren(...detail.taps.slice().reverse().map((tap) => {
     const row = document.createElement("tr");

@@ -13,7 +13,7 @@ for (const link of document.querySelectorAll(".languages a")) {
   link.href = address.pathname + address.search;
 }
 
-const when = new Intl.DateTimeFormat(document.documentElement.lang, { dateStyle: "medium", timeStyle: "medium" });
+const when = new Intl.DateTimeFormat(document.documentElement.lang, { dateStyle: "medium", timeStyle: "medium", hourCycle: "h23" });
 export function showTimes(root) {
   for (const time of root.querySelectorAll("time[data-ms]")) {
     const date = new Date(Number(time.dataset.ms));

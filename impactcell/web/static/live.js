@@ -14,7 +14,8 @@ export function coefficient(value) {
 }
 /** What stands behind a "±": as many standard deviations as the service tells everywhere. */
 export const TOLD_STDS = Number(document.body.dataset.toldStds);
-export const toldStd = (std) => `± ${number(TOLD_STDS * std, 2)}`;
+/** Two significant digits, also where the second is a 0: 0.0020 beside 0.0137. */
+export const toldStd = (std) => `± ${new Intl.NumberFormat(language, { minimumSignificantDigits: 2, maximumSignificantDigits: 2, useGrouping: false }).format(TOLD_STDS * std)}`;
 export const withUnit = (value, unit, digits) => (value === null || value === undefined ? "–" : `${number(value, digits)} ${unit}`);
 
 export function set(root, field, text) {

@@ -83,8 +83,9 @@ PAGE_TEXTS: Texts = {
     "position": ("Position", "Position"),
     "trend": ("Trend", "Verlauf"),
     "trend_help": (
-        "Band: range of µs of the cycles; line: tracked level; dashed: wear limit; marks: batches.",
-        "Band: Bereich von µs der Zyklen; Linie: Niveau; gestrichelt: Verschleißgrenze; Marken: Chargen.",
+        "Band: µs of the cycles; line: its level, as with the first batch; dashed: wear limit; marks: batches.",
+        "Band: µs der Zyklen; Linie: Niveau, wie mit der ersten Charge; gestrichelt: Verschleißgrenze; Marken: "
+        "Chargen.",
     ),
     "span": ("Span", "Zeitraum"),
     "span_hour": ("Hour", "Stunde"),
@@ -118,6 +119,11 @@ PAGE_TEXTS: Texts = {
     "open_alarms": ("Open alarms", "Offene Alarme"),
     "no_open_alarms": ("No alarm needs a look.", "Kein Alarm wartet."),
     "history": ("History", "Verlauf"),
+    "history_is_cut": (
+        "The newest {count}; the files hold up to {most} of each cell.",
+        "Die neuesten {count}; die Dateien enthalten bis zu {most} je Zelle.",
+    ),
+    "open_alarm_count": ("Open alarms: {count}", "Offene Alarme: {count}"),
     "no_history": ("Nothing has happened yet.", "Noch ist nichts geschehen."),
     "time": ("Time", "Zeit"),
     "cell": ("Cell", "Zelle"),
@@ -141,6 +147,12 @@ PAGE_TEXTS: Texts = {
     "acknowledged": ("acknowledged", "quittiert"),
     "unconfirmed": ("to be confirmed", "zu bestätigen"),
     "shelved": ("shelved", "zurückgestellt"),
+    "suppressed": ("suppressed", "unterdrückt"),
+    "suppressed_why": (
+        "Not watched: the batch or the model is new, and is being learned.",
+        "Nicht überwacht: Charge oder Modell sind neu und werden gelernt.",
+    ),
+    "watched_again": ("Watched again.", "Wird wieder überwacht."),
     "disabled": ("disabled", "abgeschaltet"),
     "statistic": ("Evidence", "Nachweis"),
     "threshold": ("alarm above", "Alarm über"),

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from impactcell.alarms import EventKind
-from impactcell.records import Evidence
+from impactcell.records import Evidence, Shelving
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, write_users
@@ -299,11 +299,26 @@ async def test_what_stands_behind_plus_minus_is_said_where_it_is_read(page: Page
     await put(page, CellNews(CELL, alarms=(raised(evidence=Evidence(12.0, 11.0, 4, 0.01, 0.002)),)))
     async with page.logged_in(Role.OBSERVER) as client:
         alarms = (await client.get("/alarms?lang=de")).text
-        assert "Größe 0,01 ± 0,004" in alarms
+        assert "Größe 0,01 ± 0,0040" in alarms
         for path in ("/", f"/cells/{CELL}", "/alarms"):
             text = (await client.get(path)).text
             assert f'data-told-stds="{TOLD_STDS}"' in text
             assert "± sind 2 Standardabweichungen: mit etwa 95 % Sicherheit" in text
+
+
+@pytest.mark.parametrize("path", ["/", "/alarms", "/studies", "/system", "/nothing"])
+async def test_every_page_counts_the_open_alarms(page: Page, path: str) -> None:
+    async with page.logged_in(Role.OBSERVER) as client:
+        assert 'id="open-alarms" hidden>' in (await client.get(path)).text
+        await put(page, CellNews(CELL, alarms=(raised(),)))
+        assert 'id="open-alarms" aria-label="Open alarms: 1">1<' in (await client.get(path)).text
+        await put(page, CellNews(CELL, alarms=(raised(shelving=Shelving.TIMED),)))
+        assert 'id="open-alarms" hidden>' in (await client.get(path)).text
+
+
+async def test_a_cell_that_places_nothing_shows_no_positioning(page: Page) -> None:
+    async with page.logged_in(Role.OBSERVER) as client:
+        assert "<h2>Positioning</h2>" not in (await client.get(f"/cells/{CELL}")).text
 
 
 async def test_wear_is_reset_by_an_engineer_and_a_refusal_is_said(page: Page) -> None:

@@ -15,6 +15,7 @@ from impactcell.journal.trend import CYCLES_PER_COLUMN, Finished, trend
 from impactcell.records import Alarm
 from impactcell.scada import Role
 from impactcell.web.alarm_export import HEADER, to_csv, to_xlsx
+from impactcell.web.alarm_pages import SHOWN_HISTORY
 from tests.snapshots import make_capture, make_snapshot
 from tests.unit.web.page import CELL, make_page, raised
 
@@ -151,3 +152,24 @@ def test_control_characters_do_not_break_a_workbook() -> None:
     history = [(CELL, Alarm("JournalFault", message="a\x00b\x1bc", time_ns=1))]
     sheet = openpyxl.load_workbook(io.BytesIO(to_xlsx(history))).active
     assert sheet[2][HEADER.index("message")].value == "abc"
+
+
+async def test_an_alarm_that_is_held_back_says_why_and_has_not_been(tmp_path: Path) -> None:
+    """A change that was announced suppresses the alarm; it has neither come nor gone."""
+    at_rest = Alarm("BatchShift", time_ns=10**18, suppressed=True)
+    store(tmp_path / "j.sqlite", [10**18], {1: "A"}, (at_rest, replace(at_rest, suppressed=False)))
+    async with make_page(tmp_path, tmp_path / "j.sqlite").logged_in(Role.OBSERVER) as client:
+        history = (await client.get("/alarms?lang=en")).text.partition("<tbody>")[2]
+    assert history.count("suppressed</span>") == 1
+    assert "Not watched: the batch or the model is new" in history
+    assert "Watched again." in history
+    assert "over</span>" not in history
+
+
+@pytest.mark.parametrize("more", [0, 1])
+async def test_a_long_history_says_where_it_is_cut(tmp_path: Path, more: int) -> None:
+    alarms = tuple(raised(f"reason {i}") for i in range(SHOWN_HISTORY - 1 + more))
+    store(tmp_path / "j.sqlite", [10**18], {1: "A"}, alarms)
+    async with make_page(tmp_path, tmp_path / "j.sqlite").logged_in(Role.OBSERVER) as client:
+        text = (await client.get("/alarms?lang=en")).text
+    assert ("The newest 200; the files hold up to 10000 of each cell." in text) == bool(more)

@@ -165,7 +165,7 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         assert found.result["mu_s"] == pytest.approx({"mean": 0.215, "spread": 0.00707, "n": 2}, abs=1e-5)
         text = (await client.get(f"/studies/{study}")).text
         assert "0.215" in text
-        assert "<td>0.002</td>" in text, "two standard deviations behind ±; the file has one"
+        assert "<td>0.0020</td>" in text, "two standard deviations behind ±; the file has one"
         assert (await client.get(f"/studies/{study}/files/friction.csv")).text.startswith("shot,")
     assert "--cell" not in verbs.asked[0]
 
