@@ -91,7 +91,9 @@ def import_files(
         print_note(note)
     shots = len(imported.campaign.shots)
     where = "nothing written (--dry-run)" if output is None else f"in {output}"
-    print_result(f"{shots} shots of excitation {imported.campaign.excitation}, {where}")
+    print_result(
+        f"{shots} {'shot' if shots == 1 else 'shots'} of excitation {imported.campaign.excitation}, {where}"
+    )
 
 
 def _check_distinct(files: Sequence[Path]) -> None:
@@ -136,7 +138,8 @@ def _print_guess(tables: Sequence[Table], mapping: Mapping) -> None:
             _plain(item.column), item.meaning, _plain(unit), _plain(item.why), f"{item.confidence:.0%}"
         )
     console = Console(stderr=True)
-    console.print(f"{len(tables)} tables; the first: {_plain('; '.join(tables[0].notes))}", markup=False)
+    of_many = f"{len(tables)} tables; the first: " if len(tables) > 1 else ""
+    console.print(f"{of_many}{_plain('; '.join(tables[0].notes))}", markup=False)
     console.print(grid)
 
 

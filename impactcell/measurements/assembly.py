@@ -76,6 +76,10 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         notes.append(
             "no mass is stated: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
         )
+    if excitation is Excitation.TAP and "stroke" not in given.constants:
+        notes.append(
+            "no stroke is stated: the actuator is taken to halt as it loses contact; give --set stroke=1.5mm"
+        )
     campaign = Campaign(
         excitation,
         tuple(captures),

@@ -173,7 +173,10 @@ def said_beside(table: Table) -> dict[ColumnMeaning, float | str]:
     for key, text in table.attributes.items():
         name, unit_text = split_unit(key)
         for meaning in SCALARS:
-            if name_score(name, meaning)[0] < TOKEN_MATCH and not is_kind_of(name, meaning):
+            score = name_score(name, meaning)[0]
+            # Nothing else is in mm/min: there a word inside a longer one will do, as in "Vorschubgeschw".
+            is_named = score > 0.0 if meaning is ColumnMeaning.VELOCITY else score >= TOKEN_MATCH
+            if not is_named and not is_kind_of(name, meaning):
                 continue
             words = text.split()
             number = parse_number(words[0]) if words else None

@@ -136,7 +136,8 @@ def _with_velocity(
             why = ": its column changes within the record, so it was measured" if varies else ""
             faults.append(
                 f"{record.place}: the velocity of the actuator is not known{why}; name the column of the "
-                f"commanded one with --column velocity=NAME, or give --set 'velocity=3000 mm/min'"
+                f"commanded one with --column velocity=NAME, write it as 'velocity: 3000 mm/min' in a line above "
+                f"the table, or give --set 'velocity=3000 mm/min'"
             )
             continue
         taps.append(_TapRecord(record, onset, abs(velocity)))
@@ -167,7 +168,7 @@ def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:
         refined = iter(contacts.onset_within_sample(times, forces, onsets, velocities))
         step = float(np.median([np.median(np.diff(time)) for time in times]))
         notes.append(
-            f"t = 0 put where the force begins, in {len(triggered)} taps, good to a part of the sampling "
+            f"t = 0 put where the force begins, in {len(triggered)} tap{'' if len(triggered) == 1 else 's'}, good to a part of the sampling "
             f"step of "
             f"{1e3 * step:.3g} ms; what lies before is kept as pretrigger"
         )

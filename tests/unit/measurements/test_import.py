@@ -109,6 +109,23 @@ def test_lines_beside_the_columns_are_told_and_a_count_of_rows_is_no_covariate(t
     assert imported.notes[0] == "the lines beside the columns say: mass 12.5 to 15 kg, velocity 3000 mm/min"
 
 
+def test_an_abbreviated_line_says_the_velocity_and_a_temperature_is_in_kelvin(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    rows = zip(*sampled(taps((3000,), (18.9,))[0], rng), strict=True)
+    lines = ["Vorschubgeschw.: 50.0 mm/s", "Teilegewicht: 18.9 kg", "Kraftbereich: 20 kg", ""]
+    lines += ["Zeit [s],Kraft [N],Weg [m],Temp [°C],Oil [degF]"]
+    lines += [f"{t:.5f},{f:.6f},{x:.8f},23.5,86" for t, f, x in rows]
+    path = tmp_path / "tap.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    tables = read([path])
+    imported = make_campaign(tables, guess(tables))
+    (shot,) = imported.campaign.shots
+    assert shot.velocity_m_s == pytest.approx(0.05)
+    assert shot.mass_kg == 18.9
+    assert shot.covariates == pytest.approx({"temp_k": 296.65, "oil_k": 303.15})
+    assert "no stroke is stated: the actuator is taken to halt as it loses contact" in imported.notes[-1]
+
+
 def test_a_column_numbers_the_shots_and_a_word_is_the_batch() -> None:
     rng = np.random.default_rng(7)
     parts = [sampled(tap, rng) for tap in taps((3000,), (18.9, 25.2))]
