@@ -24,6 +24,7 @@ from impactcell.prediction.model import Prior
 from impactcell.process.console import print_note, print_result
 from impactcell.process.shipped import shipped_config
 from impactcell.settings import read_cell
+from impactcell.settings.fields import cell_name
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import write_model
 
@@ -113,6 +114,10 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
     CampaignError, PredictionError
         No model can be fitted to the campaign.
     """
+    try:
+        cell_name(answers.name)
+    except ValueError as error:
+        raise SettingsError(f"--name {answers.name!r}: {error}") from error
     source = _map_file(answers.register_map)
     cell, model = directory / f"{answers.name}.yaml", directory / f"{answers.name}.model.yaml"
     target_map = directory / source.name

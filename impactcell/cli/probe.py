@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Final
 
 from impactcell.errors import FieldbusError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
@@ -16,7 +17,10 @@ from impactcell.fieldbus.transports import transport_for
 from impactcell.process.console import print_result
 from impactcell.records import Capture, Channel
 from impactcell.service.factory import module_link
-from impactcell.settings import read_cell
+from impactcell.settings import CellConfig, read_cell
+
+ROUNDING: Final = 1e-3
+"""Share by which the steps of a register may lead out of a range at whose edge the value is."""
 
 
 def probe(cell: Path) -> None:
@@ -37,6 +41,8 @@ def probe(cell: Path) -> None:
     result = asyncio.run(probe_module(module))
     rows = [("link", f"{link}, {1e3 * result.round_trip_s:.2f} ms a request"), *_rows(result)]
     rows.insert(1, ("in flight", result.window))
+    if result.capture is not None:
+        rows += [("look at", text) for text in _unlike(config, result.capture)]
     rows += [("no promise", text) for text in not_promised(config.register_map)]
     print_result("\n".join(f"{name:12}{text}" for name, text in rows))
     if result.faults:
@@ -89,6 +95,24 @@ def _tap_rows(capture: Capture) -> Iterator[tuple[str, str]]:
     else:
         figure = "" if summary is None else f" (slid {1e3 * summary.sliding_distance_m:.4g} mm, it says)"
         yield "position", f"{_samples(position)}, moved {1e3 * abs(position.values[-1]):.4g} mm{figure}"
+
+
+def _unlike(cell: CellConfig, capture: Capture) -> Iterator[str]:
+    """Say what of a tap the cell's model is not for: a unit or a scale is wrong, or the model is."""
+    predictors = cell.model.predictors
+    if not predictors:
+        return
+    slowest, fastest = (6e4 * velocity for velocity in predictors[0].velocity_range_m_s)
+    for name, value, low, high, unit in (
+        ("velocity", 6e4 * abs(capture.velocity_m_s), slowest, fastest, "mm/min"),
+        ("mass", capture.mass_kg, predictors[0].mass_kg, predictors[-1].mass_kg, "kg"),
+    ):
+        if math.isfinite(value) and not low * (1.0 - ROUNDING) <= value <= high * (1.0 + ROUNDING):
+            yield (
+                f"{name} {value:.6g} {unit} is not within the {low:.4g} to {high:.4g} {unit} that "
+                f"model '{cell.model.name}' is calibrated for: see unit and scale of {name} in the "
+                "map, or calibrate"
+            )
 
 
 def _samples(channel: Channel) -> str:

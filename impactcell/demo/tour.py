@@ -13,8 +13,8 @@ DEVIATION = (
     "Friction along the stroke: the dashed curve and the place where it deviates; alarm “Deviant cycle”."
 )
 APPEARANCE = (
-    "Model and gap: the gap rises above 1 and the alarm “Model gap” comes. Then the workflow names the effect, "
-    "the extended model goes into service by itself, and the gap closes."
+    "Model and gap: the gap rises above 1 and the alarm “Model gap” comes. Then the workflow names the "
+    "effect, the extended model goes into service by itself, and the gap closes."
 )
 MEASUREMENTS = "Measurements: drop a CSV of your own there; it is read, studied and compared with this cell."
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
+from impactcell.fieldbus.register_types import SI_FACTOR
 from impactcell.fieldbus.registers import RegisterMap
 
 _WITHOUT: Final = {
@@ -27,6 +28,11 @@ _ONLY_FIGURES: Final = (
 )
 
 
+_STEP_NOT_SEEN_M_S: Final = 2.0 / 6e4
+"""Steps of the velocity above which their rounding is told, m/s: half of one is 5e-4 of a slow tap of
+2000 mm/min, and a force of 100 N shows its scale to 2e-4 (noise of 0.5 N, a thousand samples). Our choice."""
+
+
 def not_promised(registers: RegisterMap) -> tuple[str, ...]:
     """Say what a map cannot promise, for what it lacks, a sentence each."""
     return tuple(_sentences(registers))
@@ -47,6 +53,7 @@ def _sentences(registers: RegisterMap) -> Iterator[str]:
         if registers.arrays and name not in registers:
             yield f"no register {name}: no waveform estimate, and mu_s is uncertain"
     yield from _of_figures(registers)
+    yield from _of_velocity(registers)
     for name in registers.arrays:
         if not any(
             each in registers or each in registers.constants for each in (f"{name}_start", "sample_start")
@@ -67,6 +74,20 @@ def _of_captures(registers: RegisterMap) -> Iterator[str]:
         yield (
             "no registers capture_crc32 and window_sequence: each capture is read twice, and used where both "
             "readings agree; one that the module leaves half written for that long is not noticed"
+        )
+
+
+def _of_velocity(registers: RegisterMap) -> Iterator[str]:
+    """Say that k, b and mu_s follow a velocity that is rounded, which nothing else tells of."""
+    velocity = registers.registers.get("velocity")
+    if velocity is None or not registers.arrays or velocity.kind in ("f32", "f64"):
+        return
+    step_m_s = velocity.scale * SI_FACTOR.get(velocity.unit, 1.0)
+    if step_m_s > _STEP_NOT_SEEN_M_S:
+        yield (
+            f"register velocity goes in steps of {6e4 * step_m_s:.3g} mm/min: k, b, mu_k/mu_s and mu_s err "
+            "by what is rounded off, beyond their ±; finer steps, or a commanded velocity that is a whole "
+            "number of them, avoid it"
         )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Final
 
 REQUIRED: Final = {
-    "cycle_counter": "there is a new cycle",
+    "cycle_counter": "it tells of a new cycle",
     "velocity": "equations (4) and (5) need it",
 }
 """Registers without which nothing can be made of any module, and what each gives."""

@@ -1,5 +1,6 @@
 """What a map file may say about a register: keys, types and ranges, every fault named."""
 
+import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -38,7 +39,10 @@ def _is_saturation(value: object) -> bool:
 
 
 _KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
-    "address": ("an address 0..65535", lambda value: _is_int(value) and 0 <= value < 65_536),
+    "address": (
+        "an address 0..65535 (a reference 4nnnnn is holding register nnnnn - 1)",
+        lambda value: _is_int(value) and 0 <= value < 65_536,
+    ),
     "type": (
         "u16, i16, u32, i32, u64, i64, bcd16, bcd32, f32, f64, bit or string",
         lambda value: isinstance(value, str),
@@ -151,7 +155,8 @@ def _key_faults(entry: Mapping[Any, Any], keys: Mapping[str, tuple[str, Callable
     faults = []
     for key, value in entry.items():
         if key not in keys:
-            faults.append(f"unknown key {key}")
+            near = difflib.get_close_matches(str(key), keys, n=1)
+            faults.append(f"unknown key {key}{f'; did you mean {near[0]}?' if near else ''}")
         elif not keys[key][1](value):
             faults.append(f"{key} must be {keys[key][0]}, not {value!r}")
     return faults

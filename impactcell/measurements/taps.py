@@ -136,8 +136,8 @@ def _with_velocity(
             why = ": its column changes within the record, so it was measured" if varies else ""
             faults.append(
                 f"{record.place}: the velocity of the actuator is not known{why}; name the column of the "
-                f"commanded one with --column velocity=NAME, write it as 'velocity: 3000 mm/min' in a line above "
-                f"the table, or give --set 'velocity=3000 mm/min'"
+                "commanded one with --column velocity=NAME, write it as 'velocity: 3000 mm/min' in a line "
+                "above the table, or give --set 'velocity=3000 mm/min'"
             )
             continue
         taps.append(_TapRecord(record, onset, abs(velocity)))
@@ -167,9 +167,9 @@ def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:
             velocities.append(tap.velocity_m_s)
         refined = iter(contacts.onset_within_sample(times, forces, onsets, velocities))
         step = float(np.median([np.median(np.diff(time)) for time in times]))
+        told = "1 tap" if len(triggered) == 1 else f"{len(triggered)} taps"
         notes.append(
-            f"t = 0 put where the force begins, in {len(triggered)} tap{'' if len(triggered) == 1 else 's'}, good to a part of the sampling "
-            f"step of "
+            f"t = 0 put where the force begins, in {told}, good to a part of the sampling step of "
             f"{1e3 * step:.3g} ms; what lies before is kept as pretrigger"
         )
     else:

@@ -137,8 +137,8 @@ class ServiceHost:
             number = getattr(error, "errno", None)
             reason = os.strerror(number) if number is not None and number > 0 else str(error)
             raise AccessError(
-                f"OPC UA server: cannot listen on {settings.endpoint} ({reason}); choose another endpoint, "
-                "or end what uses it"
+                f"OPC UA server: cannot listen on {settings.endpoint} ({reason}); choose another "
+                "`endpoint` under `opcua`, or end what uses it"
             ) from error
         self._discovery.port = self._listener.sockets[0].getsockname()[1]
         loop = asyncio.get_running_loop()

@@ -122,7 +122,7 @@ class PageContext:
         return response
 
     def _open_alarm_count(self) -> int:
-        """Count what is beside "Alarms" in the head of every page, as its script does on those that are live."""
+        """Count what stands beside "Alarms" in the head, as the script of a live page does."""
         return sum(
             alarm.enabled
             and alarm.shelving is Shelving.UNSHELVED

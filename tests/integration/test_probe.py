@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.integration.forked import forked
 from tests.integration.processes import CONFIG, simulator, write_cell
@@ -50,6 +51,30 @@ async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object],
         code, out, err = await probed(cell)
     assert (code, out) == (1, "")
     assert told in err
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "wrong", "told"),
+    [
+        ("velocity", "mm/min", "mm/s", "velocity 252000 mm/min is not within the 2400 to 6000 mm/min"),
+        ("mass", "kg", "g", "mass 0.0189 kg is not within the "),
+    ],
+)
+async def test_a_wrong_unit_of_what_the_model_knows_is_named(
+    tmp_path: Path, name: str, unit: str, wrong: str, told: str
+) -> None:
+    content = yaml.safe_load((CONFIG / "maps" / "fpga-v1.yaml").read_text())
+    assert content["registers"][name]["unit"] == unit
+    content["registers"][name]["unit"] = wrong
+    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(content))
+    strikes = {"period_s": 0.1, "cycles": 1, "velocities_mm_per_min": [4200.0]}
+    async with simulator(tmp_path, strikes=strikes) as module:
+        cell = write_cell(tmp_path, module["port"], module={"register_map": str(tmp_path / "wrong.yaml")})
+        while "tap         cycle 1" not in (out := (await probed(cell))[1]):
+            pass
+    assert f"look at     {told}" in out
+    assert f"see unit and scale of {name} in the map" in out
+    assert out.count("look at") == 1
 
 
 async def test_a_wrong_scale_is_named_beside_the_tap(tmp_path: Path) -> None:

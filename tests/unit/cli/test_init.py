@@ -62,6 +62,20 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
+@pytest.mark.parametrize("name", ["press 1", "a/b", "../press", "", "Preß"])
+def test_a_name_that_is_none_is_refused_and_nothing_is_written(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run_verb(["init", str(tmp_path / "own"), *ANSWERS, "--name", name])
+    assert ended.value.code == 2
+    assert (
+        "a cell's name has up to 64 letters, digits, '_', '-' or '.', as in press-1"
+        in capsys.readouterr().err
+    )
+    assert not (tmp_path / "own").exists()
+
+
 def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
     begun: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

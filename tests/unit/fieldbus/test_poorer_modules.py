@@ -272,6 +272,18 @@ def test_the_smallest_map_is_one_and_says_what_it_lacks() -> None:
         assert lack in said, lack
 
 
+@pytest.mark.parametrize(("scale", "is_told"), [(0.01, False), (0.1, True)])
+def test_a_velocity_in_coarse_steps_is_told(scale: float, is_told: bool) -> None:
+    """In 0.1 mm/s steps 2500 mm/min is 2502: k was off by ten times its standard deviation."""
+    registers = {**SMALLEST, "velocity": {"address": 40, "type": "u16", "unit": "mm/s", "scale": scale}}
+    registers |= {"force": {"address": 100, "type": "i16", "unit": "N", "count": 8}}
+    registers |= {"sample_rate": {"value": 10, "unit": "kHz"}}
+    said = "\n".join(
+        not_promised(RegisterMap.from_mapping({"format": 1, "name": "x", "registers": registers}))
+    )
+    assert ("register velocity goes in steps of 6 mm/min" in said) == is_told
+
+
 @pytest.mark.parametrize("std", [None, 0.5])
 def test_an_error_is_assumed_only_where_the_map_does_not_tell_it(std: float | None) -> None:
     force = SMALLEST["peak_force"] | ({} if std is None else {"std": std})
@@ -282,9 +294,11 @@ def test_an_error_is_assumed_only_where_the_map_does_not_tell_it(std: float | No
 @pytest.mark.parametrize(
     ("name", "entry", "told"),
     [
-        ("cycle_counter", None, "register cycle_counter is missing: there is a new cycle"),
+        ("cycle_counter", None, "register cycle_counter is missing: it tells of a new cycle"),
         ("velocity", None, "register velocity is missing"),
         ("peak_force", None, "register force or position or peak_force or sliding_distance is missing"),
+        ("velocity", {"address": 9, "type": "u16", "sclae": 2}, "unknown key sclae; did you mean scale?"),
+        ("velocity", {"address": 400009, "type": "u16"}, "a reference 4nnnnn is holding register nnnnn - 1"),
         ("velocity", {"value": "fast"}, "velocity: value must be a number"),
         ("velocity", {"value": math.nan}, "velocity: value must be a number"),
         ("velocity", {"value": 1, "unit": "furlong"}, "velocity: unit 'furlong' is not known"),
