@@ -69,7 +69,7 @@ class ModbusClient:
             return True
         longest = min(count, self.link.max_registers)
         for size in TRIAL_SIZES:
-            if size > longest:
+            if size > min(longest, window.most):
                 break
             window.size = size
             blocks = [PartialBlock(address, longest - shorter, table, longest) for shorter in range(size)]

@@ -95,7 +95,7 @@ class ModuleSection(Section):
     word_order: Literal["big", "little"] | None = None
     """Order of the words of a value of several registers; absent: as the map says."""
     window: Annotated[int, Field(ge=1, le=64)] | None = None
-    """Requests in flight over TCP; absent: found by trials, up to 16, and 1 for good where one fails."""
+    """Requests in flight over TCP; absent: found by trials, up to 64; 16 or 1 where one fails."""
     max_registers_per_request: Annotated[int, Field(ge=1, le=125)] = _LINK.max_registers
     """Registers asked for at once; some gateways allow fewer than 125."""
     pause_between_requests_ms: NotNegative = _LINK.pause_s * 1e3

@@ -1,4 +1,4 @@
-"""Requests in flight as found by trials: up to 16 of a device that queues, one for good of any other."""
+"""Requests in flight as found by trials: up to 64 of a device that queues, one for good of any other."""
 
 import asyncio
 import logging
@@ -76,21 +76,24 @@ def serving(misbehaviour: Misbehaviour, together: list[int]) -> Peer:
     return behave
 
 
-async def test_a_device_that_queues_has_sixteen_in_flight_and_begins_with_one() -> None:
+async def test_a_device_that_queues_has_many_in_flight_and_begins_with_one() -> None:
     async with ModbusServer(Image()) as server, linked(server, None) as client:
         assert client.window.size == 1
         assert await client.find_window(100, 20_000)
-        assert (client.window.size, server.requests) == (16, 2 + 16)
-        assert str(client.window) == "16, found by trial"
+        assert (client.window.size, server.requests) == (64, 2 + 16 + 64)
+        assert str(client.window) == "64, found by trial"
         assert await client.find_window(100, 20_000)
-        assert server.requests == 2 + 16
+        assert server.requests == 2 + 16 + 64
         assert np.array_equal(await client.read(100, 20_000), np.arange(100, 20_100))
         await client.close()
         await client.connect()
         assert client.window.size == 1
 
 
-@pytest.mark.parametrize(("count", "size", "requests"), [(1, 1, 0), (2, 2, 2), (15, 2, 2), (16, 16, 18)])
+@pytest.mark.parametrize(
+    ("count", "size", "requests"),
+    [(1, 1, 0), (2, 2, 2), (15, 2, 2), (16, 16, 18), (63, 16, 18), (64, 64, 82)],
+)
 async def test_as_many_are_tried_as_there_are_registers_to_read(count: int, size: int, requests: int) -> None:
     """Each request of a trial has a length of its own, so that answers out of order are seen."""
     async with ModbusServer(Image()) as server, linked(server, None) as client:
@@ -142,6 +145,40 @@ async def test_a_device_that_stands_two_but_not_sixteen_has_one_for_good() -> No
         await client.close()
 
 
+def busy_beyond_few(requests: list[bytes]) -> list[bytes]:
+    refused = [each[:4] + struct.pack(">H", 3) + each[6:7] + b"\x83\x06" for each in requests[16:]]
+    return [*map(reply, requests[:16]), *refused]
+
+
+@pytest.mark.parametrize(
+    ("misbehaviour", "kept"),
+    [
+        (lambda requests: None if len(requests) > 16 else [*map(reply, requests)], False),
+        (lambda requests: [*map(reply, requests[:16])], False),
+        (busy_beyond_few, True),
+    ],
+    ids=["closes", "drops", "is busy"],
+)
+async def test_a_device_that_stands_sixteen_but_not_more_keeps_sixteen(
+    misbehaviour: Misbehaviour, kept: bool
+) -> None:
+    together: list[int] = []
+    async with peer(serving(misbehaviour, together)) as port:
+        client = ModbusClient(transport_for(ModuleLink(port=port, timeout_s=SILENT_S)))
+        await client.connect()
+        assert await client.find_window(100, 500) is kept
+        together.clear()
+        for _ in range(4):
+            await client.close()
+            await client.connect()
+            assert await client.find_window(100, 500)
+            assert str(client.window) == "16, found by trial"
+            assert np.array_equal(await client.read(100, 9_000), np.arange(100, 9_100))
+        await client.close()
+    assert client.window.given_up == ""
+    assert max(together) == 16
+
+
 @pytest.mark.parametrize("pinned", [1, 4])
 async def test_a_set_window_is_neither_tried_nor_given_up(pinned: int) -> None:
     async with peer(serving(closed, [])) as port:
@@ -187,16 +224,16 @@ async def test_registers_that_cannot_be_read_decide_nothing_at_first() -> None:
             assert await client.find_window(64_900, 500)
             assert (client.window.size, client.window.given_up) == (1, "")
         assert await client.find_window(64_000, 500)
-        assert client.window.size == 16
+        assert client.window.size == 64
 
 
 async def test_what_was_passed_is_given_up_after_three_connections_lost() -> None:
-    """A link that fails is no proof against a device that has passed; three times in a row is."""
+    """A link that fails proves nothing against a device that has passed; three times in a row does."""
     async with ModbusServer(Image()) as server, linked(server, None) as client:
-        for lost in range(3):
+        for size in (64, 64, 64, 16, 16, 16):
             await client.connect()
             assert await client.find_window(0, 500)
-            assert client.window.size == 16, lost
+            assert client.window.size == size
             server.faults.inject(Fault(FaultKind.RESET, remaining=1))
             with pytest.raises(LinkError):
                 await client.read(0, 500)
@@ -211,7 +248,7 @@ async def test_a_thousand_good_replies_clear_a_device() -> None:
         for _ in range(5):
             await client.connect()
             assert await client.find_window(0, 500)
-            assert client.window.size == 16
+            assert client.window.size == 64
             for _ in range(7):
                 await client.read(0, 20_000)
             server.faults.inject(Fault(FaultKind.RESET, remaining=1))
@@ -254,13 +291,13 @@ async def test_cycles_come_whole_from_a_module_of_one_request_and_it_is_said_onc
     assert "connection lost" in said[0]
 
 
-async def test_cycles_come_whole_with_sixteen_in_flight(fpga: RegisterMap) -> None:
+async def test_cycles_come_whole_with_many_in_flight(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga)
     make(device, 3)
     async with running(fpga, device, window=None) as (_, module, receptions):
         for received in await take(receptions, 3):
             assert_whole(received)
-        assert module.register_client.modbus.window.size == 16
+        assert module.register_client.modbus.window.size == 64
 
 
 @pytest.mark.parametrize("one", [False, True])
@@ -276,7 +313,7 @@ async def test_probe_says_what_it_found(
         result = await probe(ModuleAcquisition("cell-1", client, fpga))
     assert result.capture is not None
     assert result.capture.cycle == 1
-    assert result.window.startswith("1 for good: " if one else "16, found by trial")
+    assert result.window.startswith("1 for good: " if one else "64, found by trial")
 
 
 async def test_a_refused_reading_in_flight_with_others_gives_nothing_up() -> None:
@@ -284,4 +321,4 @@ async def test_a_refused_reading_in_flight_with_others_gives_nothing_up() -> Non
         await client.find_window(0, 500)
         with pytest.raises(ModbusExceptionError):
             await client.read(64_900, 500)
-        assert client.window.size == 16
+        assert client.window.size == 64
