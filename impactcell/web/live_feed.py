@@ -14,6 +14,9 @@ from impactcell.web.interface import CellNews
 
 WAITING_NEWS = 256
 """News that may wait for the page's thread; the oldest give way, since the next cycle says all anew."""
+UNSEEN_NEWS = 16
+"""News that wait while nobody looks on: eight cycles, up to 400 kB each. To wake the page's thread for each
+takes more processor time than the news do."""
 
 
 class LiveFeed:
@@ -23,15 +26,21 @@ class LiveFeed:
     """
 
     def __init__(self, cells: Iterable[str]) -> None:
-        self.views = {cell: CellView(cell) for cell in cells}
+        self._views = {cell: CellView(cell) for cell in cells}
         self._inbox: deque[CellNews] = deque(maxlen=WAITING_NEWS)
         self._lock = threading.Lock()
         self._is_woken = False
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._versions = {(kind, cell): 1 for kind in KINDS for cell in self.views}
+        self._versions = {(kind, cell): 1 for kind in KINDS for cell in self._views}
         self._encoded: dict[tuple[str, str], tuple[int, bytes]] = {}
         self._changed: set[asyncio.Event] = set()
         self.is_closed = False
+
+    @property
+    def views(self) -> dict[str, CellView]:
+        """The cells by name, with all that has happened."""
+        self._take_news()
+        return self._views
 
     def start(self) -> None:
         """Take news from now on, in the event loop that runs."""
@@ -52,6 +61,8 @@ class LiveFeed:
             loop = self._loop
             if self._is_woken or loop is None:
                 return
+            if not self._changed and len(self._inbox) < UNSEEN_NEWS:
+                return
             self._is_woken = True
         try:
             loop.call_soon_threadsafe(self._take_news)
@@ -63,6 +74,7 @@ class LiveFeed:
         event = asyncio.Event()
         event.set()
         self._changed.add(event)
+        self._take_news()  # in this order: what comes meanwhile wakes this thread
         return event
 
     def unsubscribe(self, event: asyncio.Event) -> None:
@@ -83,7 +95,7 @@ class LiveFeed:
         version = self._versions[kind, cell]
         last = self._encoded.get((kind, cell))
         if last is None or last[0] != version or kind == "recent":
-            data = self.views[cell].encode(kind)
+            data = self._views[cell].encode(kind)
             last = version, b"event: " + kind.encode() + b"\ndata: " + data + b"\n\n"
             self._encoded[kind, cell] = last
         return last[1]
@@ -94,7 +106,7 @@ class LiveFeed:
         has_changed = False
         while self._inbox:
             news = self._inbox.popleft()
-            for kind in self.views[news.cell].take(news):
+            for kind in self._views[news.cell].take(news):
                 self._versions[kind, news.cell] += 1
                 has_changed = True
         if has_changed:

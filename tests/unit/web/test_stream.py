@@ -14,7 +14,7 @@ from impactcell.web import event_stream
 from impactcell.web.cell_view import CellView
 from impactcell.web.event_stream import MAX_VIEWERS, EventStream
 from impactcell.web.interface import CellNews
-from impactcell.web.live_feed import WAITING_NEWS, LiveFeed
+from impactcell.web.live_feed import UNSEEN_NEWS, WAITING_NEWS, LiveFeed
 from tests.snapshots import make_capture, make_snapshot
 from tests.unit.web.page import CELL, make_page, raised
 
@@ -179,6 +179,32 @@ def test_what_waits_is_bounded_and_the_newest_stays() -> None:
     asyncio.run(start())
     assert feed.version("card", CELL) == 1 + WAITING_NEWS
     assert feed.views[CELL].status.received == 3 * WAITING_NEWS - 1
+
+
+async def test_the_page_is_not_woken_for_each_cycle_while_nobody_looks_on(
+    feed: LiveFeed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    woken: list[object] = []
+    loop = asyncio.get_running_loop()
+    monkeypatch.setattr(loop, "call_soon_threadsafe", lambda work: woken.append(work))
+    for number in range(1, UNSEEN_NEWS):
+        feed.put(CellNews(CELL, snapshot=cycle(number)))
+    assert not woken
+    feed.put(CellNews(CELL, snapshot=cycle(UNSEEN_NEWS)))
+    assert len(woken) == 1
+
+
+async def test_who_comes_or_looks_sees_what_nobody_was_woken_for(feed: LiveFeed) -> None:
+    feed.put(CellNews(CELL, snapshot=cycle(1)))
+    shown = feed.views[CELL].snapshot
+    assert shown is not None
+    assert shown.cycle == 1
+    feed.put(CellNews(CELL, snapshot=cycle(2)))
+    version = feed.version("card", CELL)
+    changed = feed.subscribe()
+    assert changed.is_set()
+    assert feed.version("card", CELL) == version + 1
+    feed.unsubscribe(changed)
 
 
 async def test_an_alarm_between_cycles_is_shown(feed: LiveFeed) -> None:
