@@ -2,10 +2,12 @@
 
 import copy
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
 from impactcell.errors import PhysicsError
+from impactcell.numerics.jit import IntArray
 from impactcell.physics import memory_layout as at
 from impactcell.physics.batch_integration import (
     MAX_DURATION_S,
@@ -82,24 +84,21 @@ class Ensemble:
         times_by_channel = (force_time_s, position_time_s, actuator_time_s, velocity_time_s)
         pairs = [(channel, i) for channel in range(at.CHANNEL_COUNT) for i in range(len(taps))]
         pieces: list[Samples] = []
-        total, checked = 0, NO_SAMPLES
+        total, checked, times = 0, NO_SAMPLES, NO_SAMPLES
         for channel, i in sorted(pairs, key=lambda pair: pair[1]) if by_tap else pairs:
             of_taps = times_by_channel[channel]
-            times = NO_SAMPLES if of_taps is None else np.asarray(of_taps[i], dtype=np.float64)
-            if times.size and times is not checked:  # taps may share theirs
-                if not (np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
+            given = NO_SAMPLES if of_taps is None else of_taps[i]
+            if given is not checked:  # taps may share theirs
+                times = np.asarray(given, dtype=np.float64)
+                if not (np.isfinite(times).all() and (times[1:] >= times[:-1]).all()):
                     raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
-                checked = times
+                checked = given
             pieces.append(times)
             index[i][channel] = total
             total += times.size
             index[i][at.CHANNEL_COUNT + channel] = total
         self._times = np.concatenate(pieces) if pieces else NO_SAMPLES
         self._sample_index = np.array(index, dtype=np.int64).reshape(-1, at.SAMPLE_INDEX_COUNT)
-        self._owner = np.empty(total, dtype=np.int64)
-        for i, row in enumerate(index):
-            for channel in range(at.CHANNEL_COUNT):
-                self._owner[row[channel] : row[at.CHANNEL_COUNT + channel]] = i
         spans = [[(row[k], row[at.CHANNEL_COUNT + k]) for row in index] for k in range(at.CHANNEL_COUNT)]
         self._channels: list[slice | np.ndarray] = [
             np.concatenate([np.arange(begin, end) for begin, end in span])
@@ -255,6 +254,15 @@ class Ensemble:
     def _each_sample(self, values: Samples) -> Samples:
         by_sample: Samples = values[self._owner]
         return by_sample
+
+    @cached_property
+    def _owner(self) -> IntArray:
+        """Tap of each sample."""
+        owner = np.empty(self._times.size, dtype=np.int64)
+        for i, row in enumerate(self._sample_index.tolist()):
+            for channel in range(at.CHANNEL_COUNT):
+                owner[row[channel] : row[at.CHANNEL_COUNT + channel]] = i
+        return owner
 
     def outputs(
         self,
