@@ -7,6 +7,7 @@ left out (nan, None), so that nothing wrong is ever passed on as measured.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -26,6 +27,8 @@ LATEST_NS = 2**63 - 1
 """The year 2262."""
 OUT_OF_SCALE = 5.0
 """Factor between the module's own figure and its samples: no tap explains it, every wrong unit exceeds it."""
+TIME_AXES = 16
+"""Time axes that are kept, of some 160 kB: a map has up to three, and cells of one kind share theirs."""
 AT_REST = 20
 """One sample in so many, at either end: their median is where the part lay, and no noise is a slide [1]."""
 
@@ -218,6 +221,12 @@ class _CheckedHeader:
         return math.nan
 
 
+@lru_cache(maxsize=TIME_AXES)
+def _uniform_times(start_s: float, rate_hz: float, count: int) -> Samples:
+    """Sample times as `uniform_times` gives them, made once for all cycles that have the same."""
+    return uniform_times(start_s, rate_hz, count)
+
+
 def _channel(
     registers: RegisterMap, header: Mapping[str, Value], name: str, words: Words, faults: list[str]
 ) -> Channel | None:
@@ -233,7 +242,7 @@ def _channel(
         faults.append(f"{where}: no time axis, {name}_rate is {rate_hz:g} Hz, from {start_s:g} s on")
         return None
     values = np.asarray(register.decode(words), dtype=np.float64)
-    time_s = uniform_times(start_s, rate_hz, values.size)
+    time_s = _uniform_times(start_s, rate_hz, values.size)
     full_scale = register.full_scale
     least, most = values.min(), values.max()  # nan where one of the samples is
     if full_scale is not None and not (full_scale[0] < least and most < full_scale[1]):
