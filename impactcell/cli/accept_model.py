@@ -121,7 +121,7 @@ def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[st
 def _text(value: float | Sequence[float] | None) -> str:
     if value is None:
         return "none"
-    return f"{value:.5g}" if isinstance(value, float | int) else ", ".join(f"{v:.5g}" for v in value)
+    return f"{value:.6g}" if isinstance(value, float | int) else ", ".join(f"{v:.6g}" for v in value)
 
 
 def _tell(content: dict[str, Any], sentence: str, *, as_json: bool) -> None:

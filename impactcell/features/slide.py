@@ -67,7 +67,10 @@ def _rest_and_deceleration(
     first = int(times.searchsorted(separation_s, "right"))
     sliding = final - moved[first:] > 8.0 * sigma
     if np.count_nonzero(sliding) < 8:
-        raise NoStopError("the slide is too short for its position samples")
+        raise NoStopError(
+            "the slide after the last contact is too short for its position samples: where the actuator "
+            "caught up with the part, tap faster or with a shorter stroke"
+        )
     last = len(times) - 1 - int(sliding[::-1].argmax())
     slid = slice(first, last + 1)
     origin, span = separation_s, float(times[last] - separation_s)

@@ -21,7 +21,7 @@ GERMAN_PHASES: Final = {
 GERMAN_QUANTITIES: Final = {
     "time": "Zeit", "force": "Kraft", "position": "Position", "actuator": "Antrieb", "shot": "Stoß",
     "velocity": "Geschwindigkeit", "mass": "Masse", "direction": "Richtung", "batch": "Charge",
-    "ignored": "nichts",
+    "covariate": "Einflussgröße", "ignored": "nichts",
 }  # fmt: skip
 """What a column of a dropped file can mean."""
 GERMAN_STEPS: Final = {

@@ -15,6 +15,7 @@ from impactcell.german.findings import (
 from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
+from impactcell.web.texts.import_notes import page_note
 
 LEAST_WHOLE = 9.95
 """From here on two significant digits are a whole number."""
@@ -94,6 +95,10 @@ class Messages:
     def quantity(self, name: str) -> str:
         """Name what a column means."""
         return GERMAN_QUANTITIES.get(name, name) if self.language == "de" else name
+
+    def note(self, note: str) -> tuple[str, str]:
+        """Say what was noted of dropped files, after the language in which it is said."""
+        return page_note(note, self.language)
 
     def step(self, name: str) -> str:
         """Name a step of a study."""

@@ -2,14 +2,19 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+from impactcell.measurements import guess, make_campaign, read_tables
 from impactcell.prediction.equations import beyond_calibration
 from impactcell.web.cell_view import CellView
 from impactcell.web.interface import CellNews
+from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.reasons import german_reason
 from tests.snapshots import make_capture, make_snapshot
+from tests.unit.measurements.records import taps, write_logger_file
 from tests.unit.prediction.test_estimate import GOOD, MODEL
 
 ENGLISH = {
@@ -67,3 +72,17 @@ def test_a_card_has_both_languages() -> None:
     assert reasons["en"]["mu_s"] == "no position was recorded"
     assert reasons["de"]["mu_s"] == "Position wurde nicht aufgezeichnet"
     assert reasons["en"].keys() == reasons["de"].keys()
+
+
+def test_what_import_notes_of_taps_is_said_in_german(tmp_path: Path) -> None:
+    """Made by import itself, so that a note that is put otherwise is missed here."""
+    rng = np.random.default_rng(2)
+    write_logger_file(tmp_path / "tap.csv", taps((3000,), (18.9,))[0], rng)
+    tables = read_tables(tmp_path / "tap.csv")
+    mapping = guess(tables)
+    notes = [*make_campaign(tables, mapping).notes, *(item.why for item in mapping.assignments)]
+    assert len(notes) >= 7
+    said = [page_note(note, "de") for note in notes]
+    assert {language for language, _ in said} == {"de"}, said
+    assert ("de", "die Zeilen neben den Spalten sagen: Masse 18,9 kg, Geschwindigkeit 3000 mm/min") in said
+    assert not any("--" in page_note(note, language)[1] for note in notes for language in ("en", "de"))

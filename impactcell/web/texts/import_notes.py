@@ -1,0 +1,51 @@
+"""What `impactcell import` noted of dropped files, as the page says it: without its options."""
+
+import re
+from typing import Final
+
+OPTION: Final = re.compile(r" \(--[^)]*\)|; give --set .*")
+"""A way out on the command line; the page has a form for it."""
+GERMAN: Final = {
+    r"the lines beside the columns say: (.+)": r"die Zeilen neben den Spalten sagen: \1",
+    r"excitation tap: the force is a short push": "Anregung Stoß: die Kraft wirkt nur kurz",
+    r"excitation free_slide: no force was recorded": "Anregung freies Gleiten: keine Kraft aufgezeichnet",
+    r"excitation driven: the force acts all the time or both ways":
+        "Anregung durch eine Kraft, die ständig oder in beiden Richtungen wirkt",
+    r"force turned: it was negative in compression": "Kraft umgekehrt: sie war bei Druck negativ",
+    r"(\d+) records cut into (\d+) taps where the force begins anew":
+        r"\1 Aufzeichnungen in \2 Stöße geteilt, wo die Kraft neu beginnt",
+    r"t = 0 put where the force begins, in (\d+) taps?, good to a part of the sampling step of (\S+) ms; "
+    r"what lies before is kept as pretrigger":
+        r"t = 0 liegt, wo die Kraft beginnt (Stöße: \1), genau auf einen Teil des Abtastschritts von \2 ms; "
+        "was davor liegt, bleibt erhalten",
+    r"no stroke is stated: the actuator is taken to halt as it loses contact":
+        "kein Hub angegeben: der Antrieb gilt als angehalten, wenn der Kontakt endet",
+    r"no mass is stated: it is fitted, and only friction over mass is seen":
+        "keine Masse angegeben: sie wird angepasst, zu sehen ist nur Reibung durch Masse",
+    r"named '(.+)', unit fits": r"heißt „\1“, Einheit passt",
+    r"named '(.+)'": r"heißt „\1“",
+    r"the only column in (\S+)": r"einzige Spalte in \1",
+    r"none of the known quantities": "keine der bekannten Größen",
+}  # fmt: skip
+"""Notes and reasons as patterns; what is in none of them stays English."""
+WORDS: Final = {"mass": "Masse", "velocity": "Geschwindigkeit", "to": "bis"}
+"""What a note on the lines beside the columns is made of."""
+
+
+def page_note(note: str, language: str) -> tuple[str, str]:
+    """Give the language of a note on the page, and the note.
+
+    >>> page_note("force turned: it was negative in compression (--sign force=1 leaves it)", "en")
+    ('en', 'force turned: it was negative in compression')
+    >>> page_note("the lines beside the columns say: mass 12.5 to 15 kg", "de")
+    ('de', 'die Zeilen neben den Spalten sagen: Masse 12,5 bis 15 kg')
+    """
+    text = OPTION.sub("", note)
+    for pattern, german in GERMAN.items() if language == "de" else ():
+        match = re.fullmatch(pattern, text)
+        if match is not None:
+            told = match.expand(german)
+            if "sagen: " in german:
+                told = re.sub(r"\b(mass|velocity|to)\b", lambda word: WORDS[word[0]], told)
+            return "de", re.sub(r"(?<=\d)\.(?=\d)", ",", told)
+    return "en", text
