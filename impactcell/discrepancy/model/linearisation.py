@@ -11,6 +11,7 @@ import numpy as np
 
 from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model.shot_fits import gram_of_shots
 from impactcell.records import Samples
 
 UNSEEN_SHARE = 1e-8
@@ -19,27 +20,23 @@ UNSEEN_SHARE = 1e-8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearisedFit:
-    """Projected residuals and shared derivatives.
+    """Residuals and shared derivatives, each shot's own numbers projected out of them.
 
     Attributes
     ----------
     bounds : ndarray, shape (n + 1,)
-    residual : ndarray, shape (N,)
-    prior_residual : ndarray, shape (n,)
-        The row of each shot's friction factor.
-    basis : ndarray, shape (q, N)
-        Orthonormal, shot by shot, with `prior_basis`, shape (q, n).
-    shared, prior_shared : ndarray, shapes (p, N) and (p, n)
+    rows, prior_rows : ndarray, shapes (q + 1 + p, N) and (q + 1 + p, n)
+        Orthonormal basis of what the shots' own numbers can do, residual, and derivatives by the shared
+        coordinates; samples, and the row of each shot's friction factor.
+    own : int
+        q, how many numbers a shot has of its own.
     information : ndarray, shape (p, p)
     """
 
     bounds: np.ndarray
-    residual: Samples
-    prior_residual: Samples
-    basis: Samples
-    prior_basis: Samples
-    shared: Samples
-    prior_shared: Samples
+    rows: Samples
+    prior_rows: Samples
+    own: int
     information: Samples
     shot_information: Samples
     shot_gradient: Samples
@@ -99,18 +96,18 @@ def linearise(problem: Problem, fit: Fit) -> LinearisedFit:
         )
         basis.append(v * np.repeat(scale, np.diff(bounds)))
         prior_basis.append(pv * scale)
-    B, PB = np.array(basis), np.array(prior_basis)
     shared = model.shared_jacobian(state)
-    J, PJ = _project(shared, np.zeros((len(shared), problem.count)), B, PB, bounds)
-    r, pr = _project(fit.residual[None], (-fit.shot_parameters.log_factor / fit.spread)[None], B, PB, bounds)
-    p = len(J)
-    H = np.empty((problem.count, p, p))
-    u = np.empty((problem.count, p))
-    for i in range(problem.count):
-        part = problem.shots.samples_of(i)
-        H[i] = J[:, part] @ J[:, part].T + np.outer(PJ[:, i], PJ[:, i])
-        u[i] = J[:, part] @ r[0, part] + PJ[:, i] * pr[0, i]
-    return LinearisedFit(bounds, r[0], pr[0], B, PB, J, PJ, H.sum(0), H, u)
+    rows, priors = _project(
+        np.vstack([fit.residual, shared]),
+        np.vstack([-fit.shot_parameters.log_factor / fit.spread, np.zeros((len(shared), problem.count))]),
+        (basis, prior_basis),
+        bounds,
+    )
+    products = gram_of_shots(rows, bounds) + np.einsum("ai,bi->iab", priors, priors)
+    H, u = products[:, 1:, 1:], products[:, 1:, 0]
+    return LinearisedFit(
+        bounds, np.vstack([*basis, rows]), np.vstack([*prior_basis, priors]), len(basis), H.sum(0), H, u
+    )
 
 
 def unmet_gradient(problem: Problem, fit: Fit, linearisation: LinearisedFit) -> Samples:
@@ -131,12 +128,11 @@ def _shot_products(a: Samples, b: Samples, bounds: np.ndarray) -> Samples:
 
 
 def _project(
-    rows: Samples, prior: Samples, basis: Samples, prior_basis: Samples, bounds: np.ndarray
+    rows: Samples, prior: Samples, basis: tuple[list[Samples], list[Samples]], bounds: np.ndarray
 ) -> tuple[Samples, Samples]:
-    rows, prior = rows.copy(), prior.copy()
     sizes = np.diff(bounds)
     for i in range(len(rows)):
-        for b, pb in zip(basis, prior_basis, strict=True):
+        for b, pb in zip(*basis, strict=True):
             along = _shot_products(rows[i], b, bounds) + prior[i] * pb
             rows[i] -= np.repeat(along, sizes) * b
             prior[i] -= along * pb
@@ -193,22 +189,15 @@ def direction_products(
     prior : ndarray, shape (n,), optional
         Change of the factors' rows.
     """
-    n = len(linearisation.bounds) - 1
-    below = np.zeros(n) if prior is None else prior
-    whole = _shot_products(direction, direction, linearisation.bounds) + below**2
-    rows, priors = _project(
-        direction[None], below[None], linearisation.basis, linearisation.prior_basis, linearisation.bounds
-    )
-    d, below = rows[0], priors[0]
-    residual = (
-        _shot_products(d, linearisation.residual, linearisation.bounds) + below * linearisation.prior_residual
-    )
-    shared = (
-        np.add.reduceat(d * linearisation.shared, linearisation.bounds[:-1], axis=1)
-        + below * linearisation.prior_shared
-    )
-    square = _shot_products(d, d, linearisation.bounds) + below**2
-    return DirectionProducts(residual[:, None], shared.T[:, None, :], square[:, None], whole[:, None])
+    bounds, own = linearisation.bounds, linearisation.own
+    below = np.zeros(len(bounds) - 1) if prior is None else prior
+    parts = zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)
+    along = np.array([linearisation.rows[:, i:j] @ direction[i:j] for i, j in parts])
+    along += (linearisation.prior_rows * below).T
+    whole = _shot_products(direction, direction, bounds) + below**2
+    # Residual and derivatives are at right angles to the basis: only the length has a part in it to lose.
+    square = whole - (along[:, :own] ** 2).sum(1)
+    return DirectionProducts(along[:, own, None], along[:, None, own + 1 :], square[:, None], whole[:, None])
 
 
 def concatenate_products(parts: list[DirectionProducts]) -> DirectionProducts:

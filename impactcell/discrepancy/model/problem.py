@@ -160,7 +160,7 @@ class Problem:
     def residual(self, theta: Samples, shot_parameters: ShotParameters) -> Samples:
         """Whitened residuals, shape (N,)."""
         predicted = self.forward.samples(self.effects, self.plant_parameters(theta), shot_parameters)
-        return self.shots.whiten(self.shots.values - predicted)
+        return self.shots.whiten(np.subtract(self.shots.values, predicted, out=predicted))
 
     def evaluate(self, theta: Samples, shot_parameters: ShotParameters, spread: float) -> FitState:
         """Evaluate a state of a fit."""
@@ -271,11 +271,12 @@ def remove_jumps(change: Samples) -> Samples:
     finite: there the step came to where the plant has no answer.
     """
     size = np.abs(change)
-    if not np.isfinite(size).all():
+    largest = float(size.max(initial=0.0))
+    if largest <= 1.0:
+        return change
+    if not math.isfinite(largest):
         change[~np.isfinite(size)] = 0.0
         size = np.abs(change)
-    if not (size > 1.0).any():
-        return change
     beside = np.maximum(size[:-2], size[2:])
     change[1:-1][size[1:-1] > JUMP_FACTOR * beside + 1.0] = 0.0
     return change

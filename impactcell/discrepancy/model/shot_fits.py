@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from impactcell.discrepancy.data import IndexArray
 from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
 from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.records import Samples
@@ -146,9 +147,7 @@ def normal_equations(
         (Schur complement), so that a step is H^-1 g; and the shots' own blocks, their gradients alike.
     """
     q, p = len(Jl), len(J)
-    rows = np.vstack([Jl, J, state.residual])
-    samples_of = map(problem.shots.samples_of, range(problem.count))
-    gram = np.array([rows[:, part] @ rows[:, part].T for part in samples_of])
+    gram = gram_of_shots(np.vstack([Jl, J, state.residual]), problem.shots.bounds)
     A, C, gl = gram[:, :q, :q].copy(), gram[:, :q, q : q + p], gram[:, :q, -1].copy()
     whole = gram[:, q:, q:].sum(0)
     H, g = whole[:p, :p], whole[:p, -1]
@@ -157,6 +156,13 @@ def normal_equations(
     diagonal = np.einsum("iqq->iq", A)
     A[:, np.arange(q), np.arange(q)] += RIDGE * diagonal + (diagonal == 0.0)
     inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
-    H = H - np.einsum("iqa,iqr,irb->ab", C, inverse, C, optimize=True)
-    g = g - np.einsum("iqa,iqr,ir->a", C, inverse, gl, optimize=True)
+    eliminated = (inverse @ C).reshape(problem.count * q, p).T
+    H = H - eliminated @ C.reshape(problem.count * q, p)
+    g = g - eliminated @ gl.ravel()
     return H, g, ShotNormalEquations(inverse, C, gl)
+
+
+def gram_of_shots(rows: Samples, bounds: IndexArray) -> Samples:
+    """Products of rows, shape (r, N), with each other, shot by shot, shape (n, r, r)."""
+    parts = np.split(rows, bounds[1:-1], axis=1)
+    return np.array([part @ part.T for part in parts])

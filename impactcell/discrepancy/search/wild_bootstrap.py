@@ -62,8 +62,9 @@ def wild_bootstrap(
     W = rng.integers(0, 2, size=(draws, n)) * 2.0 - 1.0
     inverse = np.linalg.pinv(linearisation.information, rcond=1e-13, hermitian=True)
     shifts = W @ linearisation.shot_gradient @ inverse
+    shift_products = np.einsum("da,db->dab", shifts, shifts).reshape(draws, -1)
     sides = np.zeros(Q) if one_sided is None else one_sided
-    statistics = np.zeros((draws + 1, count))
+    statistics = np.zeros((draws + 1, count), order="F")
     for first in range(0, Q, DIRECTIONS_PER_BATCH):
         part = slice(first, min(first + DIRECTIONS_PER_BATCH, Q))
         e, K = scores.each[:, part], scores.leverage[:, part]
@@ -71,8 +72,8 @@ def wild_bootstrap(
         V = np.broadcast_to((e**2).sum(0), U.shape).copy()
         for a in range(K.shape[2]):
             V[1:] -= 2.0 * shifts[:, a : a + 1] * (W @ (e * K[:, :, a]))
-            for b in range(K.shape[2]):
-                V[1:] += shifts[:, a : a + 1] * shifts[:, b : b + 1] * (K[:, :, a] * K[:, :, b]).sum(0)
+        of_shots = K.swapaxes(0, 1)
+        V[1:] += shift_products @ (of_shots.swapaxes(1, 2) @ of_shots).reshape(e.shape[1], -1).T
         safe = np.where(V > 1e-300, V, 1.0)
         T = np.where(V > 1e-300, U**2 / safe, 0.0)
         side = sides[part]
