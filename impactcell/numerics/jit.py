@@ -9,6 +9,7 @@ import inspect
 import re
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Final, ParamSpec, Protocol, TypeVar, cast
 
@@ -200,6 +201,19 @@ def address(law: Law) -> int:
         signature = double(double, double, double, double, pointer_to(double))
         _POINTERS[law] = cfunc(signature, cache=_can_cache(law))(law)
     return int(_POINTERS[law].address)
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """Machine code that was not made by numba, and what keeps it in memory."""
+
+    address: int
+    owner: object
+
+
+def place_at(law: Law, where: int, owner: object) -> None:
+    """Say where the machine code of a law lies that somebody else has compiled, and what keeps it there."""
+    _POINTERS[law] = _Placed(where, owner)
 
 
 @intrinsic

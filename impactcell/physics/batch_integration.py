@@ -39,9 +39,9 @@ def sample_taps(
     Returns
     -------
     ndarray, shape (samples,)
-        Not finite from where a tap was given up for `MAX_STEPS` or `MAX_EVENTS`.
+        Not finite from where a tap was given up for `MAX_STEPS` or `MAX_EVENTS`; 0 of no tap's.
     """
-    samples = np.empty(times.size)
+    samples = np.zeros(times.size)
     outputs = np.empty((taps.parameters.shape[0], at.OUTPUT_COUNT))
     asked = SampleArrays(sample_index.copy(), times, samples, NO_KINDS, NO_SAMPLES)
     integrate_taps(taps[:], asked[:], outputs, horizon_s, at.TO_LAST_SAMPLE)

@@ -63,6 +63,15 @@ def tensor_spline(u: float, w: float, p: FloatPointer, spans: int) -> float:
     return total
 
 
+def spline_support(lower: float, upper: float, spans: int) -> tuple[Samples, Samples]:
+    """Give both ends of where each B-spline is not zero, shape (spans + 3,); infinite where it goes on."""
+    first = np.arange(spans + 3) - 3
+    width = (upper - lower) / spans
+    begin = np.where(first < 0, -np.inf, lower + first * width)
+    end = np.where(first + 4 > spans, np.inf, lower + (first + 4) * width)
+    return begin, end
+
+
 def tensor_basis(points: Samples, ends: ArrayLike, spans: int) -> Samples:
     """Values of the products of `tensor_spline`, shape (n, 4 (spans + 3)), at points of shape (n, 2)."""
     (u_low, u_high), (w_low, w_high) = np.asarray(ends, dtype=np.float64)

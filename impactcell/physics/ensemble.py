@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.errors import PhysicsError
 from impactcell.numerics.jit import IntArray
@@ -184,19 +185,25 @@ class Ensemble:
         mass_kg: Samples | None = None,
         initial_speed_m_s: Samples | None = None,
         onset_s: Samples | None = None,
+        only: NDArray[np.bool_] | None = None,
     ) -> Samples:
         """Return the samples of `traces` in one row, all taps and channels end to end.
 
         `onset_s`, shape (n,): when first contact was, by the clock of the sample times; 0 unless given. No
-        sample may lie before it.
+        sample may lie before it. `only`, shape (n,): taps to integrate, where nothing drives them; samples of
+        the others are 0.
         """
         parameters = self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s)
-        return self._sample(parameters, onset_s)
+        return self._sample(parameters, onset_s, only)
 
-    def _sample(self, parameters: Samples, onset_s: Samples | None = None) -> Samples:
-        taps = TapArrays(parameters, self._table.laws, self._drives, self._drive_ends)
+    def _sample(
+        self, parameters: Samples, onset_s: Samples | None = None, only: NDArray[np.bool_] | None = None
+    ) -> Samples:
         times = self._times if onset_s is None else self._times - self._each_sample(onset_s)
-        return sample_taps(taps, self._sample_index, times)
+        if only is None or self._drives.size:
+            taps = TapArrays(parameters, self._table.laws, self._drives, self._drive_ends)
+            return sample_taps(taps, self._sample_index, times)
+        return sample_taps(undriven(parameters[only], self._table.laws), self._sample_index[only], times)
 
     def _split(self, out: Samples) -> Traces:
         force, position, actuator, velocity = (out[..., channel] for channel in self._channels)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.data import prepare, sensor_noise, shot_set, split_held_out
+from impactcell.discrepancy.laws.covariates import visited
 from impactcell.discrepancy.laws.finding import settled
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
+from impactcell.discrepancy.laws.term_start import TermStart
 from impactcell.discrepancy.model import (
     Constraints,
     Fit,
@@ -17,7 +19,9 @@ from impactcell.discrepancy.model import (
     fit_nominal,
     refit_shot_parameters,
 )
+from impactcell.discrepancy.model.reach import shots_reached
 from impactcell.physics.bspline import spline_basis
+from impactcell.physics.free_forms import FINER
 from tests.discrepancy.study import Job, campaign
 
 
@@ -45,6 +49,24 @@ def test_a_held_parameter_stays_and_is_no_coordinate() -> None:
     parameters = held.plant_parameters(nominal.theta)
     assert parameters[held.forward.names(("viscous_friction",)).index(name)] == 33.0
     assert held.select(np.array([0, 1])).constraints is held.constraints
+
+
+@pytest.mark.parametrize("place", ["free_friction_over_position", "free_force_over_position"])
+def test_coefficients_that_a_shot_does_not_come_to_have_no_derivative_there(place: str) -> None:
+    problem, nominal, _ = _fitted("position_dependent_friction", shots=10)
+    form = FINER[place]
+    span = visited(problem, nominal, form)
+    assert span is not None
+    start = TermStart.at(problem, nominal, form, span)
+    coefficients = np.random.default_rng(1).normal(0.0, 0.3, len(form.coefficients))
+    theta = np.append(nominal.theta, coefficients)
+    state = start.problem.evaluate(theta, nominal.shot_parameters, nominal.spread)
+    constraints = start.problem.constraints
+    reached = shots_reached(problem.shots, constraints, start.problem.coordinates, state.residual)
+    assert reached is not None
+    assert 0.1 < reached.mean() < 0.6
+    everywhere = start.problem.constrained(start.problem.effects, replace(constraints, supports=()))
+    assert np.array_equal(start.problem.shared_jacobian(state), everywhere.shared_jacobian(state))
 
 
 def test_a_penalty_draws_towards_zero_as_its_normal_equations_say() -> None:

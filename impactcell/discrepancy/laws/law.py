@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.effect_file import effect_file
 from impactcell.discrepancy.laws.grammar import WAVES, Shape, evaluate, name
+from impactcell.numerics.formula import compile_formula
 from impactcell.physics import Effect, LawKind
 from impactcell.physics.effects import add_effect
 from impactcell.physics.free_column_forms import printed
@@ -120,6 +121,8 @@ def _run(text: str, identifier: str) -> Effect:
     effect = space["EFFECT"]
     if not isinstance(effect, Effect):
         raise TypeError(identifier)
+    for law in effect.laws.values():
+        compile_formula(text, law)
     return effect
 
 

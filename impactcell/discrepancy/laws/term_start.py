@@ -1,6 +1,6 @@
 """Where fits of a model with a free-form term begin, whatever its roughness weighs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,11 @@ from impactcell.discrepancy.model import (
     FitState,
     Problem,
     Roughness,
+    Support,
     fit,
     normal_equations,
 )
+from impactcell.physics.bspline import spline_support
 from impactcell.physics.free_form import ACROSS, FreeForm
 from impactcell.physics.free_forms import LOWER, UPPER
 from impactcell.physics.free_pair_forms import SECOND_LOWER, SECOND_UPPER
@@ -59,7 +61,8 @@ class TermStart:
         if span.second is not None:
             held[f"{identifier}.{SECOND_LOWER}"] = span.second.lower
             held[f"{identifier}.{SECOND_UPPER}"] = span.second.upper
-        constraints = Constraints(held, problem.constraints.roughness)
+        given = problem.constraints
+        constraints = Constraints(held, given.roughness, (*given.supports, *_supports(form, span)))
         bare = problem.constrained((*base.effects, identifier), constraints)
         theta = np.concatenate([base.theta, np.zeros(count)])
         state = bare.evaluate(theta, base.shot_parameters, base.spread)
@@ -80,7 +83,7 @@ class TermStart:
         rows = np.vstack([np.sqrt(smoothness * scale) * differences, np.sqrt(RIDGE * scale) * np.eye(count)])
         given = self.problem.constraints
         roughness = (*given.roughness, Roughness(identifier, self.form.coefficients, rows))
-        constraints = Constraints(given.held, roughness)
+        constraints = replace(given, roughness=roughness)
         return self.problem.constrained(self.problem.effects, constraints)
 
     def fit(self, smoothness: float) -> tuple[Problem, Fit]:
@@ -88,6 +91,15 @@ class TermStart:
         extended, state = self.weighed(smoothness), self.state
         fitted = fit(extended, state.theta, state.shot_parameters, spread=state.spread, most_steps=MOST_STEPS)
         return extended, fitted
+
+
+def _supports(form: FreeForm, span: Visited) -> tuple[Support, ...]:
+    """Where a term's coefficients act, if that is a matter of the position on the table."""
+    if form.covariate != "position" or form.is_between_shots:
+        return ()
+    begin, end = spline_support(span.lower, span.upper, form.spans)
+    rows = ACROSS if form.second else 1
+    return (Support(form.effect.identifier, form.coefficients, np.tile(begin, rows), np.tile(end, rows)),)
 
 
 def _second_differences(form: FreeForm) -> Samples:

@@ -1,7 +1,7 @@
 """A set of shots fitted by the plant: predictions, least squares, derivatives, intervals."""
 
 from impactcell.discrepancy.model.block_selection import decided_blocks, usable_blocks
-from impactcell.discrepancy.model.constraints import Constraints, Roughness
+from impactcell.discrepancy.model.constraints import Constraints, Roughness, Support
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, SharedError, estimate_parameters
 from impactcell.discrepancy.model.least_squares import (
@@ -46,6 +46,7 @@ __all__ = [
     "Scores",
     "SharedError",
     "SplitFits",
+    "Support",
     "concatenate_products",
     "decided_blocks",
     "direction_products",

@@ -1,5 +1,6 @@
-"""What a fit is told beside its data: parameters that are held, and how rough a free-form term may be."""
+"""What a fit is told beside its data: what is held, how rough a free-form term may be, where it acts."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -28,11 +29,30 @@ class Roughness:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Support:
+    """Where on the table the coefficients of one effect act: elsewhere they change nothing.
+
+    Attributes
+    ----------
+    effect : str
+    parameters : tuple of str
+    begin_m, end_m : ndarray, shape (len(parameters),)
+        Positions between which each of them acts.
+    """
+
+    effect: str
+    parameters: tuple[str, ...]
+    begin_m: Samples
+    end_m: Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Constraints:
-    """Parameters that do not move, by name as the plant has them, and penalties."""
+    """Parameters that do not move, by name as the plant has them, penalties, and where coefficients act."""
 
     held: Mapping[str, float] = field(default_factory=dict)
     roughness: tuple[Roughness, ...] = ()
+    supports: tuple[Support, ...] = ()
 
     def free(self, coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
         """Coordinates that a fit may move."""
@@ -54,6 +74,18 @@ class Constraints:
                 columns = [places[term.effect, name] for name in term.parameters]
                 matrix[np.ix_(columns, columns)] += term.rows.T @ term.rows
         return matrix
+
+    def acts_between(self, coordinates: tuple[Coordinate, ...]) -> tuple[Samples, Samples]:
+        """Positions on the table between which each coordinate acts [m], shape (p,) each; else infinite."""
+        ends = {
+            (support.effect, name): pair
+            for support in self.supports
+            for name, *pair in zip(support.parameters, support.begin_m, support.end_m, strict=True)
+        }
+        everywhere = [-math.inf, math.inf]
+        pairs = [ends.get((item.effect, item.parameter), everywhere) for item in coordinates]
+        begin, end = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
+        return begin, end
 
 
 UNCONSTRAINED = Constraints()

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.discrepancy.data import IndexArray, ShotSet, Trajectory
 from impactcell.discrepancy.model.shot_parameters import ShotParameters
@@ -63,10 +64,14 @@ class ForwardModel:
         return self._ensemble.with_effects(effects).names
 
     def samples(
-        self, effects: tuple[str, ...], parameters: Samples, shot_parameters: ShotParameters
+        self,
+        effects: tuple[str, ...],
+        parameters: Samples,
+        shot_parameters: ShotParameters,
+        only: NDArray[np.bool_] | None = None,
     ) -> Samples:
-        """Predicted samples, shape (N,); not finite where the plant has no answer."""
-        out = _sample(self._ensemble.with_effects(effects), parameters, shot_parameters)
+        """Predicted samples, shape (N,), of all shots or some; not finite where the plant has no answer."""
+        out = _sample(self._ensemble.with_effects(effects), parameters, shot_parameters, only)
         if shot_parameters.shift_m.any():
             out += np.repeat(shot_parameters.shift_m, np.diff(self.shots.bounds))
         return out
@@ -101,11 +106,17 @@ class ForwardModel:
         return order
 
 
-def _sample(ensemble: Ensemble, parameters: Samples, shot_parameters: ShotParameters) -> Samples:
+def _sample(
+    ensemble: Ensemble,
+    parameters: Samples,
+    shot_parameters: ShotParameters,
+    only: NDArray[np.bool_] | None = None,
+) -> Samples:
     return ensemble.samples(
         parameters,
         np.exp(shot_parameters.log_factor),
         mass_kg=shot_parameters.mass_kg,
         initial_speed_m_s=shot_parameters.speed_m_s,
         onset_s=shot_parameters.onset_s if shot_parameters.onset_s.any() else None,
+        only=only,
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.discrepancy.data import IndexArray, ShotSet
 from impactcell.discrepancy.model.constraints import UNCONSTRAINED, Constraints
@@ -18,6 +19,7 @@ from impactcell.discrepancy.model.parameters import (
     parameter_columns,
     plant_parameters,
 )
+from impactcell.discrepancy.model.reach import shots_reached
 from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.physics import LawKind
 from impactcell.physics.effects import find_effect
@@ -157,9 +159,12 @@ class Problem:
         """Penalty of a free-form term's roughness, in squared standard deviations."""
         return float(theta @ self.penalty_matrix @ theta)
 
-    def residual(self, theta: Samples, shot_parameters: ShotParameters) -> Samples:
-        """Whitened residuals, shape (N,)."""
-        predicted = self.forward.samples(self.effects, self.plant_parameters(theta), shot_parameters)
+    def residual(
+        self, theta: Samples, shot_parameters: ShotParameters, only: NDArray[np.bool_] | None = None
+    ) -> Samples:
+        """Whitened residuals, shape (N,), of all shots or some."""
+        parameters = self.plant_parameters(theta)
+        predicted = self.forward.samples(self.effects, parameters, shot_parameters, only)
         return self.shots.whiten(np.subtract(self.shots.values, predicted, out=predicted))
 
     def evaluate(self, theta: Samples, shot_parameters: ShotParameters, spread: float) -> FitState:
@@ -181,6 +186,7 @@ class Problem:
         all friction there is, it is that by the logarithm of mu_k as well.
         """
         jacobian = np.empty((len(self.coordinates), state.residual.size))
+        reached = shots_reached(self.shots, self.constraints, self.coordinates, state.residual)
         for column, coordinate in enumerate(self.coordinates):
             if by_factor is not None and self._is_common_factor(coordinate, state):
                 jacobian[column] = by_factor
@@ -192,7 +198,10 @@ class Problem:
                 step = -step
             moved = state.theta.copy()
             moved[column] += step
-            change = state.residual - self.residual(moved, state.shot_parameters)
+            only = None if reached is None else reached[column]
+            change = state.residual - self.residual(moved, state.shot_parameters, only)
+            if only is not None:
+                change[~np.repeat(only, self.sizes)] = 0.0
             jacobian[column] = remove_jumps(change) / step
         return jacobian
 
