@@ -194,12 +194,13 @@ def address(law: Law) -> int:
     """Compile `law` to a C function of fixed signature and return where it lies.
 
     Compiled code calls it through `invoke`, so that code which combines laws is compiled once and not once
-    for each combination. Cached on disk like everything else.
+    for each combination. A division by zero is infinite or not a number, as everywhere in compiled code: an
+    exception could not leave such a function. Cached on disk like everything else.
     """
     if law not in _POINTERS:
         double = types.float64
         signature = double(double, double, double, double, pointer_to(double))
-        _POINTERS[law] = cfunc(signature, cache=_can_cache(law))(law)
+        _POINTERS[law] = cfunc(signature, cache=_can_cache(law), error_model="numpy")(law)
     return int(_POINTERS[law].address)
 
 

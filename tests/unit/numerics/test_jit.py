@@ -1,5 +1,7 @@
 """Machine code on disk is not used again once a source it was made of has changed."""
 
+import ctypes
+import math
 import os
 import subprocess
 import sys
@@ -127,3 +129,17 @@ def test_without_a_place_for_a_cache_it_still_runs(tmp_path: Path) -> None:
     )
     # A function typed in on the command line has no file beside which anything could be kept.
     assert done.stdout.split() == ["2.0", "False"]
+
+
+def test_a_law_that_divides_by_zero_gives_infinity_and_writes_nothing(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    names: dict[str, jit.Law] = {}
+    exec(
+        "def law(a, b, c, d, parameters):\n    return 1.0 - 2.0 / a\n", names
+    )  # has no file, and so no cache
+    number = ctypes.c_double
+    law = ctypes.CFUNCTYPE(number, *[number] * 4, ctypes.POINTER(number))(jit.address(names["law"]))
+    assert law(0.0, 0.0, 0.0, 0.0, (number * 1)()) == -math.inf
+    assert law(4.0, 0.0, 0.0, 0.0, (number * 1)()) == 0.5
+    assert capfd.readouterr().err == ""
