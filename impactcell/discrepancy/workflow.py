@@ -188,7 +188,7 @@ def investigate(
         held_problem = _problem(prepared, floor, held_out)
         missing = missing or missing_shots(len(training), len(held_out))
     opened = OpenedShots(prepared, floor, (training, held_out), (problem, held_problem), seed)
-    outcome = opened.validate(NestedModels(nominal) if missing else nested)
+    outcome = opened.validate(NestedModels({frozenset(): nominal}) if missing else nested)
     search_evidence = selection
     if not missing and len(outcome.validation.of_effects) < len(selection.added):
         selection, outcome = _confirmed_rival(context, selection, opened, outcome)

@@ -1,6 +1,6 @@
 """What the discrepancy workflow found, said in German from its `result.json`, whose headline is English."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from impactcell.german.effects import GERMAN_EFFECTS
@@ -60,6 +60,12 @@ def german_effect(identifier: str) -> str:
     return GERMAN_EFFECTS.get(identifier, (identifier.replace("_", " "),))[0]
 
 
+def enumerated(names: Sequence[str], conjunction: str) -> str:
+    """Names in a row, as both languages write them: a, b and c."""
+    *first, last = names
+    return f"{', '.join(first)} {conjunction} {last}" if first else last
+
+
 def german_headline(result: Mapping[str, Any], decimal_point: str = ",") -> str:
     """Say the outcome in German; as it was said where its format does not have what it takes."""
     gap = result.get("gap", {}).get("held_out")
@@ -74,7 +80,7 @@ def german_headline(result: Mapping[str, Any], decimal_point: str = ",") -> str:
         case "unknown":
             said = f"Kein bekannter Effekt erklärt die Abweichung von {before}{_where(result)}."
             if result.get("unconfirmed"):
-                names = " und ".join(map(german_effect, result["unconfirmed"]))
+                names = enumerated([*map(german_effect, result["unconfirmed"])], "und")
                 said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht."
             said += _outdone(result)
         case _:
@@ -108,7 +114,7 @@ def _missing(result: Mapping[str, Any]) -> str:
         for effect in result["effects"]
     ]
     is_tied = any(effect.get("tied_with") for effect in result["effects"])
-    return " und ".join(groups) + (" (diese Messungen unterscheiden es nicht)" if is_tied else "")
+    return enumerated(groups, "und") + (" (diese Messungen unterscheiden es nicht)" if is_tied else "")
 
 
 def _where(result: Mapping[str, Any]) -> str:

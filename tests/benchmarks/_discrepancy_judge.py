@@ -3,15 +3,7 @@
 import math
 from typing import Any
 
-from tests.benchmarks._discrepancy_plan import CONFOUNDED
-
-EQUIVALENT = (
-    CONFOUNDED,
-    frozenset({"surface_tilt", "direction_asymmetry"}),
-    frozenset({"friction_drift", "batch_shift"}),
-    frozenset({"force_sensor_lag", "channel_skew"}),
-)
-"""As impactcell/discrepancy/README.md declares them: one may be named where the library lacks the other."""
+from tests.benchmarks._discrepancy_plan import CONFOUNDED, EQUIVALENT
 
 CONTACT = frozenset({"preload", "loading", "unloading"})
 MOVING = frozenset({"loading", "unloading", "free_slide"})
@@ -62,7 +54,7 @@ def judged(row: dict[str, Any]) -> str:
 
 
 def _matched(groups: list[set[str]], targets: set[str]) -> bool:
-    """Whether groups and targets can be paired one to one; there are two of each at most."""
+    """Whether groups and targets can be paired one to one."""
     if len(groups) != len(targets):
         return False
     if not groups:

@@ -20,6 +20,13 @@ from tests.discrepancy import study
 from tests.discrepancy.study import Job, recorded, scenario
 
 CONFOUNDED = frozenset({"mass_error", "force_sensor_gain"})
+EQUIVALENT = (
+    CONFOUNDED,
+    frozenset({"surface_tilt", "direction_asymmetry"}),
+    frozenset({"friction_drift", "batch_shift"}),
+    frozenset({"force_sensor_lag", "channel_skew"}),
+)
+"""As impactcell/discrepancy/README.md declares them: one may be named where the library lacks the other."""
 VISIBLE = (2.3, 6.0)
 SUBTLE = (1.27, 1.43)
 FIRST_SHOTS = 24
@@ -114,10 +121,15 @@ def _two(count: int) -> Iterator[Job]:
 
 
 def _three(count: int) -> Iterator[Job]:
-    for seed in range(70_000, 70_000 + count):
-        names = sorted(set(LAWS) - {"mass_error"})  # the exact confound of force_sensor_gain
-        chosen = np.random.default_rng([seed, 8]).choice(names, 3, replace=False)
-        yield _like("three", tuple(sorted(str(name) for name in chosen)), seed, VISIBLE)
+    """Three effects, no two of which are declared to be equivalent."""
+    trios = [
+        trio
+        for trio in itertools.combinations(sorted(LAWS), 3)
+        if not any(len(group & set(trio)) > 1 for group in EQUIVALENT)
+    ]
+    chosen = np.random.default_rng(70).permutation(len(trios))[:count]
+    for place, trio in enumerate(chosen):
+        yield _like("three", trios[int(trio)], 70_000 + place, VISIBLE)
 
 
 def _none(count: int) -> Iterator[Job]:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from impactcell.discrepancy.report import figures, sentences
+from impactcell.german.findings import german_headline
 
 
 def test_a_figure_names_the_setting_of_its_shot() -> None:
@@ -34,6 +35,41 @@ def test_a_tie_and_a_name_are_told_as_what_they_are(ties: tuple[str, ...]) -> No
     said = sentences._conclusion(result)
     assert ("cannot tell apart" in said) is bool(ties)
     assert ("with it the held-out gap falls from 3.00 to 1.00" in said) is not bool(ties)
+
+
+@pytest.mark.parametrize(
+    ("effects", "english", "german"),
+    [
+        (["adhesion"], "Missing: adhesion; with it the", "Es fehlt: Haften beim Trennen;"),
+        (
+            ["adhesion", "surface_tilt"],
+            "adhesion and surface tilt; with them",
+            "Haften beim Trennen und Neigung des Tisches;",
+        ),
+        (
+            ["adhesion", "surface_tilt", "hertz_contact"],
+            "adhesion, surface tilt and hertz contact; with them the held-out gap falls from 3.00 to 1.00",
+            "Haften beim Trennen, Neigung des Tisches und Hertzscher Kontakt; damit fällt die Abweichung",
+        ),
+    ],
+)
+def test_effects_are_told_in_a_row(effects: list[str], english: str, german: str) -> None:
+    result: Any = SimpleNamespace(
+        validation=SimpleNamespace(gap_before=3.0, gap_after=1.0),
+        conclusion=SimpleNamespace(
+            verdict="named",
+            established=tuple(effects),
+            ties=dict.fromkeys(effects, ()),
+            remaining=SimpleNamespace(explained=True),
+        ),
+    )
+    assert english in sentences._conclusion(result)
+    document = {
+        "verdict": "named",
+        "effects": [{"effect": effect} for effect in effects],
+        "gap": {"held_out": {"before": 3.0, "after": 1.0}},
+    }
+    assert german in german_headline(document)
 
 
 @pytest.mark.parametrize(

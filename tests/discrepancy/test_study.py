@@ -14,11 +14,13 @@ from impactcell.physics.effects import LIBRARY
 from simulator.effects import LIBRARY as LAWS
 from simulator.effects import UNLISTED, check
 from tests.benchmarks import _discrepancy_judge as judge
-from tests.benchmarks._discrepancy_plan import CONFOUNDED, calibrated, jobs
+from tests.benchmarks._discrepancy_plan import CONFOUNDED, EQUIVALENT, calibrated, jobs
 from tests.benchmarks._discrepancy_rivals import answered, generous, subset
 from tests.benchmarks._discrepancy_run import covered, intervals, rows, study
 from tests.benchmarks._discrepancy_sindy import selected
 from tests.discrepancy.study import Job, hidden, scenario, strengths
+
+THREE, TIED = ["adhesion", "mass_error", "surface_tilt"], {"hertz_contact": ["mass_error"]}
 
 
 def row(
@@ -44,6 +46,11 @@ def test_the_plan_is_large_enough_and_balanced_wherever_it_stops() -> None:
     in_its_own_study = {"wandering_force", "wedge_drag"}
     assert {job.hidden[0] for job in plan if job.kind == "outside"} == set(UNLISTED) - in_its_own_study
     assert all(set(job.hidden) != CONFOUNDED for job in plan)
+    threes = [job for job in jobs(three=80) if job.kind == "three"]
+    assert len({job.hidden for job in threes}) == 80
+    assert all(len(set(job.hidden)) == 3 for job in threes)
+    assert all(len(group & set(job.hidden)) < 2 for job in threes for group in EQUIVALENT)
+    assert [job for job in jobs(three=80) if job.kind != "three"] == plan
     whole = Counter(job.kind for job in plan)
     for part in (0.1, 0.3, 0.7):
         first = Counter(job.kind for job in plan[: round(part * len(plan))])
@@ -87,6 +94,9 @@ def test_a_strength_is_calibrated_to_the_gap_that_theory_gives() -> None:
         (row("unknown", ["force_sensor_lag"]), "unknown, but"),
         (row("named", ["adhesion"], hidden=["adhesion", "surface_tilt"]), "partial"),
         (row("named", ["surface_tilt", "adhesion"], hidden=["adhesion", "surface_tilt"]), "right"),
+        (row("named", ["surface_tilt", "adhesion"], hidden=THREE), "partial"),
+        (row("named", ["surface_tilt", "adhesion", "mass_error"], hidden=THREE), "right"),
+        (row("tied", ["surface_tilt", "hertz_contact", "adhesion"], TIED, hidden=THREE), "tied"),
         (
             row("named", ["channel_skew"], hidden=["force_sensor_lag"], removed="force_sensor_lag"),
             "equivalent",

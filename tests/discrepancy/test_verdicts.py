@@ -97,6 +97,12 @@ def blended(found: DiscrepancyResult, share: float) -> Fit:
     return replace(found.held_final, residual=residual)
 
 
+def nested(nominal: Any, **models: Any) -> NestedModels:
+    """Models by the letters of their effects; the last has all of them, in the order in which they came."""
+    by_effects = {frozenset(effects): model for effects, model in models.items()}
+    return NestedModels({frozenset(): nominal, **by_effects}, tuple([*models][-1]))
+
+
 def test_a_gap_that_rises_or_hardly_falls_confirms_nothing(viscous: DiscrepancyResult) -> None:
     measure, nominal = measure_of(viscous), viscous.held_nominal
     assert measure.change(nominal, viscous.held_final).is_real()
@@ -116,37 +122,49 @@ def test_traces_that_gain_what_the_friction_factors_lose_confirm_nothing(viscous
     wide = viscous.held_final.shot_parameters
     gap = measure.gap(viscous.held_nominal).trace
     scattered = replace(wide, log_factor=wide.log_factor + 2.0 * gap * spread)
-    nested = [("a", replace(viscous.held_final, shot_parameters=scattered))]
-    assert measure.change(viscous.held_nominal, nested[0][1], (Part.TRACES,)).is_real()
-    assert confirmed(measure, NestedModels(viscous.held_nominal, nested)) == {}
+    nominal, wide_a = viscous.held_nominal, replace(viscous.held_final, shot_parameters=scattered)
+    assert measure.change(nominal, wide_a, (Part.TRACES,)).is_real()
+    assert confirmed(measure, nested(nominal, a=wide_a)) == {}
     # A second effect was missing, which brings the factors together: of two that act, neither is denied.
-    both = [*nested, ("b", viscous.held_final)]
-    assert list(confirmed(measure, NestedModels(viscous.held_nominal, both))) == ["a", "b"]
+    assert list(confirmed(measure, nested(nominal, a=wide_a, ab=viscous.held_final))) == ["a", "b"]
     wider = replace(wide, log_factor=wide.log_factor + 1.5 * gap * spread)
-    in_vain = [*nested, ("b", replace(viscous.held_final, shot_parameters=wider))]
-    assert measure.change(nested[0][1], in_vain[1][1]).is_real()
-    assert confirmed(measure, NestedModels(viscous.held_nominal, in_vain)) == {}
+    in_vain = replace(viscous.held_final, shot_parameters=wider)
+    assert measure.change(wide_a, in_vain).is_real()
+    assert confirmed(measure, nested(nominal, a=wide_a, ab=in_vain)) == {}
 
 
 def test_the_first_effect_that_is_not_confirmed_ends_the_list(viscous: DiscrepancyResult) -> None:
     measure, nominal = measure_of(viscous), viscous.held_nominal
     half, whole = blended(viscous, 0.6), viscous.held_final
-    assert list(confirmed(measure, NestedModels(nominal, [("a", half), ("b", whole)]))) == ["a", "b"]
-    three = NestedModels(nominal, [("a", half), ("b", half), ("c", whole)])
-    assert list(confirmed(measure, three)) == ["a"]
-    assert confirmed(measure, NestedModels(nominal, [("a", nominal), ("b", whole)])) == {}
+    assert list(confirmed(measure, nested(nominal, a=half, ab=whole))) == ["a", "b"]
+    assert list(confirmed(measure, nested(nominal, a=half, ab=half, abc=whole))) == ["a"]
+    assert confirmed(measure, nested(nominal, a=nominal, ab=whole)) == {}
 
 
 def test_of_two_effects_each_may_be_seen_only_beside_the_other(viscous: DiscrepancyResult) -> None:
     measure, nominal, whole = measure_of(viscous), viscous.held_nominal, viscous.held_final
-    both = NestedModels(nominal, [("a", nominal), ("b", whole)], {"b": nominal})
+    both = nested(nominal, a=nominal, b=nominal, ab=whole)
     assert list(confirmed(measure, both)) == ["a", "b"]
     assert all(change.is_real() for change in confirmed(measure, both).values())
-    only_b = NestedModels(nominal, [("a", nominal), ("b", whole)], {"b": whole})
-    assert list(confirmed(measure, only_b)) == ["b"]
-    assert only_b.by_effects["b",] is whole
-    neither = NestedModels(nominal, [("a", nominal), ("b", nominal)], {"b": nominal})
-    assert confirmed(measure, neither) == {}
+    assert list(confirmed(measure, nested(nominal, a=nominal, b=whole, ab=whole))) == ["b"]
+    assert confirmed(measure, nested(nominal, a=nominal, b=nominal, ab=nominal)) == {}
+
+
+def test_of_three_effects_each_is_asked_what_it_closes_of_what_the_others_leave(
+    viscous: DiscrepancyResult,
+) -> None:
+    measure, nominal, whole = measure_of(viscous), viscous.held_nominal, viscous.held_final
+    third, most = blended(viscous, 0.4), blended(viscous, 0.7)
+    alone = {"a": nominal, "b": nominal, "c": nominal}
+    each = confirmed(measure, nested(nominal, **alone, ab=third, ac=most, bc=most, abc=whole))
+    assert list(each) == ["a", "b", "c"]
+    for effect, without in (("a", most), ("b", most), ("c", third)):
+        assert each[effect].before.trace == measure.gap(without).trace
+        assert each[effect].after.trace == measure.gap(whole).trace
+    # One that closes nothing of what the others leave is let go, and these are asked without it.
+    fewer = confirmed(measure, nested(nominal, **alone, ab=whole, ac=nominal, bc=nominal, abc=whole))
+    assert list(fewer) == ["a", "b"]
+    assert confirmed(measure, nested(nominal, **alone, ab=whole, ac=whole, bc=whole, abc=whole)) == {}
 
 
 @pytest.mark.parametrize(("p_value", "is_sure"), [(0.0005, True), (0.04, True), (0.06, False)])
@@ -162,8 +180,9 @@ def test_an_effect_may_be_sure_in_the_part_that_falls_less(p_value: float, is_su
 
     wide = Gap(2.0, 2.0)
     measure: Any = SimpleNamespace(change=change, gap=gaps.__getitem__, expected=lambda _: (wide, wide))
-    nested: Any = NestedModels("before", [("adhesion", "after")])  # type: ignore[arg-type, list-item]
-    assert [one.parts for one in confirmed(measure, nested).values()] == [(Part.TRACES,)] * is_sure
+    assert [one.parts for one in confirmed(measure, nested("before", a="after")).values()] == [
+        (Part.TRACES,)
+    ] * is_sure
 
 
 def test_what_held_out_shots_do_not_confirm_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:

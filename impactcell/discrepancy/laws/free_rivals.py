@@ -1,4 +1,4 @@
-"""Named effects held against free forms: what stands where neither a name nor two suffice.
+"""Named effects held against free forms: what stands where neither a name nor two or three suffice.
 
 What a model of a real machine leaves is a smooth function of something: position, speed, indentation, time or
 force. So effects are fitted beside a free-form term in the place that suits them, and the term is fitted

@@ -17,6 +17,7 @@ from impactcell.discrepancy.machine import (
     term_of,
 )
 from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
+from impactcell.german.findings import enumerated
 
 SYMBOLS = {
     Coordinate.TRANSLATION: {"force": "N", "F": "n", "q": "m"},
@@ -61,7 +62,7 @@ def machine_headline(finding: MachineFinding) -> str:
     if finding.verdict == "unknown":
         said = f"No known term explains a held-out gap of {before:.2f} noise floors"
         if finding.unconfirmed:
-            names = " and ".join(map(phrase, finding.unconfirmed))
+            names = enumerated([*map(phrase, finding.unconfirmed)], "and")
             said = f"{names.capitalize()} would explain what fitted, but held-out records do not confirm it"
         reason = finding.steps[0].reason if finding.steps else ""
         return f"{said}: {reason}." if reason else f"{said}."
@@ -69,7 +70,7 @@ def machine_headline(finding: MachineFinding) -> str:
         " or ".join(map(phrase, (name, *finding.tied_with.get(name, ())))) for name in finding.established
     ]
     tied = any(finding.tied_with.values())
-    missing = " and ".join(groups) + (", which these records cannot tell apart" if tied else "")
+    missing = enumerated(groups, "and") + (", which these records cannot tell apart" if tied else "")
     said = f"Missing: {missing}; the held-out gap falls from {before:.2f} to {after:.2f} noise floors."
     return said if finding.is_at_floor else f"{said} Something remains that it does not explain."
 

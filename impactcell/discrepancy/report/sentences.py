@@ -6,6 +6,7 @@ from typing import Any
 from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.german.findings import enumerated
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
 
@@ -167,7 +168,7 @@ def _conclusion(result: DiscrepancyResult) -> str:
                 f"is {_gap(proof)} noise floors"
             )
         if conclusion.unconfirmed:
-            names = " and ".join(map(phrase, conclusion.unconfirmed))
+            names = enumerated([*map(phrase, conclusion.unconfirmed)], "and")
             said = (
                 f"{names.capitalize()} would explain the training shots, but held-out shots do not confirm "
                 f"it: their gap is {_gap(proof)} noise floors"
@@ -178,11 +179,12 @@ def _conclusion(result: DiscrepancyResult) -> str:
         for effect in conclusion.established
     ]
     is_tied = any(conclusion.ties.values())
-    missing = (
-        f"{', and '.join(groups)}, which these shots cannot tell apart" if is_tied else " and ".join(groups)
-    )
+    missing = f"{', and '.join(groups)}, which these shots cannot tell apart"
+    beside = ""
+    if not is_tied:
+        missing, beside = enumerated(groups, "and"), "with them " if len(groups) > 1 else "with it "
     fall = f"the held-out gap falls from {proof.gap_before:.2f} to {proof.gap_after:.2f} noise floors"
-    established = f"Missing: {missing}; {'' if is_tied else 'with it '}{fall}."
+    established = f"Missing: {missing}; {beside}{fall}."
     return established if conclusion.remaining.explained else f"{established} {_left(conclusion.remaining)}"
 
 

@@ -53,7 +53,7 @@ class SelectionResult:
     ties : dict of str to tuple of str
         For each of them those that cannot be told from it.
     p_values : dict of str to float
-        Of each of `added`: against the nominal model, of the second of a pair beside the first.
+        Of each of `added`: beside those before it, where that was scanned, else against the nominal model.
     alternatives : tuple of Alternative
         Everything that was fitted, the likeliest first.
     unconverged : tuple of tuple of str
@@ -83,8 +83,8 @@ class SelectionResult:
 def exchanged(selection: SelectionResult) -> list[SelectionResult]:
     """List the outcomes with an effect exchanged for one that is tied with it, each in turn.
 
-    A rival's p-value is that against the nominal model, also where it stands for the second of a pair: beside
-    the first it was not scanned in every case.
+    A rival's p-value is that against the nominal model, also where it stands for one that was added later:
+    beside those before it was not scanned in every case.
     """
     variants = []
     for effect, rivals in selection.ties.items():
@@ -117,20 +117,51 @@ def reject(
     return SelectionResult(nominal, final, None, (), {}, {}, alternatives)
 
 
-def accept_single(
-    problem: Problem, nominal: ModelEvidence, final: ModelEvidence, singles: list[CandidateFit]
+def accept_set(
+    problem: Problem,
+    evidence: tuple[ModelEvidence, ModelEvidence],
+    sets: Sequence[CandidateFit],
+    order: Sequence[str],
+    scans: Sequence[CandidateScan],
+    alternatives: tuple[Alternative, ...],
 ) -> SelectionResult:
-    """Accept the likeliest single effect, with those that the shots do not tell from it.
+    """Accept the likeliest set of effects, each with those that the shots do not tell from it in its place.
 
     A shape that was fitted to the end of its range is no name.
+
+    Parameters
+    ----------
+    evidence : tuple of ModelEvidence
+        Against the nominal model and against the set.
+    sets : sequence of CandidateFit
+        Of one size.
+    order : sequence of str
+        Single effects, the likeliest first: the one that would have come first is the first of the set.
+    scans : sequence of CandidateScan
+        Of models with some effects: the p-value of an effect is that beside those before it, where that
+        was scanned, else that against the nominal model.
+    alternatives : tuple of Alternative
+        Everything that was fitted, the likeliest first.
     """
-    best = singles[0].fit
+    nominal, final = evidence
+    best = sets[0].fit
     if is_at_bound(best):
-        return reject(nominal, final, compare_fits(singles))
-    tied = tuple(
-        other.fit.effects[-1] for other in singles[1:] if are_indistinguishable(problem, singles[0], other)
-    )
-    return _single(nominal, final, best, tied, compare_fits(singles))
+        return reject(nominal, final, alternatives)
+    place = {effect: index for index, effect in enumerate(order)}
+    new_effects = best.effects[len(nominal.fit.effects) :]
+    added = tuple(sorted(new_effects, key=lambda effect: place.get(effect, len(place))))
+    ties: dict[str, tuple[str, ...]] = dict.fromkeys(added, ())
+    for rival in sets[1:]:
+        instead = set(rival.fit.effects) - set(best.effects)
+        if len(instead) == 1 and are_indistinguishable(problem, sets[0], rival):
+            (replaced,) = set(best.effects) - set(rival.fit.effects)
+            ties[replaced] = (*ties[replaced], *instead)
+    by_set = {frozenset(scan.fit.effects): scan for scan in scans}
+    p_values = {}
+    for position, effect in enumerate(added):
+        before = frozenset((*nominal.fit.effects, *added[:position]))
+        p_values[effect] = by_set.get(before, nominal.candidate_scan).p_value_of(effect)
+    return SelectionResult(nominal, final, best, added, ties, p_values, alternatives)
 
 
 def accept_plausible(
@@ -162,55 +193,7 @@ def accept_plausible(
         if model.effects != best.effects
         and float(model.misfit(coarse).sum()) - smallest <= POLICY.max_rival_share * after * scale
     )
-    return _single(nominal, final, best, tied, compare_fits(singles))
-
-
-def _single(
-    nominal: ModelEvidence,
-    final: ModelEvidence,
-    best: Fit,
-    tied: tuple[str, ...],
-    alternatives: tuple[Alternative, ...],
-) -> SelectionResult:
     effect = best.effects[-1]
     p_value = nominal.candidate_scan.p_value_of(effect)
+    alternatives = compare_fits(singles)
     return SelectionResult(nominal, final, best, (effect,), {effect: tied}, {effect: p_value}, alternatives)
-
-
-def accept_pair(
-    problem: Problem,
-    evidence: tuple[ModelEvidence, ModelEvidence],
-    pairs: list[CandidateFit],
-    order: Sequence[str],
-    scans: Sequence[CandidateScan],
-    alternatives: tuple[Alternative, ...],
-) -> SelectionResult:
-    """Accept the likeliest pair, each of its effects with those that the shots do not tell from it.
-
-    Parameters
-    ----------
-    evidence : tuple of ModelEvidence
-        Against the nominal model and against the pair.
-    order : sequence of str
-        Single effects, the likeliest first: the one that would have come first is the first of the pair.
-    scans : sequence of CandidateScan
-        Of the nominal model, then of models with one effect: the p-value of the second effect is that
-        beside the first, where it was scanned, else that against the nominal model.
-    alternatives : tuple of Alternative
-        Everything that was fitted, the likeliest first.
-    """
-    nominal, final = evidence
-    best = pairs[0].fit
-    new_effects = [effect for effect in best.effects if effect not in nominal.fit.effects]
-    place = {effect: index for index, effect in enumerate(order)}
-    first, second = sorted(new_effects, key=lambda effect: place.get(effect, len(place)))
-    ties: dict[str, tuple[str, ...]] = {first: (), second: ()}
-    for rival in pairs[1:]:
-        other = rival.fit.effects
-        if len(set(other) & {first, second}) == 1 and are_indistinguishable(problem, pairs[0], rival):
-            replaced = first if first not in other else second
-            instead = next(effect for effect in other if effect not in best.effects)
-            ties[replaced] = (*ties[replaced], instead)
-    beside_first = next((scan for scan in scans[1:] if scan.fit.effects[-1:] == (first,)), scans[0])
-    p_values = {first: scans[0].p_value_of(first), second: beside_first.p_value_of(second)}
-    return SelectionResult(nominal, final, best, (first, second), ties, p_values, alternatives)

@@ -1,7 +1,8 @@
 """Which effects held-out shots confirm: each has to close a part of the gap."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import takewhile
 
 from impactcell.discrepancy.model import Fit
 from impactcell.discrepancy.search.validation import (
@@ -19,45 +20,43 @@ class NestedModels:
 
     Attributes
     ----------
-    nominal : Fit
-    steps : sequence of (str, Fit)
-        Effect, and the model with it and all before it; the last one is the model that was accepted.
-    alone : mapping
-        Of two effects the model with the second one and without the first, by its name.
+    models : mapping
+        Fits by the effects that they have beside the nominal ones.
+    added : tuple of str
+        All these effects, in the order in which they were added.
     """
 
-    nominal: Fit
-    steps: Sequence[tuple[str, Fit]] = ()
-    alone: Mapping[str, Fit] = field(default_factory=dict)
+    models: Mapping[frozenset[str], Fit]
+    added: tuple[str, ...] = ()
+
+    @property
+    def nominal(self) -> Fit:
+        """The model without any of the effects."""
+        return self.models[frozenset()]
 
     @property
     def largest(self) -> Fit:
         """The model with all effects."""
-        return self.steps[-1][1] if self.steps else self.nominal
+        return self.models[frozenset(self.added)]
 
     @property
-    def by_effects(self) -> dict[tuple[str, ...], Fit]:
-        """Every model by the effects that it has beside the nominal ones."""
-        models: dict[tuple[str, ...], Fit] = {(): self.nominal}
-        names: tuple[str, ...] = ()
-        for effect, model in self.steps:
-            names = (*names, effect)
-            models[names] = model
-        return models | {(effect,): model for effect, model in self.alone.items()}
+    def steps(self) -> list[tuple[str, Fit]]:
+        """Each effect, and the model with it and all before it; as far as these are there."""
+        chain = [(effect, frozenset(self.added[: place + 1])) for place, effect in enumerate(self.added)]
+        there = takewhile(lambda step: step[1] in self.models, chain)
+        return [(effect, self.models[names]) for effect, names in there]
 
-    def with_models(self, models: Sequence[Fit]) -> "NestedModels":
-        """Return the same with other fits, in the order of `by_effects`."""
-        _, *rest = models
-        steps = [(effect, fit) for (effect, _), fit in zip(self.steps, rest, strict=False)]
-        alone = dict(zip(self.alone, rest[len(steps) :], strict=True))
-        return replace(self, nominal=models[0], steps=steps, alone=alone)
+    def without(self, effect: str) -> Fit | None:
+        """Return the model with all other effects."""
+        return self.models.get(frozenset(self.added) - {effect})
 
 
 def confirmed(measure: GapMeasure, nested: NestedModels, max_p: float = MAX_P_VALUE) -> dict[str, GapChange]:
     """Effects that held-out shots confirm, each with what it closes of what those before it leave.
 
-    Of two effects it may be that neither is seen while the other is missing: then each is asked what it
-    closes of what the other leaves; both are confirmed if both do, the second one alone if only it does.
+    Of several effects it may be that one is not seen while another is missing: then each is asked what it
+    closes of what all others leave. They are confirmed if all do; else those that do are asked without the
+    rest, and are confirmed if more of them are than in order.
 
     Parameters
     ----------
@@ -66,34 +65,32 @@ def confirmed(measure: GapMeasure, nested: NestedModels, max_p: float = MAX_P_VA
     max_p : float
         One-sided error for each of them.
     """
-    in_order = _in_order(measure, nested.nominal, nested.steps, max_p)
-    if len(in_order) == len(nested.steps) or not nested.alone:
+    in_order = _in_order(measure, nested, max_p)
+    if len(in_order) == len(nested.added):
         return in_order
-    (first, with_first), (second, with_both) = nested.steps
-    with_second = nested.alone[second]
     each = {
-        first: _change(measure, with_second, with_both, max_p),
-        second: _change(measure, with_first, with_both, max_p),
+        effect: _change(measure, model, nested.largest, max_p)
+        for effect in nested.added
+        if (model := nested.without(effect)) is not None
     }
-    real = [effect for effect, change in each.items() if change.is_real(max_p)]
-    if len(real) == len(each) and not _rises(measure, nested.nominal, with_both, each.values()):
-        return each
-    if real == [second] and not in_order:
-        return _in_order(measure, nested.nominal, [(second, with_second)], max_p)
-    return in_order
+    real = tuple(effect for effect, change in each.items() if change.is_real(max_p))
+    if len(real) == len(nested.added):
+        return in_order if _rises(measure, nested.nominal, nested.largest, each.values()) else each
+    if frozenset(real) not in nested.models:
+        return in_order
+    fewer = confirmed(measure, replace(nested, added=real), max_p)
+    return fewer if len(fewer) > len(in_order) else in_order
 
 
-def _in_order(
-    measure: GapMeasure, nominal: Fit, steps: Sequence[tuple[str, Fit]], max_p: float
-) -> dict[str, GapChange]:
+def _in_order(measure: GapMeasure, nested: NestedModels, max_p: float) -> dict[str, GapChange]:
     """Confirm effects one by one; the first that is not ends it.
 
     Where the whole gap, that of the wider part, rises although a part of it falls, an effect still missing
     may be why: those after it have to bring it below where it was.
     """
     changes, waiting = dict[str, GapChange](), dict[str, GapChange]()
-    before = agreed = nominal
-    for effect, model in steps:
+    before = agreed = nested.nominal
+    for effect, model in nested.steps:
         waiting[effect] = _change(measure, before, model, max_p)
         if not waiting[effect].is_real(max_p):
             break

@@ -1,6 +1,6 @@
 """The shots that the search never saw, opened once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,15 +67,14 @@ class OpenedShots:
             One-sided error for each of them.
         """
         problem, held_problem = self.problems
-        models = nested.by_effects
-        held = {names: refit_shot_parameters(held_problem, model) for names, model in models.items()}
-        held_nested = nested.with_models([*held.values()])
+        held = {names: refit_shot_parameters(held_problem, model) for names, model in nested.models.items()}
+        held_nested = replace(nested, models=held)
         replicates = self._replicates(nested.largest, held_nested.largest)
         measure = GapMeasure(held_problem, self.floor, replicates, self.seed)
         training = GapMeasure(problem, self.floor, replicates, self.seed)
         changes = confirmed(measure, held_nested, max_p)
         nominal, held_nominal = nested.nominal, held_nested.nominal
-        final, held_final = models[tuple(changes)], held[tuple(changes)]
+        final, held_final = nested.models[frozenset(changes)], held[frozenset(changes)]
         parts = counted_parts(measure, (held_nominal, held_final), changes.values())
         validation = Validation(
             training.gap(nominal),

@@ -1,89 +1,36 @@
 """Which effects join the model: a declared list of stages, each of which may end the search.
 
-Forward with every candidate refitted, one at a time or two, then backward. A set of effects is accepted when
-nothing significant is left against the model that has it. Of all sets of the smallest size the likeliest is
-taken; sets that are not significantly less likely, shot by shot, are tied with it. When no set suffices
-nothing is added: forward selection on an effect outside the library would add wrong names until it gives up.
+Forward with every candidate refitted, one at a time, two or three, then backward. A set of effects is
+accepted when nothing significant is left against the model that has it. Of all sets of the smallest size the
+likeliest is taken; sets that are not significantly less likely, shot by shot, are tied with it. When no set
+suffices nothing is added: forward selection on an effect outside the library would add wrong names until it
+gives up.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 from impactcell.discrepancy.model import Fit
-from impactcell.discrepancy.search.acceptance import (
-    SelectionResult,
-    accept_pair,
-    accept_plausible,
-    accept_single,
-    reject,
-)
+from impactcell.discrepancy.search.acceptance import SelectionResult, accept_plausible, accept_set, reject
 from impactcell.discrepancy.search.between_shots import accept_between_shots
-from impactcell.discrepancy.search.candidate_fits import (
-    finalists,
-    fit_alike,
-    fit_all_samples,
-    is_at_bound,
-    prefer_interior,
-    refine,
-    screen,
-    without_each_effect,
-)
+from impactcell.discrepancy.search.candidate_fits import fit_alike, fit_all_samples, without_each_effect
 from impactcell.discrepancy.search.confirmation import NestedModels
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.convergence import converge
 from impactcell.discrepancy.search.dominance import accept_dominant
-from impactcell.discrepancy.search.evidence import CandidateScan, ModelEvidence, scan_candidates
-from impactcell.discrepancy.search.indistinguishability import (
-    CandidateFit,
-    compare_fits,
-    rank_out_of_shot,
-    sort_by_likelihood,
-    total_log_likelihood,
+from impactcell.discrepancy.search.one_more import (
+    SearchState,
+    exchange_each,
+    fit_one_more,
+    merge,
+    refit_smaller,
 )
-from impactcell.discrepancy.search.policy import POLICY
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchState:
-    """What the stages so far have found; each stage reads it and returns the next.
-
-    Attributes
-    ----------
-    evidence : ModelEvidence
-        Against the nominal model.
-    screened : list of Fit
-        One effect more, on few samples, the likeliest first.
-    singles, pairs : list of CandidateFit
-        One and two effects more, on all samples, the likeliest out of shot first.
-    single_evidence : ModelEvidence
-        Against the best single effect.
-    scans : list of CandidateScan
-        Second effects beside several first ones.
-    unconverged : list of Fit
-        Trials that came to rest short of their optimum: they neither win nor lose.
-    result : SelectionResult or None
-        Ends the search.
-    """
-
-    evidence: ModelEvidence
-    screened: list[Fit] = field(default_factory=list)
-    singles: list[CandidateFit] = field(default_factory=list)
-    single_evidence: ModelEvidence | None = None
-    scans: list[CandidateScan] = field(default_factory=list)
-    pairs: list[CandidateFit] = field(default_factory=list)
-    unconverged: list[Fit] = field(default_factory=list)
-    result: SelectionResult | None = None
-
-    @property
-    def latest(self) -> ModelEvidence:
-        """Evidence against the best single effect, or against the nominal model before there is one."""
-        return self.single_evidence or self.evidence
 
 
 def select_model(context: SearchContext, nominal: Fit) -> SelectionResult:
     """Look for the smallest set of effects that leaves nothing significant."""
-    state = SearchState(context.test_model(nominal))
+    state = SearchState({0: context.test_model(nominal)})
     for stage in STAGES:
         state = stage(context, state)
         if state.result is not None:
@@ -100,17 +47,18 @@ def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionRe
     """
     if state.result is None:
         raise AssertionError("only a search that has ended")
-    trials = [*(single.fit for single in state.singles), *state.screened, *state.unconverged]
-    with_one_more = [trial for trial in trials if len(trial.effects) == len(state.evidence.fit.effects) + 1]
-    between = accept_between_shots(context, state.evidence, with_one_more)
+    screened = state.rough.get(1, [])
+    trials = [*state.fits(1), *screened, *state.unconverged]
+    with_one_more = [trial for trial in trials if len(trial.effects) == len(state.nominal.effects) + 1]
+    between = accept_between_shots(context, state.tested[0], with_one_more)
     if between is not None:
         return between
     dominant = accept_dominant(
         context,
-        (state.evidence, state.latest),
-        state.singles,
-        state.screened,
-        state.pairs,
+        (state.tested[0], state.tested.get(1, state.tested[0])),
+        state.sets.get(1, []),
+        screened,
+        state.sets.get(2, []),
         state.unconverged,
     )
     return dominant or state.result
@@ -124,125 +72,123 @@ def only_test(context: SearchContext, nominal: Fit) -> SelectionResult:
 
 
 def nested_models(context: SearchContext, selection: SelectionResult) -> NestedModels:
-    """Models with the effects that were added, and with some of them."""
-    nominal, best = selection.nominal.fit, selection.accepted
-    if best is None or not selection.added:
-        return NestedModels(nominal)
-    steps, last = [(selection.added[-1], best)], selection.added[-1]
-    if len(selection.added) == 1:
-        return NestedModels(nominal, steps)
-    reduced = fit_all_samples(context, without_each_effect(nominal, best))
-    singles = {single.effects[-1]: single for single in reduced}
-    first = selection.added[0]
-    if first in singles:
-        steps.insert(0, (first, singles[first]))
-    return NestedModels(nominal, steps, {last: singles[last]} if singles.keys() >= {first, last} else {})
+    """Models with all effects that were added, and with some, fitted from where a larger one stands."""
+    nominal = selection.nominal.fit
+    if selection.accepted is None or not selection.added:
+        return NestedModels({frozenset(): nominal})
+    models = {frozenset(selection.added): selection.accepted}
+    layer = [selection.accepted]
+    for _ in selection.added[1:]:
+        starts = {
+            frozenset(start.effects): start
+            for model in layer
+            for start in without_each_effect(nominal, model)
+        }
+        layer = fit_all_samples(context, [*starts.values()])
+        models |= {frozenset(model.effects[len(nominal.effects) :]): model for model in layer}
+    return NestedModels(models | {frozenset(): nominal}, selection.added)
 
 
 def test_nominal(context: SearchContext, state: SearchState) -> SearchState:
     """Accept the nominal model where nothing is left."""
-    if not context.is_sufficient(state.evidence):
+    evidence = state.tested[0]
+    if not context.is_sufficient(evidence):
         return state
-    nominal = state.evidence.fit
-    return replace(state, result=SelectionResult(state.evidence, state.evidence, nominal, (), {}, {}))
+    return replace(state, result=SelectionResult(evidence, evidence, evidence.fit, (), {}, {}))
 
 
-def fit_single_effects(context: SearchContext, state: SearchState) -> SearchState:
-    """Fit one effect more: screened and refined on few samples, finalists on all."""
-    screened = refine(context, screen(context, state.evidence.candidate_scan, POLICY.max_screened))
-    if not screened:
-        return replace(state, result=reject(state.evidence, state.evidence, ()))
-    fitted = fit_all_samples(context, finalists(context, screened))
-    converged, others = converge(context, fitted, [state.evidence.fit])
-    state = replace(state, screened=screened, unconverged=others)
-    if not converged:
-        return replace(state, result=reject(state.evidence, state.evidence, ()))
-    singles = prefer_interior(context.problem, rank_out_of_shot(context.problem, converged))
-    alike = fit_alike(context, state.evidence.candidate_scan, singles[0].fit, converged)
-    if alike:
-        more, _ = converge(context, alike, [state.evidence.fit])
-        singles = prefer_interior(context.problem, rank_out_of_shot(context.problem, [*converged, *more]))
-    return replace(state, singles=singles, single_evidence=context.test_model(singles[0].fit))
+def fit_sets(size: int, context: SearchContext, state: SearchState) -> SearchState:
+    """Fit so many effects more."""
+    state = fit_one_more(context, state, size)
+    return state if state.sets[size] else _reject(state)
 
 
-def accept_single_effect(context: SearchContext, state: SearchState) -> SearchState:
-    """Accept the best single effect where nothing is left beside it, or nothing worth a name."""
-    if not context.is_closed(state.latest):
+def fit_confounded(context: SearchContext, state: SearchState) -> SearchState:
+    """Fit single effects to which the residuals point as much as to the likeliest."""
+    converged = state.fits(1)
+    alike = fit_alike(context, state.tested[0].candidate_scan, state.best(1), converged)
+    more, _ = converge(context, alike, [state.nominal])
+    return merge(context, state, 1, more)
+
+
+def accept_sufficient(size: int, context: SearchContext, state: SearchState) -> SearchState:
+    """Accept the best set of a size where nothing is left beside it and each of its effects earns its place.
+
+    Beside a single effect what is left may be significant, as long as it is too little to be worth a name.
+    """
+    if not context.reaches_floor(state.best(size)):
         return state
-    result = accept_single(context.problem, state.evidence, state.latest, state.singles)
-    return replace(state, result=result)
+    state = _with_test(context, state, size)
+    evidence = state.tested[size]
+    suffices = context.is_closed(evidence) if size == 1 else context.is_sufficient(evidence)
+    if not suffices or not _each_earns(context, state, size):
+        return state
+    return _accept(context, state, size)
 
 
 def accept_plausible_effect(context: SearchContext, state: SearchState) -> SearchState:
     """Accept the effect that explains most of a gap where the floor is only a lower bound."""
-    result = accept_plausible(context, state.evidence, state.latest, state.singles, state.screened)
+    result = accept_plausible(context, state.tested[0], state.latest, state.sets[1], state.rough[1])
     return replace(state, result=result)
 
 
-def fit_pairs(context: SearchContext, state: SearchState) -> SearchState:
-    """Fit two effects more; the likeliest first effects on all samples need not have been so on few."""
-    best = state.singles[0].fit
-    others = [model for model in state.screened if model.effects != best.effects]
-    scan = partial(scan_candidates, context.coarse, library=context.library, seed=(context.seed, 1))
-    scans = [state.latest.candidate_scan, *context.mapper(scan, others[: POLICY.max_first_effects - 1])]
-    likeliest: dict[frozenset[str], Fit] = {}
-    for candidate_scan in scans:
-        for fitted in screen(context, candidate_scan, POLICY.max_second_effects):
-            key = frozenset(fitted.effects)
-            if key not in likeliest or total_log_likelihood(context.coarse, fitted) > total_log_likelihood(
-                context.coarse, likeliest[key]
-            ):
-                likeliest[key] = fitted
-    refined = refine(context, sort_by_likelihood(context.coarse, likeliest.values()))
-    if not refined:
-        return replace(state, result=reject(state.evidence, state.latest, compare_fits(state.singles)))
-    inner = [state.evidence.fit, *(single.fit for single in state.singles)]
-    on_all_samples = fit_all_samples(context, finalists(context, refined))
-    converged, stuck = converge(context, on_all_samples, inner)
-    state = replace(state, unconverged=[*state.unconverged, *stuck])
-    pairs = prefer_interior(context.problem, rank_out_of_shot(context.problem, converged))
-    if not pairs or not context.reaches_floor(pairs[0].fit):
-        alternatives = compare_fits([*pairs, *state.singles])
-        rejected = reject(state.evidence, state.latest, alternatives)
-        return replace(state, scans=scans, pairs=pairs, result=rejected)
-    return replace(state, scans=scans, pairs=pairs)
-
-
-def drop_either_effect(context: SearchContext, state: SearchState) -> SearchState:
-    """Fit single effects again from where the best pair stands; accept one that suffices from there."""
-    reduced = without_each_effect(state.evidence.fit, state.pairs[0].fit)
-    converged, _ = converge(context, fit_all_samples(context, reduced), [state.evidence.fit])
-    again = rank_out_of_shot(context.problem, converged)
-    if not again or total_log_likelihood(context.problem, again[0].fit) <= (
-        total_log_likelihood(context.problem, state.singles[0].fit) + POLICY.min_refit_gain
-    ):
-        return state
-    refitted = {candidate.fit.effects for candidate in again}
-    singles = [*again, *(single for single in state.singles if single.fit.effects not in refitted)]
-    singles.sort(key=lambda candidate: -float(candidate.each.sum()))
-    better = replace(state, singles=singles, single_evidence=context.test_model(singles[0].fit))
-    return accept_single_effect(context, better)
+def refit_singles(context: SearchContext, state: SearchState) -> SearchState:
+    """Fit single effects again from where a pair at the floor stands: one of them may suffice from there."""
+    return refit_smaller(context, state, 2)[0] if context.reaches_floor(state.best(2)) else state
 
 
 def prefer_single_effect(context: SearchContext, state: SearchState) -> SearchState:
     """Accept the best single effect where a second one adds too little to be worth a name."""
-    single, pair = state.singles[0].fit, state.pairs[0].fit
-    if context.gains_enough(single, pair) or not context.reaches_floor(single):
+    single, pair = state.best(1), state.best(2)
+    if (
+        not context.reaches_floor(pair)
+        or context.gains_enough(single, pair)
+        or not context.reaches_floor(single)
+    ):
         return state
-    result = accept_single(context.problem, state.evidence, state.latest, state.singles)
-    return replace(state, result=result)
+    return _accept(context, _with_test(context, state, 1), 1)
 
 
-def accept_pair_of_effects(context: SearchContext, state: SearchState) -> SearchState:
-    """Accept the best pair where nothing is left beside it, else nothing."""
-    best = state.pairs[0].fit
-    alternatives = compare_fits([*state.pairs, *state.singles])
-    evidence = context.test_model(best)
-    if not context.is_sufficient(evidence) or is_at_bound(best):
-        return replace(state, result=reject(state.evidence, evidence, alternatives))
-    order = [model.effects[-1] for model in state.screened]
-    scans = (state.evidence.candidate_scan, *state.scans)
-    result = accept_pair(context.problem, (state.evidence, evidence), state.pairs, order, scans, alternatives)
+def exchange_effects(size: int, context: SearchContext, state: SearchState) -> SearchState:
+    """Look for a better effect in the place of each of the best set, and for those that are tied with it."""
+    return exchange_each(context, state, size)
+
+
+def _reject(state: SearchState) -> SearchState:
+    """Accept nothing."""
+    return replace(state, result=reject(state.tested[0], state.latest, state.alternatives))
+
+
+def reject_all(_: SearchContext, state: SearchState) -> SearchState:
+    """Accept nothing where no set suffices."""
+    return _reject(state)
+
+
+def reject_without_floor(context: SearchContext, state: SearchState) -> SearchState:
+    """Accept nothing where a third effect could not be held to a floor."""
+    return state if context.floor_is_certain else _reject(state)
+
+
+def _with_test(context: SearchContext, state: SearchState, size: int) -> SearchState:
+    """Test the best model of a size, if that has not been done."""
+    best = state.best(size)
+    if size in state.tested and state.tested[size].fit is best:
+        return state
+    return replace(state, tested=state.tested | {size: context.test_model(best)})
+
+
+def _each_earns(context: SearchContext, state: SearchState, size: int) -> bool:
+    """Whether each effect of the best set adds enough to be worth a name, all others being there."""
+    best = state.best(size)
+    inside = [fit for fit in state.fits(size - 1) if set(fit.effects) < set(best.effects)]
+    return all(context.gains_enough(fewer, best) for fewer in inside)
+
+
+def _accept(context: SearchContext, state: SearchState, size: int) -> SearchState:
+    """Accept the best set of a size."""
+    order = [model.effects[-1] for model in state.rough[1]]
+    evidence = (state.tested[0], state.tested[size])
+    result = accept_set(context.problem, evidence, state.sets[size], order, state.scans, state.alternatives)
     return replace(state, result=result)
 
 
@@ -251,12 +197,20 @@ Stage = Callable[[SearchContext, SearchState], SearchState]
 
 STAGES: tuple[Stage, ...] = (
     test_nominal,
-    fit_single_effects,
-    accept_single_effect,
+    partial(fit_sets, 1),
+    fit_confounded,
+    partial(accept_sufficient, 1),
     accept_plausible_effect,
-    fit_pairs,
-    drop_either_effect,
+    partial(fit_sets, 2),
+    refit_singles,
+    partial(accept_sufficient, 1),
     prefer_single_effect,
-    accept_pair_of_effects,
+    partial(accept_sufficient, 2),
+    reject_without_floor,
+    partial(fit_sets, 3),
+    partial(exchange_effects, 3),
+    partial(accept_sufficient, 2),
+    partial(accept_sufficient, 3),
+    reject_all,
 )
 """The search, in order."""
