@@ -80,7 +80,7 @@ def test_a_confound_that_is_lost_on_few_samples_is_tied_all_the_same(monkeypatch
     def without_mass(context: SearchContext, rough: list[Fit]) -> list[Fit]:
         return [one for one in finalists(context, rough) if one.effects[-1] != "mass_error"]
 
-    monkeypatch.setattr("impactcell.discrepancy.search.model_selection.finalists", without_mass)
+    monkeypatch.setattr("impactcell.discrepancy.search.one_more.finalists", without_mass)
     found = investigate(make("mass_error", shots=18))
     assert found.verdict == "tied"
     assert answer(found)[1] == {"mass_error", "force_sensor_gain"}
