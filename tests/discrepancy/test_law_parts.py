@@ -8,6 +8,7 @@ import pytest
 
 from impactcell.discrepancy.data.phases import PHASES
 from impactcell.discrepancy.laws import covariates, finding, grammar
+from impactcell.discrepancy.laws.law import LawParameter
 from impactcell.physics.free_forms import FREE_FORMS
 
 
@@ -79,3 +80,10 @@ def test_only_the_smoothest_spline_tells_nothing_of_how_a_term_bends(
     assert bool(said) is (smoothness == max(finding.SMOOTHNESS))
     law: Any = SimpleNamespace(function=None)
     assert finding._refusal(term, law, change, 2.0) == ""
+
+
+def test_a_value_past_the_end_of_its_range_by_rounding_begins_at_the_end() -> None:
+    scale = LawParameter("scale_m_s", "m/s", np.nan, 1e-3, 1.0, 0.1)
+    assert scale.starting_at(np.nextafter(scale.lower, 0.0)).first == scale.lower
+    assert scale.starting_at(1.0 + 1e-15).first == scale.upper
+    assert scale.starting_at(0.3).first == 0.3

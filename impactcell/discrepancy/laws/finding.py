@@ -86,9 +86,7 @@ class LawFinding:
             if item.effect == self.law.law.identifier
         }
         law = self.law.law
-        return replace(
-            law, parameters=tuple(replace(item, first=values[item.name]) for item in law.parameters)
-        )
+        return replace(law, parameters=tuple(item.starting_at(values[item.name]) for item in law.parameters))
 
 
 def find_law(

@@ -4,7 +4,7 @@ import hashlib
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.effect_file import effect_file
@@ -43,6 +43,10 @@ class LawParameter:
     upper: float
     first: float
     kind: str = "VALUE"
+
+    def starting_at(self, value: float) -> "LawParameter":
+        """Give another first value; a fit that rests at an end of the range may be past it by rounding."""
+        return replace(self, first=min(max(value, self.lower), self.upper))
 
 
 @dataclass(frozen=True, slots=True)
