@@ -166,10 +166,6 @@ DISABLED: Mapping[EventKind, Refusal | None] = MappingProxyType(
     }
 )
 
-ACTIONS_OF_PEOPLE = frozenset(
-    set(EventKind) - {E.ACTIVATE, E.CLEAR, E.REALARM, E.SHELVE_EXPIRED, E.SUPPRESS, E.UNSUPPRESS}
-)
-
 
 @dataclass(frozen=True, slots=True)
 class AlarmEvent:

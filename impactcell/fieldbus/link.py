@@ -46,8 +46,6 @@ class TlsFiles:
         return context
 
 
-TRANSPORTS: Final = ("tcp", "tls", "udp", "rtu_over_tcp", "rtu")
-"""What a request travels on: Modbus TCP, the same encrypted, or in datagrams, RTU frames over TCP, a line."""
 _PARITY_BITS: Final = {"N": 0, "E": 1, "O": 1}
 """Bits of a character for each parity: none, even, odd."""
 _RTU_SILENCE: Final = 3.5
@@ -102,7 +100,8 @@ class ModuleLink:
     Attributes
     ----------
     transport : str
-        One of `TRANSPORTS`.
+        What a request travels on: `tcp`, the same encrypted (`tls`) or in datagrams (`udp`), RTU frames over
+        TCP (`rtu_over_tcp`), or a serial line (`rtu`).
     serial : SerialLine or None
         The line of transport `rtu`, in the place of host and port.
     device_id : int

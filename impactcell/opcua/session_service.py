@@ -83,7 +83,6 @@ class SessionService:
             context.connection,
             parameters.SessionName,
             parameters.RequestedSessionTimeout,
-            parameters.ClientNonce or b"",
             channel.peer_certificate,
         )
         response = ua.CreateSessionResponse()

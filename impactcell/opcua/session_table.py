@@ -80,7 +80,6 @@ class Session:
     connection: TcpConnection | None
     policy_uri: str
     certificate: bytes | None
-    client_nonce: bytes
     timeout_s: float
     nonce: bytes = b""
     actor: Actor | None = None
@@ -122,7 +121,7 @@ class SessionTable:
         return list(self._sessions.values())
 
     def create(
-        self, connection: TcpConnection, name: str, timeout_ms: float, nonce: bytes, certificate: bytes | None
+        self, connection: TcpConnection, name: str, timeout_ms: float, certificate: bytes | None
     ) -> Session:
         """Make a session.
 
@@ -142,7 +141,6 @@ class SessionTable:
             connection=connection,
             policy_uri=connection.channel.policy_uri,
             certificate=certificate,
-            client_nonce=nonce,
             timeout_s=min(max(requested_s, MIN_TIMEOUT_S), longest),
         )
         session.renew_nonce()

@@ -287,9 +287,7 @@ class Ensemble:
             displacement_m=outputs[:, at.DISPLACEMENT],
             sliding_distance_m=outputs[:, at.DISTANCE],
             breakaway_s=outputs[:, at.BREAKAWAY_TIME],
-            peak_s=outputs[:, at.PEAK_TIME],
             separation_s=outputs[:, at.SEPARATION_TIME],
-            halt_s=outputs[:, at.HALT_TIME],
             stop_s=outputs[:, at.STOP_TIME],
             at_rest=outputs[:, at.STATUS] == at.AT_REST,
         )

@@ -118,12 +118,11 @@ DISTANCE: Final = 2  # from the last loss of contact to rest, along the tap [m]
 BREAKAWAY_TIME: Final = 3  # of the first breakaway [s]
 SEPARATION_TIME: Final = 4  # of the last loss of contact [s]
 STOP_TIME: Final = 5  # of the last stop [s]
-PEAK_TIME: Final = 6  # of the peak force [s]
-HALT_TIME: Final = 7  # of the actuator [s]
-STATUS: Final = 8  # how the integration ended
-EVENT_COUNT: Final = 9  # recorded or not
-STEP_COUNT: Final = 10  # accepted and refused steps
-OUTPUT_COUNT: Final = 11  # length of the outputs of a tap
+HALT_TIME: Final = 6  # of the actuator [s]
+STATUS: Final = 7  # how the integration ended
+EVENT_COUNT: Final = 8  # recorded or not
+STEP_COUNT: Final = 9  # accepted and refused steps
+OUTPUT_COUNT: Final = 10  # length of the outputs of a tap
 
 AT_REST: Final = 0.0  # value of STATUS
 STILL_MOVING: Final = 1.0  # value of STATUS: at the end of the time allowed

@@ -140,7 +140,7 @@ class TapOutputs:
     peak_force_n : as the sensor shows it, over all contacts
     displacement_m : first contact to rest, along the tap
     sliding_distance_m, separation_s : from, and time of, the last loss of contact
-    breakaway_s, peak_s, halt_s, stop_s : times
+    breakaway_s, stop_s : times
     at_rest : bool; False for a part that was still moving at the end of the allowed time
     """
 
@@ -148,8 +148,6 @@ class TapOutputs:
     displacement_m: Samples
     sliding_distance_m: Samples
     breakaway_s: Samples
-    peak_s: Samples
     separation_s: Samples
-    halt_s: Samples
     stop_s: Samples
     at_rest: Samples

@@ -135,13 +135,9 @@ def update_peak_force(
             low, a, force_a = a, b, force_b
             b = high - GOLDEN * (high - low)
             force_b = sensed_force(b, t, h, phase, step)
-    if force_a > best:
-        best, best_at = force_a, a
-    if force_b > best:
-        best, best_at = force_b, b
-    if best > outputs[at.PEAK_FORCE]:
-        outputs[at.PEAK_FORCE] = best
-        outputs[at.PEAK_TIME] = t + best_at * h
+    for force in (force_a, force_b, best):
+        if force > outputs[at.PEAK_FORCE]:
+            outputs[at.PEAK_FORCE] = force
 
 
 @compiled

@@ -28,13 +28,6 @@ CELLS_URI: Final = "urn:impactcell:cells"
 MACHINERY_URI: Final = "http://opcfoundation.org/UA/Machinery/"
 NODESETS: Final = ("Di.Subset", "Machinery.Subset", "ImpactCell")
 
-AGGREGATES: Final = (
-    ua.ObjectIds.AggregateFunction_Average,
-    ua.ObjectIds.AggregateFunction_Minimum,
-    ua.ObjectIds.AggregateFunction_Maximum,
-    ua.ObjectIds.AggregateFunction_Count,
-)
-
 _CONDITION_OPTIONS: Final = frozenset(
     {
         "ConfirmedState",
