@@ -10,7 +10,7 @@ from pathlib import Path
 from impactcell.api.findings import write_findings
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
 from impactcell.campaign import Campaign, naming, read
-from impactcell.campaign.recorded import from_captures
+from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.cli.paths import note_damage, open_journal
 from impactcell.discrepancy.report import headline, machine_headline
 from impactcell.discrepancy.search import Mapper

@@ -16,7 +16,7 @@ from impactcell.discrepancy.data import check_campaign_units
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
-from impactcell.prediction.free_slide import free_slide_friction
+from impactcell.prediction.free_slide_friction import free_slide_friction
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress

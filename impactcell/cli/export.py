@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from impactcell import campaign
-from impactcell.campaign.recorded import from_captures
+from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.cli.paths import note_damage, open_journal
 from impactcell.errors import CampaignError
 from impactcell.process.console import print_note, print_result

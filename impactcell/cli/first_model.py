@@ -10,7 +10,7 @@ from typing import Final
 
 from impactcell.api.first_model import TAPS, FirstModel, fit_first_model
 from impactcell.campaign import Campaign, read
-from impactcell.campaign.recorded import from_captures
+from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.cli.accept_model import previous_model
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.paths import note_damage, open_journal

@@ -13,8 +13,8 @@ from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.captures import channel_of, described
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given, Mapping
+from impactcell.measurements.measured_records import Record, records_of
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
-from impactcell.measurements.recorded import Record, records_of
 from impactcell.measurements.scalars import said_beside
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of

@@ -3,8 +3,8 @@
 import math
 
 from impactcell.measurements.mapping import Given
+from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import ColumnMeaning
-from impactcell.measurements.recorded import Record
 from impactcell.records import Capture, Channel
 
 

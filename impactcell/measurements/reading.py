@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements.archive import ARCHIVES, unpacked
 from impactcell.measurements.dialect import Dialect
 from impactcell.measurements.hdf5 import read_hdf5
 from impactcell.measurements.json_file import read_json
@@ -17,6 +16,7 @@ from impactcell.measurements.parquet import read_parquet
 from impactcell.measurements.table import Table
 from impactcell.measurements.tdms import read_tdms
 from impactcell.measurements.text_file import read_text
+from impactcell.measurements.unpacking import ARCHIVES, unpacked
 
 Reader = Callable[[Path, Limits], tuple[Table, ...]]
 KINDS: tuple[tuple[bytes, Reader], ...] = (

@@ -10,8 +10,8 @@ from impactcell.campaign import contacts
 from impactcell.measurements.captures import channel_of, described, scalar
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given
+from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
-from impactcell.measurements.recorded import Record
 from impactcell.records import Capture, Channel, Samples
 
 START_STD = 10.0

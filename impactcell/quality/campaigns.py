@@ -9,9 +9,9 @@ import numpy as np
 from impactcell.campaign import Campaign, Excitation
 from impactcell.campaign.contacts import noise_of
 from impactcell.errors import CampaignError
-from impactcell.quality.channels import channel_faults
+from impactcell.quality.channel_faults import channel_faults
 from impactcell.quality.data_fault import DataFault, Fault
-from impactcell.quality.motion import LATE_STEPS, lateness_s, slides
+from impactcell.quality.motion_faults import LATE_STEPS, lateness_s, slides
 from impactcell.records import Capture, Samples
 
 CHANNELS = ("force", "position", "actuator")

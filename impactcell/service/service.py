@@ -30,7 +30,7 @@ from impactcell.service.factory import (
 from impactcell.service.history_source import JournalHistory
 from impactcell.service.monitoring import CellHealth, Monitoring, waiting_cell
 from impactcell.service.operator_commands import OperatorCommands
-from impactcell.service.pages import served_pages
+from impactcell.service.page_servers import served_pages
 from impactcell.settings import CellConfig
 from impactcell.web import CellNews, TourStop
 from impactcell.web.live_feed import LiveFeed

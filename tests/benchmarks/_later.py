@@ -12,7 +12,9 @@ from tests.benchmarks import _syntax
 from tests.benchmarks._lists import Count
 
 LATER: Mapping[str, str] = {
-    "the live page": r"web(\..*)?|service\.(pages|page_gateway)|settings\.web_section|process\.background",
+    "the live page": (
+        r"web(\..*)?|service\.(page_servers|page_gateway)|settings\.web_section|process\.background"
+    ),
     "import of files as people have them": r"measurements(\..*)?|cli\.import_files|campaign\.contacts",
     "quality of recorded data": r"quality(\..*)?",
     "laws that nobody had listed, in the cell": r"discrepancy\.laws(\..*)?|physics\.(free_\w*forms|bspline)",

@@ -10,7 +10,7 @@ import pytest
 
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.data import CHANNELS
-from impactcell.discrepancy.data.shots import OWN_COVARIATES
+from impactcell.discrepancy.data.prepared_shots import OWN_COVARIATES
 from impactcell.discrepancy.report import german_sentences, sentences
 from impactcell.discrepancy.report.page import PARAMETER_LABELS, SENTENCES, write_reports
 from impactcell.discrepancy.workflow import DiscrepancyResult

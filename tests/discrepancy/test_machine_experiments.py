@@ -17,7 +17,7 @@ from impactcell.discrepancy.machine import (
     experiment_design,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.study import Study
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.records import Capture, Channel
 from tests.discrepancy.test_base_model import GRAVITY, INERTIA, pendulum, swings
@@ -121,9 +121,9 @@ def test_a_machine_is_not_asked_to_go_where_it_does_not_reach(
     assert finding.established == ("quadratic_drag",)
     tied = replace(finding, steps=(replace(finding.steps[0], tied_with=("viscous_friction",)),))
     candidates = [TermChoice("quadratic_drag"), TermChoice("viscous_friction")]
-    study = Study(uniform_records(campaign, base), base, candidates, None)
+    fits = MachineFits(uniform_records(campaign, base), base, candidates, None)
     monkeypatch.setattr(experiment_design, "MAX_RANGE", widest)
-    (proposal,) = experiment_design.with_experiments(study, tied).experiments
+    (proposal,) = experiment_design.with_experiments(fits, tied).experiments
     assert proposal.effects == ("quadratic_drag", "viscous_friction")
     assert proposal.shots == shots
     assert proposal.setting.startswith("shot" if shots else "nothing")

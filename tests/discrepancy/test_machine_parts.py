@@ -1,4 +1,4 @@
-"""Parts of a machine's study by themselves: what is left, its range, spikes and correlations."""
+"""Parts of a machine's fits by themselves: what is left, its range, spikes and correlations."""
 
 import math
 from types import SimpleNamespace
@@ -10,7 +10,7 @@ import pytest
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine import proof, simulation, uniform_records
 from impactcell.discrepancy.machine.base_model import Response
-from impactcell.discrepancy.machine.study import Study
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 
 
 def test_range_of_a_gap_where_nothing_is_left_is_students() -> None:
@@ -58,9 +58,9 @@ def test_the_correlation_time_is_that_which_went_in() -> None:
         target=averaged.ravel(), columns={}, record=np.repeat([0, 1], averaged.shape[1]),
         time_s=np.tile(step * np.arange(averaged.shape[1]), 2),
     )  # fmt: skip
-    study: Any = SimpleNamespace(rows=lambda: rows, records=(None, None))
+    fits: Any = SimpleNamespace(rows=lambda: rows, records=(None, None))
     model: Any = SimpleNamespace(fit=SimpleNamespace(columns=(), coefficients=()))
-    assert Study._correlation_time(study, model) == pytest.approx(0.5 * (m + 1) * step, rel=0.3)
+    assert MachineFits._correlation_time(fits, model) == pytest.approx(0.5 * (m + 1) * step, rel=0.3)
 
 
 def test_held_out_stretches_are_simulated_from_begin_to_end(monkeypatch: pytest.MonkeyPatch) -> None:

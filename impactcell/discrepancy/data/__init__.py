@@ -16,7 +16,7 @@ from impactcell.discrepancy.data.prepared_campaign import (
     shot_set,
     split_held_out,
 )
-from impactcell.discrepancy.data.shots import (
+from impactcell.discrepancy.data.prepared_shots import (
     CHANNELS,
     FORCE,
     POSITION,

@@ -11,7 +11,7 @@ from impactcell.discrepancy.data.driven_blocks import cut_blocks
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.measured_drive import friction_of_slip, mass_from_momentum, whiten_block
 from impactcell.discrepancy.data.phases import DRIVEN, Trajectory
-from impactcell.discrepancy.data.shots import IndexArray, PreparedShot, ShotSet
+from impactcell.discrepancy.data.prepared_shots import IndexArray, PreparedShot, ShotSet
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel, Samples

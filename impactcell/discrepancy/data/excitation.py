@@ -13,7 +13,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.data.phases import Trajectory
-from impactcell.discrepancy.data.shots import IndexArray, PreparedShot, ShotSet
+from impactcell.discrepancy.data.prepared_shots import IndexArray, PreparedShot, ShotSet
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
 from impactcell.records import Capture, Channel, Samples
 

@@ -8,7 +8,7 @@ from impactcell.campaign import Excitation
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.phases import FREE_SLIDE, STOP, Trajectory
 from impactcell.discrepancy.data.plant_guesses import friction_of_slides
-from impactcell.discrepancy.data.shots import POSITION, IndexArray, PreparedShot, ShotSet
+from impactcell.discrepancy.data.prepared_shots import POSITION, IndexArray, PreparedShot, ShotSet
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
 from impactcell.records import Capture, Channel
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import solve_triangular, solveh_banded
 
 from impactcell.discrepancy.data.driven_blocks import smoothed_velocity
-from impactcell.discrepancy.data.shots import POSITION, IndexArray, PreparedShot
+from impactcell.discrepancy.data.prepared_shots import POSITION, IndexArray, PreparedShot
 from impactcell.features import white_noise_std
 from impactcell.records import Channel, Samples
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
-from impactcell.discrepancy.data.shots import CHANNELS, IndexArray, PreparedShot
+from impactcell.discrepancy.data.prepared_shots import CHANNELS, IndexArray, PreparedShot
 from impactcell.errors import CampaignError
 from impactcell.features import white_noise_std
 from impactcell.records import Samples

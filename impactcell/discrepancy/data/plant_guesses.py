@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.data.shots import FORCE, POSITION, PreparedShot
+from impactcell.discrepancy.data.prepared_shots import FORCE, POSITION, PreparedShot
 
 MIN_SAMPLES = 12
 """Samples of a channel from which on a regression means anything."""

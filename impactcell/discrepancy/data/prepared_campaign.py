@@ -14,7 +14,13 @@ from impactcell.campaign import Campaign, Excitation, from_contact
 from impactcell.discrepancy.data.driven import Driven
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
-from impactcell.discrepancy.data.shots import POSITION, IndexArray, PreparedShot, ShotSet, concatenate_shots
+from impactcell.discrepancy.data.prepared_shots import (
+    POSITION,
+    IndexArray,
+    PreparedShot,
+    ShotSet,
+    concatenate_shots,
+)
 from impactcell.discrepancy.data.tap import Tap
 from impactcell.discrepancy.data.unit_checks import check_units
 from impactcell.errors import CampaignError

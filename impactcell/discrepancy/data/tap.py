@@ -10,7 +10,14 @@ from impactcell.campaign import Excitation
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, PRELOAD, STOP, UNLOADING, Trajectory
 from impactcell.discrepancy.data.plant_guesses import contact_by_regression, friction_of_slides
-from impactcell.discrepancy.data.shots import ACTUATOR, FORCE, POSITION, IndexArray, PreparedShot, ShotSet
+from impactcell.discrepancy.data.prepared_shots import (
+    ACTUATOR,
+    FORCE,
+    POSITION,
+    IndexArray,
+    PreparedShot,
+    ShotSet,
+)
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
 from impactcell.records import Capture, Channel
 

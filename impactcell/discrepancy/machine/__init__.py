@@ -8,9 +8,9 @@ from impactcell.discrepancy.machine.finding import (
     MachineLaw,
     OpenLoopError,
 )
-from impactcell.discrepancy.machine.free_forms import COVARIATES, FREE_FORMS, VALUES
 from impactcell.discrepancy.machine.investigation import investigate_machine
 from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of
+from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, VALUES
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep, Trial
 from impactcell.discrepancy.machine.simulation import motions, simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE, Term

@@ -14,10 +14,10 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.selection import ChosenTerm, TermSearch, Trial, is_tied
 from impactcell.discrepancy.machine.simulation import needed_force, positions_from
-from impactcell.discrepancy.machine.study import Study
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.search import Proposal
 from impactcell.errors import CampaignError
@@ -54,13 +54,13 @@ class _Change:
     records: tuple[UniformRecord, ...]
 
 
-def with_experiments(study: Study, finding: MachineFinding) -> MachineFinding:
+def with_experiments(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
     """Add to a finding, for each two terms that it ties, the records that would tell them apart."""
     ties = [(name, rival) for name, rivals in finding.tied_with.items() for rival in rivals]
     if not ties:
         return finding
     changes = _within_reach(finding, _changes(finding, _longest(finding)))
-    return replace(finding, experiments=tuple(_proposal(study, finding, tie, changes) for tie in ties))
+    return replace(finding, experiments=tuple(_proposal(fits, finding, tie, changes) for tie in ties))
 
 
 def _longest(finding: MachineFinding) -> UniformRecord:
@@ -167,13 +167,13 @@ def _with_force(finding: MachineFinding, record: UniformRecord) -> UniformRecord
 
 
 def _proposal(
-    study: Study, finding: MachineFinding, tie: tuple[str, str], changes: Sequence[_Change]
+    fits: MachineFits, finding: MachineFinding, tie: tuple[str, str], changes: Sequence[_Change]
 ) -> Proposal:
     """Fewest records of a change that tell two terms apart; 0 of them where none does."""
     tried = []
     for place, change in enumerate(changes):
         try:
-            test = _Test.of(study, finding, tie, change, place)
+            test = _Test.of(fits, finding, tie, change, place)
         except CampaignError:
             continue
         separation = test.separation()
@@ -195,7 +195,7 @@ class _Test:
 
     Attributes
     ----------
-    study : Study
+    fits : MachineFits
         Of old and new records, the two terms its candidates.
     blocks : Blocks
         Its training blocks.
@@ -206,7 +206,7 @@ class _Test:
     seed : int
     """
 
-    study: Study
+    fits: MachineFits
     blocks: Blocks
     terms: tuple[ChosenTerm, ...]
     old: int
@@ -215,13 +215,13 @@ class _Test:
 
     @classmethod
     def of(
-        cls, study: Study, finding: MachineFinding, tie: tuple[str, str], change: _Change, place: int
+        cls, fits: MachineFits, finding: MachineFinding, tie: tuple[str, str], change: _Change, place: int
     ) -> "_Test":
         rng = np.random.default_rng([finding.seed, SIMULATION, place])
         copies = [_noisy(record, finding, rng) for _ in range(COPIES) for record in change.records]
-        choices = [choice for choice in study.candidates if choice.name in tie]
+        choices = [choice for choice in fits.candidates if choice.name in tie]
         choices.sort(key=lambda choice: tie.index(choice.name))
-        every = Study((*study.records, *copies), study.base, choices, study.held)
+        every = MachineFits((*fits.records, *copies), fits.base, choices, fits.held)
         every.gravity, every.delay_s = finding.final.gravity, finding.final.delay_s
         blocks, _, _ = every.blocks()
         if min(record.time_s[-1] for record in change.records) < MIN_BLOCKS * every.block_s:
@@ -237,12 +237,12 @@ class _Test:
         part = {name: getattr(self.blocks, name)[chosen] for name in ("products", "rows", "noise", "fold")}
         search = TermSearch(
             replace(self.blocks, **part),
-            self.study.candidates,
-            self.study.shapes,
-            self.study.priors,
-            self.study.nonnegative,
+            self.fits.candidates,
+            self.fits.shapes,
+            self.fits.priors,
+            self.fits.nonnegative,
         )
-        columns = self.study.columns(self.terms)
+        columns = self.fits.columns(self.terms)
         before = search.losses(columns)
         return [search.best_shape(choice, columns, before) for choice in search.candidates]
 

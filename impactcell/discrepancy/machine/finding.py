@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, TermChoice
-from impactcell.discrepancy.machine.equations import Column
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord
+from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import Proposal
 
 MIN_TRAINING, MIN_HELD_OUT = 9, 5

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.discrepancy.laws import BAND, DRAWN, FittedFunction, Tangent
-from impactcell.discrepancy.machine.equations import Column, IndexArray
 from impactcell.discrepancy.machine.finding import FittedModel
-from impactcell.discrepancy.machine.free_forms import SPLINE_PIECES, splines
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import PIECES_PER_BLOCK, Blocks, prior_weight
-from impactcell.discrepancy.machine.study import Study
+from impactcell.discrepancy.machine.rival_forms import SPLINE_PIECES, splines
+from impactcell.discrepancy.machine.weak_form import Column, IndexArray
 from impactcell.records import Samples
 
 SMOOTHNESS = (1e-4, 1e-2, 1.0, 1e2)
@@ -47,7 +47,9 @@ def spline_columns(form: str) -> tuple[Column, ...]:
     return tuple((form, 0.0, number) for number in range(SPLINE_PIECES + 3))
 
 
-def best_spline(study: Study, blocks: Blocks, model: FittedModel, before: Samples, form: str) -> FreeSpline:
+def best_spline(
+    fits: MachineFits, blocks: Blocks, model: FittedModel, before: Samples, form: str
+) -> FreeSpline:
     """As smooth as blocks that it was not fitted to want it."""
     count = SPLINE_PIECES + 3
     places = blocks.places(spline_columns(form))
@@ -59,14 +61,14 @@ def best_spline(study: Study, blocks: Blocks, model: FittedModel, before: Sample
         losses = np.empty(len(blocks))
         for fold in np.unique(blocks.fold):
             inside = blocks.fold == fold
-            fitted = _solve(study, blocks, model, (spline_columns(form), penalty), np.flatnonzero(~inside))
+            fitted = _solve(fits, blocks, model, (spline_columns(form), penalty), np.flatnonzero(~inside))
             losses[inside] = blocks.losses(*fitted)[inside]
         trials.append(FreeSpline(form, penalty, before - losses))
     return max(trials, key=lambda spline: float(spline.gains.sum()))
 
 
 def _solve(
-    study: Study,
+    fits: MachineFits,
     blocks: Blocks,
     model: FittedModel,
     spline: tuple[Sequence[Column], Samples],
@@ -79,7 +81,7 @@ def _solve(
     places = blocks.places(every)
     total = blocks.products[chosen].sum(axis=0)
     matrix = total[np.ix_(places, places)].copy()
-    weight = prior_weight(blocks, fit.columns, fit.coefficients, study.priors)
+    weight = prior_weight(blocks, fit.columns, fit.coefficients, fits.priors)
     own = len(fit.columns)
     matrix[:own, :own] += np.diag(weight) * len(chosen) / len(blocks)
     matrix[own:, own:] += penalty * len(chosen) / len(blocks)
@@ -92,10 +94,10 @@ def _solve(
     return every, coefficients
 
 
-def with_spline(study: Study, blocks: Blocks, model: FittedModel, spline: FreeSpline) -> FittedModel:
+def with_spline(fits: MachineFits, blocks: Blocks, model: FittedModel, spline: FreeSpline) -> FittedModel:
     """Model with a spline beside its terms, fitted to all blocks."""
     every, coefficients = _solve(
-        study, blocks, model, (spline.columns, spline.penalty), np.arange(len(blocks))
+        fits, blocks, model, (spline.columns, spline.penalty), np.arange(len(blocks))
     )
     unknown = np.full(len(every), math.nan)
     at_bound = np.append(model.fit.at_bound, np.zeros(len(spline.columns), dtype=bool))
@@ -105,7 +107,7 @@ def with_spline(study: Study, blocks: Blocks, model: FittedModel, spline: FreeSp
 
 
 def tangent_of(
-    blocks: Blocks, study: Study, model: FittedModel, spline: FreeSpline, tested: tuple[float, float]
+    blocks: Blocks, fits: MachineFits, model: FittedModel, spline: FreeSpline, tested: tuple[float, float]
 ) -> tuple[Tangent, float]:
     """Quadratic log-likelihood of the spline's coefficients, and the variance that it is over.
 
@@ -119,7 +121,7 @@ def tangent_of(
     total = blocks.products.sum(axis=0)
     pieces = PIECES_PER_BLOCK * len(blocks)
     variance = float(blocks.losses(fit.columns, fit.coefficients).sum()) / pieces
-    weight = prior_weight(blocks, fit.columns[:-count], fit.coefficients[:-count], study.priors)
+    weight = prior_weight(blocks, fit.columns[:-count], fit.coefficients[:-count], fits.priors)
     matrix = total[np.ix_(beside, beside)] + np.diag(weight[own])
     held = [place for place in range(len(fit.columns) - count) if fit.at_bound[place]]
     at_bound = blocks.places([fit.columns[place] for place in held])

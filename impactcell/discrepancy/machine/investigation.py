@@ -12,7 +12,7 @@ from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Re
 from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.law_search import with_law
-from impactcell.discrepancy.machine.study import Study
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.errors import CampaignError
@@ -58,9 +58,9 @@ def investigate_machine(
         )
     base, notes = hold_what_cannot_be_seen(base, records)
     candidates = _candidates(base, records)
-    study = Study(records, base, candidates, _held_records(records, train, test))
-    finding = study.investigate([*notes_of(data_faults), *notes], seed)
-    return with_experiments(study, with_law(study, finding))
+    fits = MachineFits(records, base, candidates, _held_records(records, train, test))
+    finding = fits.investigate([*notes_of(data_faults), *notes], seed)
+    return with_experiments(fits, with_law(fits, finding))
 
 
 def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:

@@ -11,17 +11,17 @@ from dataclasses import replace
 
 from impactcell.discrepancy.laws import RankedForm, rank_forms
 from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
-from impactcell.discrepancy.machine.equations import Column
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
-from impactcell.discrepancy.machine.free_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
 from impactcell.discrepancy.machine.free_splines import best_spline, spline_function, tangent_of, with_spline
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import fall_of_gap
 from impactcell.discrepancy.machine.regression import (
     Blocks,
     fit_blocks,
     out_of_fold_losses,
 )
+from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
 from impactcell.discrepancy.machine.selection import (
     MIN_GAIN_Z,
     MIN_SHARE_OF_FREE,
@@ -30,7 +30,7 @@ from impactcell.discrepancy.machine.selection import (
     mean_over_error,
 )
 from impactcell.discrepancy.machine.simulation import resistance, simulate_held_out
-from impactcell.discrepancy.machine.study import Study
+from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
 
 MIN_SHARE = 0.05
@@ -43,25 +43,25 @@ NEGATIVE_SHARE = 0.02
 """Share of the largest friction by which it may be below zero before it gives energy [1]."""
 
 
-def with_law(study: Study, finding: MachineFinding) -> MachineFinding:
+def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
     """Look for a law where a finding leaves something; the finding with it, or with the reason for none."""
     if finding.missing_blocks or finding.is_at_floor:
         return finding
-    outcome = _find_law(study, finding)
+    outcome = _find_law(fits, finding)
     if isinstance(outcome, str):
         return replace(finding, law_refused=outcome)
     return replace(finding, law=outcome)
 
 
-def _find_law(study: Study, finding: MachineFinding) -> MachineLaw | str:
+def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
     own = tuple(term.choice for term in finding.final.terms[len(finding.nominal.terms) :])
-    training, held_out, _ = study.blocks(study.rows_with(own, splines))
-    columns = study.columns(finding.final.terms)
-    fit = fit_blocks(training, columns, study.priors, study.nonnegative)
+    training, held_out, _ = fits.blocks(fits.rows_with(own, splines))
+    columns = fits.columns(finding.final.terms)
+    fit = fit_blocks(training, columns, fits.priors, fits.nonnegative)
     model = replace(finding.final, fit=fit)
-    before = out_of_fold_losses(training, columns, study.priors, study.nonnegative)
+    before = out_of_fold_losses(training, columns, fits.priors, fits.nonnegative)
     tried = sorted(
-        (best_spline(study, training, model, before, form) for form in _gone_through(finding)),
+        (best_spline(fits, training, model, before, form) for form in _gone_through(finding)),
         key=lambda spline: -float(spline.gains.sum()),
     )
     best = tried[0]
@@ -72,11 +72,11 @@ def _find_law(study: Study, finding: MachineFinding) -> MachineLaw | str:
         LAW_PREFIX + other.form for other in tried[1:] if mean_over_error(best.gains - other.gains) < TIE_Z
     )
     tested = finding.scale.ranges[COVARIATES[best.form]]
-    smooth = with_spline(study, training, model, best)
-    tangent, variance = tangent_of(training, study, smooth, best, tested)
+    smooth = with_spline(fits, training, model, best)
+    tangent, variance = tangent_of(training, fits, smooth, best, tested)
     ranked = [item for item in rank_forms(tangent) if _is_resolved(item, tested)]
     choices = _choices(best.form, ranked[:REFITTED], max(map(abs, tested)))
-    laws = _Forms(study, (*own, *choices), model, choices)
+    laws = _Forms(fits, (*own, *choices), model, choices)
     chosen, equivalents = laws.condensed(best.gains, before)
     law_model, blocks = (smooth, held_out) if chosen is None else laws.fitted(chosen)
     fall = fall_of_gap(blocks, model, law_model, finding.seed)
@@ -137,13 +137,13 @@ class _Forms:
 
     def __init__(
         self,
-        study: Study,
+        fits: MachineFits,
         choices: Sequence[TermChoice],
         model: FittedModel,
         forms: Sequence[TermChoice],
     ) -> None:
-        self.study, self.model, self.forms = study, model, forms
-        self.training, self.held_out, _ = study.blocks(study.rows_with(choices, splines))
+        self.fits, self.model, self.forms = fits, model, forms
+        self.training, self.held_out, _ = fits.blocks(fits.rows_with(choices, splines))
 
     def _fit_columns(self, form: TermChoice) -> list[Column]:
         return [*self.model.fit.columns, *ChosenTerm(form, 0.0).columns]
@@ -152,7 +152,7 @@ class _Forms:
         """Shortest form that does as well out of fold as the spline, and those that do as well as it."""
         gains = {
             form: before - out_of_fold_losses(
-                self.training, self._fit_columns(form), self.study.priors, self.study.nonnegative
+                self.training, self._fit_columns(form), self.fits.priors, self.fits.nonnegative
             )
             for form in self.forms
         }  # fmt: skip
@@ -170,7 +170,7 @@ class _Forms:
 
     def fitted(self, form: TermChoice) -> tuple[FittedModel, Blocks]:
         """Model with a form, and held-out blocks with its columns."""
-        fit = fit_blocks(self.training, self._fit_columns(form), self.study.priors, self.study.nonnegative)
+        fit = fit_blocks(self.training, self._fit_columns(form), self.fits.priors, self.fits.nonnegative)
         terms = (*self.model.terms, ChosenTerm(form, 0.0))
         return replace(self.model, terms=terms, fit=fit), self.held_out
 

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
-from impactcell.discrepancy.machine.free_forms import COVARIATES, FREE_FORMS, VALUES
+from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, VALUES
 from impactcell.discrepancy.machine.terms import CATALOGUE, MotionState, Term
 from impactcell.records import Samples
 

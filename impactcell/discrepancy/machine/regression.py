@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from impactcell.discrepancy.machine.base_model import NumberPrior
-from impactcell.discrepancy.machine.equations import Column, IndexArray, Rows
+from impactcell.discrepancy.machine.weak_form import Column, IndexArray, Rows
 from impactcell.records import Samples
 
 RIDGE = 1e-9

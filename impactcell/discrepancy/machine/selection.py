@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
-from impactcell.discrepancy.machine.equations import Column
-from impactcell.discrepancy.machine.free_forms import FREE_FORMS, KNOTS, PLACES
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS, PLACES
+from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
 
 MIN_GAIN_Z = 3.0

@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import Response
-from impactcell.discrepancy.machine.equations import (
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
+from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.terms import MotionState
+from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
+from impactcell.discrepancy.machine.weak_form import (
     direction_of_motion,
     half_supports,
     smoothed_acceleration,
     smoothed_speed,
 )
-from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
-from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.terms import MotionState
-from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
 from impactcell.records import Samples
 
 STEPS_PER_PERIOD = 200

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from impactcell.errors import CampaignError
 from impactcell.process.background import VerbOutcome, run_verb
-from impactcell.web.studies.archive import holds_campaign, unpack_campaign
+from impactcell.web.studies.campaign_archive import holds_campaign, unpack_campaign
 from impactcell.web.studies.overview import campaign_overview, friction_overview
 from impactcell.web.studies.study import Goal, Stage, Study, StudyStore
 

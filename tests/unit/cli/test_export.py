@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from impactcell import campaign
-from impactcell.campaign.recorded import from_captures
+from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.cli.export import export
 from impactcell.errors import CampaignError
 from impactcell.journal.store import Journal

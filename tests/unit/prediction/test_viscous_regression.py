@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import CaptureError
-from impactcell.prediction.free_slide import free_slide_friction
+from impactcell.prediction.free_slide_friction import free_slide_friction
 from impactcell.records import Capture, Channel
 from tests.benchmarks._viscous_regression import by_decrement, by_least_squares
 from tests.taps import Tap

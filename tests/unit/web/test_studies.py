@@ -16,8 +16,8 @@ import pytest
 from impactcell.errors import CampaignError
 from impactcell.process.background import VerbOutcome
 from impactcell.scada import Role
-from impactcell.web.studies import archive, pages, upload
-from impactcell.web.studies.archive import unpack_campaign
+from impactcell.web.studies import campaign_archive, pages, upload
+from impactcell.web.studies.campaign_archive import unpack_campaign
 from impactcell.web.studies.pages import REPORT_POLICY
 from impactcell.web.studies.queue import MAX_WAITING
 from impactcell.web.studies.study import Stage, Study, StudyStore
@@ -361,7 +361,7 @@ def lying() -> bytes:
 def many() -> bytes:
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as packed:
-        for number in range(archive.MAX_MEMBERS + 1):
+        for number in range(campaign_archive.MAX_MEMBERS + 1):
             packed.writestr(f"traces/{number}.csv", b"")
         packed.writestr("campaign.yaml", b"")
     return content.getvalue()

@@ -7,18 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
-from impactcell.discrepancy.machine.equations import (
-    Column,
-    IndexArray,
-    Rows,
-    build_rows,
-    shape_grid,
-)
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
-from impactcell.discrepancy.machine.free_forms import Basis
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import BLOCKS_OF_RECORD, Blocks, blocks_of, fit_blocks
+from impactcell.discrepancy.machine.rival_forms import Basis
 from impactcell.discrepancy.machine.selection import (
     ChosenTerm,
     SelectionStep,
@@ -27,6 +20,13 @@ from impactcell.discrepancy.machine.selection import (
     select_terms,
 )
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
+from impactcell.discrepancy.machine.weak_form import (
+    Column,
+    IndexArray,
+    Rows,
+    build_rows,
+    shape_grid,
+)
 
 RECORDS_FOR_FOLDS = 4
 """Training records from which on a fold of the cross-validation is a record [1]."""
@@ -38,7 +38,7 @@ NUISANCES = ("force_gain", "force_offset", "gravity_torque", "position_offset", 
 """Numbers of a base model that are columns of the regression."""
 
 
-class Study:
+class MachineFits:
     """Records of one machine, its base model and what may be named.
 
     Parameters

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
-from impactcell.discrepancy.machine.free_forms import Basis, free_columns, hats
 from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
 from impactcell.discrepancy.machine.terms import MotionState, Term
 from impactcell.discrepancy.machine.uniform_records import (
     MIN_HALF_SUPPORT,
