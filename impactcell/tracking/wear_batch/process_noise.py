@@ -2,7 +2,11 @@
 
 from dataclasses import replace
 
-from impactcell.tracking.wear_batch import batch_filter, noise_identification, noise_scale
+from impactcell.tracking.wear_batch import (
+    batch_change_detection,
+    noise_identification,
+    noise_scale,
+)
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.process_noise_adaptation import adapt_process_noise
 from impactcell.tracking.wear_batch.settings import TrackerSettings
@@ -62,7 +66,7 @@ def _replayed(
     return replace(
         state,
         bank=again.bank,
-        change_point=batch_filter.refined_change_point(state, again.bank),
+        change_point=batch_change_detection.refined_change_point(state, again.bank),
         outliers=again.outliers,
         filter=known,
         level_variance=level,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
 from impactcell.tracking.wear_batch import (
-    batch_filter,
+    batch_change_detection,
     noise_scale,
     run_length_bank,
     wear_blocks,
@@ -82,7 +82,7 @@ def tracking_result(
     walks = (state.level_variance, state.slope_variance)
     wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes), probability)
     change = state.change_point
-    not_ready = batch_filter.reason_not_ready(state)
+    not_ready = batch_change_detection.reason_not_ready(state)
     batch = BatchState(
         observation.batch_id or state.batch_id or "",
         offset,

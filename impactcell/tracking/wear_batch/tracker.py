@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 from impactcell.tracking.wear_batch import (
+    batch_change_detection,
     batch_filter,
     input_validation,
     noise_identification,
@@ -83,7 +84,7 @@ def update(
         notes.append("the batch id changes too often to say anything of batches")
     cycle = UsableCycle(observation, timing, noise, std, variance, announced)
     updated = batch_filter.update_bank(settings, state, cycle)
-    before, change = batch_filter.detect_change(settings, state, cycle, updated)
+    before, change = batch_change_detection.detect_change(settings, state, cycle, updated)
     state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
     correlation, factor = state.innovation_correlation, 1.0
     if timing.lag == 0:
@@ -95,7 +96,7 @@ def update(
         filter=known,
         bank=updated.bank,
         outliers=updated.outliers,
-        change_point=batch_filter.refined_change_point(state, updated.bank),
+        change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
         innovation_correlation=correlation,
     )
@@ -178,8 +179,7 @@ def _update_filter(
     batch_id, current, timing = cycle.observation.batch_id, state.filter, cycle.timing
     is_in_bank_only = timing.lag > 0 and current is not None and batch_id not in current.batches
     is_known = settings.batch is BatchKnowledge.KNOWN and batch_id is not None
-    is_same_name = current is not None and batch_id == current.current
-    if is_known and cycle.observation.expected_change and is_same_name and timing.lag == 0:
+    if is_known and _is_announced_under_same_id(cycle, current):
         # what is measured has changed, as by another model: the bank was told, and has the offset right
         change, has_changed = None, True
     else:
@@ -202,6 +202,12 @@ def _update_filter(
     return state, current, change, innovation
 
 
+def _is_announced_under_same_id(cycle: UsableCycle, current: WearFilter | None) -> bool:
+    observation = cycle.observation
+    is_same_id = current is not None and observation.batch_id == current.current
+    return observation.expected_change and is_same_id and cycle.timing.lag == 0
+
+
 def _update_known_batch(
     settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, current: WearFilter
 ) -> tuple[TrackerState, WearFilter, ChangePoint | None, float]:
@@ -214,7 +220,7 @@ def _update_known_batch(
     current, error = wear_filter.update(
         current, cycle.observation.mu_s, variance, settings.outlier_threshold, lag, batch_id
     )
-    state, change = batch_filter.compare_with_previous_batch(settings, state, current, cycle)
+    state, change = batch_change_detection.compare_with_previous_batch(settings, state, current, cycle)
     return state, current, change, error.value / error.std
 
 
