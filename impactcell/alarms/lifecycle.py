@@ -231,11 +231,7 @@ def transition(alarm: Alarm, event: AlarmEvent) -> Transition:
     moved = _apply_tables(alarm, event.kind)
     if isinstance(moved, Refusal):
         return Transition(alarm, refusal=moved)
-    if event.kind in (EventKind.SHELVE_TIMED, EventKind.SHELVE_ONE_SHOT):
-        until = event.time_ns + event.shelve_ns if event.shelve_ns > 0 else 0
-        moved = replace(moved, shelved_until_ns=until)
-    elif moved.shelving is Shelving.UNSHELVED:
-        moved = replace(moved, shelved_until_ns=0)
+    moved = _with_end_of_shelving(moved, event)
     repeated = event.kind is EventKind.COMMENT or (event.kind is EventKind.REALARM and alarm.active)
     if moved == alarm and not repeated:
         return Transition(alarm)
@@ -279,6 +275,13 @@ def _apply_tables(alarm: Alarm, kind: EventKind) -> Alarm | Refusal:
     if isinstance(shelving, Refusal):
         return shelving
     return moved if shelving is None else replace(moved, shelving=shelving)
+
+
+def _with_end_of_shelving(alarm: Alarm, event: AlarmEvent) -> Alarm:
+    if event.kind in (EventKind.SHELVE_TIMED, EventKind.SHELVE_ONE_SHOT):
+        until_ns = event.time_ns + event.shelve_ns if event.shelve_ns > 0 else 0
+        return replace(alarm, shelved_until_ns=until_ns)
+    return replace(alarm, shelved_until_ns=0) if alarm.shelving is Shelving.UNSHELVED else alarm
 
 
 def _described(alarm: Alarm, event: AlarmEvent) -> Alarm:

@@ -133,8 +133,7 @@ class CaptureReader:
                 reason = fault
             except FieldbusError as error:
                 progressed = self._progressed()
-                code = error.code if isinstance(error, ModbusExceptionError) else None
-                if isinstance(error, NotDecimalError) or code in _REQUEST_FAULTS or (code and progressed):
+                if _is_of_request(error, progressed=progressed):
                     reason = str(error)
                     if progressed:
                         continue
@@ -279,6 +278,12 @@ class CaptureReader:
         capture = replace(capture, cycle=partial.target.cycle_id.cycle)
         named = tuple(f"{self._cell}: cycle {capture.cycle}: {fault}" for fault in faults)
         return FetchedCapture(capture, partial.identity, readable=True, faults=named)
+
+
+def _is_of_request(error: FieldbusError, *, progressed: bool) -> bool:
+    """Whether the fault lies in what was asked for, and not in the link, or in a module that is busy."""
+    code = error.code if isinstance(error, ModbusExceptionError) else None
+    return isinstance(error, NotDecimalError) or code in _REQUEST_FAULTS or bool(code and progressed)
 
 
 def _at_rest(header: Mapping[str, Value]) -> bool:

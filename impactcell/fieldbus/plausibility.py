@@ -85,9 +85,14 @@ def _evidence(registers: RegisterMap, images: Sequence[RegisterImage]) -> Iterat
     cycle_time = value("cycle_time")
     if isinstance(cycle_time, int) and cycle_time:
         yield EARLIEST_NS <= cycle_time < LATEST_NS, f"cycle_time shows {cycle_time} ns"
-    for name, (least, most, also) in _RANGES.items():
+    for name in _RANGES:
         shows = value(name)
         if isinstance(shows, int | float) and name in registers:
-            possible = least <= shows <= most or shows == also or (math.isnan(also) and math.isnan(shows))
             register = registers[name]
-            yield possible, f"{name} shows {shows / register.si_factor:g} {register.unit}".rstrip()
+            text = f"{name} shows {shows / register.si_factor:g} {register.unit}"
+            yield _is_in_range(name, shows), text.rstrip()
+
+
+def _is_in_range(name: str, shows: float) -> bool:
+    least, most, also = _RANGES[name]
+    return least <= shows <= most or shows == also or (math.isnan(also) and math.isnan(shows))

@@ -21,6 +21,7 @@ from impactcell.physics.law_table import build_law_table, parameter_range, param
 from impactcell.physics.memory_layout import TapArrays
 from impactcell.physics.motion import TapOutputs, Traces
 from impactcell.physics.plant import Plant, TapInput
+from impactcell.physics.sample_layout import lay_out_samples
 from impactcell.records import Samples
 
 
@@ -81,32 +82,9 @@ class Ensemble:
         self.names = self._table.names
         self.gravity_m_s2 = gravity_m_s2
         self._count = len(taps)
-        index = [[0] * at.SAMPLE_INDEX_COUNT for _ in taps]
         times_by_channel = (force_time_s, position_time_s, actuator_time_s, velocity_time_s)
-        pairs = [(channel, i) for channel in range(at.CHANNEL_COUNT) for i in range(len(taps))]
-        pieces: list[Samples] = []
-        total, checked, times = 0, NO_SAMPLES, NO_SAMPLES
-        for channel, i in sorted(pairs, key=lambda pair: pair[1]) if by_tap else pairs:
-            of_taps = times_by_channel[channel]
-            given = NO_SAMPLES if of_taps is None else of_taps[i]
-            if given is not checked:  # taps may share theirs
-                times = np.asarray(given, dtype=np.float64)
-                if not (np.isfinite(times).all() and (times[1:] >= times[:-1]).all()):
-                    raise PhysicsError(f"tap {i}: sample times must ascend and be numbers")
-                checked = given
-            pieces.append(times)
-            index[i][channel] = total
-            total += times.size
-            index[i][at.CHANNEL_COUNT + channel] = total
-        self._times = np.concatenate(pieces) if pieces else NO_SAMPLES
-        self._sample_index = np.array(index, dtype=np.int64).reshape(-1, at.SAMPLE_INDEX_COUNT)
-        spans = [[(row[k], row[at.CHANNEL_COUNT + k]) for row in index] for k in range(at.CHANNEL_COUNT)]
-        self._channels: list[slice | np.ndarray] = [
-            np.concatenate([np.arange(begin, end) for begin, end in span])
-            if by_tap
-            else slice(span[0][0] if span else 0, span[-1][1] if span else 0)
-            for span in spans
-        ]
+        layout = lay_out_samples(times_by_channel, len(taps), by_tap=by_tap)
+        self._times, self._sample_index, self._channels = layout
         self._drives, self._drive_ends = NO_SAMPLES, np.zeros(len(taps) + 1, dtype=np.int64)
         if drives is not None:
             self._set_drives(drives, given_speed=initial_speed_m_s is not None)

@@ -184,6 +184,20 @@ def gives_up(steps: int, error: float, h: float, drive: DrivingForce, outputs: F
 
 
 @compiled
+def end_tap(t: float, horizon: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
+    """Fill what lies after the last step, and the outputs."""
+    outputs = record.outputs
+    if t >= horizon and phase.contact_mode[at.SLIP] == 0:
+        # Held for good: the actuator has stalled against it, or nothing drives it any more.
+        outputs[at.STATUS] = at.AT_REST
+    if outputs[at.STATUS] in (at.TOO_MANY_EVENTS, at.TOO_MANY_STEPS):
+        fill_unknown(record)
+    else:
+        fill_after_end(t, step.state, phase, record)
+    finish_outputs(t, step.state, phase, outputs)
+
+
+@compiled
 def integrate_tap(
     phase: SmoothPhase, step: StepBuffers, record: TapRecord, drive: DrivingForce, horizon: float, goal: int
 ) -> None:
@@ -222,15 +236,8 @@ def integrate_tap(
         if reaches_limit:
             crossed, over = cross_limit(t, phase, step, drive)
             fresh = fresh or crossed
-    if t >= horizon and phase.contact_mode[at.SLIP] == 0:
-        # Held for good: the actuator has stalled against it, or nothing drives it any more.
-        outputs[at.STATUS] = at.AT_REST
     outputs[at.STEP_COUNT] = steps
-    if outputs[at.STATUS] in (at.TOO_MANY_EVENTS, at.TOO_MANY_STEPS):
-        fill_unknown(record)
-    else:
-        fill_after_end(t, step.state, phase, record)
-    finish_outputs(t, step.state, phase, outputs)
+    end_tap(t, horizon, phase, step, record)
 
 
 @compiled

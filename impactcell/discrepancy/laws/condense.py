@@ -7,11 +7,13 @@ that the plant would take up by itself have no information and cost a form nothi
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import fmin
 
+from impactcell.discrepancy.data import IndexArray
 from impactcell.discrepancy.laws.grammar import (
     WAVE_ATOMS,
     WAVES,
@@ -39,6 +41,8 @@ PRODUCTS = 30
 """Products of a function of each of two covariates that are refined whatever their rank, the best first."""
 REFINED = 60
 """Forms whose shapes are refined."""
+TRIED_PAIRS = 50 * REFINED
+"""Sums of two that are offered, the best first: one form comes with some fifty starts."""
 SINGULAR = 1e-9
 """Relative determinant below which two terms are one."""
 WIDEST_STEP, FARTHEST = 0.25, 2.0
@@ -98,18 +102,9 @@ def rank_forms(quadratic: Tangent) -> list[RankedForm]:
     plain = [i for i, item in enumerate(singles) if len(item.term) == 1 or quadratic.second is not None]
     chosen = sorted(plain, key=lambda i: -(gains[i] - cost * numbers[i]))[:PAIRS]
     chosen += [i for i in plain if i not in set(chosen) and singles[i].shape_count == 0]
-    a, b = np.triu_indices(len(chosen), 1)
-    i, j = np.array(chosen)[a], np.array(chosen)[b]
-    determinant = diagonal[i] * diagonal[j] - gram[i, j] ** 2
-    usable = determinant > SINGULAR * diagonal[i] * diagonal[j]
-    i, j, determinant = i[usable], j[usable], determinant[usable]
-    pair = 0.5 * (diagonal[j] * h[i] ** 2 - 2.0 * gram[i, j] * h[i] * h[j] + diagonal[i] * h[j] ** 2)
-    pair = pair / determinant - cost * (numbers[i] + numbers[j])
-    for place in np.argsort(-pair)[: 50 * REFINED].tolist():
-        one, other = singles[int(i[place])], singles[int(j[place])]
-        if _is_wave(one, other) and one.shapes != other.shapes:
-            continue
-        offer(float(pair[place]), (one, other))
+    for score, i, j in _best_pairs(np.array(chosen), h, gram, cost, numbers):
+        if not _is_wave(singles[i], singles[j]) or singles[i].shapes == singles[j].shapes:
+            offer(score, (singles[i], singles[j]))
     order = sorted(best.values(), key=lambda entry: -entry[0])
     rest = order[REFINED:]
     simple = [entry for entry in rest if is_simple(tuple(t.term for t in entry[1]))]
@@ -119,6 +114,22 @@ def rank_forms(quadratic: Tangent) -> list[RankedForm]:
     refined = [projector.refine(terms, cost) for _, terms in order]
     waves = [projector.wave(cost)] if quadratic.second is None else []
     return sorted([*refined, *waves], key=lambda item: -item.score)
+
+
+def _best_pairs(
+    chosen: IndexArray, h: Samples, gram: Samples, cost: float, numbers: IndexArray
+) -> Iterator[tuple[float, int, int]]:
+    """Score and both terms of the sums of two, the best first: gain of both at once less what they cost."""
+    diagonal = np.maximum(np.diag(gram), 1e-300)
+    a, b = np.triu_indices(len(chosen), 1)
+    i, j = chosen[a], chosen[b]
+    determinant = diagonal[i] * diagonal[j] - gram[i, j] ** 2
+    usable = determinant > SINGULAR * diagonal[i] * diagonal[j]
+    i, j, determinant = i[usable], j[usable], determinant[usable]
+    score = 0.5 * (diagonal[j] * h[i] ** 2 - 2.0 * gram[i, j] * h[i] * h[j] + diagonal[i] * h[j] ** 2)
+    score = score / determinant - cost * (numbers[i] + numbers[j])
+    for place in np.argsort(-score)[:TRIED_PAIRS].tolist():
+        yield float(score[place]), int(i[place]), int(j[place])
 
 
 def is_simple(form: Form) -> bool:
