@@ -3,7 +3,8 @@
 A field that is renamed gets a row here, its place in the form before (see `Migration`) and its new key;
 nothing else refers to the old name. Format 2 is the first that has a number. Rows may be added to the last
 migration as long as no version that writes its result has been released; the change after that begins a
-migration of its own.
+migration of its own. A later format than this version knows is refused elsewhere: of what is stored by
+`impactcell.serialization.versioned`, of the file as a whole by `impactcell.journal.database`.
 """
 
 import math

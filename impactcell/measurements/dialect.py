@@ -111,15 +111,19 @@ def split_cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in line.split(delimiter)]
 
 
+def later_lines(lines: Sequence[str]) -> Sequence[str]:
+    """Up to `SAMPLED_LINES` about three quarters down a file: beyond any preamble, before what may end it."""
+    begin = max(0, 3 * len(lines) // 4 - SAMPLED_LINES // 2)
+    return lines[begin : begin + SAMPLED_LINES]
+
+
 def detect(lines: Sequence[str], given: Dialect) -> tuple[str, str, str]:
     """Delimiter, decimal mark, and why, from lines of which most are rows of numbers.
 
     The pair wins under which most lines have equally many cells and most cells are numbers; then the one with
     more columns, with fewer numbers that need a separator of thousands, and the likelier delimiter.
     """
-    filled = [line for line in lines if line.strip()]
-    begin = max(0, 3 * len(filled) // 4 - SAMPLED_LINES // 2)
-    sample = filled[begin : begin + SAMPLED_LINES]
+    sample = later_lines([line for line in lines if line.strip()])
     delimiters = DELIMITERS if given.delimiter is None else {given.delimiter: given.delimiter}
     decimals = DECIMALS if given.decimal is None else (given.decimal,)
     quoted = any('"' in line for line in sample)
@@ -139,8 +143,7 @@ def detect(lines: Sequence[str], given: Dialect) -> tuple[str, str, str]:
     note = f"{separator}-separated, decimal {'point' if decimal == '.' else 'comma'}"
     if grouped:
         note += ", thousands separated"
-    elif given.decimal is None and columns and _is_ambiguous(sample, delimiter, decimal):
-        example = _is_ambiguous(sample, delimiter, decimal)
+    elif given.decimal is None and columns and (example := _ambiguous_number(sample, delimiter, decimal)):
         note += f" (numbers like {example!r} could be thousands: --decimal says)"
     return delimiter, decimal, note
 
@@ -156,7 +159,7 @@ def _score(rows: list[list[str]], decimal: str) -> tuple[float, int, int]:
     return round(count / len(rows) * sum(numbers) / len(cells), 2), width, -grouped
 
 
-def _is_ambiguous(sample: Sequence[str], delimiter: str, decimal: str) -> str:
+def _ambiguous_number(sample: Sequence[str], delimiter: str, decimal: str) -> str:
     """Give a number that is another one under the other decimal mark where none settles it; else empty."""
     other = "," if decimal == "." else "."
     first = ""

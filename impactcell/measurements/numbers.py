@@ -1,4 +1,7 @@
-"""Numbers as text: decimal comma or point, thousands separators, signs for a value that is missing."""
+"""Numbers as text: decimal comma or point, thousands separators, signs for a value that is missing.
+
+Which mark a file uses is told from the file itself, by `dialect`.
+"""
 
 import math
 import re

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements.dialect import SAMPLED_LINES, split_cells
+from impactcell.measurements.dialect import SAMPLED_LINES, later_lines, split_cells
 from impactcell.measurements.numbers import is_missing, parse_number
 from impactcell.measurements.units import parse_unit, split_unit
 
@@ -117,8 +117,7 @@ def is_comment(line: str) -> bool:
 def _body(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, frozenset[int]]:
     """Cells of a row, and the columns that are numbers, from lines in the later part of the file."""
     filled = [line for line in lines if not is_comment(line)]
-    begin = max(0, 3 * len(filled) // 4 - SAMPLED_LINES // 2)
-    rows = [split_cells(line, delimiter) for line in filled[begin : begin + SAMPLED_LINES]]
+    rows = [split_cells(line, delimiter) for line in later_lines(filled)]
     if not rows:
         return 0, frozenset()
     width = Counter(map(len, rows)).most_common(1)[0][0]

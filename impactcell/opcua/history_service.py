@@ -29,7 +29,10 @@ EVENTS_AT_ONCE: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class _UnfinishedRead:
-    """What a continuation point stands for: it goes on with the same node and the same kind of question."""
+    """What a continuation point stands for: it goes on with the same node and the same kind of question.
+
+    When it expires, `continuation_points` says.
+    """
 
     node: ua.NodeId
     details: type
@@ -92,7 +95,7 @@ class HistoryService:
         budget: ReadBudget,
     ) -> ua.HistoryReadResult:
         result, node = ua.HistoryReadResult(), parameters.NodesToRead[index]
-        points, details = context.session.history, parameters.HistoryReadDetails
+        points, details = context.session.history_points, parameters.HistoryReadDetails
         try:
             kept = points.take(node.ContinuationPoint) if node.ContinuationPoint else None
             if parameters.ReleaseContinuationPoints:

@@ -16,6 +16,7 @@ from impactcell.opcua.attribute_service import AttributeService
 from impactcell.opcua.authentication import Authenticator
 from impactcell.opcua.binary_codec import MAX_OPERATIONS, StatusCodeError
 from impactcell.opcua.connection_table import ConnectionTable
+from impactcell.opcua.continuation_points import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS
 from impactcell.opcua.discovery_service import POLICIES, DiscoveryService
 from impactcell.opcua.historical_variable import VALUES_PER_PAGE
 from impactcell.opcua.history_processed import AGGREGATE_FUNCTIONS
@@ -27,7 +28,7 @@ from impactcell.opcua.monitored_item_service import MonitoredItemService
 from impactcell.opcua.request_dispatch import RequestDispatcher, Service
 from impactcell.opcua.secure_channel import ChannelSecurity
 from impactcell.opcua.session_service import SessionService
-from impactcell.opcua.session_table import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS, SessionTable
+from impactcell.opcua.session_table import SessionTable
 from impactcell.opcua.subscription_service import SubscriptionService
 from impactcell.opcua.tcp_connection import TcpConnection
 from impactcell.opcua.trust_list import TrustList

@@ -8,13 +8,14 @@ the rest, and limits sessions only by the thousand.
 import logging
 import os
 import time
-from collections import OrderedDict, deque
+from collections import deque
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 from asyncua import ua
 
 from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.continuation_points import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS, ContinuationPoints
 from impactcell.opcua.host_interface import Actor, ServerLimits
 from impactcell.opcua.tcp_connection import TcpConnection
 
@@ -22,12 +23,6 @@ _log = logging.getLogger(__name__)
 
 MIN_TIMEOUT_S: Final = 10.0
 """Shortest timeout of a session, seconds."""
-MAX_BROWSE_POINTS: Final = 20
-"""Continuation points of Browse kept for one session; shown among the capabilities."""
-MAX_HISTORY_POINTS: Final = 100
-"""Continuation points of HistoryRead kept for one session: one for each node of the largest request."""
-
-
 MAX_SESSION_NAME: Final = 128
 """Characters kept of the name of a session: it is for the log alone."""
 
@@ -40,34 +35,6 @@ class PublishRequest:
     handle: int
     results: bytes
     expires: float
-
-
-class ContinuationPoints:
-    """Continuation points of one session; the oldest gives way when there are too many."""
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._states: OrderedDict[bytes, Any] = OrderedDict()
-
-    def keep(self, state: object) -> bytes:
-        """Keep what is needed to read on, and name it."""
-        while len(self._states) >= self._most:
-            self._states.popitem(last=False)
-        point = os.urandom(16)
-        self._states[point] = state
-        return point
-
-    def take(self, point: bytes) -> Any:
-        """Take what was kept.
-
-        Raises
-        ------
-        StatusCodeError
-            BadContinuationPointInvalid.
-        """
-        if point not in self._states:
-            raise StatusCodeError(ua.StatusCodes.BadContinuationPointInvalid)
-        return self._states.pop(point)
 
 
 @dataclass(eq=False, slots=True)
@@ -86,8 +53,8 @@ class Session:
     language: str | None = None
     last_seen: float = field(default_factory=time.monotonic)
     publish_requests: deque[PublishRequest] = field(default_factory=deque)
-    browse: ContinuationPoints = field(default_factory=lambda: ContinuationPoints(MAX_BROWSE_POINTS))
-    history: ContinuationPoints = field(default_factory=lambda: ContinuationPoints(MAX_HISTORY_POINTS))
+    browse_points: ContinuationPoints = field(default_factory=lambda: ContinuationPoints(MAX_BROWSE_POINTS))
+    history_points: ContinuationPoints = field(default_factory=lambda: ContinuationPoints(MAX_HISTORY_POINTS))
     closed: bool = False
 
     @property

@@ -11,9 +11,9 @@ from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.continuation_points import MAX_BROWSE_POINTS, ContinuationPoints
 from impactcell.opcua.languages import Languages
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
-from impactcell.opcua.session_table import MAX_BROWSE_POINTS, ContinuationPoints
 from impactcell.opcua.type_instances import HAS_SUBTYPE, targets
 
 MAX_REFERENCES_PER_NODE: Final = 1_000
@@ -60,7 +60,7 @@ class ViewService:
             parameters.RequestedMaxReferencesPerNode or MAX_REFERENCES_PER_NODE, MAX_REFERENCES_PER_NODE
         )
         response = ua.BrowseResponse()
-        answer, language = _Answer(context.session.browse), context.session.language
+        answer, language = _Answer(context.session.browse_points), context.session.language
         response.Results = await context.share.each(
             (_UnfinishedBrowse(description, max_references) for description in descriptions),
             lambda unfinished: self._browse(unfinished, answer, language),
@@ -128,7 +128,7 @@ class ViewService:
         self, context: RequestContext, parameters: ua.BrowseNextParameters
     ) -> ua.BrowseNextResponse:
         """Go on where an answer was cut, or release what was kept for it."""
-        points, answer = context.session.browse, _Answer(context.session.browse)
+        points, answer = context.session.browse_points, _Answer(context.session.browse_points)
 
         def go_on(point: bytes) -> ua.BrowseResult:
             try:

@@ -1,4 +1,7 @@
-"""The last gate before the module: velocity, stroke, force and travel of a tap, in one place."""
+"""The last gate before the module: velocity, stroke, force and travel of a tap, in one place.
+
+That a tap might go too far is weighed before, by `action_selection`.
+"""
 
 import math
 from dataclasses import dataclass
