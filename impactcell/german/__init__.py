@@ -1,1 +1,1 @@
-"""What the effects and the findings of the discrepancy workflow are called in German, for page and report."""
+"""What the discrepancy workflow found, said in German, for page and report; an effect says it of itself."""

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from impactcell.german.effects import GERMAN_EFFECTS
+from impactcell.physics.effect import German
+from impactcell.physics.effects import LIBRARY
 from impactcell.process.progress import COMPILING
 
 REPORTS: Final[Mapping[str, str]] = {"en": "report.html", "de": "report.de.html"}
@@ -57,7 +58,14 @@ def german_effect(identifier: str) -> str:
     >>> german_effect("viscous_friction"), german_effect("own_effect")
     ('Viskose Reibung', 'own effect')
     """
-    return GERMAN_EFFECTS.get(identifier, (identifier.replace("_", " "),))[0]
+    german = german_texts(identifier)
+    return identifier.replace("_", " ") if german is None else german.name
+
+
+def german_texts(identifier: str) -> German | None:
+    """Give what an effect says of itself in German; None for one that says nothing."""
+    effect = LIBRARY.get(identifier)
+    return None if effect is None else effect.german
 
 
 def enumerated(names: Sequence[str], conjunction: str) -> str:

@@ -135,6 +135,14 @@ class Factors(NamedTuple):
     mass: Samples
 
 
+class German(NamedTuple):
+    """What an effect is called in German, what it means, what to look at: as the object of "Nachsehen:"."""
+
+    name: str
+    meaning: str
+    look_at: str
+
+
 ONE = np.ones(())
 
 
@@ -151,6 +159,8 @@ class Effect:
         The law as one would print it, and where it comes from.
     meaning, look_at : str
         What it is in a sentence for whoever knows the machine and no mechanics, and what to look at there.
+    german : German or None
+        The same in German; without it the effect is called by its identifier there, and told in English.
     phases : tuple of Phase
         Where in a record it shows directly.
     laws : mapping
@@ -180,3 +190,4 @@ class Effect:
     order: int = 0
     meaning: str = ""
     look_at: str = ""
+    german: German | None = None

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from impactcell.alarms import RULES, Message
-from impactcell.german.effects import GERMAN_EFFECTS
 from impactcell.german.findings import (
     ENGLISH_STEPS,
     GERMAN_QUANTITIES,
     GERMAN_STEPS,
     german_effect,
     german_headline,
+    german_texts,
 )
 from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
@@ -88,8 +88,8 @@ class Messages:
 
     def advice(self, effect: Mapping[str, Any]) -> tuple[str, str]:
         """Say what an effect of a result means and what to look at; empty where that is not known."""
-        if self.language == "de" and effect["effect"] in GERMAN_EFFECTS:
-            return GERMAN_EFFECTS[effect["effect"]][1:]
+        if self.language == "de" and (german := german_texts(effect["effect"])) is not None:
+            return german.meaning, german.look_at
         return effect.get("meaning", ""), effect.get("look_at", "")
 
     def quantity(self, name: str) -> str:

@@ -13,8 +13,8 @@ from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import NOT_SET
 from impactcell.discrepancy.search import UNTESTED
 from impactcell.discrepancy.workflow import DiscrepancyResult
-from impactcell.german.effects import GERMAN_EFFECTS
-from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, german_effect, german_headline
+from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, german_headline, german_texts
+from impactcell.physics.effect import German
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
 
@@ -99,8 +99,8 @@ _SHAPES: Final = (
 
 def phrase(identifier: str) -> str:
     """Name an effect, a phase, a covariate or a verdict."""
-    if identifier in GERMAN_EFFECTS:
-        return german_effect(identifier)
+    if (german := german_texts(identifier)) is not None:
+        return german.name
     return _WORDS.get(identifier, identifier.replace("_", " "))
 
 
@@ -152,9 +152,14 @@ def advice(result: DiscrepancyResult) -> list[dict[str, Any]]:
         for place, name in enumerate((effect, *result.selection.ties.get(effect, ()))):
             told = find_effect(name)
             if told.meaning:
-                meaning, look_at = GERMAN_EFFECTS.get(name, (name, told.meaning, told.look_at))[1:]
+                said = told.german or German(name, told.meaning, told.look_at)
                 rows.append(
-                    {"name": phrase(name), "is_rival": place > 0, "meaning": meaning, "look_at": look_at}
+                    {
+                        "name": phrase(name),
+                        "is_rival": place > 0,
+                        "meaning": said.meaning,
+                        "look_at": said.look_at,
+                    }
                 )
     return rows
 

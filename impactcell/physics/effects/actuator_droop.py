@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def loss(w: float, force: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -20,6 +20,14 @@ EFFECT = Effect(
     meaning="Under load the actuator slows down, and comes back to its speed only after a moment.",
     look_at="the drive: its current limit and the gain of its speed loop, a slipping belt or "
     "coupling, low air or oil pressure",
+    german=German(
+        "Geschwindigkeitseinbruch des Antriebs",
+        "Unter Last wird der Antrieb langsamer; seine Geschwindigkeit hat er erst nach einem Moment wieder.",
+        (
+            "den Antrieb: Stromgrenze, Verstärkung des Geschwindigkeitsreglers, rutschender Riemen, "
+            "zu wenig Luft- oder Öldruck"
+        ),
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(
         Parameter("speed_loss_m_per_s_n", "m/(s N)", null=0.0, lower=0.0, upper=0.001, typical=5e-05),

@@ -1,7 +1,7 @@
 """Actuator ramp: the actuator needs time to reach its speed."""
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def run_up(t: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -22,6 +22,14 @@ EFFECT = Effect(
     meaning="The actuator has not reached its speed when it meets the part; it is still speeding up.",
     look_at="the drive's acceleration limit, and the free travel before contact: start "
     "farther away, or speed up faster",
+    german=German(
+        "Anlauf des Antriebs",
+        "Der Antrieb hat seine Geschwindigkeit noch nicht erreicht, wenn er das Teil trifft.",
+        (
+            "die Beschleunigungsgrenze des Antriebs und den freien Weg vor der Berührung: weiter entfernt "
+            "beginnen oder schneller beschleunigen"
+        ),
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING),
     parameters=(Parameter("ramp_time_s", "s", null=0.0, lower=0.0, upper=0.05, typical=0.002),),
     laws={LawKind.SPEED: run_up, LawKind.UNTIL: end},

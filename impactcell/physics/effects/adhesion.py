@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def pull(gap: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -24,6 +24,14 @@ EFFECT = Effect(
     "Surface Forces, 3rd ed. (2011), chapter 17",
     meaning="A film of oil or glue holds part and actuator together for a moment when they separate.",
     look_at="the faces that touch: oil, coolant, glue, a soft pad; clean them and repeat some taps",
+    german=German(
+        "Haften beim Trennen",
+        "Ein Film aus Öl oder Kleber hält Teil und Stößel beim Trennen einen Moment zusammen.",
+        (
+            "die Flächen, die sich berühren: Öl, Kühlmittel, Kleber, weiche Auflage; reinigen, einige Stöße "
+            "wiederholen"
+        ),
+    ),
     phases=(Phase.FREE_SLIDE,),
     parameters=(
         Parameter("force_n", "N", null=0.0, lower=0.0, upper=200.0, typical=10.0),

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.physics.effect import ONE, Covariates, Effect, Factors, Kind, Parameter, Phase
+from impactcell.physics.effect import ONE, Covariates, Effect, Factors, German, Kind, Parameter, Phase
 from impactcell.records import Samples
 
 
@@ -23,6 +23,11 @@ EFFECT = Effect(
     reference="Analysis of variance, one fixed factor",
     meaning="One batch of material has more friction than another.",
     look_at="what differs between the batches: coating, oil, surface finish, supplier, storage",
+    german=German(
+        "Chargenunterschied",
+        "Eine Werkstoffcharge hat mehr Reibung als eine andere.",
+        "was die Chargen unterscheidet: Beschichtung, Öl, Oberfläche, Lieferant, Lagerung",
+    ),
     phases=(Phase.BETWEEN_SHOTS,),
     parameters=(
         Parameter("relative_change", "1", null=0.0, lower=-0.9, upper=0.9, typical=0.05, per_batch=True),

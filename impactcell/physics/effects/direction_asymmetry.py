@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from impactcell.physics.effect import ONE, Covariates, Effect, Factors, Kind, Parameter, Phase
+from impactcell.physics.effect import ONE, Covariates, Effect, Factors, German, Kind, Parameter, Phase
 from impactcell.records import Samples
 
 
@@ -20,6 +20,11 @@ EFFECT = Effect(
     "friction, Int. J. Solids Struct. 39 (2002)",
     meaning="The part slides more easily one way than the other.",
     look_at="the lay of the machining marks, burrs on the part's edge, hoses or cables that pull one way",
+    german=German(
+        "Richtungsabhängigkeit",
+        "Das Teil gleitet in einer Richtung leichter als in der anderen.",
+        "die Richtung der Bearbeitungsspuren, Grate am Teil, einseitig ziehende Schläuche oder Kabel",
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.BETWEEN_SHOTS),
     parameters=(Parameter("relative_amplitude", "1", null=0.0, lower=-0.5, upper=0.5, typical=0.03),),
     between=factors,

@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def shown(force: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -19,6 +19,11 @@ EFFECT = Effect(
     meaning="The force signal is cut off at the top: above a limit the sensor shows no more.",
     look_at="the range of the force sensor, of its amplifier and of the converter; a range "
     "that ends well above the peak",
+    german=German(
+        "Sättigung des Kraftsignals",
+        "Das Kraftsignal ist oben abgeschnitten: über einer Grenze zeigt der Sensor nicht mehr.",
+        "den Messbereich von Kraftsensor, Verstärker und Wandler; er muss deutlich über der Spitze enden",
+    ),
     phases=(Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("limit_n", "N", null=math.inf, lower=1.0, upper=math.inf, typical=200.0),),
     laws={LawKind.READING: shown},

@@ -1,7 +1,7 @@
 """Lag of the force sensor: its amplifier is a low-pass filter."""
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def time_constant(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -17,6 +17,11 @@ EFFECT = Effect(
     meaning="The force signal follows the force late and rounded, as through a filter.",
     look_at="the low-pass filter of the force amplifier: its cut-off may be too low for a tap "
     "of some milliseconds",
+    german=German(
+        "Trägheit des Kraftsensors",
+        "Das Kraftsignal folgt der Kraft verspätet und verrundet, wie durch ein Filter.",
+        "das Tiefpassfilter des Kraftverstärkers: für einen Stoß von Millisekunden vielleicht zu tief",
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("time_constant_s", "s", null=0.0, lower=0.0, upper=0.02, typical=0.0003),),
     laws={LawKind.LAG: time_constant},

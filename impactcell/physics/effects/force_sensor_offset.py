@@ -1,7 +1,7 @@
 """Zero error of the force sensor."""
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def shown(force: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -17,6 +17,11 @@ EFFECT = Effect(
     meaning="The force sensor does not show zero when nothing touches it.",
     look_at="the zero of the force sensor: tare it unloaded, and look for preload, drift with "
     "temperature, a cable that pulls",
+    german=German(
+        "Nullpunktfehler des Kraftsensors",
+        "Der Kraftsensor zeigt nicht null, wenn ihn nichts berührt.",
+        "den Nullpunkt des Kraftsensors: unbelastet tarieren; Vorspannung, Temperaturdrift, ziehendes Kabel",
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.STOP),
     parameters=(Parameter("offset_n", "N", null=0.0, lower=-100.0, upper=100.0, typical=2.0),),
     laws={LawKind.READING: shown},

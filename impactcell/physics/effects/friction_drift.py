@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from impactcell.physics.effect import ONE, Covariates, Effect, Factors, Kind, Parameter, Phase
+from impactcell.physics.effect import ONE, Covariates, Effect, Factors, German, Kind, Parameter, Phase
 from impactcell.records import Samples
 
 
@@ -19,6 +19,11 @@ EFFECT = Effect(
     reference="Running-in and wear: Blau, On the nature of running-in, Tribol. Int. 38 (2005)",
     meaning="Friction changes slowly from the first shot to the last.",
     look_at="what changes over a campaign: wear, running-in, temperature, dirt, oil that is used up",
+    german=German(
+        "Reibungsdrift",
+        "Die Reibung ändert sich langsam vom ersten bis zum letzten Stoß.",
+        "was sich über die Messung ändert: Verschleiß, Einlaufen, Temperatur, Schmutz, verbrauchtes Öl",
+    ),
     phases=(Phase.BETWEEN_SHOTS,),
     parameters=(Parameter("relative_change", "1", null=0.0, lower=-0.9, upper=0.9, typical=0.05),),
     between=factors,

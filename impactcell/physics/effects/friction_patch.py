@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, ParameterKind, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, ParameterKind, Phase
 
 
 def factor(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -18,6 +18,11 @@ EFFECT = Effect(
     reference="A local wear scar or contamination, as a Gaussian",
     meaning="At one place on the table the surface is rougher or smoother than elsewhere.",
     look_at="the table at the position named: a scratch, a worn or soiled spot, a joint between two plates",
+    german=German(
+        "Stelle anderer Reibung",
+        "An einer Stelle des Tisches ist die Oberfläche rauer oder glatter als sonst.",
+        "den Tisch an der genannten Stelle: Kratzer, verschlissener oder schmutziger Fleck, Plattenstoß",
+    ),
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("amplitude", "1", null=0.0, lower=-0.9, upper=3.0, typical=0.3),

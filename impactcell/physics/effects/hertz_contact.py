@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def stiffening(d: float, _b: float, k: float, _d: float, p: FloatPointer) -> float:
@@ -19,6 +19,11 @@ EFFECT = Effect(
     meaning="The contact gets stiffer the harder it is pressed, as of a round tip on a plane.",
     look_at="the shape of actuator tip and part where they touch: a ball or an edge, a soft "
     "layer, contact that is not plane",
+    german=German(
+        "Hertzscher Kontakt",
+        "Der Kontakt wird steifer, je fester gedrückt wird, wie eine runde Spitze auf einer Ebene.",
+        "die Form von Stößel und Teil an der Berührung: Kugel oder Kante, weiche Schicht, unebener Kontakt",
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING),
     parameters=(Parameter("exponent", "1", null=1.0, lower=0.7, upper=1.8, typical=1.1),),
     laws={LawKind.CONTACT: stiffening},

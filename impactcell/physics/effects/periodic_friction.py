@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, ParameterKind, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, ParameterKind, Phase
 
 
 def factor(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -19,6 +19,11 @@ EFFECT = Effect(
     meaning="Friction rises and falls again and again along the table.",
     look_at="the table's surface: tracks of milling or grinding with the period named, "
     "grooves, a row of bores",
+    german=German(
+        "Periodische Reibung",
+        "Die Reibung steigt und fällt entlang des Tisches immer wieder.",
+        "die Oberfläche des Tisches: Fräs- oder Schleifspuren der genannten Periode, Nuten, Bohrungsreihen",
+    ),
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("amplitude", "1", null=0.0, lower=0.0, upper=0.9, typical=0.1),

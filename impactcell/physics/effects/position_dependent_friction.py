@@ -1,7 +1,7 @@
 """Friction that changes along the table, in proportion to the position."""
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def factor(x: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -17,6 +17,14 @@ EFFECT = Effect(
     meaning="Friction grows steadily from one end of the table to the other.",
     look_at="wear, dirt or oil spread unevenly along the table, and whether the part is "
     "guided more tightly at one end",
+    german=German(
+        "Ortsabhängige Reibung",
+        "Die Reibung wächst stetig von einem Ende des Tisches zum anderen.",
+        (
+            "ungleichen Verschleiß, Schmutz oder Öl entlang des Tisches, und ob das Teil an einem Ende enger "
+            "geführt ist"
+        ),
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(Parameter("gradient_per_m", "1/m", null=0.0, lower=-50.0, upper=50.0, typical=10.0),),
     laws={LawKind.SCALE: factor},

@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def stiffness(_a: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -20,6 +20,11 @@ EFFECT = Effect(
     meaning="Before it breaks loose the part already gives way a little, like a spring.",
     look_at="soft layers beneath the part, a fixture that bends, a sensor fastened to "
     "something other than the part",
+    german=German(
+        "Nachgeben vor dem Gleiten",
+        "Bevor es losbricht, gibt das Teil schon ein wenig nach, wie eine Feder.",
+        "weiche Schichten unter dem Teil, eine nachgebende Aufnahme, einen anderswo befestigten Sensor",
+    ),
     phases=(Phase.PRELOAD, Phase.STOP, Phase.DRIVEN),
     parameters=(
         Parameter(

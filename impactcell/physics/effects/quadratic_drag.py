@@ -1,7 +1,7 @@
 """Quadratic drag: a fluid is pushed aside."""
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def drag(_a: float, v: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -17,6 +17,14 @@ EFFECT = Effect(
     meaning="Something is pushed aside: resistance grows with the square of the speed.",
     look_at="fluid or air around the part: coolant on the table, a film that piles up in "
     "front, a closed volume that is emptied",
+    german=German(
+        "Quadratischer Widerstand",
+        "Etwas wird verdrängt: der Widerstand wächst mit dem Quadrat der Geschwindigkeit.",
+        (
+            "Flüssigkeit oder Luft um das Teil: Kühlmittel auf dem Tisch, ein Film, der sich staut, "
+            "ein Hohlraum, der sich leert"
+        ),
+    ),
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("drag_coefficient_n_s2_per_m2", "N s²/m²", null=0.0, lower=0.0, upper=5000.0, typical=50.0),

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.physics.effect import ONE, Covariates, Effect, Factors, Kind, Parameter, Phase
+from impactcell.physics.effect import ONE, Covariates, Effect, Factors, German, Kind, Parameter, Phase
 from impactcell.records import Samples
 
 
@@ -22,6 +22,11 @@ EFFECT = Effect(
     meaning="The longer the part rests, the harder it is to break loose.",
     look_at="waiting times before a tap, oil that is squeezed out, contacts that stick; tap "
     "after equal rests",
+    german=German(
+        "Altern der Haftung",
+        "Je länger das Teil ruht, desto schwerer löst es sich.",
+        "Wartezeiten vor dem Stoß, verdrängtes Öl, klebende Kontakte; nach gleichen Ruhezeiten stoßen",
+    ),
     phases=(Phase.PRELOAD, Phase.BETWEEN_SHOTS),
     parameters=(Parameter("increase_per_decade", "1", null=0.0, lower=-0.2, upper=0.5, typical=0.03),),
     between=factors,

@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def excess(speed: float, _b: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -19,6 +19,11 @@ EFFECT = Effect(
     meaning="Friction is higher while the part slides slowly; at speed a film carries it.",
     look_at="lubrication: kind and amount of oil, and whether the slide is long enough at low "
     "speed for it to matter",
+    german=German(
+        "Stribeck-Reibung",
+        "Die Reibung ist höher, solange das Teil langsam gleitet; bei Geschwindigkeit trägt ein Film.",
+        "die Schmierung: Art und Menge des Öls, und ob das Teil lange genug langsam gleitet, dass es zählt",
+    ),
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("friction_increase", "1", null=0.0, lower=0.0, upper=0.5, typical=0.03),

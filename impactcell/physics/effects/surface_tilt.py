@@ -3,7 +3,7 @@
 import math
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def downhill(_a: float, _b: float, m: float, g: float, p: FloatPointer) -> float:
@@ -18,6 +18,11 @@ EFFECT = Effect(
     reference="Newtonian mechanics of the inclined plane",
     meaning="The table is not level: gravity helps the part one way and hinders it the other.",
     look_at="the table with a level along the axis; tilt is named in radians, 0.001 rad is 1 mm in a metre",
+    german=German(
+        "Neigung des Tisches",
+        "Der Tisch ist nicht waagerecht: die Schwerkraft hilft in einer Richtung und hindert in der anderen.",
+        "den Tisch mit einer Wasserwaage entlang der Achse; genannt in Radiant, 0,001 rad ist 1 mm je Meter",
+    ),
     phases=(Phase.PRELOAD, Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.STOP, Phase.DRIVEN),
     parameters=(Parameter("tilt_rad", "rad", null=0.0, lower=-0.1, upper=0.1, typical=0.005),),
     laws={LawKind.BODY: downhill},

@@ -1,7 +1,7 @@
 """Viscous friction: a lubricated surface resists in proportion to the speed."""
 
 from impactcell.numerics.jit import FloatPointer
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, German, Kind, LawKind, Parameter, Phase
 
 
 def resistance(_a: float, v: float, _c: float, _d: float, p: FloatPointer) -> float:
@@ -18,6 +18,11 @@ EFFECT = Effect(
     meaning="Resistance grows in proportion to the speed, as in oil.",
     look_at="lubrication: more oil or a thicker one than the model was made with, its "
     "temperature, a sealed guide",
+    german=German(
+        "Viskose Reibung",
+        "Der Widerstand wächst im Verhältnis zur Geschwindigkeit, wie in Öl.",
+        "die Schmierung: mehr oder zäheres Öl als beim Modell, seine Temperatur, eine gedichtete Führung",
+    ),
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.DRIVEN),
     parameters=(
         Parameter("viscous_coefficient_n_s_per_m", "N s/m", null=0.0, lower=0.0, upper=1000.0, typical=60.0),
