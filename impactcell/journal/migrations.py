@@ -184,5 +184,6 @@ STATE_MIGRATIONS: Final = (
     ),
     Migration(added={"last": None, "planner.uncounted_evidence": 0.0}),
 )
+"""Of a cell's state: to format 2, 3 and 4. What earlier planners had not counted is nothing."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

@@ -55,6 +55,7 @@ _DECLARED = (
         "s(d) in contact",
     ),
 )
+"""Places that no law is looked for in: forces in general. A force of 3 N shows clearly in a tap."""
 
 REMAINDER_FORMS: Mapping[str, FreeForm] = MappingProxyType(
     {**FREE_FORMS, **{form.effect.identifier: form for form in _DECLARED}}

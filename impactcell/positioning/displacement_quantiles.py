@@ -4,7 +4,8 @@ Uncertainty is split into the line along which friction varies (and, with it, wh
 it), followed exactly at the nodes `z` whatever the displacement does there, and the directions across,
 each taken at three standard deviations and added by `reach`: where a slow push sticks once more, or once
 less, the displacement jumps by up to a fifth of the indentation, and a slope taken near the mean knows
-nothing of it.
+nothing of it. Parameters theta are those of `impactcell.positioning.planner_posterior`, the weights w and the
+features psi, phi and beta those of `impactcell.positioning.displacement_discrepancy`.
 """
 
 import math
@@ -22,7 +23,15 @@ from impactcell.positioning.displacement_discrepancy import (
     discrepancy_features,
     indentation_features,
 )
-from impactcell.positioning.planner_posterior import FRICTION, PARAMETERS, PlannerPosterior
+from impactcell.positioning.planner_posterior import (
+    DAMPING,
+    FRICTION,
+    PARAMETERS,
+    RATIO,
+    STIFFNESS,
+    VISCOUS,
+    PlannerPosterior,
+)
 from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
 
@@ -30,6 +39,12 @@ ACROSS = 4
 """Directions across the line: parameters other than friction."""
 ACROSS_Z = 3.0
 """Standard deviations at which these are taken: beyond lies 1 in 1000, which is what is promised."""
+WIDEST_CORRECTED = 0.1
+"""Std of ln(mu_k) up to which its skewness is corrected for: what is wider is a sum of several."""
+FOLD_SHARE = 0.1
+"""Share of a node's own deviation below which what lies about it does not reach: the line folds there."""
+SHORTEST_SHIFT_M = 1e-6
+"""Least shift of a stroke over which the slope of the displacement is taken: an encoder's resolution."""
 
 
 class Scenarios(NamedTuple):
@@ -69,25 +84,25 @@ def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, 
     along[:, FRICTION] = sigma
     mean_line = cov[FRICTION] / math.sqrt(known + posterior.scatter**2)
     across = cov[1:, 1:] - np.outer(mean_line[1:], mean_line[1:])
-    aside = PARAMETERS - 1
-    values, vectors = np.linalg.eigh(across[:aside, :aside])
+    others = PARAMETERS - 1
+    values, vectors = np.linalg.eigh(across[:others, :others])
     lengths = np.sqrt(np.maximum(values, 0.0))
     steps = ACROSS_Z * (vectors * lengths).T
-    # weights that go with each of these directions, and what is left of theirs
-    going = (across[aside:, :aside] @ vectors / np.maximum(lengths, 1e-12)).T
-    left = across[aside:, aside:] - going.T @ going
-    going *= ACROSS_Z
-    own, axes = np.linalg.eigh(left)
+    # weights of the discrepancy that go with each of these directions, and covariance that is left of theirs
+    weights_along = (across[others:, :others] @ vectors / np.maximum(lengths, 1e-12)).T
+    weights_left = across[others:, others:] - weights_along.T @ weights_along
+    weights_along *= ACROSS_Z
+    variances, axes = np.linalg.eigh(weights_left)
     theta = np.empty((z.size + 2 * ACROSS, PARAMETERS + FEATURES))
     theta[:] = posterior.mean
     theta[: z.size] += z[:, None] * along
     # ln(1 + s z) to second order: a factor of friction is normal, not log-normal
-    theta[: z.size, FRICTION] -= 0.5 * np.minimum(sigma, 0.1) ** 2 * z**2
+    theta[: z.size, FRICTION] -= 0.5 * np.minimum(sigma, WIDEST_CORRECTED) ** 2 * z**2
     theta[z.size : z.size + ACROSS, 1:PARAMETERS] += steps
     theta[z.size + ACROSS :, 1:PARAMETERS] -= steps
-    theta[z.size : z.size + ACROSS, PARAMETERS:] += going
-    theta[z.size + ACROSS :, PARAMETERS:] -= going
-    root = axes * np.sqrt(np.maximum(own, 0.0))
+    theta[z.size : z.size + ACROSS, PARAMETERS:] += weights_along
+    theta[z.size + ACROSS :, PARAMETERS:] -= weights_along
+    root = axes * np.sqrt(np.maximum(variances, 0.0))
     weights = np.ascontiguousarray(theta[:, PARAMETERS:])
     return Scenarios(
         plant_parameters(theta),
@@ -100,19 +115,15 @@ def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, 
 
 
 def plant_parameters(theta: Samples) -> Samples:
-    """Rows (k, b, mu_s, mu_k, k_v) of rows of the belief's parameters."""
+    """Rows (k, b, mu_s, mu_k, k_v) of rows theta."""
     rows = np.empty((theta.shape[0], 5))
-    mu_k = np.exp(theta[:, 0])
-    rows[:, 0] = np.exp(theta[:, 1])
-    rows[:, 1] = np.exp(theta[:, 2])
-    rows[:, 2] = mu_k * np.exp(np.maximum(theta[:, 3], 0.0))
+    mu_k = np.exp(theta[:, FRICTION])
+    rows[:, 0] = np.exp(theta[:, STIFFNESS])
+    rows[:, 1] = np.exp(theta[:, DAMPING])
+    rows[:, 2] = mu_k * np.exp(np.maximum(theta[:, RATIO], 0.0))
     rows[:, 3] = mu_k
-    rows[:, 4] = np.maximum(theta[:, 4], 0.0)
+    rows[:, 4] = np.maximum(theta[:, VISCOUS], 0.0)
     return rows
-
-
-SHORTEST_SHIFT_M = 1e-6
-"""Least shift of a stroke over which the slope of the displacement is taken: an encoder's resolution."""
 
 
 @compiled
@@ -127,69 +138,71 @@ def displacement_quantiles(
     depth = rows[middle, 3] * part[0] * part[1] / rows[middle, 0]
     psi = np.empty(weights.shape[1])
     indentation_features(velocity, part, scenarios.place, psi)
-    own = psi @ scenarios.root
-    course, other = np.empty(count), np.empty(count)
+    psi_root = psi @ scenarios.root
+    moved, moved_other = np.empty(count), np.empty(count)
     square = np.zeros(count)
     size = weights.shape[1]
-    features, further = np.empty((size, count)), np.zeros((size, count))
+    features, at_breakaway = np.empty((size, count)), np.zeros((size, count))
     tap = np.empty(3)
     shift = depth * product(psi, weights[middle])
     tap[1], tap[2] = depth, rows[middle, 3]
-    displacements(velocity, strokes + shift, rows[middle], part, course)
+    displacements(velocity, strokes + shift, rows[middle], part, moved)
     for j in range(count):
         tap[0] = strokes[j] + shift
-        discrepancy_features(tap, course[j], part, scenarios.place, features[:, j])
-        breakaway_features(velocity, strokes[j], depth, further[:, j])
-    further *= depth
-    farther = max(depth * math.sqrt(product(own, own)), SHORTEST_SHIFT_M)
-    displacements(velocity, strokes + shift + farther, rows[middle], part, other)
-    slope = (other - course) * (depth / farther)  # of the displacement over psi · w
-    displaced(course, features, further, weights[middle])
-    out[:, middle] = course
+        discrepancy_features(tap, moved[j], part, scenarios.place, features[:, j])
+        breakaway_features(velocity, strokes[j], depth, at_breakaway[:, j])
+    at_breakaway *= depth
+    longer_m = max(depth * math.sqrt(product(psi_root, psi_root)), SHORTEST_SHIFT_M)
+    displacements(velocity, strokes + shift + longer_m, rows[middle], part, moved_other)
+    slope = (moved_other - moved) * (depth / longer_m)  # of the displacement over psi · w
+    add_discrepancy(moved, features, at_breakaway, weights[middle])
+    out[:, middle] = moved
     for q in range(nodes):
         if q != middle:
-            displacements(velocity, strokes + depth * product(psi, weights[q]), rows[q], part, course)
-            displaced(course, features, further, weights[q])
-            out[:, q] = course
+            displacements(velocity, strokes + depth * product(psi, weights[q]), rows[q], part, moved)
+            add_discrepancy(moved, features, at_breakaway, weights[q])
+            out[:, q] = moved
     for a in range(across):
-        p, n = nodes + a, nodes + across + a
-        displacements(velocity, strokes + depth * product(psi, weights[p]), rows[p], part, course)
-        displacements(velocity, strokes + depth * product(psi, weights[n]), rows[n], part, other)
-        displaced(course, features, further, weights[p])
-        displaced(other, features, further, weights[n])
+        above, below = nodes + a, nodes + across + a
+        displacements(velocity, strokes + depth * product(psi, weights[above]), rows[above], part, moved)
+        displacements(
+            velocity, strokes + depth * product(psi, weights[below]), rows[below], part, moved_other
+        )
+        add_discrepancy(moved, features, at_breakaway, weights[above])
+        add_discrepancy(moved_other, features, at_breakaway, weights[below])
         for j in range(count):
-            step = max(abs(course[j] - out[j, middle]), abs(other[j] - out[j, middle])) / ACROSS_Z
+            step = max(abs(moved[j] - out[j, middle]), abs(moved_other[j] - out[j, middle])) / ACROSS_Z
             square[j] += step * step
-    root, step_of, further_of = scenarios.root, np.empty(count), np.empty(count)
+    root, sliding_step, breakaway_step = scenarios.root, np.empty(count), np.empty(count)
     for a in range(root.shape[1]):
-        along_weights(features, root[:, a], step_of)
-        along_weights(further, root[:, a], further_of)
+        along_weights(features, root[:, a], sliding_step)
+        along_weights(at_breakaway, root[:, a], breakaway_step)
         for j in range(count):
-            square[j] += (out[j, middle] * step_of[j] + further_of[j] + slope[j] * own[a]) ** 2
+            square[j] += (out[j, middle] * sliding_step[j] + breakaway_step[j] + slope[j] * psi_root[a]) ** 2
     line = np.empty(nodes)
     for j in range(count):
         line[:] = out[j]
-        indented = max(abs(slope[j]), (1.0 - features[0, j]) * min(depth, line[middle]))
-        indented = max(indented, BREAKAWAY_SHARE * further[BREAKAWAY, j])
+        indented_m = max(abs(slope[j]), (1.0 - features[0, j]) * min(depth, line[middle]))
+        indented_m = max(indented_m, BREAKAWAY_SHARE * at_breakaway[BREAKAWAY, j])
         for q in range(nodes):
             if q != middle:
                 by_itself = scenarios.scatter[q, 0] * line[middle]
-                by_contact = scenarios.scatter[q, 1] * indented
+                by_contact = scenarios.scatter[q, 1] * indented_m
                 aside = math.sqrt(square[j] + by_itself**2 + by_contact**2)
                 out[j, q] = max(reach(line, z, q, middle, aside), 0.0)
 
 
 @compiled
-def displaced(course: Samples, features: Samples, further: Samples, weights: Samples) -> None:
+def add_discrepancy(moved: Samples, features: Samples, at_breakaway: Samples, weights: Samples) -> None:
     """Add the discrepancy phi and delta beta to displacements (m), that of psi being in them already.
 
-    `features` and `further`, shape (FEATURES, strokes), have phi and delta beta.
+    `features` and `at_breakaway`, shape (FEATURES, strokes), have phi and delta beta.
     """
-    sliding, breaking = np.empty(course.size), np.empty(course.size)
+    sliding, breaking = np.empty(moved.size), np.empty(moved.size)
     along_weights(features, weights, sliding)
-    along_weights(further, weights, breaking)
-    for j in range(course.size):
-        course[j] = max(course[j] * math.exp(sliding[j]) + breaking[j], 0.0)
+    along_weights(at_breakaway, weights, breaking)
+    for j in range(moved.size):
+        moved[j] = max(moved[j] * math.exp(sliding[j]) + breaking[j], 0.0)
 
 
 @compiled
@@ -230,10 +243,9 @@ def reach(line: Samples, z: Samples, q: int, middle: int, aside: float) -> float
             furthest = max(furthest, value)
     if deviation * usual >= 0.0:
         furthest = max(furthest, math.hypot(deviation, aside * radius))
-    elif furthest < 0.1 * abs(deviation):
-        return float(
-            line[q]
-        )  # a fold of the displacement which all but the tap's own friction leaves in place
+    elif furthest < FOLD_SHARE * abs(deviation):
+        # a fold of the displacement which all but the tap's own friction leaves in place
+        return float(line[q])
     return float(centre + usual * furthest)
 
 

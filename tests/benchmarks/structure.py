@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from tests.benchmarks import _syntax
+from tests.benchmarks import _lines, _syntax
 from tests.benchmarks._later import since_then
 from tests.benchmarks._lists import Count, alarms, effects, values
 from tests.benchmarks.table import Table
@@ -213,7 +213,13 @@ def tables() -> list[Table]:
         )
         for name, count in now.items()
     ]
-    return [Table("Structure", ("what", "before, by hand", "before", "bar", "now"), rows, NOTE)]
+    rooms = _lines.by_room(_syntax.modules(ROOT, "impactcell"))
+    later = [tuple(reversed(item.split(": ", 1))) for item in now["lines of it for what it did before"].items]
+    return [
+        Table("Structure", ("what", "before, by hand", "before", "bar", "now"), rows, NOTE),
+        Table("Structure: what the lines are", ("room", *_lines.KINDS, "in all"), _lines.rows(rooms)),
+        Table("Structure: lines for what came since", ("what the product did not do before", "lines"), later),
+    ]
 
 
 def main() -> int:

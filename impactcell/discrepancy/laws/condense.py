@@ -7,7 +7,7 @@ that the plant would take up by itself have no information and cost a form nothi
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,13 +105,9 @@ def rank_forms(quadratic: Tangent) -> list[RankedForm]:
     for score, i, j in _best_pairs(np.array(chosen), h, gram, cost, numbers):
         if not _is_wave(singles[i], singles[j]) or singles[i].shapes == singles[j].shapes:
             offer(score, (singles[i], singles[j]))
-    order = sorted(best.values(), key=lambda entry: -entry[0])
-    rest = order[REFINED:]
-    simple = [entry for entry in rest if is_simple(tuple(t.term for t in entry[1]))]
-    # At few starts a sum may stand in for one product between them: products alone are refined as well.
-    products = [entry for entry in rest if len(entry[1]) == 1 and len(entry[1][0].term) == 2]
-    order = order[:REFINED] + (products[:PRODUCTS] if quadratic.second else []) + simple
-    refined = [projector.refine(terms, cost) for _, terms in order]
+    order = [terms for _, terms in sorted(best.values(), key=lambda entry: -entry[0])]
+    in_turn = _to_be_refined(order, has_products=bool(quadratic.second))
+    refined = [projector.refine(terms, cost) for terms in in_turn]
     waves = [projector.wave(cost)] if quadratic.second is None else []
     return sorted([*refined, *waves], key=lambda item: -item.score)
 
@@ -130,6 +126,20 @@ def _best_pairs(
     score = score / determinant - cost * (numbers[i] + numbers[j])
     for place in np.argsort(-score)[:TRIED_PAIRS].tolist():
         yield float(score[place]), int(i[place]), int(j[place])
+
+
+def _to_be_refined(
+    order: Sequence[tuple[Shaped, ...]], *, has_products: bool
+) -> Iterator[tuple[Shaped, ...]]:
+    """Give the best forms, and of the rest what is simple.
+
+    At few starts a sum may stand in for one product between them: products alone are given as well.
+    """
+    rest = order[REFINED:]
+    yield from order[:REFINED]
+    if has_products:
+        yield from [terms for terms in rest if len(terms) == 1 and len(terms[0].term) == 2][:PRODUCTS]
+    yield from (terms for terms in rest if is_simple(tuple(item.term for item in terms)))
 
 
 def is_simple(form: Form) -> bool:
