@@ -4,7 +4,8 @@ A transport takes `RequestBatch`es, puts the data of the replies into their bloc
 """
 
 import asyncio
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -138,3 +139,13 @@ class RequestBatch:
         self.first += count
         self.requests = self.requests[count:]
         return front
+
+
+def join_queue(waiting: deque[RequestBatch], batches: Sequence[RequestBatch], *, first: bool) -> None:
+    """Let batches wait in order, `first` before all that waits; their exchanges count their requests."""
+    for batch in batches:
+        batch.exchange.unanswered += len(batch.requests)
+    if first:
+        waiting.extendleft(batches)
+    else:
+        waiting.extend(batches)

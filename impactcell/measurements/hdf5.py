@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.errors import MeasurementError
 from impactcell.measurements.arrays import tables_of
 from impactcell.measurements.limits import Limits
-from impactcell.measurements.optional import reader_library
+from impactcell.measurements.optional import damage_told, reader_library
 from impactcell.measurements.table import Table
 
 MAX_DEPTH = 8
@@ -27,13 +27,8 @@ def read_hdf5(path: Path, limits: Limits) -> tuple[Table, ...]:
     """
     h5py = reader_library("h5py", "HDF5", path)
     tables: list[Table] = []
-    try:
-        with h5py.File(path, "r") as file:
-            _read_group(h5py, file, path, limits, (0, 0), tables)
-    except MeasurementError:
-        raise
-    except Exception as error:
-        raise MeasurementError(f"{path}: is a damaged HDF5 file: {error}") from error
+    with damage_told(path, "HDF5"), h5py.File(path, "r") as file:
+        _read_group(h5py, file, path, limits, (0, 0), tables)
     if not tables:
         raise MeasurementError(f"{path}: holds no column of numbers")
     return tuple(tables)

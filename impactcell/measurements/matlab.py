@@ -10,6 +10,7 @@ from scipy.io import loadmat, whosmat
 from impactcell.errors import MeasurementError
 from impactcell.measurements.arrays import tables_of
 from impactcell.measurements.limits import Limits
+from impactcell.measurements.optional import damage_told
 from impactcell.measurements.table import Table
 
 HEADER_BYTES, COMPRESSED = 128, 15
@@ -27,16 +28,12 @@ def read_matlab(path: Path, limits: Limits) -> tuple[Table, ...]:
     MeasurementError
         It is too large, damaged, or holds no vector of numbers.
     """
-    try:
+    with damage_told(path, "MATLAB"):
         _check_unpacked(path, limits)
         cells = 0
         for name, shape, _ in whosmat(path):
             cells = limits.check_shape(f"{path}: {name}", max(shape, default=0), _width(shape), cells)
         content = loadmat(path, squeeze_me=True, struct_as_record=False, chars_as_strings=True)
-    except MeasurementError:
-        raise
-    except Exception as error:
-        raise MeasurementError(f"{path}: is a damaged MATLAB file: {error}") from error
     content = {name: value for name, value in content.items() if not name.startswith("__")}
     tables = _tables(path, content, "", limits)
     if not tables:

@@ -1,6 +1,8 @@
-"""Readers that are installed apart, with `pip install impactcell[import]`."""
+"""Libraries that read files, some of them installed apart with `pip install impactcell[import]`."""
 
+import contextlib
 import importlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,3 +25,20 @@ def reader_library(module: str, kind: str, path: Path) -> Any:
             f"pip install "
             f"'impactcell[import]', or export the file as CSV"
         ) from error
+
+
+@contextlib.contextmanager
+def damage_told(path: Path, kind: str) -> Iterator[None]:
+    """Tell whatever the library that reads a file raises as damage to the file; libraries raise anything.
+
+    Raises
+    ------
+    MeasurementError
+        Something was raised.
+    """
+    try:
+        yield
+    except MeasurementError:
+        raise
+    except Exception as error:
+        raise MeasurementError(f"{path}: is a damaged {kind} file: {error}") from error

@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.errors import MeasurementError
 from impactcell.measurements.arrays import tables_of
 from impactcell.measurements.limits import Limits
-from impactcell.measurements.optional import reader_library
+from impactcell.measurements.optional import damage_told, reader_library
 from impactcell.measurements.table import Table
 
 UNIT_KEYS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
@@ -26,22 +26,17 @@ def read_tdms(path: Path, limits: Limits) -> tuple[Table, ...]:
     nptdms = reader_library("nptdms", "TDMS", path)
     tables: list[Table] = []
     cells = 0
-    try:
-        with path.open("rb") as opened, nptdms.TdmsFile.open(opened) as file:
-            cut = ", cut off: what follows its last whole chunk is lost" if _is_cut_off(file) else ""
-            for group in file.groups():
-                channels = group.channels()
-                limits.check_shape(f"{path}: {group.name}", 0, len(channels))
-                for channel in channels:
-                    cells = limits.check_shape(f"{path}: {group.name}", len(channel), 1, cells)
-                columns = [(channel.name, _unit(channel), channel[:]) for channel in channels if len(channel)]
-                columns = [*_times(channels), *columns]
-                said = {**file.properties, **group.properties}
-                tables += tables_of(str(path), columns, group.name, said, f"TDMS group {group.name}{cut}")
-    except MeasurementError:
-        raise
-    except Exception as error:
-        raise MeasurementError(f"{path}: is a damaged TDMS file: {error}") from error
+    with damage_told(path, "TDMS"), path.open("rb") as opened, nptdms.TdmsFile.open(opened) as file:
+        cut = ", cut off: what follows its last whole chunk is lost" if _is_cut_off(file) else ""
+        for group in file.groups():
+            channels = group.channels()
+            limits.check_shape(f"{path}: {group.name}", 0, len(channels))
+            for channel in channels:
+                cells = limits.check_shape(f"{path}: {group.name}", len(channel), 1, cells)
+            columns = [(channel.name, _unit(channel), channel[:]) for channel in channels if len(channel)]
+            columns = [*_times(channels), *columns]
+            said = {**file.properties, **group.properties}
+            tables += tables_of(str(path), columns, group.name, said, f"TDMS group {group.name}{cut}")
     if not tables:
         raise MeasurementError(f"{path}: holds no channel")
     return tuple(tables)

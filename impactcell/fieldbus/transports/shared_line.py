@@ -13,7 +13,7 @@ from typing import Final, Protocol
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import BUSY, Request
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.request_batching import RequestBatch
+from impactcell.fieldbus.request_batching import RequestBatch, join_queue
 from impactcell.fieldbus.transports.request_window import RequestWindow
 
 _BUSY_PAUSE_S: Final = 0.02
@@ -175,12 +175,7 @@ class LineTransport:
         """Send requests in order, `first` before all that waits; raises LinkError without a connection."""
         if not self._connected:
             raise LinkError(f"{self.link}: not connected")
-        for batch in batches:
-            batch.exchange.unanswered += len(batch.requests)
-        if first:
-            self._waiting.extendleft(batches)
-        else:
-            self._waiting.extend(batches)
+        join_queue(self._waiting, batches, first=first)
         self._line.wake()
 
     def fail(self, error: FieldbusError, batch: RequestBatch | None = None) -> None:

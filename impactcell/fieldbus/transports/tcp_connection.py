@@ -15,7 +15,7 @@ from typing import Final
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import BUSY, check_reply
 from impactcell.fieldbus.link import ModuleLink
-from impactcell.fieldbus.request_batching import Exchange, RequestBatch
+from impactcell.fieldbus.request_batching import Exchange, RequestBatch, join_queue
 from impactcell.fieldbus.transports.batch_in_flight import BatchInFlight
 from impactcell.fieldbus.transports.mbap import FrameReader
 from impactcell.fieldbus.transports.request_window import RequestWindow
@@ -69,12 +69,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         """Send `batches` as the window allows; `first`: before all that waits."""
         if self._transport is None:
             raise LinkError(f"{self.link}: not connected")
-        for batch in batches:
-            batch.exchange.unanswered += len(batch.requests)
-        if first:
-            self._waiting.extendleft(batches)
-        else:
-            self._waiting.extend(batches)
+        join_queue(self._waiting, batches, first=first)
         self._send_waiting()
 
     def fail(self, error: FieldbusError) -> None:
