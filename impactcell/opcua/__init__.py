@@ -36,6 +36,7 @@ answers of `host_interface`, and starts it. Below it, from the wire inwards:
 `session_table`              tokens that cannot be guessed, bound to their channel; limits; timeouts;
                              continuation points
 **read, write, browse, call**
+`continuation_points`        of Browse and HistoryRead, and when they expire
 `attribute_service`          Read, Write: index ranges, encodings, timestamps, the reader's own rights
 `view_service`               Browse, BrowseNext, TranslateBrowsePathsToNodeIds: continuation points, masks
 `method_service`             Call: arguments checked, callers known, methods bound to their objects
