@@ -14,6 +14,7 @@ answers of `host_interface`, and starts it. Below it, from the wire inwards:
 `service_host`               puts listener, services and clock together
 `host_interface`             settings, limits, and what the server asks of its host
 `asyncua_adapter`            all that is used of asyncua beside its public types
+`node_references`            attributes and references of nodes, read and written in place
 `type_instances`             objects made from types, with NodeIds that stay the same
 `languages`                  texts in the language of a session, by its LocaleIds
 **transport**
@@ -33,8 +34,7 @@ answers of `host_interface`, and starts it. Below it, from the wire inwards:
                              certificates and signatures compared
 `authentication`             identity tokens into users
 `login_throttle`             guessing passwords becomes slow, for who guesses alone
-`session_table`              tokens that cannot be guessed, bound to their channel; limits; timeouts;
-                             continuation points
+`session_table`              tokens that cannot be guessed, bound to their channel; limits; timeouts
 **read, write, browse, call**
 `continuation_points`        of Browse and HistoryRead, and when they expire
 `attribute_service`          Read, Write: index ranges, encodings, timestamps, the reader's own rights

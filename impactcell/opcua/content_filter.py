@@ -17,7 +17,7 @@ from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.like_pattern import MAX_PATTERN, like
-from impactcell.opcua.type_instances import supertypes
+from impactcell.opcua.node_references import supertypes
 
 MAX_ELEMENTS: Final = 200
 """Elements of one where clause."""

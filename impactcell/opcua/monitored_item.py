@@ -15,7 +15,7 @@ from impactcell.opcua.data_change_filter import DataChangeFilter, change_filter,
 from impactcell.opcua.event_filter import EventFilter
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.host_interface import ServerLimits
-from impactcell.opcua.type_instances import read_attribute
+from impactcell.opcua.node_references import read_attribute
 from impactcell.opcua.variable_store import SharedValue, VariableStore
 
 OVERFLOW: Final = 0x0480

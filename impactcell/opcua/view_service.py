@@ -13,8 +13,8 @@ from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.continuation_points import MAX_BROWSE_POINTS, ContinuationPoints
 from impactcell.opcua.languages import Languages
+from impactcell.opcua.node_references import HAS_SUBTYPE, targets
 from impactcell.opcua.request_dispatch import RequestContext, Service, check_operations
-from impactcell.opcua.type_instances import HAS_SUBTYPE, targets
 
 MAX_REFERENCES_PER_NODE: Final = 1_000
 """References in one answer for a node; more come by continuation point."""

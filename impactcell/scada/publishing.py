@@ -6,7 +6,7 @@ from typing import Final
 
 from asyncua import ua
 
-from impactcell.opcua.type_instances import read_attribute
+from impactcell.opcua.node_references import read_attribute
 from impactcell.opcua.variable_store import GOOD, StoredVariable, VariableStore, moment
 from impactcell.quantities import CYCLE, MODULE
 from impactcell.records import ModuleStatus, Quality, Snapshot

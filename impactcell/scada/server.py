@@ -17,8 +17,8 @@ from impactcell.alarms import RULES, EventKind
 from impactcell.opcua.asyncua_adapter import AddressSpace, address_space, new_standard_server
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.host_interface import Actor, Host, Permission, Product, RefusedError, ServerSettings
+from impactcell.opcua.node_references import link
 from impactcell.opcua.service_host import ServiceHost, aggregate_functions
-from impactcell.opcua.type_instances import link
 from impactcell.opcua.variable_store import VariableStore
 from impactcell.quantities import HISTORY
 from impactcell.records import Alarm, ModuleStatus, Snapshot

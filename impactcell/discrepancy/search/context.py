@@ -57,9 +57,9 @@ class SearchContext:
         """Whether what is left beside an effect is not significant, or too little to be worth a name."""
         if self.is_sufficient(evidence):
             return True
-        return self.reaches_floor(evidence.fit) and not self.has_promising(evidence)
+        return self.reaches_floor(evidence.fit) and not self.has_promising_candidate(evidence)
 
-    def has_promising(self, evidence: ModelEvidence) -> bool:
+    def has_promising_candidate(self, evidence: ModelEvidence) -> bool:
         """Whether some candidate or some cell of the residual map promises enough to be worth a name.
 
         Gains are first-order falls of the squared misfit, twice those of the log-likelihood; of the friction

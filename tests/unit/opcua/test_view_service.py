@@ -6,7 +6,7 @@ from asyncua import ua
 from impactcell.opcua.asyncua_adapter import AddressSpace, NodeData
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.languages import Languages
-from impactcell.opcua.type_instances import set_attribute
+from impactcell.opcua.node_references import set_attribute
 from impactcell.opcua.view_service import ViewService
 
 CHILDREN = 10
