@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 _NUMBER = ir.DoubleType()
 _INDEX = ir.IntType(64)
+"""Of a parameter: numba's own, 64 bits."""
 _ARGUMENTS = [_NUMBER] * 4 + [_NUMBER.as_pointer()]
+"""Of a law, as `Law` has them: four numbers, and where its parameters lie."""
 _FUNCTIONS = {"exp": 1, "sin": 1, "cos": 1, "tanh": 1, "log1p": 1, "sqrt": 1, "pow": 2}
 """What a formula may call of `math`, and how many numbers each takes."""
 _numbers = itertools.count()
