@@ -46,7 +46,6 @@ def files_that_list(root: Path, kind: Sequence[tuple[str, ...]], homes: int) -> 
     their spellings. Those of `UNTOUCHED` are left out in a tree that has the trial which shows it.
     """
     trusted = (root / TRIAL).is_file()
-    patterns = [re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b") for names in kind]
     items = []
     for package in ("impactcell", "simulator", "tests"):
         for path in sorted((root / package).rglob("*")):
@@ -58,7 +57,8 @@ def files_that_list(root: Path, kind: Sequence[tuple[str, ...]], homes: int) -> 
             text = path.read_text(encoding="utf-8")
             if GENERATED.search(text[:400]):
                 continue
-            if 2 * sum(bool(pattern.search(text)) for pattern in patterns) > len(kind):
+            words = set(re.findall(r"\w+", text))
+            if 2 * sum(not words.isdisjoint(names) for names in kind) > len(kind):
                 items.append(str(below))
     return Count(homes + len(items), tuple(items))
 

@@ -3,10 +3,17 @@
 import re
 from pathlib import Path
 
+import pytest
+
 from tests.benchmarks import _syntax
 from tests.benchmarks.structure import DEFINITIONS, definitions, glossary, homes, retired_names, twice_listed
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def product() -> list[_syntax.Module]:
+    return _syntax.modules(ROOT, "impactcell")
 
 
 def test_each_word_is_listed_once() -> None:
@@ -20,10 +27,10 @@ def test_a_word_listed_twice_is_seen() -> None:
     assert twice_listed(["shot", "cycle", "Shot"]).items == ("shot",)
 
 
-def test_no_retired_name_is_left() -> None:
+def test_no_retired_name_is_left(product: list[_syntax.Module]) -> None:
     _, retired = glossary(ROOT)
     assert len(retired) > 40
-    assert retired_names(_syntax.modules(ROOT, "impactcell"), retired).items == ()
+    assert retired_names(product, retired).items == ()
 
 
 def test_a_retired_name_is_seen(tmp_path: Path) -> None:
@@ -33,12 +40,11 @@ def test_a_retired_name_is_seen(tmp_path: Path) -> None:
     assert len(seen.items) == 3
 
 
-def test_what_the_structure_table_looks_for_is_still_there() -> None:
-    parsed = _syntax.modules(ROOT, "impactcell")
+def test_what_the_structure_table_looks_for_is_still_there(product: list[_syntax.Module]) -> None:
     for row, patterns in DEFINITIONS.items():
-        assert definitions(parsed, patterns).value > 0, row
+        assert definitions(product, patterns).value > 0, row
         for pattern in patterns:
-            names = {node.name for home in homes(parsed, pattern) for node in _syntax.functions(home)}
+            names = {node.name for home in homes(product, pattern) for node in _syntax.functions(home)}
             # a definition whose module stands, but which is gone from it, may have been renamed: look
             found = [name for name in names if re.fullmatch(pattern.split(":")[1], name)]
             assert found or not names, pattern
