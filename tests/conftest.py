@@ -6,6 +6,8 @@ import logging
 import os
 import sys
 from collections.abc import AsyncIterator, Generator, Iterator
+from itertools import compress, islice
+from operator import not_
 from pathlib import Path
 
 import pytest
@@ -56,6 +58,25 @@ class DoctestsOfTheProduct:
 def pytest_configure(config: pytest.Config) -> None:
     """Let the choice of doctests hold for the product too, which does not lie below this file."""
     config.pluginmanager.register(DoctestsOfTheProduct())
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Have each worker begin with some of the long tests: all would wait for one that began last.
+
+    Workers are given as many neighbouring tests each, and then take from each other; those of a file stay
+    together, for they may have fixtures in common.
+    """
+    workers: int = getattr(config, "workerinput", {"workercount": 1})["workercount"]
+    is_long = [item.get_closest_marker("long") is not None for item in items]
+    long, short = list(compress(items, is_long)), compress(items, map(not_, is_long))
+    files = list(dict.fromkeys(item.path for item in long))
+    ordered: list[pytest.Item] = []
+    for worker in range(workers):
+        first = [item for item in long if files.index(item.path) % workers == worker]
+        share = (len(items) - len(ordered)) // (workers - worker)
+        ordered += [*first, *islice(short, max(0, share - len(first)))]
+    items[:] = ordered
 
 
 def pytest_collection_finish() -> None:

@@ -15,6 +15,7 @@ from tests.discrepancy.test_workflow import make
 from tests.unit.physics.test_outside_effects import OWN
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("default")
 def test_two_worker_processes_change_nothing(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")

@@ -35,6 +35,7 @@ def _investigated(hidden: tuple[str, ...], multiples: tuple[float, ...], seed: i
         return investigate(campaign(job, multiples), seed=seed, library=LIBRARY)
 
 
+@pytest.mark.long
 def test_an_effect_is_named_and_measured_beside_a_force_of_which_nobody_knows_the_form() -> None:
     strength = 1.0
     found = _investigated(("force_sensor_gain", "wandering_force"), (strength, 0.15), 600_000)

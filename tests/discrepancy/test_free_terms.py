@@ -82,6 +82,7 @@ def test_a_penalty_draws_towards_zero_as_its_normal_equations_say() -> None:
     assert held.penalty(penalised.theta) == pytest.approx(1e12 * penalised.theta[-1] ** 2)
 
 
+@pytest.mark.long
 def test_quadratic_drag_is_found_as_a_straight_line_over_speed() -> None:
     problem, nominal, held = _fitted("quadratic_drag")
     best = fit_free_terms(problem, nominal, 1)[0]

@@ -93,6 +93,7 @@ def test_nothing_is_proposed_where_nothing_is_hidden() -> None:
     assert outcome.law is None
 
 
+@pytest.mark.long
 def test_a_law_with_a_memory_is_not_mistaken_for_one_of_position() -> None:
     outcome = investigate(
         campaign(Job("outside", ("relaxing_contact",), 8204, shots=16)), seed=1, library=FEW

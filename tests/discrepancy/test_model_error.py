@@ -105,6 +105,7 @@ def test_a_penalty_adds_to_what_the_shots_know() -> None:
     assert held[0, 0] == pytest.approx(free[0, 0] / 4.0**2)
 
 
+@pytest.mark.long
 def test_an_effect_is_established_although_something_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "RATE_HZ", 2000.0)
     monkeypatch.setattr("impactcell.discrepancy.workflow.find_law", lambda *_: None)  # has tests of its own

@@ -28,6 +28,7 @@ from impactcell.physics.free_pair_forms import column_pair_forms
 from impactcell.physics.outside_effects import load_effect, offer_effects
 from tests.discrepancy.pairs import COLUMN, DRAG, HIGHEST, LOWEST, oil_campaign, thinning
 
+pytestmark = pytest.mark.long
 SHOTS = 26
 """Shots of a campaign: few, for the sake of time."""
 FEW = ("hertz_contact",)

@@ -152,6 +152,7 @@ def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
     assert "weigh the part" in found.experiments[0].setting
 
 
+@pytest.mark.long
 def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
     hidden = ("batch_shift", "force_sensor_gain")
     job = study.Job("two", hidden, 50_028, target=4.108, actuator=False)
@@ -161,6 +162,7 @@ def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
     assert "batch_shift" in found.added
 
 
+@pytest.mark.long
 def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
     # Friction then differs by direction too, for the parts slide apart: that is no name either.
     campaign = make("position_dependent_friction", seed=920030, shots=18)
@@ -187,6 +189,7 @@ def test_a_gap_between_shots_is_unknown_with_the_covariate_that_it_goes_with() -
     assert found.unexplained.depends_on == ("direction",)
 
 
+@pytest.mark.long
 def test_files_are_whole_and_the_same_to_the_byte(tmp_path: Path) -> None:
     given = make("viscous_friction", shots=24)
     campaigns.write(given, tmp_path / "campaign")

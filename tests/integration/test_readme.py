@@ -65,6 +65,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
+@pytest.mark.long
 def test_the_commands_in_their_order(checkout: Path, tmp_path: Path) -> None:
     lines = [line for block in blocks() for line in block.splitlines() if line.strip() not in ELSEWHERE]
     script = "set -eu\ntrap 'kill $(jobs -p) 2>/dev/null || true' EXIT\n" + "\n".join(lines)
