@@ -13,7 +13,10 @@ STD_SUFFIX = "StdDev"
 
 @dataclass(frozen=True, slots=True)
 class ListedValue:
-    """A published value on the page; `form` is `coefficient`, `count`, `cycle` (0: none), or empty."""
+    """A published value on the page.
+
+    `form` is `coefficient`, `count`, `cycle` (0: none), `cycles` (whole ones), or empty.
+    """
 
     path: str
     title: str
@@ -44,6 +47,8 @@ def listed_values(language: str) -> dict[str, list[ListedValue]]:
 def _form(quantity: Quantity[Any]) -> str:
     if quantity.data_type is DataType.UINT32:
         return "cycle" if quantity.path.endswith("Cycle") else "count"
+    if quantity.path.startswith("Wear/CyclesToLimit"):
+        return "cycles"
     bounds = quantity.node_range(Ranges())
     is_coefficient = quantity.unit is ONE and bounds is not None and bounds[1] <= Ranges().friction
     return "coefficient" if is_coefficient else ""

@@ -34,6 +34,7 @@ export function showValues(root, card) {
     else if (typeof value === "string") text = value || "–";
     else if (form === "coefficient") text = coefficient(value);
     else if (form === "cycle") text = value ? number(value, 10) : "–";
+    else if (form === "cycles") text = Number.isFinite(value) ? number(Math.floor(value), 4) : "–";
     else if (form === "count") text = number(value, 10);
     else text = unit ? withUnit(value, unit) : number(value);
     const std = card.values[`${path}StdDev`];

@@ -28,6 +28,7 @@ def test_a_cycle_that_has_not_been_is_no_number() -> None:
     forms = {value.path: value.form for folder in listed_values("en").values() for value in folder}
     assert forms["Batch/LastShiftCycle"] == "cycle", "0 before the first: a dash"
     assert forms["Module/CyclesMissed"] == "count", "0 is a number"
+    assert forms["Wear/CyclesToLimit"] == forms["Wear/CyclesToLimitLow"] == "cycles", "no part of a cycle"
 
 
 def test_a_card_has_every_value_in_the_unit_of_its_node() -> None:
