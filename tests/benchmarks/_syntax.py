@@ -17,6 +17,7 @@ class Module:
     path: Path
     lines: tuple[str, ...]
     tree: ast.Module
+    nodes: tuple[ast.AST, ...]  # of the tree, walked once
 
 
 def modules(root: Path, package: str) -> list[Module]:
@@ -25,18 +26,19 @@ def modules(root: Path, package: str) -> list[Module]:
     for path in sorted((root / package).rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         name = ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
-        parsed.append(Module(name, path, tuple(text.splitlines()), ast.parse(text)))
+        tree = ast.parse(text)
+        parsed.append(Module(name, path, tuple(text.splitlines()), tree, tuple(ast.walk(tree))))
     return parsed
 
 
 def classes(module: Module) -> Iterator[ast.ClassDef]:
     """Give every class of a module."""
-    return (node for node in ast.walk(module.tree) if isinstance(node, ast.ClassDef))
+    return (node for node in module.nodes if isinstance(node, ast.ClassDef))
 
 
 def functions(module: Module) -> Iterator[Function]:
     """Give every function and method of a module."""
-    return (node for node in ast.walk(module.tree) if isinstance(node, Function))
+    return (node for node in module.nodes if isinstance(node, Function))
 
 
 def dataclass_homes(parsed: list[Module]) -> Mapping[str, list[str]]:
