@@ -21,7 +21,7 @@ the ranking may err."""
 RANGES = (0.03, 0.1, 0.3, 1.0)
 """Ranges of a pull that are tried, over the largest gap."""
 SIMPLIFIED = 5
-"""Sums of two terms, the best first, of which each term is then tried alone."""
+"""Laws, the best first, of which each part is then tried alone."""
 FARTHEST = 3.0
 """Coordinates, most of them logarithms, by which a first-order step is believed: a factor of twenty."""
 MOST_STEPS = 9
@@ -100,9 +100,11 @@ def _fitted(base: Fit, term: FreeTerm, forms: Sequence[RankedForm]) -> list[Fitt
 
 
 def _single_terms(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
-    """Take each term of a sum alone, from where the sum came to rest: the plant may take up the other one."""
-    if len(fitted.ranked.terms) < 2 or fitted.law.is_wave:
-        return []
+    """Take each part of a law alone, from where the whole came to rest.
+
+    Of a sum each term: the plant may take up the other one. Of a product of functions of two covariates each
+    function: the other one may have come to rest where it is constant.
+    """
     of_law = len(fitted.law.parameters)
     pairs = zip(fitted.fit.coordinates[-of_law:], fitted.fit.theta[-of_law:].tolist(), strict=True)
     values = iter([coordinate.value(number) for coordinate, number in pairs])
@@ -113,12 +115,24 @@ def _single_terms(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
             (amplitude, Shaped(item.term, tuple(tuple(next(values) for _ in atom) for atom in item.shapes)))
         )
     references = [max(map(abs, ends)) for ends in term.visited.ranges]
-    singles = []
-    for (amplitude, kept), (other, dropped) in (shaped, shaped[::-1]):
-        constant = other * float(np.mean(dropped.values(term.visited.points, *references)))
+
+    def mean(dropped: Shaped) -> float:
+        return float(np.mean(dropped.values(term.visited.points, *references)))
+
+    def alone(kept: Shaped, amplitude: float, constant: float) -> RankedForm:
         others = _taken_up(term, fitted, constant)[:-of_law]
-        singles.append(RankedForm((kept,), (amplitude,), -math.inf, -math.inf, others))
-    return singles
+        return RankedForm((kept,), (amplitude,), -math.inf, -math.inf, others)
+
+    if len(shaped) == 2 and not fitted.law.is_wave:
+        return [
+            alone(kept, amplitude, other * mean(dropped))
+            for (amplitude, kept), (other, dropped) in (shaped, shaped[::-1])
+        ]
+    amplitude, product = shaped[0]
+    if len(shaped) > 1 or len(product.term) != 2 or not term.form.second:
+        return []
+    factors = [Shaped((atom,), (shape,)) for atom, shape in zip(product.term, product.shapes, strict=True)]
+    return [alone(kept, amplitude * mean(dropped), 0.0) for kept, dropped in (factors, factors[::-1])]
 
 
 def _taken_up(term: FreeTerm, fitted: FittedLaw, constant: float) -> Samples:
