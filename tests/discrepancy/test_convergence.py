@@ -15,20 +15,23 @@ from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.convergence import converge, is_converged
 from impactcell.discrepancy.search.indistinguishability import evaluate_out_of_shot, total_log_likelihood
 from impactcell.discrepancy.search.model_selection import select_model
-from impactcell.discrepancy.search.policy import POLICY
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import make
 
 TILTED = ("surface_tilt", "hunt_crossley_damping")
 
 
-@pytest.fixture(scope="module")
-def context() -> SearchContext:
-    prepared = prepare(make(*TILTED, shots=20))
+def context_of(*hidden: str) -> SearchContext:
+    prepared = prepare(make(*hidden, shots=20))
     shots = shot_set(prepared, np.arange(20), sensor_noise(prepared).noise_std)
     problem = Problem(shots, len(prepared.batches))
     serial = lambda function, items: [function(item) for item in items]  # noqa: E731
     return SearchContext(problem, problem, prepared, tuple(LIBRARY), 1, serial, floor_is_certain=True)
+
+
+@pytest.fixture(scope="module")
+def context() -> SearchContext:
+    return context_of(*TILTED)
 
 
 def fitted(problem: Problem, base: Fit, *effects: str) -> Fit:
@@ -55,23 +58,23 @@ def test_a_fit_at_its_optimum_promises_nothing_and_one_beside_it_much(context: S
     assert not is_converged(context.problem, beside, [nominal])
 
 
-def test_a_trial_worse_than_a_model_inside_it_starts_again_from_there(context: SearchContext) -> None:
+def test_a_trial_worse_than_a_model_inside_it_starts_again_from_there() -> None:
+    # Both fits of these come to their optimum on every machine; contact damping rests where rounding has it.
+    context = context_of("surface_tilt", "quadratic_drag")
     problem = context.problem
     nominal = fit_nominal(problem)
-    damped = fitted(problem, nominal, "hunt_crossley_damping")
-    both = fitted(problem, damped, "surface_tilt")
-    stuck = moved(problem, both, "damping_n_s_per_m2", 0.5)
-    inner = [nominal, damped]
-    assert total_log_likelihood(problem, stuck) < total_log_likelihood(problem, damped) - 200.0
+    dragged = fitted(problem, nominal, "quadratic_drag")
+    both = fitted(problem, dragged, "surface_tilt")
+    assert promised_fall(problem, both) < 1e-3
+    stuck = moved(problem, both, "drag_coefficient_n_s2_per_m2", 0.5)
+    inner = [nominal, dragged]
+    assert total_log_likelihood(problem, stuck) < total_log_likelihood(problem, dragged) - 200.0
     (mended,), others = converge(context, [stuck], inner)
     assert others == []
-    assert set(mended.effects) == set(TILTED)
-    least = (
-        total_log_likelihood(problem, damped) - POLICY.max_nesting_loss
-    )  # what shots' own factors can do too
-    assert total_log_likelihood(problem, mended) > least
+    assert set(mended.effects) == {"surface_tilt", "quadratic_drag"}
+    assert total_log_likelihood(problem, mended) > total_log_likelihood(problem, dragged)
     assert total_log_likelihood(problem, mended) == pytest.approx(
-        total_log_likelihood(problem, both), abs=2.0
+        total_log_likelihood(problem, both), abs=0.01
     )
 
 
