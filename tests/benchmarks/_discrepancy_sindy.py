@@ -24,8 +24,8 @@ import numpy as np
 from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, UNLOADING
 from impactcell.discrepancy.data.prepared_shots import ACTUATOR, FORCE, POSITION, PreparedShot
 from impactcell.discrepancy.model.least_squares import Fit
+from impactcell.discrepancy.model.phase_of_samples import sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.model.sample_phases import sample_phases, trajectory_of
 
 SMOOTH_SLIDE_S, SMOOTH_CONTACT_S = 0.010, 0.004
 STRIBECK_M_S = (0.01, 0.02, 0.04, 0.08)

@@ -9,8 +9,8 @@ import pytest
 from impactcell.discrepancy.data.phases import PHASES
 from impactcell.discrepancy.model import initial_guess
 from impactcell.discrepancy.model.parameters import NOMINAL_COORDINATES
+from impactcell.discrepancy.model.phase_of_samples import phase_positions
 from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.model.sample_phases import phase_positions
 from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.physics import Plant
 

@@ -27,8 +27,8 @@ from impactcell.discrepancy.model.parameters import (
     effect_coordinates,
     parameter_name,
 )
+from impactcell.discrepancy.model.phase_of_samples import phase_positions, sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import FitState, Problem, remove_jumps
-from impactcell.discrepancy.model.sample_phases import phase_positions, sample_phases, trajectory_of
 from impactcell.discrepancy.model.shot_fits import normal_equations
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 

@@ -18,8 +18,8 @@ from impactcell.discrepancy.data import (
     concatenate_shots,
 )
 from impactcell.discrepancy.model.least_squares import Fit, fit, initial_shot_parameters
+from impactcell.discrepancy.model.phase_of_samples import trajectory_of
 from impactcell.discrepancy.model.problem import Problem
-from impactcell.discrepancy.model.sample_phases import trajectory_of
 from impactcell.errors import DiscrepancyError
 
 SEPARATION_MARGIN = 0.1
