@@ -21,6 +21,7 @@ UNTOUCHED: Mapping[str, str] = {
     "tests/contract/test_effects.py": "holds the effects that are used from outside; others may join",
     "tests/unit/simulator/test_effects.py": "closed forms beside what holds for every law",
     "tests/discrepancy/test_free_rivals.py": "tries effects beside free forms; others may join",
+    "tests/discrepancy/test_study.py": "judges rows that name some effects; others may join",
     "tests/integration/test_opcua_values.py": "holds the nodes that are used from outside; others may join",
     "tests/interop/node/nodesets.js": "asks for the conditions that are used from outside",
 }
