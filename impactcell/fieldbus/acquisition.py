@@ -15,10 +15,11 @@ from typing import Self
 
 from impactcell.errors import FieldbusError, LinkError
 from impactcell.fieldbus.backoff import Backoff
-from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
+from impactcell.fieldbus.capture_reader import CaptureReader
 from impactcell.fieldbus.capture_ring import cycles_after
 from impactcell.fieldbus.cycle_choice import CycleChoice
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.identity import IdentityCheck
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.poll_schedule import PollSchedule

@@ -8,7 +8,6 @@ the window still shows the same and there is a CRC to prove the whole.
 """
 
 import asyncio
-import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
@@ -19,13 +18,14 @@ from impactcell.errors import FieldbusError, ModbusExceptionError, NotDecimalErr
 from impactcell.fieldbus import decoding
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.fetched_capture import FetchedCapture, NotFetched
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Words, registers_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.fieldbus.status_block import integer
 from impactcell.fieldbus.taken_cycles import TakenCycles
-from impactcell.records import Capture, CycleId
+from impactcell.records import CycleId
 
 _AT_ONCE: Final = 5
 """Readings of one cycle that may be discarded one after the other; then the status block is looked at."""
@@ -39,35 +39,6 @@ _PAUSE_S, _LONGEST_PAUSE_S = 0.001, 0.25
 slot, or another client be selecting others."""
 _REQUEST_FAULTS: Final = (1, 2, 3)
 """Exceptions that the request earns; all others tell of a module, or a gateway, that cannot answer now."""
-
-
-class NotFetched(enum.Enum):
-    """Why a cycle was not read although the status block has it; none of these is a fault of the link."""
-
-    OVERWRITTEN = "the module has put a newer cycle in its place"
-    NOT_SHOWN = "its slot shows another cycle: the status block is wrong, or the window"
-    TAKEN = "it has been taken before: the status block is old, or wrong"
-    NOT_YET = "no reading of it was of use yet; the ring still holds it"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FetchedCapture:
-    """What came of reading one cycle.
-
-    Attributes
-    ----------
-    header : bytes
-        Words of the header, for telling whether the same is read again; empty where there was none.
-    readable : bool
-        False if it has no content but its number.
-    faults : tuple of str
-        What is wrong; each names cell, cycle and register.
-    """
-
-    capture: Capture
-    header: bytes
-    readable: bool
-    faults: tuple[str, ...]
 
 
 @dataclass(slots=True, eq=False)

@@ -2,8 +2,8 @@
 
 from typing import Final
 
-from impactcell.fieldbus.capture_reader import NotFetched
 from impactcell.fieldbus.capture_ring import NextCapture, is_consistent, next_capture
+from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.process.cell_logger import CellLogger

@@ -6,8 +6,9 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
-from impactcell.fieldbus.capture_reader import CaptureReader, NotFetched
+from impactcell.fieldbus.capture_reader import CaptureReader
 from impactcell.fieldbus.capture_ring import NextCapture
+from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.registers import Value
 from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.taken_cycles import TakenCycles

@@ -54,9 +54,8 @@ MAX_STEP = 0.3
 MIN_RATIO_STD = 1e-3
 """Least standard deviation of mu_k/mu_s from tap to tap that a prior is given. Our choice."""
 NO_REST = (
-    "the plant could not be fitted to the campaign: no k, b and mu_k/mu_s explain its taps; see that t = 0 "
-    "is the first contact in each trace and that stroke and masses are right, or give --cell; "
-    "where the model lacks something, `impactcell discrepancy` says what"
+    "the plant could not be fitted to the campaign: no k, b and mu_k/mu_s explain its taps; see that stroke, "
+    "masses and t = 0, first contact, are right, or give --cell; `discrepancy` says what a model lacks"
 )
 """What is said where the steps of a joint fit come to no end."""
 REWEIGHTING_ROUNDS = 4

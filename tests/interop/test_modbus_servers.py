@@ -124,7 +124,7 @@ async def test_what_pymodbus_server_can_have_in_flight_is_found_and_its_register
 async def test_libmodbus_server(libmodbus_port: int, window: int | None) -> None:
     async with connected(libmodbus_port, window) as client:
         await client.find_window(100, 20_000)
-        assert client.window.size == (window or 16)
+        assert client.window.size == (window or 64)
         for _ in range(3):
             assert np.array_equal(await client.read(100, 20_000), np.arange(100, 20_100))
         assert np.array_equal(await client.read(0, 500, "input"), 65_535 - np.arange(500))

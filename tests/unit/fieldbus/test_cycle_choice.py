@@ -4,8 +4,8 @@ import logging
 
 import pytest
 
-from impactcell.fieldbus.capture_reader import NotFetched
 from impactcell.fieldbus.cycle_choice import CycleChoice
+from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.process.cell_logger import CellLogger
