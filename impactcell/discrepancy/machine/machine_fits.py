@@ -189,6 +189,7 @@ class MachineFits:
             notes = [*notes, *_alike(self.candidates, candidates)]
             search = TermSearch(training, candidates, self.shapes, self.priors, self.nonnegative)
             steps = select_terms(search, self.columns(base_terms))
+            notes += [step.note for step in steps if step.note]
         proposed = [step.accepted.term for step in steps if step.accepted is not None]
         before = nominal
         falls: dict[str, FallOfGap] = {}

@@ -7,12 +7,20 @@ from scipy.stats import t as student
 
 from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FallOfGap, FittedModel
 from impactcell.discrepancy.machine.regression import Blocks
-from impactcell.discrepancy.machine.selection import sign_flip_p
+from impactcell.records import Samples
 
 CLOSED_RESAMPLES = 999
 """Draws of the held-out blocks for the interval of the share that is closed [1]."""
 MIN_OPEN_GAP = 1.05
 """Gap above which there is something to close, as in the workflow of shots [1]."""
+
+
+def sign_flip_p(differences: Samples, seed: int, draws: int = 1999) -> float:
+    """One-sided p-value that the sum of differences is above zero, signs of the blocks drawn at random."""
+    rng = np.random.default_rng([seed, 8])
+    signs = 2.0 * rng.integers(0, 2, (draws, len(differences))) - 1.0
+    least = differences.sum() - 1e-12 * np.abs(differences).sum()
+    return float(1 + np.sum(signs @ differences >= least)) / (1 + draws)
 
 
 def gap(blocks: Blocks, model: FittedModel) -> float:

@@ -7,6 +7,7 @@ from block to block, and if it does about as well as a free form in the same pla
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -41,6 +42,8 @@ MIN_SECOND_GAP = 2.0
 """Gap in noise floors beside the first term from which on a second one is named [1]."""
 MAX_ALIKE = 0.95
 """Squared correlation with inertia, gravity or drive from which on a term cannot be told from it [1]."""
+NOT_IN_EVERY_BLOCK = "no term does better in block after block that it was not fitted to"
+"""Why the best term is not taken where its gain scatters too much from block to block."""
 MACHINE: tuple[Column, ...] = tuple(
     (name, 0.0, 0) for name in ("inertia", "gravity_torque", "force_gain", "force_offset")
 )
@@ -107,6 +110,8 @@ class SelectionStep:
     tied_with : tuple of str
     reason : str
         Why nothing was accepted; empty where something was.
+    beside : str
+        Term beside which alone the accepted one shows; empty where it shows by itself.
     """
 
     trials: tuple[Trial, ...]
@@ -116,6 +121,15 @@ class SelectionStep:
     accepted: Trial | None
     tied_with: tuple[str, ...]
     reason: str
+    beside: str = ""
+
+    @property
+    def note(self) -> str:
+        """Say beside which term the accepted one shows; empty where it shows by itself."""
+        if self.accepted is None or not self.beside:
+            return ""
+        name, beside = self.accepted.term.choice.name, self.beside
+        return f"{name} shows only beside {beside}, which hides it on these records; {beside} is not named."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,6 +208,11 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     gain_of_all = float((before - search.losses([*columns, *every])).sum())
     best = trials[0]
     reason = _refusal(best, free_gains, max(gain_of_all, best.gain), excess)
+    if reason == NOT_IN_EVERY_BLOCK and best.gain > 0.0 and not best.at_end:
+        least = max(MIN_SHARE * excess, MIN_SHARE_OF_ALL * gain_of_all)
+        shown = _beside_another(search, (columns, before), trials, least)
+        if shown is not None:
+            return SelectionStep(tuple(trials), free_gains, gain_of_all, excess, shown[0], (), "", shown[1])
     tied: tuple[str, ...] = ()
     if not reason:
         tied = tuple(trial.term.choice.name for trial in trials[1:] if is_tied(best, trial))
@@ -202,10 +221,41 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     )
 
 
+def _beside_another(
+    search: TermSearch, model: tuple[list[Column], Samples], trials: Sequence[Trial], least: float
+) -> tuple[Trial, str] | None:
+    """Best term as it shows beside another one, and that one's name; None where it does not.
+
+    Where each of two shows only beside the other (speed falls where pressure rises), no step of one finds
+    either. Both have to hold from block to block, together and each beside the other, the pair has to close
+    `least` more than the other alone, and no two terms without the best may do about as well.
+    """
+    columns, before = model
+    best, others = trials[0], trials[1:]
+    shown: list[tuple[Trial, Trial]] = []
+    for other in others:
+        pair = search.best_shape(other.term.choice, [*columns, *best.term.columns], before)
+        alone = before - search.losses([*columns, *pair.term.columns])
+        own = pair.gains - alone
+        holds = all(
+            mean_over_error(gains) >= MIN_GAIN_Z for gains in (pair.gains, own, pair.gains - best.gains)
+        )
+        if holds and not pair.at_end and pair.gain - max(float(alone.sum()), 0.0) >= least:
+            shown.append((pair, replace(best, gains=own)))
+    if not shown:
+        return None
+    pair, own_trial = max(shown, key=lambda item: item[0].gain)
+    for one, two in combinations(others, 2):
+        together = before - search.losses([*columns, *one.term.columns, *two.term.columns])
+        if is_tied(pair, replace(pair, gains=together)):
+            return None
+    return own_trial, pair.term.choice.name
+
+
 def _refusal(best: Trial, free_gains: Mapping[str, float], gain_of_all: float, excess: float) -> str:
     """Say why a term is not taken; empty if it is."""
     if best.gain <= 0.0 or best.z < MIN_GAIN_Z:
-        return "no term does better in block after block that it was not fitted to"
+        return NOT_IN_EVERY_BLOCK
     if best.gain < MIN_SHARE * excess:
         return "no term closes a fifth of the gap"
     if best.gain < MIN_SHARE_OF_ALL * gain_of_all:
@@ -234,14 +284,6 @@ def mean_over_error(values: Samples) -> float:
 
 def _free_columns(form: str) -> list[Column]:
     return [(form, 0.0, number) for number in range(KNOTS)]
-
-
-def sign_flip_p(differences: Samples, seed: int, draws: int = 1999) -> float:
-    """One-sided p-value that the sum of differences is above zero, signs of the blocks drawn at random."""
-    rng = np.random.default_rng([seed, 8])
-    signs = 2.0 * rng.integers(0, 2, (draws, len(differences))) - 1.0
-    least = differences.sum() - 1e-12 * np.abs(differences).sum()
-    return float(1 + np.sum(signs @ differences >= least)) / (1 + draws)
 
 
 def like_the_machine(blocks: Blocks, term: ChosenTerm) -> bool:
