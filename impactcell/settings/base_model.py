@@ -19,6 +19,8 @@ Positive = Annotated[FiniteFloat, Field(gt=0)]
 """A finite number above 0."""
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 """A finite number of at least 0."""
+NUISANCES = ("position_offset", "position_eccentricity", "force_offset", "force_gain", "delay_s")
+"""What a measurement may be off by, in the order in which it is written."""
 HEADER = "# A base model of impactcell: a machine with one coordinate, for `impactcell discrepancy --base`.\n"
 
 
@@ -64,6 +66,7 @@ class Nuisances(_Part):
     """What a measurement may be off by; each is 0 and exact where it is not named."""
 
     position_offset: Number = 0.0
+    position_eccentricity: Number = 0.0
     force_offset: Number = 0.0
     force_gain: Number = 0.0
     delay_s: Number = 0.0
@@ -96,6 +99,11 @@ class BaseModelFile(_Part):
             raise ValueError("a translation has mass_kg in place of inertia_kg_m2")
         if not turns and self.gravity_torque_n_m != 0.0:
             raise ValueError("gravity_torque_n_m, m g l, belongs to a rotation")
+        eccentricity = self.nuisances.position_eccentricity
+        if not turns and eccentricity != 0.0:
+            raise ValueError("position_eccentricity is of an encoder that turns, and belongs to a rotation")
+        if (eccentricity.value if isinstance(eccentricity, UncertainNumber) else eccentricity) != 0.0:
+            raise ValueError("position_eccentricity is about 0, its phase is free: write {std: ...}")
         if self.excitation == "free" and self.predicts == "force":
             raise ValueError("where nothing drives, predicts is position")
         return self
@@ -131,6 +139,7 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
         gravity_torque=_prior(file.gravity_torque_n_m),
         terms=tuple(choices),
         position_offset=_prior(nuisances.position_offset),
+        position_eccentricity=_prior(nuisances.position_eccentricity),
         force_offset=_prior(nuisances.force_offset),
         force_gain=_prior(nuisances.force_gain),
         delay_s=_prior(nuisances.delay_s),
@@ -149,15 +158,15 @@ def base_model_text(model: MachineModel, excitation: Excitation, provenance: dic
         "excitation": "free" if excitation is Excitation.FREE_SLIDE else "driven",
         "predicts": str(model.response),
     }
-    inertia = "inertia_kg_m2" if model.coordinate is Coordinate.ROTATION else "mass_kg"
+    turns = model.coordinate is Coordinate.ROTATION
+    inertia = "inertia_kg_m2" if turns else "mass_kg"
     if math.isfinite(model.inertia.value):
         mapping[inertia] = _number(model.inertia)
-    if model.coordinate is Coordinate.ROTATION:
+    if turns:
         mapping["gravity_torque_n_m"] = _number(model.gravity_torque)
     mapping["terms"] = [_term(choice) for choice in model.terms]
     mapping["nuisances"] = {
-        name: _number(getattr(model, name))
-        for name in ("position_offset", "force_offset", "force_gain", "delay_s")
+        name: _number(getattr(model, name)) for name in NUISANCES if turns or name != "position_eccentricity"
     }
     if math.isfinite(model.block_s):
         mapping["block_s"] = model.block_s

@@ -14,10 +14,12 @@ from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, V
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep, Trial
 from impactcell.discrepancy.machine.simulation import motions, simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE, Term
+from impactcell.discrepancy.machine.weak_form import ECCENTRICITY
 
 __all__ = [
     "CATALOGUE",
     "COVARIATES",
+    "ECCENTRICITY",
     "FREE_FORMS",
     "LAW_PLACES",
     "VALUES",

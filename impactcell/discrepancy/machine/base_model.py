@@ -92,6 +92,8 @@ class BaseModel:
         What the model has beside inertia and gravity.
     position_offset : NumberPrior
         q_0, zero of the position sensor against the vertical [m or rad].
+    position_eccentricity : NumberPrior
+        e_c and e_s of an encoder that turns off its centre, which reads q + e_c cos q + e_s sin q [rad].
     force_offset : NumberPrior
         F_0 [N or N m].
     force_gain : NumberPrior
@@ -109,6 +111,7 @@ class BaseModel:
     gravity_torque: NumberPrior = NumberPrior()
     terms: tuple[TermChoice, ...] = field(default=(TermChoice("coulomb_friction"),))
     position_offset: NumberPrior = NumberPrior()
+    position_eccentricity: NumberPrior = NumberPrior()
     force_offset: NumberPrior = NumberPrior()
     force_gain: NumberPrior = NumberPrior()
     delay_s: NumberPrior = NumberPrior()

@@ -9,6 +9,7 @@ the held-out simulation decide.
 from collections.abc import Sequence
 from dataclasses import replace
 
+from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import RankedForm, rank_forms
 from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
@@ -30,7 +31,7 @@ from impactcell.discrepancy.machine.selection import (
     mean_over_error,
 )
 from impactcell.discrepancy.machine.simulation import resistance, simulate_held_out
-from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
 from impactcell.records import Samples
 
 MIN_SHARE = 0.05
@@ -39,6 +40,11 @@ REFITTED = 20
 """Functional forms that are fitted by themselves, of those that come nearest to the spline."""
 PIECES_PER_WAVE = 3.0
 """Pieces of a spline that a wave takes to be seen in it."""
+ENCODER = (
+    "an encoder that turns off its centre does as well as any function of speed, load or position; "
+    "position_eccentricity among the nuisances of the base model would tell"
+)
+"""Why no law is proposed where the sensor may be to blame."""
 NEGATIVE_SHARE = 0.02
 """Share of the largest friction by which it may be below zero before it gives energy [1]."""
 
@@ -68,6 +74,8 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
     excess = float(before.sum() - training.noise.sum())
     if mean_over_error(best.gains) < MIN_GAIN_Z or float(best.gains.sum()) < MIN_SHARE * excess:
         return "no function of speed, load or position helps block after block that it was not fitted to"
+    if _is_of_the_encoder(fits, training, model, best.gains, before):
+        return ENCODER
     rivals = tuple(
         LAW_PREFIX + other.form for other in tried[1:] if mean_over_error(best.gains - other.gains) < TIE_Z
     )
@@ -88,6 +96,19 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
         LAW_PREFIX + best.form, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated
     )
     return _refusal(finding, law) or law
+
+
+def _is_of_the_encoder(
+    fits: MachineFits, training: Blocks, model: FittedModel, spline: Samples, before: Samples
+) -> bool:
+    """Whether an encoder off its centre does as well as a spline, where the base model holds it at none."""
+    if fits.base.coordinate is not Coordinate.ROTATION or not fits.base.position_eccentricity.is_held:
+        return False
+    columns = [*model.fit.columns, *((ECCENTRICITY, 0.0, number) for number in range(2))]
+    gains = before - out_of_fold_losses(training, columns, fits.priors, fits.nonnegative)
+    is_real = mean_over_error(gains) >= MIN_GAIN_Z
+    does_as_well = float(gains.sum()) >= MIN_SHARE_OF_FREE * float(spline.sum())
+    return is_real and does_as_well and mean_over_error(spline - gains) < TIE_Z
 
 
 def _gone_through(finding: MachineFinding) -> list[str]:

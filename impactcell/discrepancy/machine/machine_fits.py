@@ -21,6 +21,7 @@ from impactcell.discrepancy.machine.selection import (
 )
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
 from impactcell.discrepancy.machine.weak_form import (
+    ECCENTRICITY,
     Column,
     IndexArray,
     Rows,
@@ -81,6 +82,9 @@ class MachineFits:
             # The columns are deviations from the stated value, that of the inertia relative to it.
             std = prior.std / prior.value if name == "inertia" and math.isfinite(prior.value) else prior.std
             self.priors[name, 0.0, 0] = NumberPrior(0.0, std)
+        if not self.base.position_eccentricity.is_held:
+            for number in range(2):
+                self.priors[ECCENTRICITY, 0.0, number] = self.base.position_eccentricity
 
     def _build(self, gravity: float, delay_s: float) -> Rows:
         return build_rows(self.records, self.base, self.candidates, (gravity, delay_s))

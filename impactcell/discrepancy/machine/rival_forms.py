@@ -20,6 +20,7 @@ FREE_FORMS: Mapping[str, str] = {
     "friction_over_load": "-s(|F + G sin(q - q_0)|) sign(q')",
     "friction_over_position": "-s(q) sign(q')",
     "force_over_position": "s(q)",
+    "force_over_speed": "s(|q'|)",
 }
 """Free forms and their place in the equation of motion."""
 COVARIATES: Mapping[str, str] = {
@@ -27,12 +28,14 @@ COVARIATES: Mapping[str, str] = {
     "friction_over_load": "load",
     "friction_over_position": "position",
     "force_over_position": "position",
+    "force_over_speed": "speed",
 }
 """What each is a function of."""
 PLACES: Mapping[str, str] = {
     "viscous_friction": "friction_over_speed",
     "quadratic_drag": "friction_over_speed",
     "stribeck_friction": "friction_over_speed",
+    "directional_viscous_friction": "force_over_speed",
     "load_dependent_friction": "friction_over_load",
     "position_dependent_friction": "friction_over_position",
     "periodic_friction": "friction_over_position",

@@ -16,7 +16,9 @@ from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
 from impactcell.discrepancy.machine.weak_form import (
+    ECCENTRICITY,
     direction_of_motion,
+    eccentricity_waves,
     half_supports,
     smoothed_acceleration,
     smoothed_speed,
@@ -73,6 +75,11 @@ def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scal
     needed += record.inertia * model.nuisance("inertia") * acceleration
     force: Samples = needed - smooth - model.nuisance("force_offset") + direction * friction
     force -= _gravity_deviation(model, record.position)
+    eccentricity = _eccentricity(model)
+    if eccentricity.any():
+        wave = eccentricity @ eccentricity_waves(record.position)
+        bent = smoothed_acceleration(wave, max(half // 2, narrow), record.step_s)
+        force -= record.inertia * bent + model.gravity * np.cos(record.position) * wave
     delayed = np.interp(record.time_s - model.delay_s, record.time_s, force)
     return np.where(np.abs(direction) < 1.0, np.nan, delayed)[stretch]
 
@@ -128,11 +135,14 @@ def _runner(
         },
     )
 
+    eccentricity = _eccentricity(model)
+
     def run(state: Samples, count: int) -> Samples:
-        q, v = state
+        slope = eccentricity @ np.stack([-np.sin(state[0]), np.cos(state[0])])
+        q, v = state[0] - eccentricity @ eccentricity_waves(state[0]), state[1] * (1.0 - slope)
         out = np.empty((count, len(records)))
         for place in range(count):
-            out[place] = q
+            out[place] = q + eccentricity @ eccentricity_waves(q)
             for part in range(parts):
                 share = (part + 0.5) / parts
                 q, v = _advance(
@@ -256,6 +266,11 @@ def _gravity_deviation(model: FittedModel, position: Samples) -> Samples:
     """Torque of gravity beyond its stated value, and by the zero of the position sensor."""
     deviation: Samples = model.gravity * model.nuisance("position_offset") * np.cos(position)
     return deviation - model.nuisance("gravity_torque") * np.sin(position)
+
+
+def _eccentricity(model: FittedModel) -> Samples:
+    """Amplitudes e_c and e_s of an encoder that turns off its centre, shape (2,)."""
+    return np.array([model.value((ECCENTRICITY, 0.0, number)) for number in range(2)])
 
 
 def _first_state(position: Samples, step: float) -> tuple[float, float]:

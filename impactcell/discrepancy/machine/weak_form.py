@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
@@ -37,6 +38,8 @@ TURNING_NOISES = 2.0
 """And at least this many standard deviations of the speed's noise [1]."""
 MAX_RESTING_SHARE = 0.5
 """Share of a row's support at rest beyond which it says nothing of friction: the part may stick [1]."""
+ECCENTRICITY = "position_eccentricity"
+"""Columns of an encoder that turns off its centre: e_c and e_s."""
 TEST_FUNCTION_POWER = 4
 """w = (1 - s²)^4: three derivatives vanish at its ends [1]."""
 
@@ -135,6 +138,13 @@ def _record_rows(
     motion = MotionState(record.position, velocity, load, one)
     raw |= free_columns(motion, direction, scale.ranges, basis)
     columns = {name: _averaged(values, weight, centres) for name, values in raw.items()}
+    if base.coordinate is Coordinate.ROTATION:
+        # The angle is what is read less e_c cos q + e_s sin q: to first order a force by inertia and gravity.
+        for number, wave in enumerate(eccentricity_waves(record.position)):
+            columns[ECCENTRICITY, 0.0, number] = record.inertia * _averaged(wave, curvature, centres)
+            columns[ECCENTRICITY, 0.0, number] += _averaged(
+                gravity * np.cos(record.position) * wave, weight, centres
+            )
     columns["inertia", 0.0, 0] = -accelerating
     if base.response is Response.FORCE:
         # What is measured is the gain times what a rigid machine would need, and friction in its own unit.
@@ -145,6 +155,11 @@ def _record_rows(
     sensors = (record.inertia * record.noise[0]) ** 2 * float(curvature @ curvature)
     sensors += record.noise[1] ** 2 * float(weight @ weight)
     return Rows(target, columns, np.zeros(target.size), record.time_s[centres], np.full(target.size, sensors))
+
+
+def eccentricity_waves(position: Samples) -> Samples:
+    """Return what an encoder off its centre reads beside the angle, per unit of e_c and e_s: (2, n)."""
+    return np.stack([np.cos(position), np.sin(position)])
 
 
 def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:

@@ -6,6 +6,7 @@ from typing import Any
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import (
     COVARIATES,
+    ECCENTRICITY,
     FREE_FORMS,
     LAW_PLACES,
     ChosenTerm,
@@ -24,6 +25,8 @@ SYMBOLS = {
     Coordinate.ROTATION: {"force": "N m", "F": "n_m", "q": "rad"},
 }
 """Units of force and coordinate, as they are shown and as they end a parameter's name."""
+ECCENTRIC_PARTS = ("position_eccentricity_cosine", "position_eccentricity_sine")
+"""Names of the two amplitudes of an encoder that turns off its centre."""
 SLUGS = {
     "{F}": "{F}",
     "{F} s/{q}": "{F}_s_per_{q}",
@@ -255,9 +258,9 @@ def _parameters(finding: MachineFinding, chosen: ChosenTerm, *, in_full: bool = 
 
 def _nuisances(model: FittedModel) -> dict[str, Any]:
     document = {
-        column[0]: _estimate(model, place)
+        ECCENTRIC_PARTS[column[2]] if column[0] == ECCENTRICITY else column[0]: _estimate(model, place)
         for place, column in enumerate(model.fit.columns)
-        if column[0] in ("force_gain", "force_offset", "position_offset")
+        if column[0] in ("force_gain", "force_offset", "position_offset", ECCENTRICITY)
     }
     scaled = {"inertia": (model.base.inertia.value, model.base.inertia.value), "gravity_torque": (
         model.base.gravity_torque.value, 1.0)}  # fmt: skip

@@ -1,0 +1,102 @@
+"""An encoder off its centre: scipy's integrator swings the pendulum, the angle is bent afterwards."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell.campaign import Excitation
+from impactcell.discrepancy.machine import (
+    ECCENTRICITY,
+    MachineFinding,
+    Response,
+    investigate_machine,
+    simulate_held_out,
+)
+from impactcell.discrepancy.report import machine_result
+from impactcell.errors import SettingsError
+from impactcell.records import Capture, Channel
+from impactcell.settings.base_model import base_model_text
+from tests.discrepancy.test_base_model import NOISE, PENDULUM, base_of, pendulum, swings
+
+COSINE, SINE = 2.0e-3, -1.2e-3
+"""Of the encoder [rad]."""
+FREE = PENDULUM + "  position_eccentricity: {std: 0.005}\n"
+SLIDE = """\
+format: 1
+coordinate: translation
+excitation: free
+mass_kg: 1
+nuisances: {position_eccentricity: {std: 0.1}}
+"""
+
+
+def bent(shots: tuple[Capture, ...], cosine: float, sine: float) -> tuple[Capture, ...]:
+    """What the encoder reads of the same swings."""
+    read = []
+    for shot in shots:
+        assert shot.position is not None
+        angle = shot.position.values
+        values = angle + cosine * np.cos(angle) + sine * np.sin(angle)
+        read.append(replace(shot, position=Channel(shot.position.time_s, values, NOISE)))
+    return tuple(read)
+
+
+def amplitudes(finding: MachineFinding) -> list[tuple[float, float, float]]:
+    """Each amplitude between the ends of its interval."""
+    fit = finding.final.fit
+    places = [fit.columns.index((ECCENTRICITY, 0.0, number)) for number in range(2)]
+    return [tuple(float(part[place]) for part in (fit.low, fit.coefficients, fit.high)) for place in places]  # type: ignore[misc]
+
+
+def test_an_encoder_off_its_centre_is_told_from_the_machine(tmp_path: Path) -> None:
+    finding = investigate_machine(pendulum(bent(swings(4e-4), COSINE, SINE)), base_of(tmp_path, FREE))
+    assert finding.established == ("quadratic_drag",)
+    assert finding.fall.after < 1.3
+    (low_c, cosine, high_c), (low_s, _, high_s) = amplitudes(finding)
+    assert cosine == pytest.approx(COSINE, rel=0.05)
+    assert low_c < COSINE < high_c
+    assert low_s < SINE < high_s
+    blind = investigate_machine(pendulum(bent(swings(4e-4), COSINE, SINE)), base_of(tmp_path, PENDULUM))
+    assert blind.fall.after > 10.0
+    knows, not_knows = (simulate_held_out(one, one.final).rmse for one in (finding, blind))
+    assert knows < 0.5 * not_knows
+    document = json.loads(json.dumps(machine_result.machine_document(finding)))
+    told = document["nominal"]["position_eccentricity_cosine"]
+    assert told["ci95"][0] < COSINE < told["ci95"][1]
+
+
+def test_an_encoder_in_its_centre_is_not_called_off_it(tmp_path: Path) -> None:
+    finding = investigate_machine(pendulum(swings(4e-4)), base_of(tmp_path, FREE))
+    assert finding.established == ("quadratic_drag",)
+    for low, value, high in amplitudes(finding):
+        assert low < 0.0 < high
+        assert abs(value) < 3e-4
+
+
+def test_no_law_of_the_machine_is_made_of_what_the_encoder_may_be(tmp_path: Path) -> None:
+    """Without the nuisance a force over speed squared would do about as well; that is told, not proposed."""
+    finding = investigate_machine(pendulum(bent(swings(4e-4), COSINE, 0.0)), base_of(tmp_path, PENDULUM))
+    assert finding.law is None
+    assert "position_eccentricity" in finding.law_refused
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (FREE.replace("{std: 0.005}", "{value: 0.001, std: 0.005}"), "write {std: ...}"),
+        (SLIDE, "belongs to a rotation"),
+    ],
+)
+def test_an_eccentricity_that_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(SettingsError, match=said):
+        base_of(tmp_path, text)
+
+
+def test_it_is_written_as_it_was_read(tmp_path: Path) -> None:
+    base = base_of(tmp_path, FREE)
+    assert base_of(tmp_path, base_model_text(base, Excitation.FREE_SLIDE, {})) == base
+    assert base.position_eccentricity.std == 0.005
+    assert base.response is Response.POSITION
