@@ -1,4 +1,4 @@
-"""What others do with the same training shots: forward selection by BIC or likelihood ratio, and PySINDy.
+"""What others do with the same shots: forward selection by BIC or likelihood ratio, PySINDy and LISDD.
 
 The two forward selections take samples as independent and the sensors' noise as known. From the effects with
 the largest first-order gain each is fitted beside what the model has, everything refitted; the best joins
@@ -25,6 +25,7 @@ from impactcell.discrepancy.search import candidate_scores
 from impactcell.errors import DiscrepancyError
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks import _discrepancy_judge as judge
+from tests.benchmarks._discrepancy_lisdd import lisdd
 from tests.benchmarks._discrepancy_sindy import sindy
 from tests.benchmarks.table import Table
 from tests.discrepancy.study import Job, campaign
@@ -34,7 +35,13 @@ TRIED, FINISHED = 5, 2
 FEW_STEPS, MANY_STEPS = 5, 30
 FAMILY = 0.01
 Row = dict[str, Any]
-NAMES = {"ours": "impactcell", "bic": "BIC", "ratio": "likelihood ratio", "sindy": "PySINDy"}
+NAMES = {
+    "ours": "impactcell",
+    "bic": "BIC",
+    "ratio": "likelihood ratio",
+    "sindy": "PySINDy",
+    "lisdd": "LISDD",
+}
 
 
 @dataclass(frozen=True)
@@ -84,7 +91,10 @@ def run(task: Task) -> Row:
     row["seconds"] = round(time.process_time() - started, 2)
     started = time.process_time()
     row["sindy"] = sindy(problem, nominal, library)
-    return row | {"sindy_seconds": round(time.process_time() - started, 2)}
+    row["sindy_seconds"] = round(time.process_time() - started, 2)
+    started = time.process_time()
+    row["lisdd"] = lisdd(problem, nominal, library)
+    return row | {"lisdd_seconds": round(time.process_time() - started, 2)}
 
 
 @dataclass
@@ -198,11 +208,16 @@ def table(found: list[Row], rivals: list[Row]) -> Table | None:
         return None
     ours = {row["key"]: row for row in found}
     rivals = [row for row in rivals if row["key"] in ours and "sindy" in row]
+    names = {
+        which: name for which, name in NAMES.items() if which == "ours" or any(which in r for r in rivals)
+    }
     answers = {
         which: [
-            ours[row["key"]] if which == "ours" else generous(answered(row, row[which])) for row in rivals
+            (ours[row["key"]], ours[row["key"]] if which == "ours" else generous(answered(row, row[which])))
+            for row in rivals
+            if which == "ours" or which in row  # earlier rows are without those that came later
         ]
-        for which in NAMES
+        for which in names
     }
     right = {judge.RIGHT, judge.TIED}
     falsely = {judge.WRONG, judge.PARTIAL, judge.FALSE}
@@ -219,24 +234,21 @@ def table(found: list[Row], rivals: list[Row]) -> Table | None:
     lines = []
     for what, kinds, accepted in wanted:
         cells = [what]
-        for which in NAMES:
-            mine = [
-                answer
-                for row, answer in zip(rivals, answers[which], strict=True)
-                if category(ours[row["key"]]) in kinds
-            ]
+        for which in names:
+            mine = [answer for campaign, answer in answers[which] if category(campaign) in kinds]
             count = sum(judge.judged(answer) in accepted for answer in mine)
             cells.append(" · ".join(part for part in judge.share(count, len(mine))))
         lines.append(cells)
-    seconds = [
-        [row.get("seconds", math.nan) for row in (ours[one["key"]] for one in rivals)],
-        [row["seconds"] for row in rivals],
-        [row["sindy_seconds"] for row in rivals],
-    ]
-    own, both, fast = (f"{np.nanmedian(one):.1f} s" for one in seconds)
-    lines.append(["processor time (median)", own, both, "(with BIC)", fast])
+    seconds = {
+        "ours": [ours[row["key"]].get("seconds", math.nan) for row in rivals],
+        "bic": [row["seconds"] for row in rivals],
+        "sindy": [row["sindy_seconds"] for row in rivals],
+        "lisdd": [row["lisdd_seconds"] for row in rivals if "lisdd_seconds" in row],
+    }
+    times = [f"{np.nanmedian(seconds[which]):.1f} s" if which in seconds else "(with BIC)" for which in names]
+    lines.append(["processor time (median)", *times])
     note = f"The same {len(rivals)} campaigns: every third of each kind. An exact confound counts as right."
-    return Table("Discrepancy: beside rivals", ("what", *NAMES.values()), lines, note)
+    return Table("Discrepancy: beside rivals", ("what", *names.values()), lines, note)
 
 
 def category(row: Row) -> str:

@@ -14,6 +14,7 @@ from impactcell.physics.effects import LIBRARY
 from simulator.effects import LIBRARY as LAWS
 from simulator.effects import UNLISTED, check
 from tests.benchmarks import _discrepancy_judge as judge
+from tests.benchmarks._discrepancy_certified import certified, halves, regime
 from tests.benchmarks._discrepancy_plan import CONFOUNDED, EQUIVALENT, calibrated, jobs
 from tests.benchmarks._discrepancy_rivals import answered, generous, subset
 from tests.benchmarks._discrepancy_run import covered, intervals, rows, study
@@ -187,6 +188,31 @@ def test_a_sparse_regression_names_the_terms_that_are_there() -> None:
         noise = 0.1 * rng.standard_normal(60)
         shots.append((5.0 - 2.0 * columns["viscous_friction", "term"] + noise, columns))
     assert selected(shots) == ["viscous_friction"]
+
+
+def test_localised_discovery_certifies_the_term_that_is_there_and_controls_what_it_names_in_noise() -> None:
+    rng = np.random.default_rng(3)
+    names = [
+        (name, str(point)) for name in ("adhesion", "viscous_friction", "surface_tilt") for point in range(2)
+    ]
+    first = halves(12)
+    false = 0
+    for strength in [0.0] * 300 + [0.5] * 5:
+        places = []
+        for place in range(2):
+            parts = []
+            for _ in range(12):
+                physics, terms = rng.standard_normal((60, 2)), rng.standard_normal((60, len(names)))
+                here = strength * terms[:, 2] if place else 0.0
+                parts.append((physics @ [5.0, -1.0] + here + rng.standard_normal(60), physics, terms, 0))
+            places.append(regime(parts, names))
+        found = certified(places, first)
+        if strength:
+            assert ["viscous_friction"] in found
+            assert len(found) <= 2
+        else:
+            false += bool(found)
+    assert 1 <= false <= 27  # of 300 at most 5 %: 15, and three standard deviations
 
 
 def test_a_study_goes_on_where_it_was(tmp_path: Any) -> None:
