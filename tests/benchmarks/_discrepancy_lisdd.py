@@ -16,7 +16,8 @@ Own choices, tried on a dozen campaigns of seeds that no study reports:
 - Physics are the shared parameters of the plant and every shot's own, linearised about the nominal fit.
 - Regimes are the phases, narrowed to half of a covariate where the other half is clean. In a trace what
   happens in one phase is carried on into the next: neighbours that are flagged are one regime.
-- Friction factors are a regime of their own. Their scatter is not known beforehand, so it is always tested.
+- Friction factors are a regime of their own. Their scatter is not known beforehand, so it is always
+  tested; for effects that show in the traces only where nothing is wrong with those.
 - Shots are split in two at random; holdout is by cross-validation within the first half. A regime has one
   term: of a strong effect the linearised term leaves a rest that is certain, and further terms fitted that.
 - Effects whose chosen terms can hardly be told apart there are named together, as PySINDy's are.
@@ -60,7 +61,7 @@ def lisdd(problem: Problem, nominal: Fit, library: tuple[str, ...]) -> list[list
     first = halves(problem.count)
     whitened = Whitened(problem, nominal)
     found = [whitened.regime(rows, traces) for rows in whitened.flagged(first)]
-    names = list(factors)
+    names = [term for term in factors if not found or not any(term[0] == other[0] for other, _ in traces)]
     level = np.ones(1)
     logs = nominal.shot_parameters.log_factor
     parts = [
