@@ -18,8 +18,9 @@ $(VENV)/.installed: requirements.lock pyproject.toml
 	$(UV) --no-deps --editable . || $(PIP) --no-deps --editable .
 	@touch $@
 
+# Ctrl-C is how it ends: the exit code for that is no error to report.
 demo: install
-	$(BIN)/impactcell demo $(ARGS)
+	@trap : INT; $(BIN)/impactcell demo $(ARGS) || { code=$$?; [ $$code -eq 130 ] || exit $$code; }
 
 # Each worker, and each process that a test starts, would compile all sources anew where bytecode is not kept.
 test: export PYTHONDONTWRITEBYTECODE =

@@ -1,0 +1,40 @@
+"""`make demo` is ended by Ctrl-C: make reports no error then, and any other one as it is."""
+
+import os
+import shutil
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+INTERRUPTED = "trap 'exit 130' INT; kill -INT 0"
+"""A terminal sends Ctrl-C to every process that it shows."""
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+@pytest.mark.parametrize(
+    ("demo", "said", "code"),
+    [
+        (INTERRUPTED, "", -signal.SIGINT),
+        ("exit 130", "", 0),
+        ("exit 0", "", 0),
+        ("exit 2", "demo] Error 2", 2),
+    ],
+)
+def test_ctrl_c_is_no_error(tmp_path: Path, demo: str, said: str, code: int) -> None:
+    program = tmp_path / "bin" / "impactcell"
+    program.parent.mkdir()
+    program.write_text(f"#!/bin/sh\n{demo}\n")
+    program.chmod(0o755)
+    (tmp_path / ".installed").touch()
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    done = subprocess.run(
+        ["make", "demo", f"VENV={tmp_path}"],
+        cwd=ROOT, env=environment, start_new_session=True, capture_output=True, text=True, timeout=60,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    assert done.returncode == code
+    assert done.stdout == ""
+    assert said in done.stderr if said else done.stderr == ""
