@@ -206,6 +206,8 @@ class AlarmRule:
         Rules by name that explain this one only where they begin to hold while it is held back.
     logged_by_cause : bool
         What raises it has logged it already.
+    is_probability : bool
+        Its statistic and threshold are probabilities, which people read in per cent.
     """
 
     name: str
@@ -221,3 +223,4 @@ class AlarmRule:
     explained_by: tuple[str, ...] = ()
     may_be_explained_by: tuple[str, ...] = ()
     logged_by_cause: bool = False
+    is_probability: bool = False

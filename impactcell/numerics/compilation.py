@@ -1,4 +1,4 @@
-"""Who is told that machine code is being compiled, which on a new machine takes up to a minute.
+"""Who is told that machine code is being compiled, which on a new machine takes a minute or more.
 
 Apart from `jit`, so that who asks to be told need not load the compiler.
 """

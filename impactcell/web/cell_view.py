@@ -15,6 +15,8 @@ from impactcell.records.quantity import Quantity, S
 from impactcell.scada.alarm_events import event_id
 from impactcell.web.curves import Curve, decimate, envelope
 from impactcell.web.interface import CellNews, Freshness
+from impactcell.web.messages import Messages
+from impactcell.web.texts import LANGUAGES
 from impactcell.web.texts.reasons import english_reason, german_reason
 
 RECENT_CYCLES = 120
@@ -215,8 +217,7 @@ def alarm_content(cell: str, alarm: Alarm) -> dict[str, Any]:
         "user": alarm.user,
         "event_id": event_id(cell, alarm).hex(),
         "evidence": {
-            "statistic": number(evidence.statistic),
-            "threshold": number(evidence.threshold),
+            "compared": {language: Messages(language).compared(alarm) for language in LANGUAGES},
             "change_cycle": evidence.change_cycle or None,
             "size": number(evidence.size),
             "size_std": number(evidence.size_std),

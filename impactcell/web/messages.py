@@ -1,9 +1,11 @@
 """Texts in the language of who reads them, numbers as that language writes them."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from impactcell.alarms import RULES, Message
+from impactcell.alarms.rule import percent_sure
 from impactcell.german.findings import (
     ENGLISH_STEPS,
     GERMAN_QUANTITIES,
@@ -68,6 +70,18 @@ class Messages:
         if not alarm.message:
             return self["suppressed_why" if alarm.suppressed else "watched_again"] if alarm.enabled else ""
         return Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
+
+    def compared(self, alarm: Alarm) -> str:
+        """Say what an alarm compared with what, a probability in per cent; empty for one without figures."""
+        is_probability = RULES[alarm.name].is_probability
+        statistic, threshold = (
+            f"{percent_sure(value)[self._index]} %" if is_probability else self.number(value, 3)
+            for value in (alarm.evidence.statistic, alarm.evidence.threshold)
+        )
+        if math.isnan(alarm.evidence.statistic):
+            return ""
+        said = f"{self['probability' if is_probability else 'statistic']} {statistic}"
+        return said if math.isnan(alarm.evidence.threshold) else f"{said}, {self['threshold']} {threshold}"
 
     def refusal(self, code: str) -> str:
         """Say why something was not done, by OPC UA's name of it; what an address makes up is not repeated.

@@ -68,5 +68,6 @@ RULE = AlarmRule(
     condition_class=ConditionClass.MAINTENANCE,
     input_node="Wear/Level",
     evaluate=evaluate,
+    is_probability=True,
 )
 """The rule."""

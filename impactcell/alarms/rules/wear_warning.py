@@ -76,5 +76,6 @@ RULE = AlarmRule(
     input_node="Wear/CyclesToLimit",
     evaluate=evaluate,
     explained_by=(wear_limit.NAME,),
+    is_probability=True,
 )
 """The rule."""

@@ -58,7 +58,7 @@ function showCard(card) {
   const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
   const said = {
     cycle_time: moment(card.time_ms),
-    batch_offset: offset === null ? "" : `${coefficient(offset)}${std === null ? "" : ` ${toldStd(std)}`}`,
+    batch_offset: offset === null ? "" : `${coefficient(offset)}${std === null ? "" : ` ${toldStd(std)}`} ${texts.batch_offset}`,
     estimator: texts[card.estimator],
     mass: withUnit(card.mass, "kg"),
     signature_reason: reasons.signature,

@@ -90,7 +90,7 @@ export const isOpen = (alarm) => alarm.enabled && alarm.shelved === "unshelved" 
 
 export function evidence(alarm) {
   const e = alarm.evidence, parts = [];
-  if (e.statistic !== null) parts.push(`${texts.statistic} ${number(e.statistic, 3)}` + (e.threshold === null ? "" : `, ${texts.threshold} ${number(e.threshold, 3)}`));
+  if (e.compared[language]) parts.push(e.compared[language]);
   if (e.size !== null) parts.push(`${texts.size} ${number(e.size, 2)}` + (e.size_std === null ? "" : ` ${toldStd(e.size_std)}`));
   if (e.change_cycle) parts.push(`${texts.since_cycle} ${e.change_cycle}`);
   return parts.join(", ");

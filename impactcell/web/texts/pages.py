@@ -154,6 +154,7 @@ PAGE_TEXTS: Texts = {
     "watched_again": ("Watched again.", "Wird wieder überwacht."),
     "disabled": ("disabled", "abgeschaltet"),
     "statistic": ("Evidence", "Nachweis"),
+    "probability": ("Probability", "Wahrscheinlichkeit"),
     "threshold": ("alarm above", "Alarm über"),
     "size": ("size", "Größe"),
     "since_cycle": ("since cycle", "seit Zyklus"),

@@ -15,6 +15,7 @@ from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, write_users
 from impactcell.web import system_page
 from impactcell.web.app import ACTIONS, VIEWS, Action, View
+from impactcell.web.cell_view import alarm_content
 from impactcell.web.interface import CellNews
 from impactcell.web.requests import MAX_FORM_BYTES
 from impactcell.web.security_headers import HEADERS
@@ -304,6 +305,31 @@ async def test_what_stands_behind_plus_minus_is_said_where_it_is_read(page: Page
             text = (await client.get(path)).text
             assert f'data-told-stds="{TOLD_STDS}"' in text
             assert "± sind 2 Standardabweichungen: mit etwa 95 % Sicherheit" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "evidence", "english", "german"),
+    [
+        ("WearLimit", Evidence(1.0, 0.97), "Probability over 99.9 %, alarm above 97 %",
+         "Wahrscheinlichkeit über 99,9 %, Alarm über 97 %"),
+        ("WearWarning", Evidence(0.9312, 0.9), "Probability 93 %, alarm above 90 %",
+         "Wahrscheinlichkeit 93 %, Alarm über 90 %"),
+        ("DeviantCycle", Evidence(12.25, 11.0), "Evidence 12.2, alarm above 11",
+         "Nachweis 12,2, Alarm über 11"),
+        ("DeviantCycle", Evidence(12.25), "Evidence 12.2", "Nachweis 12,2"),
+        ("DeviantCycle", Evidence(), "", ""),
+    ],
+)  # fmt: skip
+async def test_a_probability_is_said_to_be_one(
+    page: Page, name: str, evidence: Evidence, english: str, german: str
+) -> None:
+    alarm = replace(raised(evidence=evidence), name=name)
+    assert alarm_content(CELL, alarm)["evidence"]["compared"] == {"en": english, "de": german}
+    await put(page, CellNews(CELL, alarms=(alarm,)))
+    async with page.logged_in(Role.OBSERVER) as client:
+        for language, said in (("en", english), ("de", german)):
+            text = (await client.get(f"/alarms?lang={language}")).text
+            assert f"500. {said}</p>" in text
 
 
 @pytest.mark.parametrize("path", ["/", "/alarms", "/studies", "/system", "/nothing"])
