@@ -17,6 +17,7 @@ STUDY_TEXTS: Texts = {
     "drop_cell": ("Compare with the model of", "Vergleichen mit dem Modell von"),
     "drop_no_cell": ("none: fit it to the data", "keinem: aus den Daten bestimmen"),
     "drop_files": ("Files", "Dateien"),
+    "files": ("files", "Dateien"),
     "drop_send": ("Send", "Senden"),
     "drop_operators": ("Operators and engineers can drop measurements here.",
                        "Bediener und Ingenieure können hier Messungen ablegen."),

@@ -408,6 +408,18 @@ def test_nothing_is_unpacked_elsewhere(tmp_path: Path) -> None:
         unpack_campaign(twice, tmp_path / "b")
 
 
+async def test_many_files_are_folded(page: Page) -> None:
+    async with page.logged_in(Role.OBSERVER) as client:
+        study = page.studies.store.begin("rail", "otto", CELL)
+        study.files = {f"tap-{number}.csv": 115_000 for number in range(27)}
+        many = (await client.get(f"/studies/{study.id}?lang=de")).text
+        study.files = {"tap-0.csv": 115_000}
+        one = (await client.get(f"/studies/{study.id}?lang=de")).text
+    assert '<details class="help"><summary>27 Dateien, 3,1 MB</summary>tap-0.csv, tap-1.csv, ' in many
+    assert "tap-0.csv (0,12 MB)" in one
+    assert "Dateien, " not in one
+
+
 async def test_a_report_can_do_nothing(page: Page) -> None:
     async with page.logged_in(Role.OBSERVER) as client:
         store = page.studies.store
