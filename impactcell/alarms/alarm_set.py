@@ -145,7 +145,7 @@ def _explained(state: AlarmSetState, results: tuple[RuleResult, ...]) -> Iterato
     active = {alarm.name for alarm in state.alarms if alarm.active}
     for result in results:
         rule = RULES[result.name]
-        causes = set(rule.explained_by) & (holding | active)
+        causes = set(rule.explained_by) & (holding | active) | set(rule.explained_at_once_by) & holding
         if result.hold_back or state.counters[_INDEX[result.name]].held_back is not None:
             causes |= set(rule.may_be_explained_by) & (holding - active)
         yield RuleResult(result.name, holds=False, is_explained=True) if causes else result

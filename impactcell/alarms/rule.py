@@ -202,6 +202,8 @@ class AlarmRule:
         An announced batch change keeps it silent for a while.
     explained_by : tuple of str
         Rules by name: while one of them holds or is active, it has called already, and this one does not.
+    explained_at_once_by : tuple of str
+        Rules by name that explain this one in a cycle in which they hold, not while they merely stay active.
     may_be_explained_by : tuple of str
         Rules by name that explain this one only where they begin to hold while it is held back.
     logged_by_cause : bool
@@ -221,6 +223,7 @@ class AlarmRule:
     evaluate: Evaluate | None = None
     suppressed_by_announcement: bool = False
     explained_by: tuple[str, ...] = ()
+    explained_at_once_by: tuple[str, ...] = ()
     may_be_explained_by: tuple[str, ...] = ()
     logged_by_cause: bool = False
     is_probability: bool = False

@@ -66,6 +66,8 @@ RULE = AlarmRule(
     settings=RuleSettings(severity=400, off_delay=1),
     input_node="Signature/TSquared",
     evaluate=evaluate,
-    explained_by=(batch_shift.NAME, model_gap.NAME),
+    explained_by=(model_gap.NAME,),
+    # the signature begins anew with a shift: what deviates from there on is not of the batch
+    explained_at_once_by=(batch_shift.NAME,),
 )
 """The rule."""

@@ -19,6 +19,7 @@ from tests.taps import VISCOUS, Tap
 STRIBECK: dict[str, Any] = {
     "stribeck_friction": {"friction_increase": 0.05, "stribeck_velocity_m_s": 0.04},
 }
+PATCH: dict[str, Any] = {"friction_patch": {"amplitude": 0.5, "position_m": 0.001, "width_m": 0.0004}}
 SCATTER = 0.012
 LEARNED = 70
 
@@ -68,6 +69,14 @@ def watching() -> Cell:
 def test_an_unannounced_batch_calls_once(watching: Cell, step: float) -> None:
     moved = replace(watching).run(12, lambda _: 0.2 * (1.0 + step))
     assert [(name, active) for _, name, active in moved] == [("BatchShift", True)]
+
+
+def test_a_deviant_cycle_after_a_batch_is_told_while_the_batch_still_is(watching: Cell) -> None:
+    cell = replace(watching)
+    assert [name for _, name, _ in cell.run(20, lambda _: 0.22)] == ["BatchShift"]
+    moved = cell.run(1, lambda _: 0.22, VISCOUS | PATCH) + cell.run(6, lambda _: 0.22)
+    assert ("DeviantCycle", True) in [(name, active) for _, name, active in moved]
+    assert cell.state.alarms.alarm("BatchShift").active
 
 
 def test_a_part_that_is_odd_as_a_whole_is_told_when_it_is_sure_that_no_batch_follows(watching: Cell) -> None:
