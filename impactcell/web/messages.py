@@ -18,6 +18,7 @@ from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 from impactcell.web.texts.import_notes import page_note
+from impactcell.web.texts.parameters import parameter_words
 
 LEAST_WHOLE = 9.95
 """From here on two significant digits are a whole number."""
@@ -99,6 +100,21 @@ class Messages:
     def effect(self, identifier: str) -> str:
         """Name an effect."""
         return german_effect(identifier) if self.language == "de" else identifier.replace("_", " ")
+
+    def parameter(self, effect: str, name: str) -> tuple[str, str]:
+        """Give words and unit of an effect's parameter."""
+        return parameter_words(effect, name, self.language)
+
+    def changed_parameter(self, name: str) -> str:
+        """Name a parameter of a model, after its effect where it has one, with its unit.
+
+        >>> Messages("de").changed_parameter("stribeck_friction.stribeck_velocity_m_s")
+        'Stribeck-Reibung: Stribeck-Geschwindigkeit [m/s]'
+        """
+        effect, _, own = name.rpartition(".")
+        words, unit = self.parameter(effect, own)
+        said = f"{self.effect(effect)}: {words}" if effect else words
+        return f"{said} [{unit}]" if unit else said
 
     def advice(self, effect: Mapping[str, Any]) -> tuple[str, str]:
         """Say what an effect of a result means and what to look at; empty where that is not known."""

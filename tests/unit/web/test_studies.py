@@ -4,6 +4,7 @@ import asyncio
 import csv
 import io
 import json
+import re
 import shutil
 import zipfile
 from collections.abc import AsyncIterator, Callable
@@ -418,6 +419,28 @@ async def test_many_files_are_folded(page: Page) -> None:
     assert '<details class="help"><summary>27 Dateien, 3,1 MB</summary>tap-0.csv, tap-1.csv, ' in many
     assert "tap-0.csv (0,12 MB)" in one
     assert "Dateien, " not in one
+
+
+async def test_parameters_are_said_in_words_with_their_unit(page: Page) -> None:
+    found = {
+        "effect": "stribeck_friction",
+        "parameters": {"stribeck_velocity_m_s": {"value": 0.04}, "friction_increase": {"value": 0.03}},
+    }
+    own = {"effect": "own_effect", "parameters": {"strength_n_per_m": {"value": 60.0}}}
+    changes = [
+        {"parameter": name, "before": None, "after": 1.5}
+        for name in ("mu_s", "stiffness_n_per_m", "viscous_friction.viscous_coefficient_n_s_per_m")
+    ]
+    async with page.logged_in(Role.OBSERVER) as client:
+        study = page.studies.store.begin("rail", "otto", CELL)
+        study.stage, study.result = Stage.DONE, RESULT | {"effects": [found, own]}
+        study.changes = CHANGES | {"changes": changes}
+        shown = {code: (await client.get(f"/studies/{study.id}?lang={code}")).text for code in ("en", "de")}
+    assert "</b> · stribeck velocity 0.04 m/s · friction increase 0.03" in shown["en"]
+    assert "</b> · Stribeck-Geschwindigkeit 0,04 m/s · Zunahme der Reibung 0,03" in shown["de"]
+    assert "own effect</b> · strength n per m 60" in shown["en"]
+    names = re.findall(r'<tr><td data-label="[^"]*">(.*?)</td>', shown["de"])
+    assert names == ["µs", "Steifigkeit [N/m]", "Viskose Reibung: viskoser Koeffizient [N s/m]"]
 
 
 async def test_a_report_can_do_nothing(page: Page) -> None:

@@ -1,0 +1,72 @@
+"""What the page calls the parameters of plant and effects: words and a unit for `stribeck_velocity_m_s`."""
+
+from typing import Final
+
+from impactcell.physics.effects import LIBRARY
+
+PLANT: Final = {
+    "stiffness_n_per_m": ("stiffness", "N/m"),
+    "damping_n_s_per_m": ("damping", "N s/m"),
+    "mu_s": ("µs", ""),
+    "mu_k": ("µk", ""),
+}
+"""Words and unit of the plant's own parameters."""
+UNIT_PARTS: Final = {"n", "m", "m2", "s", "s2", "rad", "per"}
+"""What the unit at the end of a parameter's name is made of."""
+GERMAN: Final = {
+    "amplitude": "Amplitude",
+    "damping": "Dämpfung",
+    "delay": "Verzögerung",
+    "drag coefficient": "Widerstandsbeiwert",
+    "exponent": "Exponent",
+    "force": "Kraft",
+    "friction increase": "Zunahme der Reibung",
+    "gradient": "Gradient",
+    "increase per decade": "Zunahme je Dekade",
+    "limit": "Grenze",
+    "offset": "Versatz",
+    "period": "Periode",
+    "phase": "Phase",
+    "position": "Position",
+    "ramp time": "Anlaufzeit",
+    "range": "Reichweite",
+    "relative amplitude": "relative Amplitude",
+    "relative change": "relative Änderung",
+    "relative error": "relativer Fehler",
+    "speed loss": "Geschwindigkeitsverlust",
+    "stiffness": "Steifigkeit",
+    "stribeck velocity": "Stribeck-Geschwindigkeit",
+    "tilt": "Neigung",
+    "time constant": "Zeitkonstante",
+    "viscous coefficient": "viskoser Koeffizient",
+    "width": "Breite",
+}
+"""By the words in English; what is not here stays English."""
+
+
+def parameter_words(effect: str, name: str, language: str) -> tuple[str, str]:
+    """Give words and unit of a parameter, of the plant where `effect` is empty.
+
+    One of an effect that the library does not have keeps its whole name: nobody says what of it is a unit.
+
+    >>> parameter_words("stribeck_friction", "stribeck_velocity_m_s", "en")
+    ('stribeck velocity', 'm/s')
+    >>> parameter_words("", "damping_n_s_per_m", "de")
+    ('Dämpfung', 'N s/m')
+    """
+    words, unit = PLANT.get(name, (name, "")) if not effect else _of_effect(effect, name)
+    words = words.replace("_", " ")
+    return (GERMAN.get(words, words) if language == "de" else words), unit
+
+
+def _of_effect(effect: str, name: str) -> tuple[str, str]:
+    known = LIBRARY.get(effect)
+    units = {} if known is None else {parameter.name: parameter.unit for parameter in known.parameters}
+    if name not in units:
+        return name, ""
+    if units[name] == "1":
+        return name, ""
+    *words, last = name.split("_")
+    while words and last in UNIT_PARTS:
+        *words, last = words
+    return "_".join((*words, last)), units[name]
