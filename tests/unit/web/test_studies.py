@@ -122,7 +122,7 @@ async def test_a_campaign_is_dropped_confirmed_and_studied(page: Page, verbs: Ve
     assert "Friction grows with speed." in text
     assert "the &lt;oil&gt;" in text
     assert "These shots cannot tell it from quadratic drag" in text
-    assert "<code>mu_s</code>" in text
+    assert '<td data-label="Parameter">µs</td>' in text
     assert "/accept" not in text, "an operator accepts nothing"
 
 
