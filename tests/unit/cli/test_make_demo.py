@@ -10,8 +10,8 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 INTERRUPTED = "kill -INT $PPID; exit 130"
-"""A terminal sends Ctrl-C to every process that it shows: to the recipe's shell as well. What make does with its own,
-which may come while it waits for that shell, is not ours to test."""
+"""A terminal sends Ctrl-C to every process that it shows: to the recipe's shell as well. What make does
+with its own, which may come while it waits for that shell, is not ours to test."""
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
