@@ -74,15 +74,15 @@ class Messages:
 
     def compared(self, alarm: Alarm) -> str:
         """Say what an alarm compared with what, a probability in per cent; empty for one without figures."""
-        is_probability = RULES[alarm.name].is_probability
+        evidence, is_probability = alarm.evidence, RULES[alarm.name].is_probability
+        if math.isnan(evidence.statistic):
+            return ""
         statistic, threshold = (
             f"{percent_sure(value)[self._index]} %" if is_probability else self.number(value, 3)
-            for value in (alarm.evidence.statistic, alarm.evidence.threshold)
+            for value in (evidence.statistic, evidence.threshold)
         )
-        if math.isnan(alarm.evidence.statistic):
-            return ""
         said = f"{self['probability' if is_probability else 'statistic']} {statistic}"
-        return said if math.isnan(alarm.evidence.threshold) else f"{said}, {self['threshold']} {threshold}"
+        return said if math.isnan(evidence.threshold) else f"{said}, {self['threshold']} {threshold}"
 
     def refusal(self, code: str) -> str:
         """Say why something was not done, by OPC UA's name of it; what an address makes up is not repeated.

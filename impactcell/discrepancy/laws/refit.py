@@ -75,7 +75,7 @@ def refit_forms(base: Fit, term: FreeTerm, ranked: Sequence[RankedForm]) -> list
     simpler = {
         name(entry.form): entry
         for item in reversed(fitted[:SIMPLIFIED])
-        for entry in _single_terms(term, item)
+        for entry in _parts_alone(term, item)
         if name(entry.form) not in known or not tied_with(item, known[name(entry.form)])
     }
     best = dict(known)
@@ -99,7 +99,7 @@ def _fitted(base: Fit, term: FreeTerm, forms: Sequence[RankedForm]) -> list[Fitt
     return sorted(fitted, key=lambda item: -item.score)
 
 
-def _single_terms(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
+def _parts_alone(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
     """Take each part of a law alone, from where the whole came to rest.
 
     Of a sum each term: the plant may take up the other one. Of a product of functions of two covariates each
