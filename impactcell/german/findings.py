@@ -1,5 +1,6 @@
 """What the discrepancy workflow found, said in German from its `result.json`, whose headline is English."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -74,12 +75,21 @@ def enumerated(names: Sequence[str], conjunction: str) -> str:
     return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
-def german_headline(result: Mapping[str, Any], decimal_point: str = ",") -> str:
+def with_decimal_commas(text: str) -> str:
+    """Write the numbers of a text as German does.
+
+    >>> with_decimal_commas("0.35 N. 12.5 bis 15 kg")
+    '0,35 N. 12,5 bis 15 kg'
+    """
+    return re.sub(r"(?<=\d)\.(?=\d)", ",", text)
+
+
+def german_headline(result: Mapping[str, Any]) -> str:
     """Say the outcome in German; as it was said where its format does not have what it takes."""
     gap = result.get("gap", {}).get("held_out")
     if not gap:
         return str(result.get("headline", ""))
-    before, after = (f"{gap[when]:.2f}".replace(".", decimal_point) for when in ("before", "after"))
+    before, after = (with_decimal_commas(f"{gap[when]:.2f}") for when in ("before", "after"))
     match result["verdict"]:
         case "untested":
             said = f"Zu wenige Messungen für eine Aussage; Abweichung des Modells: {before}."

@@ -14,11 +14,11 @@ from impactcell.german.findings import (
     german_headline,
     german_texts,
 )
+from impactcell.german.parameters import parameter_words
 from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 from impactcell.web.texts.import_notes import page_note
-from impactcell.web.texts.parameters import parameter_words
 
 LEAST_WHOLE = 9.95
 """From here on two significant digits are a whole number."""

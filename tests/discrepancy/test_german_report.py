@@ -10,11 +10,13 @@ import pytest
 
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.data import CHANNELS
+from impactcell.discrepancy.data.prepared_campaign import STRATEGIES
 from impactcell.discrepancy.data.prepared_shots import OWN_COVARIATES
 from impactcell.discrepancy.report import german_sentences, sentences
-from impactcell.discrepancy.report.page import PARAMETER_LABELS, SENTENCES, write_reports
+from impactcell.discrepancy.report.page import SENTENCES, write_reports
 from impactcell.discrepancy.workflow import DiscrepancyResult
-from impactcell.german.findings import GERMAN_PHASES, REPORTS
+from impactcell.german.findings import GERMAN_PHASES, REPORTS, with_decimal_commas
+from impactcell.german.parameters import GERMAN, parameter_words
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_report import Page
 from tests.discrepancy.test_workflow import investigated
@@ -68,7 +70,7 @@ def test_both_are_whole_and_show_the_same_numbers(found: DiscrepancyResult, tmp_
     assert english.pictures == german.pictures
     assert english.outside() == german.outside()
     in_tables = [re.findall(r'<td class="n[^"]*">([^<]*)', text) for text in pages(found, tmp_path).values()]
-    assert [re.sub(" to ", " bis ", cell) for cell in in_tables[0]] == in_tables[1]
+    assert [with_decimal_commas(re.sub(" to ", " bis ", cell)) for cell in in_tables[0]] == in_tables[1]
 
 
 def test_nothing_is_left_in_english(found: DiscrepancyResult, tmp_path: Path) -> None:
@@ -82,14 +84,53 @@ def test_nothing_is_left_in_english(found: DiscrepancyResult, tmp_path: Path) ->
         piece
         for piece in set(told["en"]) & set(told["de"])
         if re.search(r"[A-Za-z]{4}", piece)
-        and piece not in {*SAME, *PARAMETER_LABELS.values()}
+        and piece not in {*SAME, *(words for words in GERMAN.values() if GERMAN.get(words.lower()) == words)}
         and piece not in references
-        and not re.fullmatch(r"[a-z]+(_[a-z]+)+( \[.*\])?", piece)  # a parameter by its name
     }
     assert alike == set()
     german = " ".join(told["de"])
     for word in (" the ", " and ", " shots", " with ", " held", " noise", " gap"):
         assert word not in german, word
+    formulas = "|".join(re.escape(effect.equation) for effect in LIBRARY.values())
+    assert re.findall(r"\d\.\d+", re.sub(formulas, "", german)) == []
+
+
+def test_every_parameter_of_the_library_has_german_words_and_its_unit() -> None:
+    units = {
+        "1": "",
+        **{parameter.unit: parameter.unit for e in LIBRARY.values() for parameter in e.parameters},
+    }
+    for effect in LIBRARY.values():
+        for parameter in effect.parameters:
+            english, unit = parameter_words(effect.identifier, parameter.name, "en")
+            german, german_unit = parameter_words(effect.identifier, parameter.name, "de")
+            assert unit == german_unit == ("" if parameter.unit == "1" else units[parameter.unit])
+            assert "_" not in english
+            assert german in GERMAN.values(), english
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        (
+            "The noise of force is not stated; 0.312 was estimated from neighbouring samples, which is a ...",
+            ("de", ("Das Rauschen (Kraft) ist nicht angegeben; 0,312 ist aus benachbarten Messwerten "
+                    "geschätzt, eine untere Schranke, wo es korreliert ist.")),
+        ),
+        ("Shot 7 has a gap in time; what happened in it is lost.",
+         ("de", "Stoß 7 hat eine Lücke in der Zeit; was darin geschah, ist verloren.")),
+        ("Data, clipped: shot 2: the force stands at its upper end, 5.2, for 12 samples.",
+         ("en", "Data, clipped: shot 2: the force stands at its upper end, 5.2, for 12 samples.")),
+    ],
+)  # fmt: skip
+def test_notes_are_said_in_german_where_it_has_words_for_them(english: str, german: tuple[str, str]) -> None:
+    assert german_sentences.note(english) == german
+
+
+def test_notes_on_what_a_campaign_lacks_are_known() -> None:
+    lacking = STRATEGIES[Excitation.TAP].missing_information([])
+    assert len(lacking) > 5
+    assert {german_sentences.note(note)[0] for note in lacking} == {"de"}
 
 
 def test_templates_show_the_same_things() -> None:
@@ -113,7 +154,7 @@ def test_templates_show_the_same_things() -> None:
 def test_every_function_of_one_language_is_in_the_other() -> None:
     def public(module: object) -> set[str]:
         return {name for name in ("headline", "noise_floor_sentence", "advice", "next_step", "split_sentence",
-                                  "law_sentences", "phrase", "label", "setting", "shape")
+                                  "law_sentences", "phrase", "label", "setting", "shape", "written", "note")
                 if callable(getattr(module, name, None))}  # fmt: skip
 
     assert public(sentences) == public(german_sentences)
@@ -150,7 +191,7 @@ def test_phases_channels_covariates_and_effects_have_german_names() -> None:
     ("english", "german"),
     [
         ("6000 mm/min, 18.9 kg, direction -1, after 30 s at rest",
-         "6000 mm/min, 18.9 kg, Richtung -1, nach 30 s Ruhe"),
+         "6000 mm/min, 18,9 kg, Richtung -1, nach 30 s Ruhe"),
         ("batch 2 again, after the others", "Charge 2 noch einmal, nach den anderen"),
         ("record the actuator's position", "die Position des Antriebs aufzeichnen"),
     ],

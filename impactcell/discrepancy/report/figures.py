@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import ScalarFormatter
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS
 from impactcell.discrepancy.search import ALL, ModelEvidence
@@ -39,8 +40,23 @@ STYLE: Any = {
 }
 
 
-def svg(figure: Figure) -> str:
+class _Written(ScalarFormatter):
+    """Numbers at an axis, as the language writes them."""
+
+    def __init__(self, said: ModuleType) -> None:
+        super().__init__()
+        self._said = said
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return str(self._said.written(super().__call__(x, pos)))
+
+
+def svg(figure: Figure, said: ModuleType) -> str:
     """Write a figure as text that a page holds."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), ScalarFormatter):
+                axis.set_major_formatter(_Written(said))
     out = io.StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None}, bbox_inches="tight")
     text = out.getvalue()
@@ -80,7 +96,7 @@ def map_figure(evidence: ModelEvidence, said: ModuleType) -> str:
             spine.set_visible(False)
         bar = figure.colorbar(image, ax=axes, shrink=0.85, pad=0.02)
         bar.set_label(said.label("|score| over its spread"))
-        return svg(figure)
+        return svg(figure, said)
 
 
 def _column(name: str, said: ModuleType) -> str:
@@ -159,7 +175,7 @@ def trace_figure(result: DiscrepancyResult, said: ModuleType) -> str:
                 if row == len(channels) - 1:
                     lower.set_xlabel(said.label("time [ms]"))
         figure.align_ylabels()
-        return svg(figure)
+        return svg(figure, said)
 
 
 def _moving_average(values: np.ndarray, step: int) -> np.ndarray:
@@ -173,7 +189,7 @@ def _setting(shot: Any, said: ModuleType) -> str:
     if np.isfinite(shot.velocity_m_s):
         parts.append(f"{shot.velocity_m_s * 6e4:.0f} mm/min")
     if np.isfinite(shot.mass_kg):
-        parts.append(f"{shot.mass_kg:.3g} kg")
+        parts.append(said.written(f"{shot.mass_kg:.3g} kg"))
     parts.append("+" if shot.direction > 0 else "−")
     return ", ".join(parts)
 
@@ -211,7 +227,7 @@ def factor_figure(result: DiscrepancyResult, said: ModuleType) -> str:
         axes.set_xlabel(said.label("shot, in order"))
         axes.set_ylabel(said.label("friction factor [%]"))
         axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
-        return svg(figure)
+        return svg(figure, said)
 
 
 def shape_figure(result: DiscrepancyResult, said: ModuleType) -> str | None:
@@ -229,4 +245,4 @@ def shape_figure(result: DiscrepancyResult, said: ModuleType) -> str | None:
             axes.set_xlabel(said.label("place within the phase, 0 = start, 1 = end"))
             what = "residual, times {} [noise std]" if shape.times else "mean residual [noise std]"
             axes.set_ylabel(said.label(what).format(said.phrase(shape.times)))
-        return svg(figure)
+        return svg(figure, said)

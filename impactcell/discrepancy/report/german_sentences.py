@@ -1,6 +1,7 @@
 """What the report says in German; each function says the same as the one of its name in `sentences`.
 
-Notes on the data and reasons why no law is proposed stay as the workflow says them, in English.
+Notes that are not among `_NOTES`, and reasons why no law is proposed, stay as the workflow says them, in
+English.
 """
 
 import math
@@ -13,7 +14,13 @@ from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import NOT_SET
 from impactcell.discrepancy.search import UNTESTED
 from impactcell.discrepancy.workflow import DiscrepancyResult
-from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, german_headline, german_texts
+from impactcell.german.findings import (
+    GERMAN_PHASES,
+    GERMAN_QUANTITIES,
+    german_headline,
+    german_texts,
+    with_decimal_commas,
+)
 from impactcell.physics.effect import German
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
@@ -96,6 +103,34 @@ _SHAPES: Final = (
     (r"largest late in the phase$", "am größten spät in der Phase"),
 )  # fmt: skip
 
+_NOTES: Final = (
+    (r"The noise of (\w+) is not stated; (\S+) was estimated .*",
+     lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
+     "geschätzt, eine untere Schranke, wo es korreliert ist."),
+    (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
+     r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
+    (r"(\d+) of (\d+) training blocks were left out: .*",
+     r"\1 von \2 Blöcken bleiben bei der Anpassung weg: zu nah am Haften oder dem Modell fern."),
+    (r"No force channel: .*", "Keine Kraft: Effekte von Kontakt und Kraftsensor zeigt nur die Bewegung."),
+    (r"No position channel: .*", "Keine Position: Effekte auf das Gleiten sind kaum zu sehen."),
+    (r"No actuator channel: .*",
+     "Kein Antrieb: Nachgeben und Anlauf des Antriebs sind kaum von Dämpfung zu unterscheiden."),
+    (r"One direction only: .*", "Nur eine Richtung: Neigung und Richtungsabhängigkeit sind nicht zu sehen."),
+    (r"One velocity only: .*",
+     "Nur eine Geschwindigkeit: was von ihr abhängt, ist kaum auseinanderzuhalten."),
+    (r"One mass only: .*",
+     "Nur eine Masse: Masse und Steifigkeit, Neigung und Rückstellkraft heben sich weniger voneinander ab."),
+    (r"The mass of (\d+) shots is not stated and is fitted\.",
+     r"Die Masse ist nicht angegeben und wird angepasst (Stöße: \1)."),
+    (r"No replicates: .*",
+     "Keine Wiederholungen: das Rauschen ist nur eine untere Schranke, Abweichung (b) gibt es nicht."),
+    (r"Shot (\d+) has a gap in time; .*",
+     r"Stoß \1 hat eine Lücke in der Zeit; was darin geschah, ist verloren."),
+    (r"Samples before contact \(pretrigger\) of (\d+) shots are left out of the fits\.",
+     r"Messwerte vor dem Kontakt (Stöße: \1) werden nicht angepasst."),
+)  # fmt: skip
+"""Notes on the data."""
+
 
 def phrase(identifier: str) -> str:
     """Name an effect, a phase, a covariate or a verdict."""
@@ -119,15 +154,29 @@ def shape(english: str) -> str:
     return _in_german(english, _SHAPES)
 
 
+def written(text: str) -> str:
+    """Write the numbers of a text as the language does."""
+    return with_decimal_commas(text)
+
+
+def note(english: str) -> tuple[str, str]:
+    """Say a note on the data: in which language, and the note."""
+    for pattern, german in _NOTES:
+        said, found = re.subn(f"^{pattern}$", german, english)
+        if found:
+            return "de", written(said)
+    return "en", english
+
+
 def _in_german(text: str, pairs: Any) -> str:
     for pattern, german in pairs:
         text = re.sub(pattern, german, text)
-    return text
+    return written(text)
 
 
 def headline(result: DiscrepancyResult) -> str:
     """Say what is established, what remains, and which law would explain it, if one was found."""
-    return german_headline(result_document(result), decimal_point=".")
+    return german_headline(result_document(result))
 
 
 def noise_floor_sentence(result: DiscrepancyResult) -> str:
@@ -138,7 +187,7 @@ def noise_floor_sentence(result: DiscrepancyResult) -> str:
         for channel, std, scale, unit in units
         if not math.isnan(std)
     ]
-    return (
+    return written(
         "Eine Rauschschwelle ist der Unterschied zwischen Modell und Messung, den allein das Rauschen der "
         f"Sensoren macht (Standardabweichung von {', '.join(noise)}). Eine Abweichung von 1 hat ein Modell, "
         f"dem nichts fehlt; bei {result.validation.gap_before:.2f} liegt es so viel mal weiter weg."
@@ -184,7 +233,7 @@ def split_sentence(result: DiscrepancyResult) -> str:
     alone = result.unexplained.split_fits if result.unexplained else None
     if alone is None or math.isnan(alone.contact + alone.slide):
         return ""
-    return (
+    return written(
         f" Getrennt angepasst bleiben die Kontakte bei {alone.contact:.2f} Rauschschwellen, das Gleiten "
         f"danach bei {alone.slide:.2f}."
     )
@@ -202,5 +251,5 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     ]
     return told | {
         "subject": "die Streuung der Reibungsfaktoren" if of_factors else "die Verläufe",
-        "tested": " und ".join(tested),
+        "tested": written(" und ".join(tested)),
     }

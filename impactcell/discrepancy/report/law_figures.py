@@ -42,7 +42,7 @@ def _slices_figure(finding: LawFinding, said: ModuleType) -> str:
         axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
         for (w, curve), style in zip(finding.slices, ("-", "--", ":"), strict=True):
             u = scale * curve.covariate
-            at = f"w = {w:.3g} {form.second_unit.strip('1')}"
+            at = said.written(f"w = {w:.3g} {form.second_unit.strip('1')}")
             axes.fill_between(u, curve.low, curve.high, color=MEASURED, alpha=0.4, linewidth=0)
             axes.plot(u, curve.function, style, color=BEFORE, label=f"{said.label('spline')}, {at}")
             if law is not None:
@@ -51,7 +51,7 @@ def _slices_figure(finding: LawFinding, said: ModuleType) -> str:
         axes.set_ylabel("s(u, w)" if form.unit == "1" else f"s(u, w) [{form.unit}]")
         axes.set_xlabel(f"u, {said.phrase(form.covariate)} [{unit}]; w, {second}; {said.label('95 % bands')}")
         axes.legend(frameon=False, fontsize=8)
-        return svg(figure)
+        return svg(figure, said)
 
 
 def function_figure(
@@ -99,4 +99,4 @@ def function_figure(
         below.hist(scale * met, bins=60, color=MEASURED)
         below.set_yticks([])
         below.set_xlabel(f"u, {said.phrase(covariate)} [{unit}]; {said.label('below: where samples lie')}")
-        return svg(figure)
+        return svg(figure, said)

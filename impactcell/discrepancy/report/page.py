@@ -8,12 +8,12 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 
-from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report import figures, german_sentences, law_figures, sentences
 from impactcell.discrepancy.report.result import locate_effect
 from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import REPORTS
+from impactcell.german.parameters import parameter_words
 from impactcell.physics.effects import LIBRARY
 from impactcell.records.uncertainty import TOLD_STDS
 
@@ -23,10 +23,6 @@ LARGE_REGION_RMS = 1.25
 """RMS of a region's residuals, in noise floors, from which on it is shown as large."""
 MM_PER_M = 1e3
 """Millimetres in a metre: the page shows errors of positions in them."""
-PARAMETER_LABELS = {"ratio": "mu_s/mu_k"}
-PLANT_UNITS = {"stiffness_n_per_m": "N/m", "damping_n_s_per_m": "N s/m"}
-
-
 SENTENCES: Mapping[str, ModuleType] = {"en": sentences, "de": german_sentences}
 """What is said beside the templates, by language: functions of the same names."""
 
@@ -45,8 +41,14 @@ def write_report(result: DiscrepancyResult, source: str, file: Path, language: s
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    words = SENTENCES[language].phrase
-    environment.filters.update(zip=zip, number=format_number, grouped=format_thousands, words=words)
+    said = SENTENCES[language]
+    environment.filters.update(
+        zip=zip,
+        words=said.phrase,
+        format=lambda form, *values: said.written(form % values),
+        number=lambda value: said.written(format_number(value)),
+        grouped=lambda value, decimals: said.written(format_thousands(value, decimals)),
+    )
     template = environment.get_template(f"{REPORTS[language]}.j2")
     page = template.render(**page_context(result, source, language))
     file.write_text(page, encoding="utf-8")
@@ -80,7 +82,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "training": len(result.training),
         "held_out": len(result.held_out),
         "excitation": str(result.prepared.excitation.excitation),
-        "notes": [*result.prepared.notes, *result.floor.notes],
+        "notes": [said.note(note) for note in (*result.prepared.notes, *result.floor.notes)],
         "map_before": figures.map_figure(search.nominal, said),
         "map_after": figures.map_figure(search.final, said) if search.final is not search.nominal else None,
         "traces": figures.trace_figure(result, said),
@@ -115,18 +117,18 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "parameters": [
             {
                 "effect": phrase(item.effect) if item.effect else label("nominal plant"),
-                "name": PARAMETER_LABELS.get(item.parameter, item.parameter)
-                + (f" [{phrase('batch')} {item.batch + 1}]" if item.batch else ""),
+                "name": words + (f" [{phrase('batch')} {item.batch + 1}]" if item.batch else ""),
                 "value": item.value,
                 "low": item.low,
                 "high": item.high,
                 "at_bound": item.at_bound,
-                "unit": _unit(item),
+                "unit": unit,
             }
             for item in (
                 *(one for one in result.parameters if not one.effect),
                 *result.effect_parameters,
             )
+            for words, unit in [parameter_words(item.effect, item.parameter, language)]
         ],
         "proof": result.validation,
         "change_of_gap": result.validation.held_out,
@@ -137,7 +139,9 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "large": LARGE_REGION_RMS,
         "uncertain": TOLD_STDS / math.sqrt(2.0 * max(len(result.held_out), 1)),
         "extended": extended,
-        "change": lambda form, before, after: form % before + (f" → {form % after}" if extended else ""),
+        "change": lambda form, before, after: said.written(
+            form % before + (f" → {form % after}" if extended else "")
+        ),
         "nominal_effects": [phrase(item) for item in result.nominal.effects],
         "floor": result.floor,
         "replicates": result.replicates,
@@ -150,18 +154,6 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "setting": said.setting,
         "shape_in_words": said.shape,
     }
-
-
-def _unit(estimate: ParameterEstimate) -> str:
-    """Return the unit of a parameter; empty for a pure number."""
-    if not estimate.effect:
-        return PLANT_UNITS.get(estimate.parameter, "")
-    unit = next(
-        parameter.unit
-        for parameter in LIBRARY[estimate.effect].parameters
-        if parameter.name == estimate.parameter
-    )
-    return "" if unit == "1" else unit
 
 
 def _regions(proof: Validation) -> dict[str, Any]:

@@ -19,6 +19,16 @@ def phrase(identifier: str) -> str:
     return identifier.replace("_", " ")
 
 
+def written(text: str) -> str:
+    """Write the numbers of a text as the language does."""
+    return text
+
+
+def note(english: str) -> tuple[str, str]:
+    """Say a note on the data: in which language, and the note."""
+    return "en", english
+
+
 def headline(result: DiscrepancyResult) -> str:
     """Say what is established, what remains, and which law would explain it, if one was found."""
     finding = result.law

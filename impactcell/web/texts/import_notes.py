@@ -3,6 +3,8 @@
 import re
 from typing import Final
 
+from impactcell.german.findings import with_decimal_commas
+
 OPTION: Final = re.compile(r" \(--[^)]*\)|; give --set .*")
 """A way out on the command line; the page has a form for it."""
 GERMAN: Final = {
@@ -47,5 +49,5 @@ def page_note(note: str, language: str) -> tuple[str, str]:
             told = match.expand(german)
             if "sagen: " in german:
                 told = re.sub(r"\b(mass|velocity|to)\b", lambda word: WORDS[word[0]], told)
-            return "de", re.sub(r"(?<=\d)\.(?=\d)", ",", told)
+            return "de", with_decimal_commas(told)
     return "en", text

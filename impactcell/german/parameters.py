@@ -1,4 +1,4 @@
-"""What the page calls the parameters of plant and effects: words and a unit for `stribeck_velocity_m_s`."""
+"""What page and report call the parameters of plant and effects: words and a unit, in both languages."""
 
 from typing import Final
 
@@ -9,6 +9,7 @@ PLANT: Final = {
     "damping_n_s_per_m": ("damping", "N s/m"),
     "mu_s": ("µs", ""),
     "mu_k": ("µk", ""),
+    "ratio": ("µs/µk", ""),
 }
 """Words and unit of the plant's own parameters."""
 UNIT_PARTS: Final = {"n", "m", "m2", "s", "s2", "rad", "per"}
