@@ -106,6 +106,8 @@ class BaseModelFile(_Part):
             raise ValueError("position_eccentricity is about 0, its phase is free: write {std: ...}")
         if self.excitation == "free" and self.predicts == "force":
             raise ValueError("where nothing drives, predicts is position")
+        if self.excitation == "free" and _prior(self.nuisances.force_offset).value != 0.0:
+            raise ValueError("where nothing drives, there is no force whose force_offset could be stated")
         return self
 
 

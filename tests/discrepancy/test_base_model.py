@@ -21,6 +21,8 @@ from impactcell.discrepancy.machine import (
     investigate_machine,
     simulate_held_out,
 )
+from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.errors import CampaignError, SettingsError
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import base_model_text, read_base_model
@@ -83,6 +85,37 @@ def test_drag_is_named_and_the_zero_of_the_sensor_is_not(tmp_path: Path) -> None
         assert finding.final.fit.coefficients[place] == pytest.approx(truth, rel=0.05)
     before, after = (simulate_held_out(finding, model).rmse for model in (finding.nominal, finding.final))
     assert after < 0.1 * before
+
+
+def test_what_is_stated_of_the_sensors_is_believed(tmp_path: Path) -> None:
+    """Exact, it is not fitted again; uncertain, what is told is the whole of it and not the rest."""
+    told = {}
+    for stated in ("0.02", "{value: 0.015, std: 0.01}", "0.0"):
+        text = PENDULUM.replace("position_offset: {std: 0.05}", f"position_offset: {stated}")
+        finding = investigate_machine(pendulum(swings(4e-4, offset=0.02)), base_of(tmp_path, text))
+        told[stated] = machine_document(finding)["nominal"].get("position_offset"), finding.is_at_floor
+    assert told["0.02"] == (None, True)
+    assert told["0.0"] == (None, False)
+    offset, is_at_floor = told["{value: 0.015, std: 0.01}"]
+    assert is_at_floor
+    assert offset["value"] == pytest.approx(0.02, rel=0.05)
+    assert offset["ci95"][0] < 0.02 < offset["ci95"][1]
+
+
+def test_records_are_corrected_by_what_is_stated() -> None:
+    gain, offset, zero = 0.1, 3.0, 0.002
+    read = replace(
+        SEAL,
+        force_gain=NumberPrior(gain),
+        force_offset=NumberPrior(offset),
+        position_offset=NumberPrior(zero),
+    )
+    for plain, corrected in zip(
+        uniform_records(seal(0.8), SEAL), uniform_records(seal(0.8), read), strict=True
+    ):
+        np.testing.assert_allclose(corrected.force, (1.0 + gain) * plain.force + offset)
+        np.testing.assert_allclose(corrected.position, plain.position - zero)
+        assert corrected.noise == pytest.approx((plain.noise[0], (1.0 + gain) * plain.noise[1]))
 
 
 def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
@@ -172,6 +205,7 @@ def test_inertia_that_a_free_motion_cannot_show_is_held_and_said_so(tmp_path: Pa
         (("excitation: free", "excitation: tap"), "1:1", "--cell"),
         (("{value: 0.55, std: free}", "{value: 0.55, std: -1}"), "5:40", "greater than or equal to 0"),
         (("inertia_kg_m2: 0.02", "inertia_kg_m2: heavy"), "4:16", "a valid number"),
+        (("force_offset: {std: 0.01}", "force_offset: 0.1"), "1:1", "no force whose force_offset"),
     ],
 )
 def test_faults_of_a_base_model_have_line_and_column(

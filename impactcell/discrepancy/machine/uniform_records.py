@@ -87,7 +87,10 @@ class MotionScale:
 
 
 def uniform_records(campaign: Campaign, base: BaseModel) -> tuple[UniformRecord, ...]:
-    """Lay all shots out at equal steps.
+    """Lay all shots out at equal steps, corrected by what the base model states of their sensors.
+
+    The part is at q - q_0 where q is read, and driven by (1 + g) F + F_0 where F is; what is fitted later is
+    how far q_0, g and F_0 are from what is stated.
 
     Raises
     ------
@@ -122,16 +125,17 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
     ]
     noise = [_noise(channel, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)]
     covariates = {name: value for name, value in shot.covariates.items() if isinstance(value, float)}
+    gain = 1.0 + base.force_gain.value
     return UniformRecord(
         shot=shot.cycle,
         label=shot.batch_id or "",
         time_s=time - begin,
-        position=values[0],
-        force=values[1] if len(values) > 1 else np.zeros(count),
+        position=values[0] - base.position_offset.value,
+        force=gain * values[1] + base.force_offset.value if len(values) > 1 else np.zeros(count),
         inertia=inertia,
         covariates=covariates,
         spikes=sum(spikes for _, spikes in cleaned),
-        noise=(noise[0], noise[1] if len(noise) > 1 else 0.0),
+        noise=(noise[0], abs(gain) * noise[1] if len(noise) > 1 else 0.0),
     )
 
 

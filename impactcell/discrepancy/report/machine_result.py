@@ -257,31 +257,32 @@ def _parameters(finding: MachineFinding, chosen: ChosenTerm, *, in_full: bool = 
 
 
 def _nuisances(model: FittedModel) -> dict[str, Any]:
-    document = {
-        ECCENTRIC_PARTS[column[2]] if column[0] == ECCENTRICITY else column[0]: _estimate(model, place)
-        for place, column in enumerate(model.fit.columns)
-        if column[0] in ("force_gain", "force_offset", "position_offset", ECCENTRICITY)
+    base, gain = model.base, 1.0 + model.base.force_gain.value
+    # What is fitted is a deviation from what is stated: value = stated + unit * coefficient.
+    fitted = {
+        "force_gain": (base.force_gain.value, gain),
+        "force_offset": (base.force_offset.value * (1.0 + model.nuisance("force_gain")), 1.0),
+        "position_offset": (base.position_offset.value, 1.0),
+        "inertia": (base.inertia.value, base.inertia.value),
+        "gravity_torque": (base.gravity_torque.value, 1.0),
+        ECCENTRICITY: (0.0, 1.0),
     }
-    scaled = {"inertia": (model.base.inertia.value, model.base.inertia.value), "gravity_torque": (
-        model.base.gravity_torque.value, 1.0)}  # fmt: skip
-    for name, (value, unit) in scaled.items():
-        if (name, 0.0, 0) in model.fit.columns:
-            place = model.fit.columns.index((name, 0.0, 0))
-            ends = [value + unit * float(end[place]) for end in (model.fit.low, model.fit.high)]
-            document[name] = {
-                "value": round_digits(value + unit * float(model.fit.coefficients[place])),
-                "ci95": [round_digits(end) for end in ends],
-                "at_bound": bool(model.fit.at_bound[place]),
-            }
+    document = {
+        ECCENTRIC_PARTS[column[2]] if column[0] == ECCENTRICITY else column[0]: _estimate(
+            model, place, *fitted[column[0]]
+        )
+        for place, column in enumerate(model.fit.columns)
+        if column[0] in fitted
+    }
     if not model.base.delay_s.is_held:
         document["delay_s"] = {"value": round_digits(model.delay_s), "ci95": None, "at_bound": False}
     return document
 
 
-def _estimate(model: FittedModel, place: int) -> dict[str, Any]:
+def _estimate(model: FittedModel, place: int, stated: float = 0.0, unit: float = 1.0) -> dict[str, Any]:
     fit = model.fit
-    return {
-        "value": round_digits(float(fit.coefficients[place])),
-        "ci95": [round_digits(float(fit.low[place])), round_digits(float(fit.high[place]))],
-        "at_bound": bool(fit.at_bound[place]),
-    }
+    value, low, high = (
+        round_digits(stated + unit * float(numbers[place]))
+        for numbers in (fit.coefficients, fit.low, fit.high)
+    )
+    return {"value": value, "ci95": [low, high], "at_bound": bool(fit.at_bound[place])}
