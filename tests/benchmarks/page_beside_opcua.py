@@ -61,6 +61,6 @@ def tables(*, quick: bool = False) -> list[Table]:
             ("the service", "cycle to notification, p99", "run by run", "CPU a cycle", "cycles missed"),
             lines,
             f"p99 with viewers: {text}, for a bar of +{BAR_MS:g} ms. Client, modules and viewers share "
-            "the other core, so that what the viewers cost there is in it.",
+            "the other core, where the viewers stand back (nice 10): in a plant they have their own.",
         )
     ]
