@@ -21,7 +21,7 @@ from impactcell.positioning import (
 )
 from impactcell.serialization import Migration
 from impactcell.serialization.tree import Tree
-from impactcell.tracking.wear_batch import block_filter
+from impactcell.tracking.wear_batch import autocorrelation, block_filter
 
 ALARM_NAMES_1: Final[Mapping[str, str]] = {
     "WEAR_LIMIT": "WearLimit",
@@ -169,6 +169,13 @@ _WEAR_BLOCKS_3_ADDED: Final[Mapping[str, Tree]] = {
     "weighed_until": 0.0,
 }
 """Format 2 kept all blocks: they are weighed once more, and then forgotten."""
+_AUTOCORRELATION_5: Final[Mapping[str, Tree]] = {
+    "recent": np.zeros(0),
+    "weight": 0.0,
+    "square": 0.0,
+    "products": np.zeros(autocorrelation.LAGS),
+}
+"""Of no innovations: format 4 had lag one only."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
 
@@ -183,7 +190,22 @@ STATE_MIGRATIONS: Final = (
         dropped=("cell.tracker.wear_blocks.weighed_blocks",),
     ),
     Migration(added={"last": None, "planner.uncounted_evidence": 0.0}),
+    Migration(
+        added={
+            **_under(
+                "cell.tracker",
+                {
+                    "innovation_correlation": _AUTOCORRELATION_5,
+                    "scatter_correlation": _AUTOCORRELATION_5,
+                    "noise.correlation": 0.0,
+                    "replayed_noise.correlation": 0.0,
+                },
+            )
+        },
+        dropped=("cell.tracker.innovation_correlation",),
+    ),
 )
-"""Of a cell's state: to format 2, 3 and 4. What earlier planners had not counted is nothing."""
+"""Of a cell's state: to format 2, 3, 4 and 5. What earlier planners had not counted is nothing; how the
+innovations are correlated is learned anew."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

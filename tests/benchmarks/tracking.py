@@ -15,6 +15,7 @@ from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
 from tests.benchmarks import (
+    _correlated,
     _declared,
     _inside,
     _signatures,
@@ -38,6 +39,7 @@ def tables(*, quick: bool = False) -> Iterator[Table]:
         _tracker.starts_table,
         _tracker.known_table,
         _declared.table,
+        _correlated.table,
         _steps.table,
         _told_steps.table,
         _signatures.speed_table,

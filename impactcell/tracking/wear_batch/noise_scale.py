@@ -15,6 +15,7 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import declared_std_calibration
+from impactcell.tracking.wear_batch.noise_correlation import variance_factor
 
 CLIP = 2.5
 """Standard deviations at which a difference is winsorised, as in the filter."""
@@ -70,6 +71,8 @@ class NoiseScale:
         No standard deviation was ever declared; the scale was guessed and is learned.
     exponent_posterior : ndarray
         How far the declared standard deviations are believed, see `declared_std_calibration`.
+    correlation : float
+        Of an estimate's scatter with the one before, see `noise_correlation`.
     """
 
     factor: float = 1.0
@@ -81,6 +84,7 @@ class NoiseScale:
     identical: int = 0
     guessed: bool = False
     exponent_posterior: Samples = field(default_factory=declared_std_calibration.prior_posterior)
+    correlation: float = 0.0
 
 
 def identical_run(noise: NoiseScale, value: float) -> int:
@@ -113,7 +117,18 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
         weight = min(weight + 1.0, MEMORY)
         factors, posterior = _learned_factors(noise, value, (std, usual), weight, guessed=guessed)
     factor, winsorised_factor = factors
-    learned = NoiseScale(factor, weight, winsorised_factor, usual, value, std, identical, guessed, posterior)
+    learned = replace(
+        noise,
+        factor=factor,
+        weight=weight,
+        winsorised_factor=winsorised_factor,
+        usual_std=usual,
+        last_value=value,
+        last_std=std,
+        identical=identical,
+        guessed=guessed,
+        exponent_posterior=posterior,
+    )
     return learned, std
 
 
@@ -151,6 +166,7 @@ def variance(noise: NoiseScale, std: float) -> float:
     doubt = 1.0 + GUESS_DOUBT / max(noise.weight, 1.0) if noise.guessed else 1.0
     return float(
         noise.factor
+        * variance_factor(noise.correlation)
         * doubt
         * declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std) ** 2
     )
@@ -158,12 +174,12 @@ def variance(noise: NoiseScale, std: float) -> float:
 
 def usual_variance(noise: NoiseScale) -> float:
     """Variance of a usual estimate."""
-    return noise.factor * noise.usual_std**2
+    return noise.factor * variance_factor(noise.correlation) * noise.usual_std**2
 
 
 def variances(noise: NoiseScale, stds: Samples) -> Samples:
     """Variances of the estimates of a history, whose noise is now known."""
-    return noise.factor * _calibrated_variances(noise, stds)
+    return noise.factor * variance_factor(noise.correlation) * _calibrated_variances(noise, stds)
 
 
 def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[float, float]:

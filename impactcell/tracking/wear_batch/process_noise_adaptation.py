@@ -1,16 +1,16 @@
 """Process noise that follows the data: innovations of a right filter are uncorrelated (Mehra 1970)."""
 
 import math
-from dataclasses import dataclass
+
+from impactcell.tracking.wear_batch import autocorrelation
+from impactcell.tracking.wear_batch.autocorrelation import Autocorrelation
 
 MEMORY = 1000.0
 """Cycles after which an innovation is forgotten."""
 CERTAIN = 5.0
-"""Standard deviations of the lag-one correlation at which the process noise is changed: 1 in 1.7 million."""
+"""Standard deviations of the correlation at which the process noise is changed: 1 in 1.7 million."""
 FEWEST = 200.0
 """Cycles before which nothing is changed: the correlation of fewer is not normal enough to say `CERTAIN`."""
-CLIP = 3.0
-"""Normalised innovations count at most as this, outliers too."""
 STEP = 4.0
 """Factor by which the process variance is raised or lowered at a time: its standard deviation by two."""
 SMALLEST = 1e-6
@@ -18,34 +18,21 @@ SMALLEST = 1e-6
 one estimate: a random walk that takes a million cycles to be as large as the noise."""
 
 
-@dataclass(frozen=True, slots=True)
-class InnovationCorrelation:
-    """Running lag-one product of the normalised innovations."""
+def update(state: Autocorrelation, innovation: float) -> tuple[Autocorrelation, float]:
+    """Take one normalised innovation; also give the factor of the process variance that it makes certain.
 
-    last: float = math.nan
-    weight: float = 0.0
-    product: float = 0.0
-    square: float = 0.0
-
-
-def update(state: InnovationCorrelation, innovation: float) -> tuple[InnovationCorrelation, float]:
-    """Take one normalised innovation; also give the factor of the process variance that it makes certain."""
-    if not math.isfinite(innovation):
-        return state, 1.0
-    clipped = max(-CLIP, min(innovation, CLIP))
-    if math.isnan(state.last):
-        return InnovationCorrelation(clipped), 1.0
-    kept = 1.0 - 1.0 / MEMORY
-    weight = kept * state.weight + 1.0
-    product = kept * state.product + clipped * state.last
-    square = kept * state.square + clipped**2
-    updated = InnovationCorrelation(clipped, weight, product, square)
-    if weight < FEWEST or square <= 0.0:
+    A level that walks more than is believed shows at the far lags, where the scatter's own correlation is
+    gone; one that walks less shows at lag one, as that of a filter which follows the scatter.
+    """
+    updated = autocorrelation.update(state, innovation, MEMORY)
+    if updated.weight < FEWEST:
         return updated, 1.0
-    score = product / square * math.sqrt(weight)
-    if abs(score) < CERTAIN:
-        return updated, 1.0
-    return InnovationCorrelation(clipped), STEP if score > 0.0 else 1.0 / STEP
+    root = math.sqrt(updated.weight)
+    if autocorrelation.far(updated) * root * math.sqrt(autocorrelation.FAR) > CERTAIN:
+        return autocorrelation.begun_anew(updated), STEP
+    if autocorrelation.next_to(updated) * root < -CERTAIN:
+        return autocorrelation.begun_anew(updated), 1.0 / STEP
+    return updated, 1.0
 
 
 def adapt_process_noise(variance: float, factor: float, unit: float) -> float:

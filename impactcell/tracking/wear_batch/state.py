@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from impactcell.records import BatchState, Capture, Evidence, FrictionEstimate, Samples, WearState
+from impactcell.tracking.wear_batch.autocorrelation import Autocorrelation
 from impactcell.tracking.wear_batch.input_validation import CycleClock, CycleTiming
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
-from impactcell.tracking.wear_batch.process_noise_adaptation import InnovationCorrelation
 from impactcell.tracking.wear_batch.run_length_bank import WIDTH
 from impactcell.tracking.wear_batch.wear_blocks import WearBlocks
 from impactcell.tracking.wear_batch.wear_filter import WearFilter
@@ -116,6 +116,8 @@ class TrackerState:
         The present known batch has been reported as shifted, or was expected to be.
     replayed_noise : NoiseScale
         As it was when the first cycles were last gone over with it.
+    innovation_correlation, scatter_correlation : Autocorrelation
+        Of the same innovations: since the process noise was last changed, and over a longer time.
     wear_blocks : WearBlocks or None
         What all cycles say of wear where nobody says of which batch they are; None while the filter does.
     """
@@ -136,7 +138,8 @@ class TrackerState:
     first_index: int = 0
     replayed_noise: NoiseScale = field(default_factory=NoiseScale)
     commissioning: CommissioningRecord | None = None
-    innovation_correlation: InnovationCorrelation = field(default_factory=InnovationCorrelation)
+    innovation_correlation: Autocorrelation = field(default_factory=Autocorrelation)
+    scatter_correlation: Autocorrelation = field(default_factory=Autocorrelation)
     level_variance: float = 0.0
     slope_variance: float = 0.0
     wear_blocks: WearBlocks | None = None
@@ -185,6 +188,7 @@ def reset_wear_level(state: TrackerState) -> TrackerState:
     return TrackerState(
         clock=state.clock,
         noise=state.noise,
+        scatter_correlation=state.scatter_correlation,
         level_variance=state.level_variance,
         slope_variance=state.slope_variance,
     )

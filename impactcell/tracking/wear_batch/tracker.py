@@ -7,6 +7,7 @@ from impactcell.tracking.wear_batch import (
     batch_change_detection,
     batch_filter,
     input_validation,
+    noise_correlation,
     noise_identification,
     noise_scale,
     process_noise_adaptation,
@@ -86,9 +87,11 @@ def update(
     updated = batch_filter.update_bank(settings, state, cycle)
     before, change = batch_change_detection.detect_change(settings, state, cycle, updated)
     state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
-    correlation, factor = state.innovation_correlation, 1.0
+    correlation, scatter, factor = state.innovation_correlation, state.scatter_correlation, 1.0
     if timing.lag == 0:
         correlation, factor = process_noise_adaptation.update(correlation, innovation)
+        scatter, lag_one = noise_correlation.update(scatter, innovation)
+        noise = replace(noise, correlation=lag_one)
     state = replace(
         state,
         clock=clock,
@@ -99,6 +102,7 @@ def update(
         change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
         innovation_correlation=correlation,
+        scatter_correlation=scatter,
     )
     if timing.lag == 0:
         state, raised = update_process_noise(settings, state, cycle, factor)
