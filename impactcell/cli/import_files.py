@@ -4,10 +4,11 @@ import json
 import os
 from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from impactcell.campaign import Campaign, Coordinate
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements import (
     Dialect,
@@ -84,6 +85,7 @@ def import_files(
             faults = {**_understood(tables, mapping), "faults": str(error).splitlines()}
             print_result(json.dumps(faults, ensure_ascii=False, indent=1))
         raise
+    imported = replace(imported, notes=(*imported.notes, *_doubted_units(imported.campaign)))
     if as_json:
         print_result(json.dumps(_summary(tables, mapping, imported, output), ensure_ascii=False, indent=1))
         return
@@ -94,6 +96,19 @@ def import_files(
     print_result(
         f"{shots} {'shot' if shots == 1 else 'shots'} of excitation {imported.campaign.excitation}, {where}"
     )
+
+
+def _doubted_units(campaign: Campaign) -> list[str]:
+    """Say what the verbs that take the campaign will refuse it for: a unit wrong by a large factor."""
+    from impactcell.discrepancy.data import check_campaign_units
+
+    if campaign.coordinate is Coordinate.ROTATION:
+        return []
+    try:
+        check_campaign_units(campaign)
+    except CampaignError as error:
+        return [f"{error}; it will be refused as it stands (--unit NAME=UNIT says another)"]
+    return []
 
 
 def _check_distinct(files: Sequence[Path]) -> None:

@@ -24,6 +24,9 @@ GERMAN: Final = {
         "kein Hub angegeben: der Antrieb gilt als angehalten, wenn der Kontakt endet",
     r"no mass is stated: it is fitted, and only friction over mass is seen":
         "keine Masse angegeben: sie wird angepasst, zu sehen ist nur Reibung durch Masse",
+    r"(.+) is (\S+), where about 1 is possible: check the unit of (.+) or (\S+) "
+    r"\(off by a factor of about (\S+)\); it will be refused as it stands":
+        r"Einheit prüfen: \3 oder \4 (um etwa den Faktor \5 daneben); so wird es später abgelehnt",
     r"named '(.+)', unit fits": r"heißt „\1“, Einheit passt",
     r"named '(.+)'": r"heißt „\1“",
     r"the only column in (\S+)": r"einzige Spalte in \1",

@@ -27,6 +27,7 @@ from impactcell.measurements import (
 from impactcell.measurements.given import read_given
 from impactcell.prediction import estimate_from_features
 from impactcell.prediction.joint_plant_fit import fit_plant
+from impactcell.web.texts.import_notes import page_note
 from tests.unit.measurements.records import PLACE_M, sampled, taps, write_logger_file
 
 
@@ -219,6 +220,28 @@ def test_the_verb_shows_what_it_guessed_and_writes(
         run_verb(["import", *named, "--dry-run", "--set", "mass=12"])
     with pytest.raises(MeasurementError, match="say where to write"):
         run_verb(["import", *named])
+
+
+def test_a_unit_that_is_wrong_by_far_is_told_before_other_verbs_refuse_it(
+    files: list[Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    constants = [
+        item for name in ("mass=12.6kg", "velocity=4000mm/min", "stroke=1.5mm") for item in ("--set", name)
+    ]
+
+    def notes(*arguments: str) -> list[str]:
+        with pytest.raises(SystemExit):
+            run_verb(["import", *map(str, files), "--dry-run", "--json", *constants, *arguments])
+        told: list[str] = json.loads(capsys.readouterr().out)["notes"]
+        return [note for note in told if "check the unit" in note]
+
+    assert notes() == []
+    (note,) = notes("--unit", "Kraft=kN")
+    assert "check the unit of force_n or mass_kg (off by a factor of about 1e+3)" in note
+    assert note.endswith("it will be refused as it stands (--unit NAME=UNIT says another)")
+    language, german = page_note(note, "de")
+    assert language == "de"
+    assert german.startswith("Einheit prüfen: force_n oder mass_kg (um etwa den Faktor 1e+3 daneben)")
 
 
 def test_a_mapping_file_says_the_same(files: list[Path], tmp_path: Path) -> None:
