@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from impactcell.numerics import autocorrelation
 from impactcell.positioning import (
     displacement_discrepancy,
     model_hypotheses,
@@ -21,7 +22,7 @@ from impactcell.positioning import (
 )
 from impactcell.serialization import Migration
 from impactcell.serialization.tree import Tree
-from impactcell.tracking.wear_batch import autocorrelation, block_filter
+from impactcell.tracking.wear_batch import block_filter
 
 ALARM_NAMES_1: Final[Mapping[str, str]] = {
     "WEAR_LIMIT": "WearLimit",
@@ -170,10 +171,10 @@ _WEAR_BLOCKS_3_ADDED: Final[Mapping[str, Tree]] = {
 }
 """Format 2 kept all blocks: they are weighed once more, and then forgotten."""
 _AUTOCORRELATION_5: Final[Mapping[str, Tree]] = {
-    "recent": np.zeros(0),
+    "recent": [*autocorrelation.NONE],
     "weight": 0.0,
     "square": 0.0,
-    "products": np.zeros(autocorrelation.LAGS),
+    "products": [*autocorrelation.NONE],
 }
 """Of no innovations: format 4 had lag one only."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
@@ -200,7 +201,8 @@ STATE_MIGRATIONS: Final = (
                     "noise.correlation": 0.0,
                     "replayed_noise.correlation": 0.0,
                 },
-            )
+            ),
+            "cell.gap.correlation": _AUTOCORRELATION_5,
         },
         dropped=("cell.tracker.innovation_correlation",),
     ),

@@ -2,15 +2,18 @@
 
 Hawkins (1987, The Statistician 36:299): the residual of capture n, standardised by mean and standard
 deviation of those before, is turned into an exactly standard normal score by Student's t distribution,
-so that the false-alarm rate holds from the first captures on, whatever level is usual for the cell.
+so that the false-alarm rate holds from the first captures on, whatever level is usual for the cell. Scores
+that are correlated from capture to capture are divided by the root of what that makes of a sum's variance.
 """
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scipy.special import ndtri, stdtr
 
+from impactcell.numerics import scatter_correlation
+from impactcell.numerics.autocorrelation import Autocorrelation
 from impactcell.records import Evidence
 
 SLACK = 0.75
@@ -45,6 +48,8 @@ class GapState:
         Detection statistic of the CUSUM.
     since : int
         Cycle at which the excess last left zero.
+    correlation : Autocorrelation
+        Of the scores, as long as the excess is below the threshold.
     """
 
     count: int = 0
@@ -52,6 +57,7 @@ class GapState:
     squared_deviations: float = 0.0
     excess: float = 0.0
     since: int = 0
+    correlation: Autocorrelation = field(default_factory=Autocorrelation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +84,12 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
     if not (math.isfinite(gap) and gap > 0.0):
         return GapResult(state, None, Evidence(), "the capture has no normalised residual")
     value = math.log(gap)
-    excess = min(max(0.0, state.excess + _score(state, value) - SLACK), CAP * limit)
+    score, correlation = _score(state, value), state.correlation
+    learned, lag_one = scatter_correlation.update(correlation, score)
+    if state.excess <= limit:
+        correlation = learned
+    score /= math.sqrt(scatter_correlation.variance_over_scatter(lag_one))
+    excess = min(max(0.0, state.excess + score - SLACK), CAP * limit)
     since = cycle if state.excess == 0.0 else state.since
     count, mean, squared_deviations = state.count, state.mean, state.squared_deviations
     if count < LEARNED and state.excess <= limit:
@@ -86,7 +97,7 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         step = value - mean
         mean += step / count
         squared_deviations += step * (value - mean)
-    updated = GapState(count, mean, squared_deviations, excess, since)
+    updated = GapState(count, mean, squared_deviations, excess, since, correlation)
     if count < FIRST:
         return GapResult(updated, None, Evidence(), "the usual residual is being learned")
     usual = math.exp(mean)

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from impactcell.numerics.jit import compiled
+from impactcell.numerics.scatter_correlation import variance_over_differences
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import declared_std_calibration
-from impactcell.tracking.wear_batch.noise_correlation import variance_factor
 
 CLIP = 2.5
 """Standard deviations at which a difference is winsorised, as in the filter."""
@@ -72,7 +72,7 @@ class NoiseScale:
     exponent_posterior : ndarray
         How far the declared standard deviations are believed, see `declared_std_calibration`.
     correlation : float
-        Of an estimate's scatter with the one before, see `noise_correlation`.
+        Of an estimate's scatter with the one before, see `scatter_correlation`.
     """
 
     factor: float = 1.0
@@ -166,7 +166,7 @@ def variance(noise: NoiseScale, std: float) -> float:
     doubt = 1.0 + GUESS_DOUBT / max(noise.weight, 1.0) if noise.guessed else 1.0
     return float(
         noise.factor
-        * variance_factor(noise.correlation)
+        * variance_over_differences(noise.correlation)
         * doubt
         * declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std) ** 2
     )
@@ -174,12 +174,12 @@ def variance(noise: NoiseScale, std: float) -> float:
 
 def usual_variance(noise: NoiseScale) -> float:
     """Variance of a usual estimate."""
-    return noise.factor * variance_factor(noise.correlation) * noise.usual_std**2
+    return noise.factor * variance_over_differences(noise.correlation) * noise.usual_std**2
 
 
 def variances(noise: NoiseScale, stds: Samples) -> Samples:
     """Variances of the estimates of a history, whose noise is now known."""
-    return noise.factor * variance_factor(noise.correlation) * _calibrated_variances(noise, stds)
+    return noise.factor * variance_over_differences(noise.correlation) * _calibrated_variances(noise, stds)
 
 
 def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[float, float]:

@@ -2,8 +2,8 @@
 
 import math
 
-from impactcell.tracking.wear_batch import autocorrelation
-from impactcell.tracking.wear_batch.autocorrelation import Autocorrelation
+from impactcell.numerics import autocorrelation
+from impactcell.numerics.autocorrelation import Autocorrelation
 
 MEMORY = 1000.0
 """Cycles after which an innovation is forgotten."""

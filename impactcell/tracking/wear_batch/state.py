@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from impactcell.numerics.autocorrelation import Autocorrelation
 from impactcell.records import BatchState, Capture, Evidence, FrictionEstimate, Samples, WearState
-from impactcell.tracking.wear_batch.autocorrelation import Autocorrelation
 from impactcell.tracking.wear_batch.input_validation import CycleClock, CycleTiming
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale

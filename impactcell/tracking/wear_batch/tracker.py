@@ -3,11 +3,11 @@
 import math
 from dataclasses import replace
 
+from impactcell.numerics import scatter_correlation
 from impactcell.tracking.wear_batch import (
     batch_change_detection,
     batch_filter,
     input_validation,
-    noise_correlation,
     noise_identification,
     noise_scale,
     process_noise_adaptation,
@@ -90,7 +90,7 @@ def update(
     correlation, scatter, factor = state.innovation_correlation, state.scatter_correlation, 1.0
     if timing.lag == 0:
         correlation, factor = process_noise_adaptation.update(correlation, innovation)
-        scatter, lag_one = noise_correlation.update(scatter, innovation)
+        scatter, lag_one = scatter_correlation.update(scatter, innovation)
         noise = replace(noise, correlation=lag_one)
     state = replace(
         state,

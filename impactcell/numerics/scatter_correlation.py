@@ -9,21 +9,20 @@ could, which makes alarms later, never more frequent.
 """
 
 import math
+from typing import Final
 
-import numpy as np
-
-from impactcell.tracking.wear_batch import autocorrelation
-from impactcell.tracking.wear_batch.autocorrelation import Autocorrelation
+from impactcell.numerics import autocorrelation
+from impactcell.numerics.autocorrelation import Autocorrelation
 
 MEMORY = 5000.0
-"""Innovations after which one is forgotten, as in `noise_scale`."""
+"""Innovations after which one is forgotten."""
 FEWEST = 20.0
 """Innovations before which nothing is said."""
 DOUBTED = 1.5
 """Standard deviations up to which a correlation is taken for none: of white noise in 14 of 15 cases."""
 LARGEST = 0.7
 """Correlations beyond it are a level that walks: their far lags are no longer the smaller part [1]."""
-FAR_LAGS = np.arange(autocorrelation.FIRST_FAR, autocorrelation.LAGS + 1)
+FAR_LAGS: Final = range(autocorrelation.FIRST_FAR, autocorrelation.LAGS + 1)
 """Lags at which the level is seen apart from the scatter."""
 ROUNDS = 8
 """Of the fixed point below: within 0.002 of its end up to 0.6."""
@@ -46,10 +45,15 @@ def update(state: Autocorrelation, innovation: float) -> tuple[Autocorrelation, 
         return updated, 0.0
     correlation = min(excess, LARGEST)
     for _ in range(ROUNDS):
-        correlation = min(excess + float(np.mean(correlation**FAR_LAGS)), LARGEST)
+        correlation = min(excess + sum(correlation**lag for lag in FAR_LAGS) / autocorrelation.FAR, LARGEST)
     return updated, correlation * (1.0 - (DOUBTED / score) ** 2)
 
 
-def variance_factor(correlation: float) -> float:
+def variance_over_differences(correlation: float) -> float:
     """Variance that counts for levels, over half that of successive differences."""
     return (1.0 + correlation) / (1.0 - correlation) ** 2
+
+
+def variance_over_scatter(correlation: float) -> float:
+    """Variance that counts for levels, over that of the scatter."""
+    return (1.0 + correlation) / (1.0 - correlation)
