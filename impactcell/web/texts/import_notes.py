@@ -20,6 +20,8 @@ GERMAN: Final = {
     r"what lies before is kept as pretrigger":
         r"t = 0 liegt, wo die Kraft beginnt (Stöße: \1), genau auf einen Teil des Abtastschritts von \2 ms; "
         "was davor liegt, bleibt erhalten",
+    r"no samples before contact: the records' own t = 0 is taken":
+        "keine Messwerte vor dem Kontakt: es gilt das t = 0 der Aufzeichnungen",
     r"no stroke is stated: the actuator is taken to halt as it loses contact":
         "kein Hub angegeben: der Antrieb gilt als angehalten, wenn der Kontakt endet",
     r"no mass is stated: it is fitted, and only friction over mass is seen":
