@@ -78,6 +78,7 @@ class Cells:
         self.late_s: list[float] = []
         self.watch = LoopWatch()
         self.published = self.due = self.lost = 0
+        self.pending: dict[str, float] = {}
         self._threads = {cell: ThreadPoolExecutor(1) for cell in CELLS}
 
     async def run(self, cell: str, offset_s: float) -> None:
@@ -89,9 +90,11 @@ class Cells:
             due = begin + number / RATE_HZ
             await asyncio.sleep(max(0.0, due - loop.time()))
             self.due += 1
+            self.pending[cell] = due
             snapshot = await loop.run_in_executor(self._threads[cell], cycle, number)
             self.here.server.publish(cell, snapshot)
             self.published += 1
+            del self.pending[cell]
             late_s = loop.time() - due
             self.late_s.append(late_s)
             self.lost += late_s > 1.0 / RATE_HZ
@@ -101,10 +104,11 @@ async def tell(cells: Cells) -> None:
     """Tell a line whenever one is asked for: all since the one before."""
     loop, process = asyncio.get_running_loop(), psutil.Process()
     while await loop.run_in_executor(None, sys.stdin.readline):
+        overdue = sum(loop.time() - due > 1.0 / RATE_HZ for due in cells.pending.values())
         late_ms = 1e3 * np.percentile(cells.late_s, [50, 99, 100]) if cells.late_s else np.full(3, np.nan)
         state: dict[str, Any] = {
             "due": cells.due,
-            "lost": cells.lost + cells.due - cells.published,
+            "lost": cells.lost + overdue,
             "late_ms": list(late_ms),
             "held_ms": cells.watch.told_ms(),
             "rss_mb": process.memory_info().rss / 2**20,
