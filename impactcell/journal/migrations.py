@@ -177,6 +177,8 @@ _AUTOCORRELATION_5: Final[Mapping[str, Tree]] = {
     "products": [*autocorrelation.NONE],
 }
 """Of no innovations: format 4 had lag one only."""
+_NOISE_5_ADDED: Final[Mapping[str, Tree]] = {"correlation": 0.0, "watched_ratio": 1.0, "latest_ratio": 1.0}
+"""Of the tracker's scale of the noise: white, and as it was learned."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
 
@@ -198,8 +200,8 @@ STATE_MIGRATIONS: Final = (
                 {
                     "innovation_correlation": _AUTOCORRELATION_5,
                     "scatter_correlation": _AUTOCORRELATION_5,
-                    "noise.correlation": 0.0,
-                    "replayed_noise.correlation": 0.0,
+                    **_under("noise", _NOISE_5_ADDED),
+                    **_under("replayed_noise", _NOISE_5_ADDED),
                 },
             ),
             "cell.gap.correlation": _AUTOCORRELATION_5,

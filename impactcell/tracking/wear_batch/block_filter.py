@@ -116,11 +116,16 @@ def copy_present(segments: Segments, into: Segments) -> int:
 
 
 @compiled
-def relay(grid: Samples, segments: Segments, onto: Samples, moved: Segments) -> Samples:
+def relay(
+    grid: Samples, segments: Segments, onto: Samples, moved: Segments, normal: tuple[float, float]
+) -> Samples:
     """Write to `moved`, all zero before, what the segments of the nearest of `grid` say at slopes `onto`.
 
-    Returns the log evidence of each, over that of the slope that it comes from.
+    Returns the log evidence of each, over that of the slope that it comes from. Beyond the ends of the grid
+    nothing was seen: there it falls at least as that of a normal distribution of the mean and standard
+    deviation in `normal`. A tail that stayed level would take all the probability as it grows longer.
     """
+    mean, std = normal
     evidence = np.empty(len(onto))
     for k in range(len(onto)):
         j = int(np.argmin(np.abs(grid - onto[k])))
@@ -138,10 +143,17 @@ def relay(grid: Samples, segments: Segments, onto: Samples, moved: Segments) -> 
         for i in range(count):
             total += math.exp(moved[k, i].probability - top)
         evidence[k] = top + math.log(total)
+        kept = 0
         for i in range(count):
-            moved[k, i].probability = math.exp(moved[k, i].probability - evidence[k])
+            share = math.exp(moved[k, i].probability - evidence[k])
+            moved[k, i].probability = 0.0
+            if share > DROPPED:
+                moved[k, kept] = moved[k, i]
+                moved[k, kept].probability = share
+                kept += 1
         if not grid[0] <= onto[k] <= grid[-1]:
-            evidence[k] = min(evidence[k], 0.0)  # nothing was seen there: no more than at the end
+            fall = 0.5 * ((onto[k] - mean) ** 2 - (grid[j] - mean) ** 2) / std**2
+            evidence[k] = min(evidence[k], -max(fall, 0.0))
     return evidence
 
 

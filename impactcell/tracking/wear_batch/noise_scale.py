@@ -47,6 +47,13 @@ SMALLEST_GUESS = 1e-6
 """Guessed standard deviations do not fall below this, mu_s: nor does any estimate's."""
 SMALLEST_FACTOR = 1e-6
 """Factors do not fall below this, so that identical values divide by no zero."""
+WATCHED = 200.0
+"""Differences over which it is watched whether the factor still holds."""
+LATEST = 20.0
+"""Differences from which it begins anew where it does not."""
+CHANGED = 0.4
+"""How far the mean winsorised square of `WATCHED` differences may be from one: five of its standard
+deviations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +78,8 @@ class NoiseScale:
         No standard deviation was ever declared; the scale was guessed and is learned.
     exponent_posterior : ndarray
         How far the declared standard deviations are believed, see `declared_std_calibration`.
+    watched_ratio, latest_ratio : float
+        Mean winsorised squares of the last differences over the factor, of `WATCHED` and of `LATEST`.
     correlation : float
         Of an estimate's scatter with the one before, see `scatter_correlation`.
     """
@@ -84,6 +93,8 @@ class NoiseScale:
     identical: int = 0
     guessed: bool = False
     exponent_posterior: Samples = field(default_factory=declared_std_calibration.prior_posterior)
+    watched_ratio: float = 1.0
+    latest_ratio: float = 1.0
     correlation: float = 0.0
 
 
@@ -113,9 +124,14 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
     if late:
         return replace(noise, weight=weight, usual_std=usual, guessed=guessed, identical=identical), std
     factors, posterior = (noise.factor, noise.winsorised_factor), noise.exponent_posterior
+    watched, latest = noise.watched_ratio, noise.latest_ratio
     if not math.isnan(noise.last_value):
         weight = min(weight + 1.0, MEMORY)
         factors, posterior = _learned_factors(noise, value, (std, usual), weight, guessed=guessed)
+        watched, latest = _watched_ratios(noise, value, (std, usual))
+        if abs(watched - 1.0) > CHANGED and weight > WATCHED:
+            factors = max(latest * factors[0], SMALLEST_FACTOR), max(latest * factors[1], SMALLEST_FACTOR)
+            weight, watched, latest = LATEST, 1.0, 1.0
     factor, winsorised_factor = factors
     learned = replace(
         noise,
@@ -128,8 +144,24 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
         identical=identical,
         guessed=guessed,
         exponent_posterior=posterior,
+        watched_ratio=watched,
+        latest_ratio=latest,
     )
     return learned, std
+
+
+def _watched_ratios(noise: NoiseScale, value: float, stds: tuple[float, float]) -> tuple[float, float]:
+    """Take a difference into both means of winsorised squares over the factor, one where it holds."""
+    (std, usual), posterior = stds, noise.exponent_posterior
+    scale = noise.winsorised_factor * (
+        declared_std_calibration.calibrated_std(posterior, std, usual) ** 2
+        + declared_std_calibration.calibrated_std(posterior, noise.last_std, usual) ** 2
+    )
+    ratio = min((value - noise.last_value) ** 2 / scale, CLIP**2) / CONSISTENCY
+    return (
+        noise.watched_ratio + (ratio - noise.watched_ratio) / WATCHED,
+        noise.latest_ratio + (ratio - noise.latest_ratio) / LATEST,
+    )
 
 
 def _learned_factors(

@@ -52,6 +52,8 @@ OFFSETS = np.array(
 a batch change more, which later cycles prove right."""
 WIDENED = 1.2
 """Factor of the last standard deviation from which the next grid is made."""
+TAIL = 2.0
+"""Standard deviation beyond the ends of the grid, where nothing was seen, in those of the posterior."""
 EDGE = 1e-3
 """Probability of an outermost slope at which the grid is laid again."""
 MOVED = 1e-2
@@ -219,7 +221,7 @@ def _relaid(grid: Samples, evidence: Samples, segments: Segments) -> tuple[Sampl
     onto = slope + WIDENED * max(std, 0.5 * spacing) * OFFSETS
     nearest = np.abs(grid - onto[:, None]).argmin(axis=1)
     moved = np.zeros_like(segments)
-    gained = relay(grid.copy(), segments, onto, moved)
+    gained = relay(grid.copy(), segments, onto, moved, (slope, TAIL * max(std, 0.5 * spacing)))
     return onto, evidence[nearest] + gained, moved
 
 

@@ -1,6 +1,9 @@
 """Block means: against models solved in one piece, bounded in size, and begun in the middle."""
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -90,18 +93,31 @@ def test_what_is_known_at_some_slopes_is_known_at_others_without_the_blocks():
     expected, straight = wear_blocks.before_blocks(wear, others, STD**2)
     expected += block_filter.filter_slopes(others, straight, blocks, 0.0, 0.0, MODEL)
     moved = np.zeros_like(segments)
-    gained = block_filter.relay(grid, segments, others, moved)
+    gained = block_filter.relay(grid, segments, others, moved, (0.0, 1e-5))
     nearest = np.abs(grid - others[:, None]).argmin(axis=1)
     assert evidence[nearest] + gained == pytest.approx(expected, abs=1e-6)
     assert block_filter.levels(moved) == pytest.approx(block_filter.levels(straight), rel=1e-9)
 
 
-def test_beyond_the_grid_nothing_is_likelier_than_at_its_end():
+def test_beyond_the_grid_it_falls_as_a_normal_distribution_does():
     wear = wear_blocks.begin(0, 0.2, 0.1)
     grid = np.linspace(1e-5, 2e-5, 5)
     _, segments = wear_blocks.before_blocks(wear, grid, STD**2)  # steep: likelier the nearer to no wear
-    gained = block_filter.relay(grid, segments, np.array([0.0, 1e-5]), np.zeros_like(segments[:2]))
-    assert gained.max() <= 0.0
+    mean, std, onto = 1.5e-5, 2.5e-6, np.array([0.0, 5e-6, 1e-5])
+    gained = block_filter.relay(grid, segments, onto, np.zeros_like(segments[:3]), (mean, std))
+    normal = -0.5 * ((onto - mean) ** 2 - (grid[0] - mean) ** 2) / std**2
+    assert gained == pytest.approx(normal, abs=1e-9)
+
+
+def test_segments_that_have_become_impossible_are_left_out_and_the_others_stay():
+    segments = np.zeros((1, block_filter.SEGMENTS, block_filter.WIDTH)).view(block_filter.SEGMENT)[..., 0]
+    segments["probability"][0, :3] = 0.3, 0.3, 0.4
+    segments["log_by_slope"][0, :3] = -1e9, 1e9, 1e9
+    segments["change"][0, :3] = 1.0, 2.0, 3.0
+    moved = np.zeros_like(segments)
+    block_filter.relay(np.zeros(1), segments, np.array([1e-5]), moved, (0.0, 1.0))
+    assert moved["change"][0, :2].tolist() == [2.0, 3.0]
+    assert moved["probability"][0] == pytest.approx([3.0 / 7.0, 4.0 / 7.0, *[0.0] * 10])
 
 
 def test_a_long_run_stays_small_and_loses_nothing_of_the_slope():
@@ -215,3 +231,30 @@ def test_a_change_that_may_have_been_takes_its_probability_from_that_of_none(haz
     probability = present[:count]["probability"]
     assert probability.sum() == pytest.approx(1.0)
     assert probability[changed].sum() == pytest.approx(hazard)
+
+
+SWINGING = """
+import numpy as np, impactcell
+for seed in (2, 4):
+    n = 6000
+    swing = np.sin(2.0 * np.pi * np.arange(n) / 2000.0)
+    mu_s = 0.2 + 0.002 * (np.random.default_rng([99, seed]).normal(size=n) + swing + 3.3e-4 * np.arange(n))
+    wear = impactcell.track(np.arange(n), mu_s, np.full(n, 0.002)).wear
+    print(wear.rate_per_cycle / 0.002, wear.rate_std / 0.002)
+"""
+
+
+def test_a_level_that_swings_leaves_the_slopes_finite_and_near_in_memory_that_is_theirs(tmp_path):
+    """A segment without probability stood before others: all were dropped, and the next wrote past the end.
+
+    By the compiler's own check of bounds, in a process of its own. Then slopes ran off along a level tail.
+    """
+    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", SWINGING], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    for line in done.stdout.splitlines():
+        rate, std = map(float, line.split())
+        assert abs(rate - 3.3e-4) < np.pi / 1000.0  # no steeper than the swing
+        assert 0.0 < std < 2e-3
