@@ -35,8 +35,8 @@ from impactcell.tracking.wear_batch.block_filter import (
     Segments,
     filter_slopes,
     levels,
-    relay,
 )
+from impactcell.tracking.wear_batch.slope_grid import relay
 from impactcell.tracking.wear_batch.wear_report import WearMoments
 
 KEPT_BLOCKS = 64

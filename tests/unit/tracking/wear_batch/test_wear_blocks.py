@@ -18,6 +18,7 @@ from impactcell.tracking.wear_batch import (
     TrackerSettings,
     block_filter,
     initial_state,
+    slope_grid,
     wear_blocks,
 )
 from impactcell.tracking.wear_batch.block_filter import BLOCK, STEP_SCALES, STEP_SHARES, BlockModel
@@ -93,7 +94,7 @@ def test_what_is_known_at_some_slopes_is_known_at_others_without_the_blocks():
     expected, straight = wear_blocks.before_blocks(wear, others, STD**2)
     expected += block_filter.filter_slopes(others, straight, blocks, 0.0, 0.0, MODEL)
     moved = np.zeros_like(segments)
-    gained = block_filter.relay(grid, segments, others, moved, (0.0, 1e-5))
+    gained = slope_grid.relay(grid, segments, others, moved, (0.0, 1e-5))
     nearest = np.abs(grid - others[:, None]).argmin(axis=1)
     assert evidence[nearest] + gained == pytest.approx(expected, abs=1e-6)
     assert block_filter.levels(moved) == pytest.approx(block_filter.levels(straight), rel=1e-9)
@@ -104,7 +105,7 @@ def test_beyond_the_grid_it_falls_as_a_normal_distribution_does():
     grid = np.linspace(1e-5, 2e-5, 5)
     _, segments = wear_blocks.before_blocks(wear, grid, STD**2)  # steep: likelier the nearer to no wear
     mean, std, onto = 1.5e-5, 2.5e-6, np.array([0.0, 5e-6, 1e-5])
-    gained = block_filter.relay(grid, segments, onto, np.zeros_like(segments[:3]), (mean, std))
+    gained = slope_grid.relay(grid, segments, onto, np.zeros_like(segments[:3]), (mean, std))
     normal = -0.5 * ((onto - mean) ** 2 - (grid[0] - mean) ** 2) / std**2
     assert gained == pytest.approx(normal, abs=1e-9)
 
@@ -115,7 +116,7 @@ def test_segments_that_have_become_impossible_are_left_out_and_the_others_stay()
     segments["log_by_slope"][0, :3] = -1e9, 1e9, 1e9
     segments["change"][0, :3] = 1.0, 2.0, 3.0
     moved = np.zeros_like(segments)
-    block_filter.relay(np.zeros(1), segments, np.array([1e-5]), moved, (0.0, 1.0))
+    slope_grid.relay(np.zeros(1), segments, np.array([1e-5]), moved, (0.0, 1.0))
     assert moved["change"][0, :2].tolist() == [2.0, 3.0]
     assert moved["probability"][0] == pytest.approx([3.0 / 7.0, 4.0 / 7.0, *[0.0] * 10])
 
