@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from impactcell.campaign import Campaign, Coordinate
+from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements import (
     Dialect,
@@ -99,10 +99,13 @@ def import_files(
 
 
 def _doubted_units(campaign: Campaign) -> list[str]:
-    """Say what the verbs that take the campaign will refuse it for: a unit wrong by a large factor."""
+    """Say what the verbs that take the campaign will refuse it for: a unit wrong by a large factor.
+
+    Of taps and slides of a part only: how a drive and a machine move is for a base model to say.
+    """
     from impactcell.discrepancy.data import check_campaign_units
 
-    if campaign.coordinate is Coordinate.ROTATION:
+    if campaign.coordinate is Coordinate.ROTATION or campaign.excitation is Excitation.DRIVEN:
         return []
     try:
         check_campaign_units(campaign)

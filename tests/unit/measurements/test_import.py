@@ -244,6 +244,25 @@ def test_a_unit_that_is_wrong_by_far_is_told_before_other_verbs_refuse_it(
     assert german.startswith("Einheit prüfen: force_n oder mass_kg (um etwa den Faktor 1e+3 daneben)")
 
 
+def test_of_a_driven_machine_nothing_is_refused_that_a_base_model_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    phase = 2.0 * np.pi * time / 4.0
+    force, position = 5.0 * np.sign(np.cos(phase)) + 4.0 * np.sin(phase), 20.0 * np.sin(phase)
+    file = tmp_path / "driven.csv"
+    np.savetxt(
+        file, np.column_stack([time, force, position]), delimiter=";",
+        header="time [s];force [N];position [mm]", comments="",
+    )  # fmt: skip
+    with pytest.raises(SystemExit) as ended:
+        run_verb(["import", str(file), "--dry-run", "--json"])
+    assert ended.value.code == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["excitation"] == "driven"
+    assert not any("refused" in note for note in told["notes"])
+
+
 def test_a_mapping_file_says_the_same(files: list[Path], tmp_path: Path) -> None:
     mapping = tmp_path / "map.yaml"
     mapping.write_text(
