@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from impactcell.numerics import autocorrelation
 from impactcell.positioning import (
     displacement_discrepancy,
     model_hypotheses,
@@ -86,6 +85,25 @@ def _planner_2(belief: dict[str, Tree]) -> dict[str, Tree]:
         "surprise": belief["surprise"],
         "watch": {"log_sums": np.full(len(prediction_watch.BETS), -np.inf), "score": 0.0, "doubted": False},
     }
+
+
+def _state_6(content: dict[str, Tree]) -> dict[str, Tree]:
+    """Keep what correlation of the scatter was learned: as of so many differences that show it."""
+    cell = content["cell"]
+    tracker = {**cell["tracker"]}
+    weight = tracker["scatter_correlation"]["weight"]
+    for name in ("noise", "replayed_noise"):
+        scale = {**tracker[name]}
+        correlation = scale.pop("correlation")
+        squares = [weight * (1.0 - correlation**lag) / (1.0 - correlation) for lag in _LAGS_6]
+        variogram = {
+            "recent": [],
+            "weights": [weight] * len(_LAGS_6),
+            "squares": squares,
+            "correlation": correlation,
+        }
+        tracker[name] = {**scale, "variogram": variogram}
+    return {**content, "cell": {**cell, "tracker": tracker}}
 
 
 def _alarm_2(content: dict[str, Tree]) -> dict[str, Tree]:
@@ -171,14 +189,23 @@ _WEAR_BLOCKS_3_ADDED: Final[Mapping[str, Tree]] = {
 }
 """Format 2 kept all blocks: they are weighed once more, and then forgotten."""
 _AUTOCORRELATION_5: Final[Mapping[str, Tree]] = {
-    "recent": [*autocorrelation.NONE],
+    "recent": [0.0] * 8,
     "weight": 0.0,
     "square": 0.0,
-    "products": [*autocorrelation.NONE],
+    "products": [0.0] * 8,
 }
 """Of no innovations: format 4 had lag one only."""
 _NOISE_5_ADDED: Final[Mapping[str, Tree]] = {"correlation": 0.0, "watched_ratio": 1.0, "latest_ratio": 1.0}
 """Of the tracker's scale of the noise: white, and as it was learned."""
+_LAGS_6: Final = range(1, 5)
+"""Of a variogram."""
+_NO_VARIOGRAM_6: Final[Mapping[str, Tree]] = {
+    "recent": [],
+    "weights": [0.0] * len(_LAGS_6),
+    "squares": [0.0] * len(_LAGS_6),
+    "correlation": 0.0,
+}
+"""Of no scores: what format 5 knew of them was correlation of innovations."""
 _MODEL_2_RENAMED: Final[Mapping[str, str]] = {}
 """Of `impactcell.prediction.Model`, as "predictors.force.rms": "error"."""
 
@@ -208,8 +235,20 @@ STATE_MIGRATIONS: Final = (
         },
         dropped=("cell.tracker.innovation_correlation",),
     ),
+    Migration(
+        _state_6,
+        added={
+            "cell.gap.variogram": _NO_VARIOGRAM_6,
+            "cell.signature.deviant_share": 0.0,
+            "cell.tracker.walk_models": None,
+        },
+        dropped=(
+            "cell.tracker.scatter_correlation",
+            "cell.tracker.innovation_correlation",
+            "cell.gap.correlation",
+        ),
+    ),
 )
-"""Of a cell's state: to format 2, 3, 4 and 5. What earlier planners had not counted is nothing; how the
-innovations are correlated is learned anew."""
+"""Of a cell's state: to format 2, 3, 4, 5 and 6. What earlier planners had not counted is nothing."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

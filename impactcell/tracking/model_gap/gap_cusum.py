@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from scipy.special import ndtri, stdtr
 
 from impactcell.numerics import scatter_correlation
-from impactcell.numerics.autocorrelation import Autocorrelation
+from impactcell.numerics.scatter_correlation import Variogram
 from impactcell.records import Evidence
 
 SLACK = 0.75
@@ -48,8 +48,8 @@ class GapState:
         Detection statistic of the CUSUM.
     since : int
         Cycle at which the excess last left zero.
-    correlation : Autocorrelation
-        Of the scores, as long as the excess is below the threshold.
+    variogram : Variogram
+        Of the scores.
     """
 
     count: int = 0
@@ -57,7 +57,7 @@ class GapState:
     squared_deviations: float = 0.0
     excess: float = 0.0
     since: int = 0
-    correlation: Autocorrelation = field(default_factory=Autocorrelation)
+    variogram: Variogram = field(default_factory=Variogram)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +84,10 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
     if not (math.isfinite(gap) and gap > 0.0):
         return GapResult(state, None, Evidence(), "the capture has no normalised residual")
     value = math.log(gap)
-    score, correlation = _score(state, value), state.correlation
-    learned, lag_one = scatter_correlation.update(correlation, score)
-    if state.excess <= limit:
-        correlation = learned
-    score /= math.sqrt(scatter_correlation.variance_over_scatter(lag_one))
-    excess = min(max(0.0, state.excess + score - SLACK), CAP * limit)
+    score = _score(state, value)
+    variogram = scatter_correlation.update(state.variogram, score, 1.0)
+    inflation = scatter_correlation.variance_over_scatter(variogram.correlation)
+    excess = min(max(0.0, state.excess + score / math.sqrt(inflation) - SLACK), CAP * limit)
     since = cycle if state.excess == 0.0 else state.since
     count, mean, squared_deviations = state.count, state.mean, state.squared_deviations
     if count < LEARNED and state.excess <= limit:
@@ -97,7 +95,7 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         step = value - mean
         mean += step / count
         squared_deviations += step * (value - mean)
-    updated = GapState(count, mean, squared_deviations, excess, since, correlation)
+    updated = GapState(count, mean, squared_deviations, excess, since, variogram)
     if count < FIRST:
         return GapResult(updated, None, Evidence(), "the usual residual is being learned")
     usual = math.exp(mean)

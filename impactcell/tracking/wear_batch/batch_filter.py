@@ -49,10 +49,9 @@ class BankUpdate:
     outlier_share: float
 
 
-def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCycle) -> BankUpdate:
-    """Take a cycle into the bank."""
-    bank = run_length_bank.workspace(state.bank)
-    model = BankModel(
+def bank_model(settings: TrackerSettings, state: TrackerState, cycle: UsableCycle) -> BankModel:
+    """Give what the bank assumes at a cycle."""
+    return BankModel(
         hazard=settings.hazard,
         step_variance=settings.step_std**2 * cycle.variance,
         level_variance=state.level_variance,
@@ -60,8 +59,12 @@ def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCyc
         outlier_probability=settings.outlier_probability,
         slope_prior=settings.slope_std**2 * cycle.variance,
     )
+
+
+def bank_measurement(cycle: UsableCycle) -> Measurement:
+    """Give what a cycle brings to the bank."""
     timing = cycle.timing
-    measurement = Measurement(
+    return Measurement(
         value=cycle.observation.mu_s,
         variance=cycle.variance,
         cycles=float(timing.passed),
@@ -69,6 +72,12 @@ def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCyc
         cycle=float(timing.index),
         announced=cycle.announced,
     )
+
+
+def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCycle) -> BankUpdate:
+    """Take a cycle into the bank."""
+    bank = run_length_bank.workspace(state.bank)
+    model, measurement = bank_model(settings, state, cycle), bank_measurement(cycle)
     outliers = np.array(state.outliers)
     result = run_length_bank.update(
         bank, len(state.bank), model, measurement, outliers, float(state.accepted)

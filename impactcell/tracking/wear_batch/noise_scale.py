@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from impactcell.numerics import scatter_correlation
 from impactcell.numerics.jit import compiled
-from impactcell.numerics.scatter_correlation import variance_over_differences
+from impactcell.numerics.scatter_correlation import Variogram, variance_over_differences
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import declared_std_calibration
 
@@ -80,8 +81,8 @@ class NoiseScale:
         How far the declared standard deviations are believed, see `declared_std_calibration`.
     watched_ratio, latest_ratio : float
         Mean winsorised squares of the last differences over the factor, of `WATCHED` and of `LATEST`.
-    correlation : float
-        Of an estimate's scatter with the one before, see `scatter_correlation`.
+    variogram : Variogram
+        How an estimate's scatter goes with that of those before.
     """
 
     factor: float = 1.0
@@ -95,7 +96,7 @@ class NoiseScale:
     exponent_posterior: Samples = field(default_factory=declared_std_calibration.prior_posterior)
     watched_ratio: float = 1.0
     latest_ratio: float = 1.0
-    correlation: float = 0.0
+    variogram: Variogram = field(default_factory=Variogram)
 
 
 def identical_run(noise: NoiseScale, value: float) -> int:
@@ -103,8 +104,12 @@ def identical_run(noise: NoiseScale, value: float) -> int:
     return noise.identical + 1 if value == noise.last_value else 1
 
 
-def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> tuple[NoiseScale, float]:
+def update(
+    noise: NoiseScale, value: float, declared: float, *, late: bool, other_batch: bool
+) -> tuple[NoiseScale, float]:
     """Take in an estimate, and its difference from the one before into the factor unless it comes late.
+
+    How differences go with one another is not learned across estimates of two batches.
 
     Returns
     -------
@@ -133,6 +138,9 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
             factors = max(latest * factors[0], SMALLEST_FACTOR), max(latest * factors[1], SMALLEST_FACTOR)
             weight, watched, latest = LATEST, 1.0, 1.0
     factor, winsorised_factor = factors
+    calibrated = math.sqrt(noise.factor) * declared_std_calibration.calibrated_std(posterior, std, usual)
+    before = scatter_correlation.begun_anew(noise.variogram) if other_batch else noise.variogram
+    variogram = scatter_correlation.update(before, value, calibrated)
     learned = replace(
         noise,
         factor=factor,
@@ -146,17 +154,29 @@ def update(noise: NoiseScale, value: float, declared: float, *, late: bool) -> t
         exponent_posterior=posterior,
         watched_ratio=watched,
         latest_ratio=latest,
+        variogram=variogram,
     )
     return learned, std
 
 
+def _calibrated_stds(noise: NoiseScale, stds: tuple[float, float]) -> tuple[float, float]:
+    """Give the standard deviations of an estimate and the one before, before the factor."""
+    (std, usual), posterior = stds, noise.exponent_posterior
+    return (
+        declared_std_calibration.calibrated_std(posterior, std, usual),
+        declared_std_calibration.calibrated_std(posterior, noise.last_std, usual),
+    )
+
+
+def _variance_of_difference(noise: NoiseScale, stds: tuple[float, float]) -> float:
+    """Variance of their difference, before the factor."""
+    std, last_std = _calibrated_stds(noise, stds)
+    return std**2 + last_std**2
+
+
 def _watched_ratios(noise: NoiseScale, value: float, stds: tuple[float, float]) -> tuple[float, float]:
     """Take a difference into both means of winsorised squares over the factor, one where it holds."""
-    (std, usual), posterior = stds, noise.exponent_posterior
-    scale = noise.winsorised_factor * (
-        declared_std_calibration.calibrated_std(posterior, std, usual) ** 2
-        + declared_std_calibration.calibrated_std(posterior, noise.last_std, usual) ** 2
-    )
+    scale = noise.winsorised_factor * _variance_of_difference(noise, stds)
     ratio = min((value - noise.last_value) ** 2 / scale, CLIP**2) / CONSISTENCY
     return (
         noise.watched_ratio + (ratio - noise.watched_ratio) / WATCHED,
@@ -172,10 +192,7 @@ def _learned_factors(
     `stds` are the estimate's and the usual one; the scale rests on `weight` differences with this one.
     """
     (std, usual), posterior, square = stds, noise.exponent_posterior, (value - noise.last_value) ** 2
-    squared = square / (
-        declared_std_calibration.calibrated_std(posterior, std, usual) ** 2
-        + declared_std_calibration.calibrated_std(posterior, noise.last_std, usual) ** 2
-    )
+    squared = square / _variance_of_difference(noise, stds)
     if guessed and weight <= UNSCALED:
         # nothing to judge outliers by yet: the plain mean
         factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
@@ -198,7 +215,7 @@ def variance(noise: NoiseScale, std: float) -> float:
     doubt = 1.0 + GUESS_DOUBT / max(noise.weight, 1.0) if noise.guessed else 1.0
     return float(
         noise.factor
-        * variance_over_differences(noise.correlation)
+        * variance_over_differences(noise.variogram.correlation)
         * doubt
         * declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std) ** 2
     )
@@ -206,12 +223,16 @@ def variance(noise: NoiseScale, std: float) -> float:
 
 def usual_variance(noise: NoiseScale) -> float:
     """Variance of a usual estimate."""
-    return noise.factor * variance_over_differences(noise.correlation) * noise.usual_std**2
+    return noise.factor * variance_over_differences(noise.variogram.correlation) * noise.usual_std**2
 
 
 def variances(noise: NoiseScale, stds: Samples) -> Samples:
     """Variances of the estimates of a history, whose noise is now known."""
-    return noise.factor * variance_over_differences(noise.correlation) * _calibrated_variances(noise, stds)
+    return (
+        noise.factor
+        * variance_over_differences(noise.variogram.correlation)
+        * _calibrated_variances(noise, stds)
+    )
 
 
 def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[float, float]:

@@ -1,25 +1,25 @@
-"""The tracker's process noise: commissioned from the first cycles, adapted later by the innovations."""
+"""The tracker's process noise: commissioned from the first cycles, later the walk that explains them best."""
 
 from dataclasses import replace
 
 from impactcell.tracking.wear_batch import (
     batch_change_detection,
+    batch_filter,
     noise_identification,
     noise_scale,
+    walk_models,
 )
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
-from impactcell.tracking.wear_batch.process_noise_adaptation import adapt_process_noise
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 from impactcell.tracking.wear_batch.state import TrackerState, UsableCycle
 
 
 def update_process_noise(
-    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, factor: float
+    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle
 ) -> tuple[TrackerState, list[str]]:
-    """Commission the process noise from the first cycles, later multiply it by `factor`; say what changed."""
-    state, notes = _adapted(state, factor)
+    """Commission the process noise from the first cycles, then let it follow the data; say what changed."""
     if state.commissioning is None:
-        return state, notes
+        return _following(settings, state, cycle)
     record = noise_identification.append_cycle(state.commissioning, cycle, cycle.observation.batch_id)
     cycles = len(record.rows)
     is_ended = cycles >= settings.commissioning_cycles
@@ -29,18 +29,39 @@ def update_process_noise(
         values, stds = record.rows[:, noise_identification.VALUE], record.rows[:, noise_identification.STD]
         state = replace(state, noise=noise_scale.refit(state.noise, values, stds))
     elif not identifies:
-        return state, notes
-    return _replayed(settings, state, record, identifies=identifies), notes
+        return state, []
+    return _replayed(settings, state, record, identifies=identifies), []
 
 
-def _adapted(state: TrackerState, factor: float) -> tuple[TrackerState, list[str]]:
-    if factor == 1.0:
+def _following(
+    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle
+) -> tuple[TrackerState, list[str]]:
+    """Take a cycle into the banks under other walks, and believe the one that has become clearly likelier."""
+    if state.walk_models is None:
+        believed = state.level_variance, state.slope_variance
+        unit = noise_scale.usual_variance(state.noise)
+        begun = walk_models.begin(state.bank, state.outliers, believed, unit)
+        return replace(state, walk_models=begun), []
+    model = batch_filter.bank_model(settings, state, cycle)
+    before = state.walk_models.believed
+    models = walk_models.update(
+        state.walk_models, batch_filter.bank_measurement(cycle), model, state.accepted
+    )
+    state = replace(state, walk_models=models)
+    if models.believed == before:
         return state, []
-    level = adapt_process_noise(state.level_variance, factor, noise_scale.usual_variance(state.noise))
-    if level == state.level_variance:
-        return state, []
-    moved = "raised" if factor > 1.0 else "lowered"
-    return replace(state, level_variance=level), [f"innovations are correlated: process noise {moved}"]
+    bank, outliers = models.banks[models.believed], models.outliers[models.believed].tolist()
+    level, slope = models.variances[models.believed].tolist()
+    believing = replace(
+        state,
+        bank=bank,
+        outliers=(outliers[0], outliers[1]),
+        change_point=batch_change_detection.refined_change_point(state, bank),
+        level_variance=level,
+        slope_variance=slope,
+    )
+    how = "steadily" if level == slope == 0.0 else "unsteadily"
+    return believing, [f"friction is found to go {how} from cycle to cycle, the past is seen so from here on"]
 
 
 def _replayed(

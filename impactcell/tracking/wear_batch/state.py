@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from impactcell.numerics.autocorrelation import Autocorrelation
 from impactcell.records import BatchState, Capture, Evidence, FrictionEstimate, Samples, WearState
 from impactcell.tracking.wear_batch.input_validation import CycleClock, CycleTiming
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
 from impactcell.tracking.wear_batch.run_length_bank import WIDTH
+from impactcell.tracking.wear_batch.walk_models import WalkModels
 from impactcell.tracking.wear_batch.wear_blocks import WearBlocks
 from impactcell.tracking.wear_batch.wear_filter import WearFilter
 
@@ -116,8 +116,8 @@ class TrackerState:
         The present known batch has been reported as shifted, or was expected to be.
     replayed_noise : NoiseScale
         As it was when the first cycles were last gone over with it.
-    innovation_correlation, scatter_correlation : Autocorrelation
-        Of the same innovations: since the process noise was last changed, and over a longer time.
+    walk_models : WalkModels or None
+        How much more likely other random walks of level and slope have become; None while commissioning.
     wear_blocks : WearBlocks or None
         What all cycles say of wear where nobody says of which batch they are; None while the filter does.
     """
@@ -138,8 +138,7 @@ class TrackerState:
     first_index: int = 0
     replayed_noise: NoiseScale = field(default_factory=NoiseScale)
     commissioning: CommissioningRecord | None = None
-    innovation_correlation: Autocorrelation = field(default_factory=Autocorrelation)
-    scatter_correlation: Autocorrelation = field(default_factory=Autocorrelation)
+    walk_models: WalkModels | None = None
     level_variance: float = 0.0
     slope_variance: float = 0.0
     wear_blocks: WearBlocks | None = None
@@ -188,7 +187,6 @@ def reset_wear_level(state: TrackerState) -> TrackerState:
     return TrackerState(
         clock=state.clock,
         noise=state.noise,
-        scatter_correlation=state.scatter_correlation,
         level_variance=state.level_variance,
         slope_variance=state.slope_variance,
     )

@@ -3,14 +3,12 @@
 import math
 from dataclasses import replace
 
-from impactcell.numerics import scatter_correlation
 from impactcell.tracking.wear_batch import (
     batch_change_detection,
     batch_filter,
     input_validation,
     noise_identification,
     noise_scale,
-    process_noise_adaptation,
     run_length_bank,
     wear_blocks,
     wear_filter,
@@ -70,7 +68,11 @@ def update(
             settings, replace(state, clock=clock, noise=noise), observation, CycleOutcome(notes, used=False)
         )
     noise, std = noise_scale.update(
-        noise, observation.mu_s, input_validation.valid_std(observation.mu_s_std), late=timing.lag > 0
+        noise,
+        observation.mu_s,
+        input_validation.valid_std(observation.mu_s_std),
+        late=timing.lag > 0,
+        other_batch=_is_other_batch(settings, state, observation),
     )
     variance = noise_scale.variance(noise, std)
     if len(state.bank) == 0:
@@ -87,11 +89,6 @@ def update(
     updated = batch_filter.update_bank(settings, state, cycle)
     before, change = batch_change_detection.detect_change(settings, state, cycle, updated)
     state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
-    correlation, scatter, factor = state.innovation_correlation, state.scatter_correlation, 1.0
-    if timing.lag == 0:
-        correlation, factor = process_noise_adaptation.update(correlation, innovation)
-        scatter, lag_one = scatter_correlation.update(scatter, innovation)
-        noise = replace(noise, correlation=lag_one)
     state = replace(
         state,
         clock=clock,
@@ -101,11 +98,9 @@ def update(
         outliers=updated.outliers,
         change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
-        innovation_correlation=correlation,
-        scatter_correlation=scatter,
     )
     if timing.lag == 0:
-        state, raised = update_process_noise(settings, state, cycle, factor)
+        state, raised = update_process_noise(settings, state, cycle)
         notes.extend(raised)
     is_expected = announced > 0.0 and observation.expected_change
     outcome = CycleOutcome(notes, used=True, change=change, innovation=innovation, expected=is_expected)
@@ -147,6 +142,12 @@ def _first_state(settings: TrackerSettings, state: TrackerState, cycle: UsableCy
             noise_identification.CommissioningRecord(), cycle, batch
         ),
     )
+
+
+def _is_other_batch(settings: TrackerSettings, state: TrackerState, observation: FrictionObservation) -> bool:
+    """Whether the estimate is said, and believed, to be of another batch than the one before."""
+    is_other_id = observation.batch_id is not None and observation.batch_id != state.batch_id
+    return observation.expected_change or (is_other_id and settings.batch is BatchKnowledge.KNOWN)
 
 
 def _follow_batch_id(

@@ -52,7 +52,9 @@ def test_velocities_that_change_late_change_the_belief_late():
     noise, draw = noise_scale.NoiseScale(), np.random.default_rng(2)
     for cycle in range(1200):
         std = float(DECLARED[cycle % 4]) if cycle >= 600 else float(DECLARED[2])
-        noise, _ = noise_scale.update(noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False)
+        noise, _ = noise_scale.update(
+            noise, 0.2 + 0.0028 * draw.standard_normal(), std, late=False, other_batch=False
+        )
         if cycle == 599:
             assert np.exp(
                 noise.exponent_posterior[:, declared_std_calibration.LOG_PROBABILITY]

@@ -14,7 +14,7 @@ def scales(values):
     """Standard deviation that is believed after each value, over the declared one; and the weight of it."""
     noise, believed, weights = NoiseScale(), [], []
     for value in values:
-        noise, _ = noise_scale.update(noise, 0.2 + STD * value, STD, late=False)
+        noise, _ = noise_scale.update(noise, 0.2 + STD * value, STD, late=False, other_batch=False)
         believed.append(np.sqrt(noise_scale.usual_variance(noise)) / STD)
         weights.append(noise.weight)
     return np.array(believed), np.array(weights)

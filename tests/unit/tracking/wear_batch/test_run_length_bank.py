@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
+from impactcell.numerics import scatter_correlation
 from impactcell.tracking import wear_batch
 from impactcell.tracking.wear_batch import (
     BatchKnowledge,
@@ -228,13 +229,14 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
     z[1100:] -= 1.0
     z[::150] += 9.0
     config, std = TrackerSettings(batch=BatchKnowledge.UNKNOWN), 0.002
-    state, ours = initial_state(), []
+    state, ours, variances = initial_state(), [], []
     for i, value in enumerate(z.tolist()):
         done = wear_batch.update(config, state, FrictionObservation(i, 0.2 + std * value, std))
         state = done.state
+        variances.append(scatter_correlation.variance_over_differences(state.noise.variogram.correlation))
         if done.shift is not None:
             ours.append((i, done.shift.change_cycle, done.shift.size / std))
-    # the bank, told what the tracker has to learn: the scale of the noise
+    # the bank, told what the tracker has to learn: the scale of the noise, and how white it takes it to be
     model = BankModel(
         config.hazard, config.step_std**2, 0.0, 0.0, config.outlier_probability, config.slope_std**2
     )
@@ -242,7 +244,7 @@ def test_the_tracker_gives_the_alarms_of_its_bank_alone():
     bank, outliers = run_length_bank.workspace(first), np.zeros(2)
     count, accepted, its = len(first), 0.0, []
     for t in range(1, len(z)):
-        measurement = Measurement(float(z[t]), 1.0, 1.0, 0.0, float(t), 0.0)
+        measurement = Measurement(float(z[t]), variances[t], 1.0, 0.0, float(t), 0.0)
         count, _, statistic, _ = run_length_bank.update(bank, count, model, measurement, outliers, accepted)
         if statistic > run_length_bank.threshold(config.false_alarm_cycles):
             before, accepted = accepted, float(t)
