@@ -16,6 +16,10 @@ MIN_MATERIAL_CYCLES = 5
 """Cycles of a new material before its cycles are judged."""
 MAX_DEVIANT_RUN = 10
 """Deviant cycles in a row that are rather another material."""
+SHARE_MEMORY = 50.0
+"""Judged cycles over which the share of deviant ones is watched."""
+MAX_DEVIANT_SHARE = 0.12
+"""Share of deviant cycles that is rather how cycles vary by now: seven at once, or one in eight for long."""
 
 
 @lru_cache(maxsize=64)
@@ -64,6 +68,7 @@ class SignatureState:
     reference: Reference = field(default_factory=Reference)
     batch_id: str = ""
     deviant_run: int = 0
+    deviant_share: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,21 +176,28 @@ def update_reference(
     settings: SignatureSettings,
     test: deviation_test.DeviationTest | None,
 ) -> SignatureState:
-    """Take a normal cycle into the reference; a long run of deviant ones starts it anew."""
+    """Take a normal cycle into the reference; a long run of deviant ones, or many, start it anew.
+
+    After a run the mean is learned anew. Where many deviate between others that do not, as by velocity since
+    friction depends on it, so is how cycles vary.
+    """
+
+    def with_cycle(reference: Reference, spe: float | None = None) -> Reference:
+        return references.update(reference, information, settings.grid_m, settings.settled, spe)
+
     if test is None:
-        reference = references.update(state.reference, information, settings.grid_m, settings.settled)
-        return SignatureState(reference, state.batch_id)
-    if test.p_value < 1.0 / settings.false_alarm_cycles:
-        run = state.deviant_run + 1
-        if run < MAX_DEVIANT_RUN:
-            return SignatureState(state.reference, state.batch_id, run)
-        reference = references.update(
-            references.restart(state.reference), information, settings.grid_m, settings.settled
-        )
-        return SignatureState(reference, state.batch_id)
-    spe = test.spe / test.spe_freedom if test.spe_freedom > 0 else None
-    reference = references.update(state.reference, information, settings.grid_m, settings.settled, spe)
-    return SignatureState(reference, state.batch_id)
+        return replace(state, reference=with_cycle(state.reference), deviant_run=0)
+    is_deviant = test.p_value < 1.0 / settings.false_alarm_cycles
+    share = state.deviant_share + (is_deviant - state.deviant_share) / SHARE_MEMORY
+    if not is_deviant:
+        spe = test.spe / test.spe_freedom if test.spe_freedom > 0 else None
+        return SignatureState(with_cycle(state.reference, spe), state.batch_id, 0, share)
+    run = state.deviant_run + 1
+    if run >= MAX_DEVIANT_RUN:
+        return SignatureState(with_cycle(references.restart(state.reference)), state.batch_id)
+    if share > MAX_DEVIANT_SHARE:
+        return SignatureState(with_cycle(initial_state(settings).reference), state.batch_id)
+    return SignatureState(state.reference, state.batch_id, run, share)
 
 
 def _evidence(

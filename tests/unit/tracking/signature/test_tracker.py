@@ -268,6 +268,21 @@ def test_another_material_is_learned_before_it_is_judged(learned):
     assert tracker.update(SETTINGS, after, extract(capture), CycleConditions(batch_id="B")).judged
 
 
+@pytest.mark.parametrize(("every", "begins_anew"), [(3, True), (6, True), (30, False)])
+def test_many_deviant_cycles_between_others_are_how_cycles_vary(learned, every, begins_anew):
+    state, _ = learned
+    deviant, unjudged = 0, 0
+    for cycle in range(1, 121):
+        friction = textured(1000 + cycle, 0.3 if cycle % every == 0 else 0.0)
+        done = tracker.update(SETTINGS, state, extract(slide(friction, 0.09, 1e4, NOISE, 1000 + cycle)[0]))
+        state = done.state
+        deviant += done.deviation is not None
+        unjudged += not done.judged
+    assert (unjudged > 0) == begins_anew
+    assert deviant <= 15
+    assert begins_anew or deviant == 4
+
+
 @pytest.mark.parametrize(
     ("position", "why"),
     [
