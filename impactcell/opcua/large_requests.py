@@ -7,7 +7,9 @@ the interpreter begins whenever it sees fit, waits in the same line.
 
 import asyncio
 import contextlib
+import ctypes
 import gc
+import sys
 from collections.abc import AsyncIterator
 from typing import Final
 
@@ -71,6 +73,17 @@ class LargeRequests:
             await asyncio.sleep(COLLECT_EVERY_S)
             async with self._lock:
                 gc.collect()
+                give_back_memory()
+
+
+def give_back_memory() -> None:
+    """Let the C library return what it keeps of freed memory: under 1 ms; nothing where it is not glibc.
+
+    It returns by itself only what lies above the last block in use: long answers left 4 MB below it.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+    if trim is not None:
+        trim(ctypes.c_size_t(0))
 
 
 def leave_full_rounds_to_the_server() -> None:

@@ -39,7 +39,7 @@ def table(*, quick: bool) -> Table:
         f"{QUIET} streams of {QUIET_CYCLES} cycles without a step, their first cycles with them, and "
         f"{STEPPED} of {STEPPED_CYCLES} with one of {STEP:g} sd in the middle; wear in all. The bound is of "
         "white scatter with the same variance of a mean of many: sd times the root of (1 + a) / (1 - a). "
-        f"Designed is one false alarm in {_steps.DESIGN:.0f} cycles. Beyond 0.7 it is a level that walks."
+        f"Designed is one false alarm in {_steps.DESIGN:.0f} cycles. Beyond 0.9 it is a level that walks."
     )
     columns = [
         "correlation of successive estimates, a",

@@ -1,11 +1,13 @@
 """Whoever asks for much waits for turns, one in a round of the loop; what many hear is told in slices."""
 
 import asyncio
+import ctypes
 import gc
 import itertools
 from collections.abc import Callable
 from types import SimpleNamespace
 
+import psutil
 import pytest
 
 from impactcell.opcua.fan_out import AT_ONCE, FanOut
@@ -13,6 +15,7 @@ from impactcell.opcua.large_requests import (
     LARGE_BYTES,
     NEVER,
     LargeRequests,
+    give_back_memory,
     leave_full_rounds_to_the_server,
 )
 from impactcell.opcua.loop_share import SLICE_S, LoopShare, Turns
@@ -209,3 +212,15 @@ async def test_few_listeners_are_told_at_once() -> None:
     told = list[int]()
     FanOut().deliver([told.append], 1)
     assert told == [1]
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="a C library without malloc_trim")
+def test_freed_memory_below_a_block_in_use_is_given_back() -> None:
+    process = psutil.Process()
+    blocks = [bytes(8000) for _ in range(10_000)]
+    kept = blocks[:: len(blocks) // 10]
+    held = process.memory_info().rss
+    del blocks
+    give_back_memory()
+    assert process.memory_info().rss < held - 60_000_000
+    assert sum(map(len, kept)) == 80_000
