@@ -13,6 +13,7 @@ import contextlib
 import multiprocessing
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -63,6 +64,10 @@ def run_in_clone(arguments: list[str]) -> tuple[int, float, float, list[str]]:
     with tempfile.TemporaryDirectory(prefix="suite-") as directory:
         checkout = Path(directory) / "checkout"
         subprocess.run(["git", "clone", "-q", str(ROOT), str(checkout)], check=True)
+        # the README's commands are run there with what is installed here, and was after these were written
+        (checkout / ".venv").symlink_to(sys.prefix)
+        for name in ("pyproject.toml", "requirements.lock"):
+            shutil.copystat(ROOT / name, checkout / name)
         return run(arguments, checkout)
 
 
