@@ -6,11 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-import impactcell
-from tests.benchmarks import _streams
+from tests.benchmarks import _correlated, _streams
 from tests.benchmarks.table import Table
 
-UNIT, MEAN = 0.002, 0.2  # of a series in mu_s
 SEEDS = _streams.REPORTED + 160_000
 STREAMS, CYCLES, YOUNG = 6, 5000, 1500
 
@@ -69,18 +67,12 @@ KINDS: dict[str, Make] = {
 }
 
 
-def shifts(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Cycles of the batch alarms, and how many of its std the rate at the end is off the wear's."""
-    worn = values + _streams.SLOPE * TIME
-    series = impactcell.track(TIME, MEAN + UNIT * worn, np.full(CYCLES, UNIT))
-    found = np.array([alarm.cycle for alarm in series.alarms if alarm.alarm == "BatchShift"])
-    return found, (series.wear.rate_per_cycle - UNIT * _streams.SLOPE) / series.wear.rate_std
-
-
 def table(*, quick: bool) -> Table:
     runs, rows = 1 if quick else STREAMS, []
     for number, (name, make) in enumerate(KINDS.items()):
-        done = [shifts(make(np.random.default_rng([SEEDS + seed, number]))) for seed in range(runs)]
+        done = [
+            _correlated.shifts(make(np.random.default_rng([SEEDS + seed, number]))) for seed in range(runs)
+        ]
         found = np.concatenate([cycles for cycles, _ in done])
         young = int(np.sum(found < YOUNG))
         late = 1e5 * (len(found) - young) / (runs * (CYCLES - YOUNG))

@@ -159,19 +159,13 @@ def update(
     return learned, std
 
 
-def _calibrated_stds(noise: NoiseScale, stds: tuple[float, float]) -> tuple[float, float]:
-    """Give the standard deviations of an estimate and the one before, before the factor."""
-    (std, usual), posterior = stds, noise.exponent_posterior
-    return (
-        declared_std_calibration.calibrated_std(posterior, std, usual),
-        declared_std_calibration.calibrated_std(posterior, noise.last_std, usual),
-    )
-
-
 def _variance_of_difference(noise: NoiseScale, stds: tuple[float, float]) -> float:
-    """Variance of their difference, before the factor."""
-    std, last_std = _calibrated_stds(noise, stds)
-    return std**2 + last_std**2
+    """Variance of an estimate's difference from the one before, before the factor."""
+    (std, usual), posterior = stds, noise.exponent_posterior
+    return float(
+        declared_std_calibration.calibrated_std(posterior, std, usual) ** 2
+        + declared_std_calibration.calibrated_std(posterior, noise.last_std, usual) ** 2
+    )
 
 
 def _watched_ratios(noise: NoiseScale, value: float, stds: tuple[float, float]) -> tuple[float, float]:
